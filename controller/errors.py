@@ -1,0 +1,49 @@
+"""Errors of the controller room, and the one tuple a command line has to catch.
+
+The tree::
+
+    ControllerError
+    ├── ConfigError      a configuration file: every fault at once, each with its path in the file
+    ├── ParameterError   an unknown parameter or a value that is not a number
+    ├── LinkError        a link to the outside cannot be opened or went away
+    └── TakeError        a recorded take cannot be read
+"""
+
+from __future__ import annotations
+
+from drivers.errors import DriverError
+from surface.errors import SurfaceError
+
+
+class ControllerError(Exception):
+    """Something the controller room cannot do.
+
+    Parameters
+    ----------
+    message : what failed, where (file and key, port, line) and why.
+    hint : the next thing to type or do; may be empty.
+    """
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class ConfigError(ControllerError):
+    """A configuration file is wrong; the message lists every fault with its path in the file."""
+
+
+class ParameterError(ControllerError):
+    """An unknown parameter, or a value that is not a number."""
+
+
+class LinkError(ControllerError):
+    """A link to the outside cannot be opened or went away."""
+
+
+class TakeError(ControllerError):
+    """A recorded take cannot be read."""
+
+
+OMOTE_ERRORS = (ControllerError, DriverError, SurfaceError)
+"""Everything omote raises on purpose; the command line turns these into one message and exit code 1."""

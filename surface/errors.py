@@ -1,0 +1,39 @@
+"""Errors of the surface room.
+
+The tree::
+
+    SurfaceError
+    ├── HeadFileError   a head's files are missing, damaged or of another version
+    ├── FitError        a mesh cannot be turned into a head (no UVs, NaN, mismatched shapes)
+    └── ViewError       no picture can be drawn (no OpenGL, no display, context too old)
+
+A wrong argument to :class:`surface.DCPSurface` is a ``ValueError`` that names the argument and the index.
+"""
+
+from __future__ import annotations
+
+
+class SurfaceError(Exception):
+    """Something the surface room cannot do.
+
+    Parameters
+    ----------
+    message : what failed, where (file and key) and why.
+    hint : the next thing to type or do; may be empty.
+    """
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class HeadFileError(SurfaceError):
+    """A head's files are missing, damaged or of another version."""
+
+
+class FitError(SurfaceError):
+    """A mesh cannot be turned into a head."""
+
+
+class ViewError(SurfaceError):
+    """No picture can be drawn: no OpenGL, no display, or a context that is too old."""
