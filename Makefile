@@ -1,0 +1,72 @@
+# omote: `make demo` shows it, `make test` checks it. Both set everything up by themselves.
+# Setting up needs the network once; afterwards nothing is fetched.
+
+VENV  := .venv
+BIN   := $(VENV)/bin
+PY    := $(BIN)/python
+UV    := $(shell command -v uv 2>/dev/null)
+# The first interpreter found that is new enough.
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	command -v $$p >/dev/null 2>&1 && $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check bench setup lock clean
+
+help: ## this list
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
+
+demo: setup ## set up, then drive the face and the simulated servo head
+	@$(BIN)/omote demo
+
+test: setup ## set up, then run the tests (no display, graphics processor or servo needed)
+	@$(PY) -m pytest
+
+check: setup ## style and types
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy
+
+bench: setup ## measure the engine on this machine
+	@$(BIN)/omote bench
+
+setup: $(VENV)/.installed $(VENV)/.opengl ## set up only
+
+$(VENV)/.installed: requirements.lock pyproject.toml
+	@test -n "$(UV)$(PYTHON)" || { echo "omote needs Python 3.11 or newer. Debian, Ubuntu: sudo apt-get install python3 python3-venv"; exit 1; }
+	@echo "Setting up $(VENV) (a minute, once) ..."
+ifneq ($(UV),)
+	@test -x $(PY) || $(UV) venv --quiet --python '>=3.11' $(VENV)
+	@$(UV) pip install --quiet --python $(PY) --require-hashes -r requirements.lock
+	@$(UV) pip install --quiet --python $(PY) --no-build-isolation --no-deps --editable .
+else
+	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+		echo "Python's venv module is missing. Debian, Ubuntu: sudo apt-get install python3-venv"; exit 1; }
+	@$(PY) -m pip install --quiet --require-hashes -r requirements.lock
+	@$(PY) -m pip install --quiet --no-build-isolation --no-deps --editable .
+endif
+	@touch $@
+
+# Drawing without a display needs EGL and, without a graphics processor, Mesa's software renderer (Linux).
+OPENGL_PROBE := $(PY) -c 'import moderngl; moderngl.create_context(standalone=True, backend="egl", require=310)'
+OPENGL_INSTALL := apt-get install -y --no-install-recommends libegl1 libgl1-mesa-dri
+
+$(VENV)/.opengl: $(VENV)/.installed
+	@if [ "$$(uname)" = Linux ] && ! $(OPENGL_PROBE) >/dev/null 2>&1; then \
+		if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+			echo "Installing Mesa's software renderer ..."; \
+			{ $(OPENGL_INSTALL) || { apt-get update && $(OPENGL_INSTALL); }; } >$(VENV)/opengl.log 2>&1 \
+				|| { tail -n 5 $(VENV)/opengl.log; exit 1; }; \
+		else \
+			echo "OpenGL is missing. Type: sudo $(OPENGL_INSTALL)"; exit 1; \
+		fi; \
+		$(OPENGL_PROBE) || { echo "OpenGL still does not start; see docs/troubleshooting.md"; exit 1; }; \
+	fi
+	@touch $@
+
+lock: ## renew requirements.lock (needs uv)
+	@uv pip compile pyproject.toml --extra all --group dev --universal --python-version 3.11 \
+		--generate-hashes --no-emit-index-url --no-header --no-annotate --quiet --upgrade -o requirements.lock
+
+clean: ## remove what setting up and running made
+	@rm -rf $(VENV) out dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
