@@ -1,0 +1,124 @@
+"""Blending functions of single control points.
+
+A blending function of degree p is given by its own p + 2 knots, 0 <= p <= 7. It is zero outside them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+MAX_DEGREE = 7
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str = "right") -> Floats:
+    """Blending function over ``knots``, or its derivative, at ``x``.
+
+    Parameters
+    ----------
+    knots : (p + 2,) float64, not decreasing
+    x : (m,) float64
+    derivative : 0, 1 or 2
+    side : "right" for intervals closed on the left as in NURBS, "left" for the limit from the left,
+        which differs only at knots of full multiplicity and for derivatives at repeated knots.
+
+    Returns
+    -------
+    (m,) float64
+
+    Raises
+    ------
+    ValueError
+        For bad knots, an unknown derivative or an unknown side.
+    """
+    from . import kernels
+
+    row, _ = pad_knots([np.asarray(knots, dtype=np.float64)], "knots", 1)
+    if derivative not in (0, 1, 2):
+        raise ValueError(f"derivative: must be 0, 1 or 2, not {derivative!r}")
+    if side not in ("left", "right"):
+        raise ValueError(f'side: must be "left" or "right", not {side!r}')
+    samples = np.ascontiguousarray(np.atleast_1d(np.asarray(x, dtype=np.float64)))
+    out = np.zeros((len(samples), 3))
+    kernels.blend_samples(row, row.shape[1] - 2, samples, side == "left", out)
+    return out[:, derivative].copy()
+
+
+def pad_knots(knots: object, name: str, n: int) -> tuple[Floats, Ints]:
+    """Knot vectors of n points as one array.
+
+    Parameters
+    ----------
+    knots : n sequences of degree + 2 numbers each, or an (n, degree + 2) array
+    name : argument name for error messages
+    n : how many are expected
+
+    Returns
+    -------
+    padded : (n, w) float64, rows repeat their last knot up to the largest length w
+    degrees : (n,) int64
+
+    Raises
+    ------
+    ValueError
+        Naming the argument and the index of the first bad knot vector.
+    """
+    if isinstance(knots, np.ndarray) and knots.ndim == 2 and knots.dtype != object:
+        padded = np.array(knots, dtype=np.float64, order="C")
+        degrees = np.full(len(padded), padded.shape[1] - 2, dtype=np.int64)
+    else:
+        padded, degrees = _stack(list(knots), name)  # type: ignore[call-overload]
+    if len(padded) != n:
+        raise ValueError(f"{name}: {len(padded)} knot vectors for {n} points")
+    check_knots(padded, degrees, name)
+    return padded, degrees
+
+
+def _stack(rows: list, name: str) -> tuple[Floats, Ints]:
+    """Rows of different lengths into one padded array."""
+    lengths = np.zeros(len(rows), dtype=np.int64)
+    for i, row in enumerate(rows):
+        try:
+            lengths[i] = len(row)
+        except TypeError:
+            raise ValueError(f"{name}[{i}]: not a sequence of knots but {row!r}") from None
+    _check_degrees(lengths - 2, name)
+    width = int(lengths.max(initial=2))
+    columns = np.minimum(np.arange(width), lengths[:, None] - 1)
+    offsets = np.cumsum(lengths) - lengths
+    try:
+        flat = np.concatenate([np.asarray(row, dtype=np.float64) for row in rows]) if rows else np.zeros(0)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: knot vectors must be flat sequences of numbers ({error})") from None
+    return flat[offsets[:, None] + columns], lengths - 2
+
+
+def _check_degrees(degrees: Ints, name: str) -> None:
+    bad = (degrees < 0) | (degrees > MAX_DEGREE)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(
+            f"{name}[{i}]: {degrees[i] + 2} knots; a point has degree + 2 knots, degree 0 to {MAX_DEGREE}"
+        )
+
+
+def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
+    """Raise ``ValueError`` for knots that are not finite, decrease, or have fewer than two distinct values."""
+    _check_degrees(degrees, name)
+    finite = np.isfinite(padded).all(axis=1)
+    if not finite.all():
+        i = int(np.argmin(finite))
+        raise ValueError(f"{name}[{i}]: knots must be finite, got {padded[i, : degrees[i] + 2].tolist()}")
+    steps = np.diff(padded, axis=1)
+    rising = (steps >= 0).all(axis=1)
+    if not rising.all():
+        i = int(np.argmin(rising))
+        k = int(np.argmax(steps[i] < 0)) + 1
+        raise ValueError(f"{name}[{i}]: knots decrease at knot {k} ({padded[i, k]} after {padded[i, k - 1]})")
+    spread = padded[:, -1] > padded[:, 0]
+    if not spread.all():
+        i = int(np.argmin(spread))
+        raise ValueError(f"{name}[{i}]: fewer than two distinct knots (all are {padded[i, 0]})")

@@ -1,0 +1,58 @@
+"""Regular grid over (u, v) that lists, per bin, the control points whose support reaches it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .basis import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Lists of control points by bin.
+
+    Attributes
+    ----------
+    grid : (6,) float64, u0, v0, bins per unit of u, bins per unit of v, u1, v1
+    shape : (2,) int64, bins along u and v
+    start : (bins + 1,) int64, where the list of each bin starts in ``ids``
+    ids : (entries,) int32 control points
+    """
+
+    grid: Floats
+    shape: Ints
+    start: Ints
+    ids: np.ndarray
+
+
+def build_bins(knots_u: Floats, knots_v: Floats) -> Bins:
+    """Bins about as large as the median support of a point, so that a list is not much longer than needed.
+
+    Parameters
+    ----------
+    knots_u, knots_v : (n, w) float64 padded knots
+    """
+    from . import kernels
+
+    axes = [_axis(knots_u), _axis(knots_v)]
+    shape = np.array([axes[0][3], axes[1][3]], dtype=np.int64)
+    while int(shape.prod()) > max(64, 8 * len(knots_u)):
+        shape = np.maximum(1, shape // 2)
+    scales = [n / (high - low) for (low, high, _, _), n in zip(axes, shape, strict=True)]
+    grid = np.array([axes[0][0], axes[1][0], *scales, axes[0][1], axes[1][1]])
+    start = np.zeros(int(shape.prod()) + 1, dtype=np.int64)
+    ids = np.zeros(0, dtype=np.int32)
+    kernels.fill_bins(knots_u, knots_v, grid, shape, start[1:], ids, True)
+    np.cumsum(start, out=start)
+    ids = np.zeros(int(start[-1]), dtype=np.int32)
+    kernels.fill_bins(knots_u, knots_v, grid, shape, start[:-1].copy(), ids, False)
+    return Bins(grid, shape, start, ids)
+
+
+def _axis(knots: Floats) -> tuple[float, float, float, int]:
+    """Low end, high end, median support and wanted number of bins along one direction."""
+    low, high = float(knots[:, 0].min()), float(knots[:, -1].max())
+    support = float(np.median(knots[:, -1] - knots[:, 0]))
+    return low, high, support, int(np.clip(6.0 * (high - low) / support, 1, 1024))

@@ -1,0 +1,320 @@
+"""Discretized control point surfaces, Eq. (1): S = sum b_i w_i P_i / sum b_i w_i.
+
+Every control point has its own position, weight and two knot vectors; b_i is the product of its blending
+function in u and its blending function in v. There is no grid (Hosaka, Sugimoto, Nishi and Kato, "Facial
+expression for a CG robot using real-time surface modification", Eq. 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .basis import Floats, Ints, check_knots, pad_knots
+from .bins import Bins, build_bins
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+CHUNK = 8192  # samples per pass of basis_matrix: bounds its scratch memory
+
+
+class DCPSurface:
+    """A surface of scattered control points; immutable.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    weights : (n,) float64, positive
+    knots_u, knots_v : n sequences of degree + 2 knots each, or (n, degree + 2) arrays; the degree may differ
+        per point and direction (0 to 7)
+
+    Raises
+    ------
+    ValueError
+        For wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
+        decreasing knots or fewer than two distinct knots; names the argument and the index.
+
+    Notes
+    -----
+    Blending functions are right-continuous as in NURBS. Where that leaves (u, v) uncovered, the limits from the
+    left are tried (first in u, then v, then both), which includes the right end of a clamped domain.
+    """
+
+    def __init__(self, points: ArrayLike, weights: ArrayLike, knots_u: Any, knots_v: Any) -> None:
+        xyz, w = check_points(points), check_weights(weights)
+        if len(w) != len(xyz):
+            raise ValueError(f"weights: {len(w)} weights for {len(xyz)} points")
+        ku, pu = pad_knots(knots_u, "knots_u", len(xyz))
+        kv, pv = pad_knots(knots_v, "knots_v", len(xyz))
+        self._set(xyz, w, (ku, kv), (pu, pv), None)
+
+    def _set(
+        self, points: Floats, weights: Floats, knots: tuple[Floats, Floats], degrees: tuple[Ints, Ints], bins: Bins | None
+    ) -> None:
+        self._points, self._weights = points, weights
+        self._ku, self._kv = knots
+        self._pu, self._pv = degrees
+        self._lazy_bins = bins
+        for array in (points, weights, *knots, *degrees):
+            array.flags.writeable = False
+
+    @classmethod
+    def from_nurbs(
+        cls,
+        degree_u: int,
+        degree_v: int,
+        knots_u: ArrayLike,
+        knots_v: ArrayLike,
+        control_points: ArrayLike,
+        weights: ArrayLike | None = None,
+    ) -> DCPSurface:
+        """The same surface as a NURBS surface; see :func:`surface.nurbs.nurbs_arrays` for arguments and errors.
+
+        Point (i, j) of the net becomes control point ``i * nv + j``.
+        """
+        from .nurbs import nurbs_arrays
+
+        return cls(*nurbs_arrays(degree_u, degree_v, knots_u, knots_v, control_points, weights))
+
+    @classmethod
+    def from_padded(
+        cls,
+        points: ArrayLike,
+        weights: ArrayLike,
+        knots_u: ArrayLike,
+        knots_v: ArrayLike,
+        degrees_u: ArrayLike,
+        degrees_v: ArrayLike,
+    ) -> DCPSurface:
+        """From the arrays that :attr:`padded` gives: the fast way in and out of a binary file.
+
+        Parameters
+        ----------
+        points, weights : (n, 3), (n,) float64
+        knots_u, knots_v : (n, w) float64, row i holds ``degrees[i] + 2`` knots and repeats the last one
+        degrees_u, degrees_v : (n,) int
+        """
+        xyz, w = check_points(points), check_weights(weights)
+        sides = []
+        for name, rows, degrees in (("u", knots_u, degrees_u), ("v", knots_v, degrees_v)):
+            knots = np.array(rows, dtype=np.float64, order="C", ndmin=2)
+            p = np.array(degrees, dtype=np.int64, ndmin=1)
+            if len(knots) != len(xyz) or len(p) != len(xyz) or len(w) != len(xyz):
+                raise ValueError(f"knots_{name}, degrees_{name}, weights: need one row per point ({len(xyz)})")
+            check_knots(knots, p, f"knots_{name}")
+            if (p + 2 > knots.shape[1]).any():
+                raise ValueError(f"degrees_{name}: needs more knots than the {knots.shape[1]} per row")
+            sides.append((np.take_along_axis(knots, np.minimum(np.arange(knots.shape[1]), p[:, None] + 1), 1), p))
+        surface = cls.__new__(cls)
+        surface._set(xyz, w, (sides[0][0], sides[1][0]), (sides[0][1], sides[1][1]), None)
+        return surface
+
+    def with_points(self, points: ArrayLike) -> DCPSurface:
+        """The same surface with other positions ``(n, 3)``; knots and bins are shared."""
+        xyz = check_points(points)
+        if xyz.shape != self._points.shape:
+            raise ValueError(f"points: shape {xyz.shape}, expected {self._points.shape}")
+        surface = type(self).__new__(type(self))
+        surface._set(xyz, self._weights, (self._ku, self._kv), (self._pu, self._pv), self._lazy_bins)
+        return surface
+
+    @property
+    def n(self) -> int:
+        """How many control points."""
+        return len(self._points)
+
+    @property
+    def points(self) -> Floats:
+        """(n, 3) float64, read-only."""
+        return self._points
+
+    @property
+    def weights(self) -> Floats:
+        """(n,) float64, read-only."""
+        return self._weights
+
+    @property
+    def knots_u(self) -> Sequence[Floats]:
+        """n arrays of degree + 2 knots, read-only."""
+        return [row[: p + 2] for row, p in zip(self._ku, self._pu, strict=True)]
+
+    @property
+    def knots_v(self) -> Sequence[Floats]:
+        """n arrays of degree + 2 knots, read-only."""
+        return [row[: p + 2] for row, p in zip(self._kv, self._pv, strict=True)]
+
+    @property
+    def degrees(self) -> tuple[Ints, Ints]:
+        """Degrees in u and v, (n,) int64 each, read-only."""
+        return self._pu, self._pv
+
+    @property
+    def padded(self) -> tuple[Floats, Floats]:
+        """Knots in u and v, (n, w) float64 each, read-only; rows repeat their last knot."""
+        return self._ku, self._kv
+
+    @property
+    def supports(self) -> Floats:
+        """(n, 4) float64: u0, u1, v0, v1 of every point's subdomain."""
+        return np.stack([self._ku[:, 0], self._ku[:, -1], self._kv[:, 0], self._kv[:, -1]], axis=1)
+
+    @property
+    def rect(self) -> tuple[float, float, float, float]:
+        """u0, u1, v0, v1 of the smallest rectangle that holds every subdomain."""
+        return (
+            float(self._ku[:, 0].min()),
+            float(self._ku[:, -1].max()),
+            float(self._kv[:, 0].min()),
+            float(self._kv[:, -1].max()),
+        )
+
+    @property
+    def bins(self) -> Bins:
+        """Control points by region of (u, v); built at the first evaluation."""
+        if self._lazy_bins is None:
+            self._lazy_bins = build_bins(self._ku, self._kv)
+        return self._lazy_bins
+
+    def evaluate(self, uv: ArrayLike, side: ArrayLike | None = None) -> Floats:
+        """Points of the surface.
+
+        Parameters
+        ----------
+        uv : (m, 2) float64
+        side : (m,) int, optional; 1 takes the limit from the left in u, 2 in v, 3 in both
+
+        Returns
+        -------
+        (m, 3) float64, NaN rows where nothing covers (u, v)
+        """
+        return self._sample(uv, side)[2]
+
+    def covered(self, uv: ArrayLike) -> np.ndarray:
+        """(m,) bool: does any control point cover (u, v)?"""
+        return self._sample(uv, None)[1] >= 0
+
+    def derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
+        """S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; arguments as in :meth:`evaluate`."""
+        out = self._sample_derivatives(uv, side)
+        return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()
+
+    def second_derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
+        """S_uu, S_uv and S_vv, each (m, 3) float64, NaN rows where nothing covers."""
+        out = self._sample_derivatives(uv, side)
+        return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
+
+    def basis_matrix(
+        self, uv: ArrayLike, derivative: tuple[int, int] = (0, 0), side: ArrayLike | None = None
+    ) -> csr_matrix:
+        """Rational weights: ``basis_matrix(uv) @ points`` is ``evaluate(uv)``.
+
+        Parameters
+        ----------
+        uv : (m, 2) float64
+        derivative : (0, 0), (1, 0) for S_u or (0, 1) for S_v
+        side : as in :meth:`evaluate`
+
+        Returns
+        -------
+        (m, n) scipy CSR matrix, float64; rows where nothing covers are empty
+        """
+        from scipy.sparse import csr_matrix
+
+        if tuple(derivative) not in ((0, 0), (1, 0), (0, 1)):
+            raise ValueError(f"derivative: must be (0, 0), (1, 0) or (0, 1), not {derivative!r}")
+        samples, sides, _ = self._sample(uv, side)
+        data, columns, start = self._rows(samples, sides)
+        rows = np.repeat(np.arange(len(samples)), np.diff(start))
+        total = np.stack([np.bincount(rows, data[:, k], len(samples)) for k in range(3)], axis=1)
+        ratio = data[:, 0] / total[rows, 0]
+        if tuple(derivative) != (0, 0):
+            k = 1 if derivative[0] else 2
+            ratio = (data[:, k] - ratio * total[rows, k]) / total[rows, 0]
+        return csr_matrix((ratio, columns, start), shape=(len(samples), self.n))
+
+    def _sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
+        """Checked samples, the side really used (-1: uncovered) and S."""
+        from . import kernels
+
+        samples = check_uv(uv)
+        sides = np.zeros(len(samples), dtype=np.int64)
+        if side is not None:
+            sides[:] = side
+        out = np.zeros((len(samples), 3))
+        kernels.sample(*self._arrays(), *self._bin_arrays(), samples, sides, out)
+        return samples, sides, out
+
+    def _sample_derivatives(self, uv: ArrayLike, side: ArrayLike | None) -> Floats:
+        from . import kernels
+
+        samples, sides, _ = self._sample(uv, side)
+        out = np.zeros((len(samples), 6, 3))
+        kernels.sample_derivatives(*self._arrays(), *self._bin_arrays(), samples, sides, out)
+        return out
+
+    def _rows(self, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:
+        """b w and its derivatives (k, 3), columns (k,) and row starts (m + 1,), a chunk at a time."""
+        from . import kernels
+
+        data, columns, counts = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int32)], []
+        for first in range(0, len(samples), CHUNK):
+            part, sub = samples[first : first + CHUNK], sides[first : first + CHUNK]
+            bins = self._bin_arrays()
+            capacity = kernels.row_capacity(*bins[:3], part)
+            chunk, ids = np.zeros((capacity, 3)), np.zeros(capacity, dtype=np.int32)
+            start = np.zeros(len(part) + 1, dtype=np.int64)
+            arrays = self._arrays()
+            used = kernels.fill_rows(*arrays[:4], arrays[5], *bins, part, sub, chunk, ids, start)
+            data.append(chunk[:used].copy())
+            columns.append(ids[:used].copy())
+            counts.append(np.diff(start))
+        starts = np.concatenate([[0], *counts]).cumsum()
+        return np.concatenate(data), np.concatenate(columns), starts
+
+    def _arrays(self) -> tuple[np.ndarray, ...]:
+        return self._ku, self._kv, self._pu, self._pv, self._points, self._weights
+
+    def _bin_arrays(self) -> tuple[np.ndarray, ...]:
+        return self.bins.grid, self.bins.shape, self.bins.start, self.bins.ids
+
+
+def check_points(points: ArrayLike, name: str = "points") -> Floats:
+    """(n, 3) float64 copy; ``ValueError`` for another shape, no points, or numbers that are not finite."""
+    xyz = np.array(points, dtype=np.float64, order="C")
+    if xyz.ndim != 2 or xyz.shape[1] != 3:
+        raise ValueError(f"{name}: shape {xyz.shape}, expected (n, 3)")
+    if len(xyz) == 0:
+        raise ValueError(f"{name}: empty; a surface needs at least one control point")
+    finite = np.isfinite(xyz).all(axis=1)
+    if not finite.all():
+        i = int(np.argmin(finite))
+        raise ValueError(f"{name}[{i}]: must be finite, got {xyz[i].tolist()}")
+    return xyz
+
+
+def check_weights(weights: ArrayLike, name: str = "weights") -> Floats:
+    """(n,) float64 copy; ``ValueError`` for another shape or weights that are not positive and finite."""
+    w = np.array(weights, dtype=np.float64, order="C")
+    if w.ndim != 1:
+        raise ValueError(f"{name}: shape {w.shape}, expected (n,)")
+    good = np.isfinite(w) & (w > 0)
+    if not good.all():
+        i = int(np.argmin(good))
+        raise ValueError(f"{name}[{i}]: must be positive and finite, got {w[i]}")
+    return w
+
+
+def check_uv(uv: ArrayLike, name: str = "uv") -> Floats:
+    """(m, 2) float64; ``ValueError`` for another shape or NaN."""
+    samples = np.ascontiguousarray(np.asarray(uv, dtype=np.float64))
+    if samples.ndim != 2 or samples.shape[1] != 2:
+        raise ValueError(f"{name}: shape {samples.shape}, expected (m, 2)")
+    good = np.isfinite(samples).all(axis=1)
+    if not good.all():
+        i = int(np.argmin(good))
+        raise ValueError(f"{name}[{i}]: must be finite, got {samples[i].tolist()}")
+    return samples

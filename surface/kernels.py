@@ -1,0 +1,250 @@
+"""Compiled kernels that evaluate blending functions: single values, samples of a surface, weights by cell.
+
+Every kernel that calls :func:`blend` lives in this file, because numba's disk cache watches one file only.
+
+Layout: ``knots`` is ``(n, w)`` float64, row i holds the ``degree[i] + 2`` knots of point i and repeats the last
+one up to the width ``w``. ``side`` is a bit mask per sample: 1 takes the limit from the left in u, 2 in v.
+Bins (``bin_start``, ``bin_ids``) list, per cell of a regular grid over (u, v), the points that reach it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+TINY = 1e-290  # denominators below this count as "nothing covers"
+
+
+@njit(cache=True, nogil=True, inline="always")
+def span(knots, i, p, x, left):
+    """Index j of the knot interval of point i that holds x: [t_j, t_j+1), or (t_j, t_j+1] from the left; -1 if none."""
+    if left:
+        if not (knots[i, 0] < x <= knots[i, p + 1]):
+            return -1
+        j = 0
+        while knots[i, j + 1] < x:
+            j += 1
+        return j
+    if not (knots[i, 0] <= x < knots[i, p + 1]):
+        return -1
+    j = p
+    while knots[i, j] > x:
+        j -= 1
+    return j
+
+
+@njit(cache=True, nogil=True, inline="always")
+def ratio(a, b):
+    """a / b with 0 for b = 0, the convention for repeated knots (Piegl and Tiller, The NURBS Book, 2.2)."""
+    return a / b if b > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True)
+def climb(knots, i, p, x, j, top, work):
+    """Fill ``work[0 .. p - top]`` with the blending functions of degree ``top`` over the knots of point i (Cox-de Boor)."""
+    for k in range(p + 2):
+        work[k] = 0.0
+    work[j] = 1.0
+    for k in range(1, top + 1):
+        for a in range(max(0, j - k), min(p - k, j) + 1):
+            value = 0.0
+            if work[a] != 0.0:
+                value = ratio(x - knots[i, a], knots[i, a + k] - knots[i, a]) * work[a]
+            if work[a + 1] != 0.0:
+                value += ratio(knots[i, a + k + 1] - x, knots[i, a + k + 1] - knots[i, a + 1]) * work[a + 1]
+            work[a] = value
+
+
+@njit(cache=True, nogil=True)
+def blend(knots, i, p, x, left, work):
+    """Value of point i's blending function at x."""
+    j = span(knots, i, p, x, left)
+    if j < 0:
+        return 0.0
+    climb(knots, i, p, x, j, p, work)
+    return work[0]
+
+
+@njit(cache=True, nogil=True)
+def blend1(knots, i, p, x, left, work):
+    """Value and first derivative of point i's blending function at x."""
+    j = span(knots, i, p, x, left)
+    if j < 0:
+        return 0.0, 0.0
+    if p == 0:
+        return 1.0, 0.0
+    climb(knots, i, p, x, j, p - 1, work)
+    low = ratio(work[0], knots[i, p] - knots[i, 0])
+    high = ratio(work[1], knots[i, p + 1] - knots[i, 1])
+    return (x - knots[i, 0]) * low + (knots[i, p + 1] - x) * high, p * (low - high)
+
+
+@njit(cache=True, nogil=True)
+def blend2(knots, i, p, x, left, work):
+    """Value, first and second derivative of point i's blending function at x."""
+    j = span(knots, i, p, x, left)
+    if j < 0:
+        return 0.0, 0.0, 0.0
+    if p < 2:
+        value, slope = blend1(knots, i, p, x, left, work)
+        return value, slope, 0.0
+    climb(knots, i, p, x, j, p - 2, work)
+    t0, t1, t2 = knots[i, 0], knots[i, 1], knots[i, 2]
+    s0, s1, s2 = knots[i, p - 1], knots[i, p], knots[i, p + 1]
+    a, b, c = ratio(work[0], s0 - t0), ratio(work[1], s1 - t1), ratio(work[2], s2 - t2)
+    low = ratio((x - t0) * a + (s1 - x) * b, s1 - t0)
+    high = ratio((x - t1) * b + (s2 - x) * c, s2 - t1)
+    bend = ratio((p - 1) * (a - b), s1 - t0) - ratio((p - 1) * (b - c), s2 - t1)
+    return (x - t0) * low + (s2 - x) * high, p * (low - high), p * bend
+
+
+@njit(cache=True, nogil=True)
+def blend_samples(knots, p, x, left, out):
+    """``out[s] = (value, first, second derivative)`` of one blending function at ``x[s]``."""
+    work = np.zeros(12)
+    for s in range(x.shape[0]):
+        out[s, 0], out[s, 1], out[s, 2] = blend2(knots, 0, p, x[s], left, work)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def bin_of(u, v, grid, shape):
+    """Bin of (u, v), or -1 outside the grid; ``grid`` = (u0, v0, bins per u, bins per v, u1, v1)."""
+    if not (grid[0] <= u <= grid[4] and grid[1] <= v <= grid[5]):
+        return -1
+    a = min(int((u - grid[0]) * grid[2]), shape[0] - 1)
+    b = min(int((v - grid[1]) * grid[3]), shape[1] - 1)
+    return a * shape[1] + b
+
+
+@njit(cache=True, nogil=True)
+def fill_bins(knots_u, knots_v, grid, shape, start, ids, count_only):
+    """Count, or write, the points whose closed support reaches each bin."""
+    last_u, last_v = knots_u.shape[1] - 1, knots_v.shape[1] - 1
+    for i in range(knots_u.shape[0]):
+        a0 = min(int((knots_u[i, 0] - grid[0]) * grid[2]), shape[0] - 1)
+        a1 = min(int((knots_u[i, last_u] - grid[0]) * grid[2]), shape[0] - 1)
+        b0 = min(int((knots_v[i, 0] - grid[1]) * grid[3]), shape[1] - 1)
+        b1 = min(int((knots_v[i, last_v] - grid[1]) * grid[3]), shape[1] - 1)
+        for a in range(a0, a1 + 1):
+            for b in range(b0, b1 + 1):
+                cell = a * shape[1] + b
+                if not count_only:
+                    ids[start[cell]] = i
+                start[cell] += 1
+
+
+@njit(cache=True, nogil=True)
+def sum_numerators(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
+    """Add b w P and b w of the listed points into ``acc[0:4]``."""
+    acc[:4] = 0.0
+    for q in range(ids.shape[0]):
+        i = ids[q]
+        bu = blend(knots_u, i, pu[i], u, side & 1, work)
+        if bu == 0.0:
+            continue
+        bw = bu * blend(knots_v, i, pv[i], v, side & 2, work) * weights[i]
+        acc[0] += bw * points[i, 0]
+        acc[1] += bw * points[i, 1]
+        acc[2] += bw * points[i, 2]
+        acc[3] += bw
+
+
+@njit(cache=True, nogil=True)
+def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
+    """Write S into ``out`` (NaN where nothing covers) and the side really used into ``side`` (-1: uncovered)."""
+    work, acc = np.zeros(12), np.zeros(4)
+    for s in range(uv.shape[0]):
+        u, v, wanted = uv[s, 0], uv[s, 1], side[s]
+        cell = bin_of(u, v, grid, shape)
+        out[s, :] = np.nan
+        side[s] = -1
+        if cell < 0:
+            continue
+        ids = bins[start[cell] : start[cell + 1]]
+        for extra in range(4):
+            sum_numerators(knots_u, knots_v, pu, pv, points, weights, ids, u, v, wanted | extra, work, acc)
+            if acc[3] > TINY:
+                side[s] = wanted | extra
+                for c in range(3):
+                    out[s, c] = acc[c] / acc[3]
+                break
+
+
+@njit(cache=True, nogil=True)
+def sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
+    """Add b w (P, 1) and its derivatives into ``acc (6, 4)``: rows S, u, v, uu, uv, vv."""
+    acc[:, :] = 0.0
+    for q in range(ids.shape[0]):
+        i = ids[q]
+        a0, a1, a2 = blend2(knots_u, i, pu[i], u, side & 1, work)
+        if a0 == 0.0 and a1 == 0.0 and a2 == 0.0:
+            continue
+        b0, b1, b2 = blend2(knots_v, i, pv[i], v, side & 2, work)
+        for c in range(4):
+            value = weights[i] if c == 3 else weights[i] * points[i, c]
+            acc[0, c] += a0 * b0 * value
+            acc[1, c] += a1 * b0 * value
+            acc[2, c] += a0 * b1 * value
+            acc[3, c] += a2 * b0 * value
+            acc[4, c] += a1 * b1 * value
+            acc[5, c] += a0 * b2 * value
+
+
+@njit(cache=True, nogil=True)
+def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
+    """Write S, S_u, S_v, S_uu, S_uv, S_vv into ``out (m, 6, 3)`` for resolved sides (quotient rule, NURBS Book 4.5)."""
+    work, acc = np.zeros(12), np.zeros((6, 4))
+    for s in range(uv.shape[0]):
+        if side[s] < 0:
+            out[s, :, :] = np.nan
+            continue
+        cell = bin_of(uv[s, 0], uv[s, 1], grid, shape)
+        ids = bins[start[cell] : start[cell + 1]]
+        sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, uv[s, 0], uv[s, 1], side[s], work, acc)
+        w, wu, wv, wuu, wuv, wvv = acc[0, 3], acc[1, 3], acc[2, 3], acc[3, 3], acc[4, 3], acc[5, 3]
+        for c in range(3):
+            p = acc[0, c] / w
+            du = (acc[1, c] - wu * p) / w
+            dv = (acc[2, c] - wv * p) / w
+            out[s, 0, c], out[s, 1, c], out[s, 2, c] = p, du, dv
+            out[s, 3, c] = (acc[3, c] - 2.0 * wu * du - wuu * p) / w
+            out[s, 4, c] = (acc[4, c] - wu * dv - wv * du - wuv * p) / w
+            out[s, 5, c] = (acc[5, c] - 2.0 * wv * dv - wvv * p) / w
+
+
+@njit(cache=True, nogil=True)
+def row_capacity(grid, shape, start, uv):
+    """Upper bound of the number of influences of all samples together."""
+    total = 0
+    for s in range(uv.shape[0]):
+        cell = bin_of(uv[s, 0], uv[s, 1], grid, shape)
+        if cell >= 0:
+            total += start[cell + 1] - start[cell]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def fill_rows(knots_u, knots_v, pu, pv, weights, grid, shape, start, bins, uv, side, data, columns, row_start):
+    """Write b w and its two derivatives ``data (k, 3)`` row by row; returns how many entries were written."""
+    work, top = np.zeros(12), 0
+    for s in range(uv.shape[0]):
+        row_start[s] = top
+        if side[s] < 0:
+            continue
+        u, v = uv[s, 0], uv[s, 1]
+        cell = bin_of(u, v, grid, shape)
+        for q in range(start[cell], start[cell + 1]):
+            i = bins[q]
+            a0, a1 = blend1(knots_u, i, pu[i], u, side[s] & 1, work)
+            if a0 == 0.0 and a1 == 0.0:
+                continue
+            b0, b1 = blend1(knots_v, i, pv[i], v, side[s] & 2, work)
+            if b0 == 0.0 and b1 == 0.0:
+                continue
+            data[top, 0] = a0 * b0 * weights[i]
+            data[top, 1] = a1 * b0 * weights[i]
+            data[top, 2] = a0 * b1 * weights[i]
+            columns[top] = i
+            top += 1
+    row_start[uv.shape[0]] = top
+    return top
