@@ -1,0 +1,145 @@
+"""One bus at its own clock: the newest parameters out, measured positions back.
+
+The loop owns its bus: nobody else touches it. It reads the parameters from whoever makes them as a latest
+value, and leaves its own measurements as a latest value. It never waits for the face.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.channels import build_table, servo_specs
+from controller.clock import Clock, Samples
+from controller.motion import MotionLimiter
+from controller.parameters import Parameters
+from controller.robot import BusSettings, ChannelSettings
+from drivers import open_bus
+from drivers.bus import Bus, BusState
+from drivers.errors import DriverError, PortLost
+
+Floats = NDArray[np.float64]
+Newest = Callable[[], tuple[Floats, int]]
+
+
+class BusLoop:
+    """Drives the channels of one bus until it is stopped.
+
+    Parameters
+    ----------
+    settings : the bus.
+    channels : its channels, one a servo.
+    parameters : the vocabulary the channels' mixes refer to.
+    newest : gives the newest parameter vector ``(p,) float64`` and the time (monotonic ns) at which the command
+        behind it arrived, 0 for none.
+    """
+
+    def __init__(
+        self,
+        settings: BusSettings,
+        channels: Sequence[ChannelSettings],
+        parameters: Parameters,
+        newest: Newest,
+    ) -> None:
+        self.settings = settings
+        self.table = build_table(channels, parameters)
+        self.bus: Bus = open_bus(
+            kind=settings.kind,
+            port=settings.port,
+            baud=settings.baud,
+            servos=servo_specs(channels),
+            watchdog_ms=settings.watchdog_ms,
+            faults=tuple(settings.faults),
+        )
+        self.clock = Clock(settings.rate_hz)
+        self.latency_ms = Samples()
+        self.held = 0
+        self.error: DriverError | None = None
+        self._newest = newest
+        self._limiter = MotionLimiter(
+            self.table.max_speed_rad_s, self.table.max_accel_rad_s2, self.table.low_rad, self.table.high_rad
+        )
+        self._sent = np.zeros(len(channels))
+        self._last_stamp = 0
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Open the bus, bring the servos up safely and begin to drive them.
+
+        Raises
+        ------
+        DriverError
+            when the port or a servo does not come up; the bus is closed again.
+        """
+        try:
+            self.bus.open()
+            self.bus.start()
+            self._resume()
+        except BaseException:
+            self.bus.close()
+            raise
+        self._thread = threading.Thread(target=self._run, name=f"bus {self.settings.name}", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop driving, switch torque off on every reachable servo and close the port."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+        try:
+            with suppress(PortLost):
+                self.bus.stop()
+        finally:
+            self.bus.close()
+
+    def measured(self) -> BusState | None:
+        """The newest measurement, or None before the first."""
+        return self._state
+
+    def _resume(self) -> None:
+        """Begin from where the servos are, so that the first goals are a ramp from there."""
+        state = self._state = self.bus.read()
+        self._sent[:] = np.clip(state.position_rad, self.table.low_rad, self.table.high_rad)
+        self._limiter.reset(self._sent)
+
+    def _run(self) -> None:
+        try:
+            for now in self.clock.run(lambda: not self._stopping.is_set()):
+                self._cycle(now)
+        except DriverError as error:
+            self.error = error
+
+    def _cycle(self, now: int) -> None:
+        values, stamp = self._newest()
+        angles, held = self.table.angles(values)
+        self.held += held
+        self._limiter.step(self.clock.period_ns / 1e9, angles, self._sent)
+        try:
+            self.bus.write(self._sent)
+            self._note_latency(stamp)
+            self._state = self.bus.read()
+        except PortLost:
+            self._reconnect()
+
+    def _note_latency(self, stamp: int) -> None:
+        if stamp > self._last_stamp:
+            self._last_stamp = stamp
+            self.latency_ms.add((time.monotonic_ns() - stamp) / 1e6)
+
+    def report(self) -> dict[str, object]:
+        """What was measured: rate and jitter, command-to-wire latency, errors by kind, limits hit."""
+        return {
+            "name": self.settings.name,
+            "servos": len(self.table.names),
+            **self.clock.report(),
+            "command_to_wire_ms": self.latency_ms.summary(),
+            "channels_held_at_limit": self.held,
+            "bus": self.bus.report().as_dict(),
+            "fault": str(self.error) if self.error else None,
+        }

@@ -1,0 +1,65 @@
+"""The ``omote`` command: one message and exit code 1 for everything that goes wrong, never a traceback.
+
+Each command lives in a ``cli_*`` module and imports what it needs when it runs, so that ``omote --help`` and
+the simulated parts start at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import typer
+from rich.console import Console
+
+from controller import cli_bench, cli_bus, cli_check, cli_picture, cli_run
+from controller.errors import OMOTE_ERRORS
+
+app = typer.Typer(
+    name="omote",
+    help="Drives a robot's face: a CG face and a servo head that make the same expression.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for module in (cli_run, cli_picture, cli_bus, cli_check, cli_bench):
+    module.register(app)
+
+
+def report_error(error: BaseException) -> None:
+    """Print what failed and what to do next on standard error."""
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console.print(f"[bold red]error:[/] {_plain(error)}")
+    hint = getattr(error, "hint", "")
+    if hint:
+        console.print(f"[bold]try:[/] {_escape(hint)}")
+
+
+def _plain(error: BaseException) -> str:
+    return _escape(str(error) or type(error).__name__)
+
+
+def _escape(text: str) -> str:
+    return text.replace("[", r"\[")
+
+
+def main() -> None:
+    """Entry point of the ``omote`` command."""
+    try:
+        app()
+    except OMOTE_ERRORS as error:
+        report_error(error)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except Exception as error:  # noqa: BLE001  the last line of defence: users get a sentence, not a traceback
+        if os.environ.get("OMOTE_DEBUG"):
+            raise
+        report_error(error)
+        Console(stderr=True).print("This is a fault in omote. OMOTE_DEBUG=1 shows where.", style="dim")
+        sys.exit(70)

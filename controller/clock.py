@@ -1,0 +1,115 @@
+"""Fixed-rate clock on absolute deadlines, and the statistics a report needs.
+
+A tick that comes too late is skipped and counted, never made up for: a face that runs after its own past
+is worse than one that misses a step.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+
+class Samples:
+    """The newest ``capacity`` measurements, without growing.
+
+    Parameters
+    ----------
+    capacity : how many are kept for percentiles; older ones are overwritten.
+    """
+
+    def __init__(self, capacity: int = 65536) -> None:
+        self._values = np.zeros(capacity)
+        self._sum = 0.0
+        self.count = 0
+        self.maximum = 0.0
+
+    def add(self, value: float) -> None:
+        """Take one measurement."""
+        self._values[self.count % len(self._values)] = value
+        self.count += 1
+        self._sum += value
+        self.maximum = max(self.maximum, value)
+
+    def summary(self) -> dict[str, float]:
+        """Mean, median, p95, p99 and maximum, in the unit that was added; empty without measurements."""
+        if not self.count:
+            return {}
+        p50, p95, p99 = np.percentile(self._values[: self.count], [50, 95, 99])
+        return {
+            "mean": self._sum / self.count,
+            "p50": float(p50),
+            "p95": float(p95),
+            "p99": float(p99),
+            "max": self.maximum,
+        }
+
+
+class Clock:
+    """Ticks at a fixed rate on absolute deadlines.
+
+    Parameters
+    ----------
+    rate_hz : ticks per second.
+    now_ns, sleep_s : the time source and the way to wait; replaced in tests.
+
+    Attributes
+    ----------
+    jitter_ms : how much later than its deadline each tick began.
+    skipped : deadlines that passed unused.
+    """
+
+    def __init__(
+        self,
+        rate_hz: float,
+        *,
+        now_ns: Callable[[], int] = time.monotonic_ns,
+        sleep_s: Callable[[float], object] = time.sleep,
+    ) -> None:
+        if not rate_hz > 0:
+            raise ValueError(f"rate_hz must be positive, not {rate_hz}")
+        self.period_ns = round(1e9 / rate_hz)
+        self.jitter_ms = Samples()
+        self.skipped = 0
+        self.ticks = 0
+        self._now_ns = now_ns
+        self._sleep_s = sleep_s
+        self._started_ns = 0
+        self._last_ns = 0
+
+    def run(self, keep_going: Callable[[], bool]) -> Iterator[int]:
+        """Yield the present time (ns) once per tick until ``keep_going()`` is false."""
+        self._started_ns = self._last_ns = self._now_ns()
+        deadline = self._started_ns
+        while keep_going():
+            now = self._wait_until(deadline)
+            self.jitter_ms.add((now - deadline) / 1e6)
+            self.ticks += 1
+            yield now
+            self._last_ns = self._now_ns()
+            deadline = self._next_deadline(deadline)
+
+    def _wait_until(self, deadline: int) -> int:
+        now = self._now_ns()
+        while now < deadline:
+            self._sleep_s((deadline - now) / 1e9)
+            now = self._now_ns()
+        return now
+
+    def _next_deadline(self, deadline: int) -> int:
+        missed = max(0, (self._last_ns - deadline) // self.period_ns)
+        self.skipped += missed
+        return deadline + (missed + 1) * self.period_ns
+
+    def report(self) -> dict[str, object]:
+        """Measured rate (Hz), ticks, skipped deadlines and jitter percentiles (ms)."""
+        seconds = (self._last_ns - self._started_ns) / 1e9
+        return {
+            "rate_hz": self.ticks / seconds if seconds > 0 else 0.0,
+            "wanted_hz": 1e9 / self.period_ns,
+            "ticks": self.ticks,
+            "skipped": self.skipped,
+            "jitter_ms": self.jitter_ms.summary(),
+        }

@@ -1,0 +1,53 @@
+"""What main and body process say to each other, besides the mailboxes: a few pickled records over a pipe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class BodyOrders:
+    """What the body shall do.
+
+    Attributes
+    ----------
+    stage : path of the stage's file.
+    mailbox : path of the mailbox the parameters are published in.
+    take : a recorded take to play instead of the links; None for none.
+    """
+
+    stage: str
+    mailbox: str
+    take: str | None = None
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The body is up.
+
+    Attributes
+    ----------
+    notes : what a user should know, a line each: ports that were made, servos found.
+    """
+
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Failed:
+    """The body could not come up, or gave up; carries the error's message and hint."""
+
+    message: str
+    hint: str = ""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The body has nothing left to play."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the body measured."""
+
+    content: dict[str, object] = field(default_factory=dict)
