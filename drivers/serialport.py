@@ -1,0 +1,241 @@
+"""A serial port that is opened exclusively, read without spinning, and fails with one error tree.
+
+pyserial raises four different exceptions when a device is unplugged, one of which (termios.error) is no OSError;
+here each of them becomes :class:`~drivers.errors.PortLost`. Deadlines are on the monotonic clock.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import serial
+
+from drivers.errors import PortBusy, PortError, PortLost, PortMissing, PortPermission
+
+try:
+    import termios
+    from termios import error as TermiosError
+except ImportError:  # no termios outside POSIX
+    termios = None  # type: ignore[assignment]
+
+    class TermiosError(Exception):  # type: ignore[no-redef]
+        """Stands in where there is no termios."""
+
+
+UNPLUGGED = (OSError, serial.SerialException, TermiosError)
+"""Everything that pyserial and the system raise when a device goes away."""
+
+_MISSING = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR, errno.EIO}
+_DENIED = {errno.EACCES, errno.EPERM}
+_BUSY = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
+_CHUNK = 4096
+_WRITE_LIMIT_S = 0.5
+
+
+class SerialPort:
+    """One serial device, held by this process alone while it is open.
+
+    Parameters
+    ----------
+    path : device path; prefer ``/dev/serial/by-id/...``, which stays the same after a replug.
+    baud : any rate the device takes.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], baud: int = 1_000_000) -> None:
+        self.path = os.fspath(path)
+        self.baud = int(baud)
+        self.low_latency = False
+        self._serial: serial.Serial | None = None
+        self._fd = -1
+
+    @property
+    def is_open(self) -> bool:
+        """True while the device is held."""
+        return self._serial is not None
+
+    @property
+    def serial(self) -> Any:
+        """The pyserial object underneath, for code that insists on one; None while closed."""
+        return self._serial
+
+    def open(self) -> None:
+        """Take the device for this process, ask for low latency, and throw away what lies in its input.
+
+        Raises
+        ------
+        PortMissing : no such device.
+        PortBusy : another program holds it.
+        PortPermission : this user may not open it.
+        PortError : the device does not take the baud rate.
+        """
+        self.close()
+        try:
+            device = serial.Serial(self.path, self.baud, timeout=0, exclusive=True)
+        except UNPLUGGED as error:
+            raise self._opening_error(error) from error
+        except ValueError as error:
+            message = f"port {self.path} does not take {self.baud} baud: {error}"
+            raise PortError(message, hint="set a baud rate the adapter has", port=self.path) from error
+        self._serial, self._fd = device, device.fileno()
+        _tell_empty_from_gone(self._fd)
+        self.low_latency = _ask_low_latency(device)
+        self.drain()
+
+    def close(self) -> None:
+        """Give the device back; never raises, may be called any number of times."""
+        device, self._serial, self._fd = self._serial, None, -1
+        if device is not None:
+            with suppress(*UNPLUGGED):
+                device.close()
+
+    def write(self, data: bytes) -> None:
+        """Hand all bytes to the system.
+
+        Raises
+        ------
+        PortLost : the device went away, or took nothing for half a second.
+        """
+        deadline = 0.0
+        view = memoryview(data)
+        while view:
+            try:
+                view = view[os.write(self._fd, view) :]
+                continue
+            except BlockingIOError:
+                deadline = deadline or time.monotonic() + _WRITE_LIMIT_S
+            except (*UNPLUGGED, ValueError) as error:
+                raise self._lost(error) from error
+            if time.monotonic() > deadline:
+                raise self._lost("it takes no bytes")
+            self._wait(deadline, writing=True)
+
+    def read(self, deadline_s: float) -> bytes:
+        """What has arrived, waiting for the first byte until a deadline.
+
+        Parameters
+        ----------
+        deadline_s : time of ``time.monotonic()``. One in the past only takes what is there already, so bytes that
+            came while this process was stalled still count.
+
+        Returns
+        -------
+        bytes : empty when nothing came.
+
+        Raises
+        ------
+        PortLost : the device went away.
+        """
+        try:
+            return self._take()
+        except BlockingIOError:
+            pass
+        if not self._wait(deadline_s):
+            return b""
+        try:
+            return self._take()
+        except BlockingIOError:
+            return b""
+
+    def drain(self, quiet_s: float = 0.0, limit_s: float = 0.2) -> int:
+        """Throw away input until nothing came for ``quiet_s`` seconds, at most ``limit_s``.
+
+        Returns
+        -------
+        int : bytes thrown away.
+        """
+        count, end = 0, time.monotonic() + limit_s
+        while True:
+            now = time.monotonic()
+            data = self.read(min(now + quiet_s, end))
+            count += len(data)
+            if not data or now > end:
+                return count
+
+    def _take(self) -> bytes:
+        try:
+            data = os.read(self._fd, _CHUNK)
+        except BlockingIOError:
+            raise
+        except (*UNPLUGGED, ValueError) as error:
+            raise self._lost(error) from error
+        if not data:
+            raise self._empty()
+        return data
+
+    def _empty(self) -> Exception:
+        """What a read of nothing means: no data yet where VMIN is 0, else that the device hung up."""
+        poll = select.poll()
+        poll.register(self._fd, select.POLLIN)
+        gone = any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, event in poll.poll(0))
+        return self._lost("it hung up") if gone else BlockingIOError()
+
+    def _wait(self, deadline_s: float, writing: bool = False) -> bool:
+        timeout = max(0.0, deadline_s - time.monotonic())
+        fds = [self._fd]
+        try:
+            ready = select.select([] if writing else fds, fds if writing else [], [], timeout)
+        except (*UNPLUGGED, ValueError) as error:
+            raise self._lost(error) from error
+        return bool(ready[0] or ready[1])
+
+    def _lost(self, why: object) -> PortLost:
+        reason = why if self.is_open else "it is not open"
+        return PortLost(
+            f"port {self.path} went away: {reason}",
+            hint="plug it in again and reconnect; `omote ports` shows what is there",
+            port=self.path,
+        )
+
+    def _opening_error(self, error: BaseException) -> PortError:
+        code = getattr(error, "errno", None)
+        if code in _BUSY:
+            message = f"port {self.path} is held by another program"
+            return PortBusy(message, hint=f"close it; `fuser -v {self.path}` names it", port=self.path)
+        if code in _DENIED:
+            return PortPermission(
+                f"no permission to open port {self.path}",
+                hint="sudo usermod -a -G dialout $USER, then log out and in again",
+                port=self.path,
+            )
+        if code in _MISSING or not Path(self.path).exists():
+            message = f"no port {self.path}"
+            return PortMissing(message, hint="`omote ports` lists what is plugged in", port=self.path)
+        return PortError(f"cannot open port {self.path}: {error}", hint="try `omote ports`", port=self.path)
+
+
+def _ask_low_latency(device: serial.Serial) -> bool:
+    """Ask the driver for its low-latency mode; pseudo-terminals and many adapters have none."""
+    try:
+        device.set_low_latency_mode(True)
+    except (ValueError, NotImplementedError, AttributeError, *UNPLUGGED):
+        return False
+    return True
+
+
+def _tell_empty_from_gone(fd: int) -> None:
+    """Set VMIN to 1: with pyserial's 0 a read without data looks like the end of the file."""
+    if termios is None:
+        return
+    with suppress(*UNPLUGGED):
+        attributes = termios.tcgetattr(fd)
+        attributes[6][termios.VMIN] = 1
+        termios.tcsetattr(fd, termios.TCSANOW, attributes)
+
+
+def latency_s(path: str | os.PathLike[str], sys_root: str | os.PathLike[str] = "/sys") -> float | None:
+    """Latency timer of the USB adapter behind a device path, in seconds; None where the system knows none.
+
+    Linux keeps it in ``/sys/bus/usb-serial/devices/<name>/latency_timer`` (milliseconds).
+    """
+    name = Path(path).resolve().name
+    try:
+        text = (Path(sys_root) / "bus/usb-serial/devices" / name / "latency_timer").read_text()
+        return int(text) / 1000.0
+    except (OSError, ValueError):
+        return None
