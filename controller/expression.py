@@ -1,0 +1,180 @@
+"""Named expressions: what a name and an intensity mean in parameters, and how they rise and fall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller.config import config_error
+from controller.errors import ParameterError
+from controller.parameters import Floats, Parameters, did_you_mean, fold, read_toml
+from controller.paths import config_dir
+
+KINDS = ("emotion", "gesture", "user")
+OVERRIDES = ("keep", "block", "blend")
+_KEYS = {"kind", "aliases", "source", "onset_s", "offset_s", "blink", "gaze", "weights"}
+_RISE_S = 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """One named expression.
+
+    Attributes
+    ----------
+    name : canonical name. kind : one of :data:`KINDS`. source : where it comes from.
+    weights : (P,) float64, the parameters at intensity 1; read-only.
+    onset_s, offset_s : times to rise and to fall.
+    blink, gaze : what it does to idle life, one of :data:`OVERRIDES`.
+    """
+
+    name: str
+    weights: Floats
+    kind: str = "user"
+    source: str = ""
+    onset_s: float = _RISE_S
+    offset_s: float = _RISE_S
+    blink: str = "keep"
+    gaze: str = "keep"
+
+
+class Vocabulary:
+    """The expressions of one file, by name.
+
+    Parameters
+    ----------
+    expressions : the expressions, in file order.
+    aliases : folded other names to canonical ones.
+    """
+
+    def __init__(self, expressions: dict[str, Expression], aliases: dict[str, str] | None = None) -> None:
+        self._expressions = expressions
+        self._lookup = {fold(name): name for name in expressions} | (aliases or {})
+
+    @classmethod
+    def load(cls, parameters: Parameters, path: Path | None = None) -> Vocabulary:
+        """Read a vocabulary of expressions; the shipped one without ``path``.
+
+        Raises
+        ------
+        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        """
+        path = path or config_dir() / "vocabularies" / "expressions.toml"
+        reader = _Reader(parameters)
+        expressions = {name: reader.expression(name, given) for name, given in read_toml(path).items()}
+        aliases = reader.aliases(expressions)
+        if reader.faults:
+            raise config_error(path, reader.faults)
+        return cls(expressions, aliases)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Canonical names, in file order."""
+        return tuple(self._expressions)
+
+    def __getitem__(self, name: str) -> Expression:
+        """The expression called ``name``, any case. Raises ParameterError with the nearest names."""
+        found = self._lookup.get(name) or self._lookup.get(fold(name))
+        if found is None:
+            raise ParameterError(
+                f"unknown expression {name!r}{did_you_mean(name, self.names)}",
+                hint="list the names: LIST EXPRESSIONS on the link, or configs/vocabularies/expressions.toml",
+            )
+        return self._expressions[found]
+
+    def expand(self, name: str, intensity: float = 1.0) -> dict[int, float]:
+        """Parameter index to value for ``name`` at ``intensity`` 0..1. Raises ParameterError."""
+        weights = self[name].weights
+        if not 0.0 <= intensity <= 1.0:
+            raise ParameterError(f"intensity must be 0 to 1, not {intensity}", hint="0.5 is half of the expression")
+        return {int(i): float(weights[i] * intensity) for i in np.flatnonzero(weights)}
+
+
+class _Reader:
+    """Turns tables into expressions and collects every fault on the way."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._aliases: list[tuple[str, Any]] = []
+        self.faults: list[str] = []
+
+    def expression(self, name: str, given: Any) -> Expression:
+        if not isinstance(given, dict):
+            self.faults.append(f"{name}: must be a table with weights")
+            given = {"weights": {}}
+        self.faults += [f"{name}.{key}: unknown key{did_you_mean(key, _KEYS)}" for key in given if key not in _KEYS]
+        self._aliases.append((name, given.get("aliases", [])))
+        return Expression(
+            name,
+            self._weights(name, given.get("weights")),
+            self._choice(name, given, "kind", KINDS, "user"),
+            str(given.get("source", "")),
+            self._seconds(name, given, "onset_s"),
+            self._seconds(name, given, "offset_s"),
+            self._choice(name, given, "blink", OVERRIDES, "keep"),
+            self._choice(name, given, "gaze", OVERRIDES, "keep"),
+        )
+
+    def aliases(self, known: dict[str, Expression]) -> dict[str, str]:
+        table: dict[str, str] = {}
+        for name, given in self._aliases:
+            if not (isinstance(given, list) and all(isinstance(a, str) for a in given)):
+                self.faults.append(f"{name}.aliases: must be a list of names")
+                continue
+            for alias in map(fold, given):
+                taken = table.get(alias) or next((k for k in known if fold(k) == alias), None)
+                if taken is not None:
+                    self.faults.append(f"{name}.aliases: {alias!r} is already a name of {taken!r}")
+                table[alias] = name
+        return table
+
+    def _weights(self, name: str, given: Any) -> Floats:
+        weights = self._parameters.neutral()
+        if not isinstance(given, dict):
+            self.faults.append(f"{name}.weights: missing")
+            given = {}
+        for key, value in given.items():
+            self._put(f"{name}.weights.{key}", key, value, weights)
+        weights.flags.writeable = False
+        return weights
+
+    def _put(self, where: str, key: str, value: Any, weights: Floats) -> None:
+        positions = sides(self._parameters, key)
+        if not positions:
+            self.faults.append(f"{where}: unknown parameter{did_you_mean(key, self._parameters.names)}")
+            return
+        low, high = self._parameters.low[positions[0]], self._parameters.high[positions[0]]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            self.faults.append(f"{where}: must be a number from {low:g} to {high:g} (is {value!r})")
+            return
+        weights[positions] = value
+
+    def _seconds(self, name: str, given: dict[str, Any], key: str) -> float:
+        value = given.get(key, _RISE_S)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 60:
+            self.faults.append(f"{name}.{key}: must be 0 to 60 seconds (is {value!r})")
+            return _RISE_S
+        return float(value)
+
+    def _choice(self, name: str, given: dict[str, Any], key: str, known: tuple[str, ...], default: str) -> str:
+        value = given.get(key, default)
+        if value not in known:
+            self.faults.append(f"{name}.{key}: must be one of {', '.join(known)} (is {value!r})")
+            return default
+        return str(value)
+
+
+def sides(parameters: Parameters, name: str) -> list[int]:
+    """Positions that ``name`` means: itself, or its left and right when it names neither; empty when unknown."""
+    found = []
+    for spelling in (name, f"{name}Left", f"{name}Right"):
+        try:
+            found.append(parameters.index(spelling))
+        except ParameterError:
+            continue
+        if spelling == name:
+            break
+    return found

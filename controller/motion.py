@@ -1,0 +1,176 @@
+"""Motion in time: minimum-jerk curves, envelopes of timed expressions, and the limiter every parameter passes.
+
+The limiter follows its target along the square-root braking curve with a linear end,
+
+    v(e) = e / r                          for |e| <= a r^2
+    v(e) = sqrt(2 a (|e| - a r^2 / 2))    beyond,
+
+so it brakes at no more than ``a`` and arrives like a critically damped spring of time constant ``r``. Each step
+chooses one constant acceleration for its whole length, so that speed and acceleration stay inside their limits
+whatever the length of the steps, and braking from any speed ends inside the range.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.parameters import Floats, Parameters
+
+_LONGEST_STEP_S = 0.1
+_TINY = 1e-12
+
+
+def minimum_jerk(t: float) -> float:
+    """10 t^3 - 15 t^4 + 6 t^5 with ``t`` held in 0..1 (Flash and Hogan 1985)."""
+    t = min(max(t, 0.0), 1.0)
+    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Level 0..1 of something that rises, holds and falls along minimum-jerk curves.
+
+    Attributes
+    ----------
+    start_s : when it begins. onset_s : time to rise. hold_s : time at 1. offset_s : time to fall.
+    """
+
+    start_s: float
+    onset_s: float
+    hold_s: float
+    offset_s: float
+
+    @property
+    def end_s(self) -> float:
+        """When the level is 0 again."""
+        return self.start_s + self.onset_s + self.hold_s + self.offset_s
+
+    def level(self, now_s: float) -> float:
+        """Level at ``now_s``."""
+        t = now_s - self.start_s
+        if t <= 0.0:
+            return 0.0
+        if t < self.onset_s:
+            return minimum_jerk(t / self.onset_s)
+        t -= self.onset_s + self.hold_s
+        if t <= 0.0:
+            return 1.0
+        return 1.0 - minimum_jerk(t / self.offset_s) if t < self.offset_s else 0.0
+
+
+class MotionLimiter:
+    """Moves (P,) values towards targets inside their range, speed and acceleration.
+
+    Parameters
+    ----------
+    parameters : gives range, ``max_speed``, ``max_acceleration``, ``response_s`` and ``smooth_s`` of each.
+
+    Attributes
+    ----------
+    limited : (P,) bool, whether the last step was held back by a speed or acceleration limit.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._low, self._high = parameters.low, parameters.high
+        self._speed, self._accel = parameters.max_speed, parameters.max_acceleration
+        self._response, self._smooth = parameters.response_s, parameters.smooth_s
+        self._half_knee = 0.5 * self._accel * self._response**2
+        self._position, self._velocity = parameters.neutral(), parameters.neutral()
+        self._output = parameters.neutral()
+        self._target = parameters.neutral()
+        self.limited: NDArray[np.bool_] = np.zeros(len(parameters), dtype=bool)
+        self._work = [parameters.neutral() for _ in range(6)]
+        self._flags = [np.zeros(len(parameters), dtype=bool) for _ in range(2)]
+
+    @property
+    def velocity(self) -> Floats:
+        """(P,) float64, present speed in units/s, before the jerk filter."""
+        return self._velocity
+
+    def reset(self, values: Floats) -> None:
+        """Be at ``values`` : (P,), at rest."""
+        np.clip(values, self._low, self._high, out=self._position)
+        self._velocity[:] = 0.0
+        self._output[:] = self._position
+        self._target[:] = self._position
+
+    def step(self, dt: float, targets: Floats, out: Floats) -> Floats:
+        """Move for ``dt`` seconds towards ``targets`` : (P,) and write the values to ``out`` : (P,).
+
+        A target that is not finite leaves the earlier one in force. A step longer than 0.1 s counts as 0.1 s: after
+        a pause of the machine the face goes on from where it was and does not leap.
+        """
+        np.copyto(self._target, targets, where=np.isfinite(targets))
+        np.clip(self._target, self._low, self._high, out=self._target)
+        dt = min(dt, _LONGEST_STEP_S)
+        if dt > 0.0:
+            self._move(dt)
+        out[:] = self._output
+        return out
+
+    def _move(self, dt: float) -> None:
+        error, sign, speed, wanted, free, reach = self._work
+        np.subtract(self._target, self._position, out=error)
+        np.copysign(1.0, error, out=sign)
+        np.multiply(self._velocity, sign, out=speed)  # + = towards the target
+        np.abs(error, out=error)
+        self._braking_speed(dt, error, speed, wanted, free)
+        np.copyto(free, wanted)
+        np.minimum(wanted, self._speed, out=wanted)
+        np.multiply(self._accel, dt, out=reach)
+        np.subtract(wanted, speed, out=wanted)
+        np.clip(wanted, -reach, reach, out=wanted)
+        np.add(wanted, speed, out=wanted)
+        np.subtract(free, wanted, out=free)
+        np.greater(free, 1e-9, out=self.limited)
+        self._advance(dt, error, sign, speed, wanted, free)
+        self._filter(dt, free)
+
+    def _braking_speed(self, dt: float, error: Floats, speed: Floats, out: Floats, work: Floats) -> None:
+        """Speed at the end of the step from which the rest of the way is just enough to brake."""
+        left = np.multiply(speed, 0.5 * dt, out=work)
+        np.subtract(error, left, out=left)  # way left when the step ended at rest
+        np.divide(left, self._response + 0.5 * dt, out=out)  # the linear end
+        np.subtract(left, self._half_knee, out=left)
+        np.divide(left, self._accel, out=left)
+        left *= 2.0
+        left += 0.25 * dt * dt
+        np.maximum(left, 0.0, out=left)
+        np.sqrt(left, out=left)
+        left -= 0.5 * dt
+        left *= self._accel
+        np.maximum(left, 0.0, out=left)
+        far = np.greater(left, np.multiply(self._accel, self._response, out=self._work[5]), out=self._flags[0])
+        np.copyto(out, left, where=far)
+
+    def _advance(
+        self, dt: float, error: Floats, sign: Floats, speed: Floats, wanted: Floats, work: Floats
+    ) -> None:
+        """Move with constant acceleration from ``speed`` to ``wanted``; stop where the target lies on the way."""
+        arrived, braking = self._flags
+        np.multiply(speed, 0.5 * dt, out=work)  # way it takes to stop evenly within the step
+        np.greater_equal(work, error, out=arrived)
+        np.multiply(speed, speed, out=work)
+        work /= self._accel
+        work *= 0.5
+        np.less_equal(work, error + _TINY, out=braking)
+        arrived &= braking
+        np.add(speed, wanted, out=work)
+        work *= 0.5 * dt
+        np.copyto(work, error, where=arrived)
+        np.copyto(wanted, 0.0, where=arrived)
+        work *= sign
+        self._position += work
+        np.multiply(wanted, sign, out=self._velocity)
+        np.clip(self._position, self._low, self._high, out=self._position)
+
+    def _filter(self, dt: float, work: Floats) -> None:
+        """Jerk filter: a weighted mean with the earlier output keeps range, speed and acceleration."""
+        np.add(self._smooth, dt, out=work)
+        np.divide(dt, work, out=work)
+        np.subtract(self._position, self._output, out=self._work[5])
+        self._work[5] *= work
+        self._output += self._work[5]
