@@ -1,12 +1,13 @@
 """What every servo bus promises, whatever protocol is on the wire.
 
 One bus is one wire with many servos. A driver implements :class:`Bus`; the caller owns the clock and calls
-``write`` and ``read`` once a cycle from one thread. Nothing here queues: ``write`` sends the newest target and
-returns what was really sent, ``read`` returns what is known, with an age for everything that is not new.
+``write`` and ``read`` once a cycle from one thread. Nothing here queues: ``write`` sends the newest target
+and returns what was really sent, ``read`` returns what is known, with an age for everything that is old.
 
 All arrays are ordered as the ``servos`` given to the bus, so ``n`` below is ``len(bus.servos)``.
 
-Angles are the servo's own: radians from the middle of its range (tick 2048 of 4096), positive where ticks grow.
+Angles are the servo's own: radians from the middle of its range (tick 2048 of 4096), positive where ticks
+grow.
 With ``zero_rad`` and ``reverse`` set, ``shaft = zero_rad + (-1 if reverse else 1) * angle``.
 """
 
@@ -217,7 +218,7 @@ class Bus(ABC):
 
         Raises
         ------
-        NoReply, WrongModel, ServoFault, ServoRefused, CorruptReply : nothing was moved; servo ids in ``servo_ids``.
+        NoReply, WrongModel, ServoFault, ServoRefused, CorruptReply : nothing was moved; see ``servo_ids``.
         """
 
     @abstractmethod
@@ -257,7 +258,7 @@ class Bus(ABC):
 
     @abstractmethod
     def reconnect(self) -> None:
-        """Open the port again by its path after :class:`~drivers.errors.PortLost`, and start if it was running.
+        """Open the port again by its path after :class:`~drivers.errors.PortLost`; start if it was running.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 """A serial port that is opened exclusively, read without spinning, and fails with one error tree.
 
-pyserial raises four different exceptions when a device is unplugged, one of which (termios.error) is no OSError;
-here each of them becomes :class:`~drivers.errors.PortLost`. Deadlines are on the monotonic clock.
+pyserial raises four different exceptions when a device is unplugged, one of which (termios.error) is not even
+an OSError; here each of them becomes :class:`~drivers.errors.PortLost`. Deadlines are on the monotonic clock.
 """
 
 from __future__ import annotations
@@ -120,8 +120,8 @@ class SerialPort:
 
         Parameters
         ----------
-        deadline_s : time of ``time.monotonic()``. One in the past only takes what is there already, so bytes that
-            came while this process was stalled still count.
+        deadline_s : time of ``time.monotonic()``. One in the past only takes what is there already, so that
+            bytes which came while this process was stalled still count.
 
         Returns
         -------

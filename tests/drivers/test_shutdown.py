@@ -44,8 +44,9 @@ def run(root: Path, how: str, send: int | None = None) -> tuple[int, str]:
     assert child.stdout.readline() == "ready\n"
     if send is not None:
         child.send_signal(send)
-    out, _ = child.communicate(timeout=20)
-    return child.returncode, out
+    with child.stdout as stream:
+        out = stream.read()
+    return child.wait(timeout=20), out
 
 
 @pytest.mark.parametrize(
