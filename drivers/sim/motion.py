@@ -1,0 +1,163 @@
+"""How a simulated shaft moves: pieces of constant acceleration, evaluated when somebody looks.
+
+Units are position steps (ticks) and seconds. A trajectory is planned when a goal is written and read at any
+later time, so a bus at rest costs nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Motion(NamedTuple):
+    """Position (ticks), velocity (ticks/s) and acceleration (ticks/s²) at one moment."""
+
+    position: float
+    velocity: float
+    acceleration: float
+
+
+class Profile:
+    """Profile types as Moving Status (123) bits 4-5 number them."""
+
+    STEP = 0
+    RECTANGULAR = 1
+    TRIANGULAR = 2
+    TRAPEZOIDAL = 3
+
+
+class Trajectory:
+    """Motion from `start_s` on: pieces of constant acceleration, then the last velocity for ever.
+
+    Parameters
+    ----------
+    start_s : time of the first piece.
+    position, velocity : motion at that time.
+    pieces : (duration in seconds, acceleration) in order.
+    goal : position it ends at, set exactly (rounding must not leave a servo a hair off its goal); None where
+        it never ends (velocity control).
+    profile : a `Profile` number.
+    """
+
+    __slots__ = ("_end", "_pieces", "duration", "profile", "start_s")
+
+    def __init__(
+        self,
+        start_s: float,
+        position: float,
+        velocity: float,
+        pieces: list[tuple[float, float]],
+        goal: float | None = None,
+        profile: int = Profile.STEP,
+    ) -> None:
+        self.start_s, self.profile = start_s, profile
+        self._pieces: list[tuple[float, float, float, float]] = []
+        at = 0.0
+        for duration, acceleration in pieces:
+            if duration <= 0.0:
+                continue
+            self._pieces.append((at, position, velocity, acceleration))
+            position += (velocity + 0.5 * acceleration * duration) * duration
+            velocity += acceleration * duration
+            at += duration
+        self.duration = at
+        self._end = (position, velocity) if goal is None else (goal, 0.0)
+
+    @property
+    def end(self) -> float:
+        """Position where the pieces end."""
+        return self._end[0]
+
+    def moving(self, now_s: float) -> bool:
+        """Whether the pieces are still running."""
+        return now_s - self.start_s < self.duration
+
+    def at(self, now_s: float) -> Motion:
+        """Motion at a time; before the start it is the start's."""
+        t = max(now_s - self.start_s, 0.0)
+        if t >= self.duration:
+            position, velocity = self._end
+            return Motion(position + velocity * (t - self.duration), velocity, 0.0)
+        piece = next(piece for piece in reversed(self._pieces) if t >= piece[0])
+        begin, position, velocity, acceleration = piece
+        t -= begin
+        return Motion(
+            position + (velocity + 0.5 * acceleration * t) * t, velocity + acceleration * t, acceleration
+        )
+
+
+def hold(now_s: float, position: float) -> Trajectory:
+    """Stand still."""
+    return Trajectory(now_s, position, 0.0, [], position)
+
+
+def plan_move(
+    now_s: float,
+    position: float,
+    velocity: float,
+    goal: float,
+    top_speed: float,
+    acceleration: float,
+    profile: int = Profile.TRAPEZOIDAL,
+) -> Trajectory:
+    """Quickest move to rest at `goal`: a trapezoid, or a triangle where it is too short.
+
+    Parameters
+    ----------
+    top_speed, acceleration : above zero, ticks/s and ticks/s².
+    profile : number to report; a trapezoid that never cruises is reported as triangular.
+    """
+    distance = goal - position
+    stop = velocity * abs(velocity) / (2.0 * acceleration)
+    side = 1.0 if distance >= stop else -1.0
+    cruise = side * top_speed
+    ramp_up = abs(cruise - velocity) / acceleration
+    ramp_down = top_speed / acceleration
+    level = distance - 0.5 * (velocity + cruise) * ramp_up - 0.5 * cruise * ramp_down
+    if level * side < 0.0:
+        peak = math.sqrt(max(acceleration * side * distance + 0.5 * velocity * velocity, 0.0))
+        cruise, level, ramp_down = side * peak, 0.0, peak / acceleration
+        ramp_up = abs(cruise - velocity) / acceleration
+        profile = Profile.TRIANGULAR if profile == Profile.TRAPEZOIDAL else profile
+    push = math.copysign(acceleration, cruise - velocity)
+    level_s = level / cruise if cruise else 0.0
+    pieces = [(ramp_up, push), (level_s, 0.0), (ramp_down, -side * acceleration)]
+    return Trajectory(now_s, position, velocity, pieces, goal, profile)
+
+
+def plan_timed(
+    now_s: float, position: float, velocity: float, goal: float, total_s: float, ramp_s: float
+) -> Trajectory:
+    """Move to rest at `goal` in exactly `total_s`, with ramps of `ramp_s` (at most half of it).
+
+    The cruising speed v follows from D = (v0 + v)/2 ramp + v (total - 2 ramp) + v/2 ramp.
+    """
+    ramp_s = min(ramp_s, 0.5 * total_s)
+    speed = (goal - position - 0.5 * velocity * ramp_s) / (total_s - ramp_s)
+    if ramp_s <= 0.0:
+        return Trajectory(now_s, position, speed, [(total_s, 0.0)], goal, Profile.RECTANGULAR)
+    pieces = [(ramp_s, (speed - velocity) / ramp_s), (total_s - 2.0 * ramp_s, 0.0), (ramp_s, -speed / ramp_s)]
+    profile = Profile.TRAPEZOIDAL if total_s > 2.0 * ramp_s else Profile.TRIANGULAR
+    return Trajectory(now_s, position, velocity, pieces, goal, profile)
+
+
+def plan_speed(
+    now_s: float, position: float, velocity: float, goal_velocity: float, acceleration: float
+) -> Trajectory:
+    """Ramp to a velocity and keep it."""
+    change = goal_velocity - velocity
+    pieces = [(abs(change) / acceleration, math.copysign(acceleration, change))]
+    return Trajectory(now_s, position, velocity, pieces, None, Profile.RECTANGULAR)
+
+
+def plan_stop(now_s: float, position: float, velocity: float, acceleration: float) -> Trajectory:
+    """Slow down to rest, wherever that is."""
+    time = abs(velocity) / acceleration
+    return Trajectory(
+        now_s,
+        position,
+        velocity,
+        [(time, -math.copysign(acceleration, velocity))],
+        position + 0.5 * velocity * time,
+    )
