@@ -1,0 +1,139 @@
+"""The SDK's port handler, mended: exclusive, blocking, monotonic, with timeouts that fit the wire.
+
+See drivers/dynamixel/sdk.py for the list of faults that the numbers S1 to S14 refer to.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from dynamixel_sdk import port_handler
+
+from drivers.errors import DriverError
+from drivers.serialport import SerialPort, latency_s
+
+HOST_MARGIN_S = 0.010
+"""Time a busy host may need to notice a reply, beyond the wire and the adapter."""
+UNKNOWN_LATENCY_S = 0.002
+
+
+class Port(port_handler.PortHandler):
+    """The SDK's port handler on an exclusive, blocking :class:`~drivers.serialport.SerialPort`.
+
+    Parameters
+    ----------
+    path : device path.
+    baud : any rate the adapter takes.
+    margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
+    """
+
+    def __init__(self, path: str, baud: int = 1_000_000, margin_s: float | None = None) -> None:
+        self._busy = threading.Lock()
+        super().__init__(path)
+        self.baudrate = baud
+        self.link = SerialPort(path, baud)
+        self.suspects: set[int] = set()
+        self.stray = 0
+        self.deadline_s = 0.0
+        self._margin_s = margin_s
+        self._held = bytearray()
+        self._tune()
+
+    def _tune(self) -> None:
+        latency = latency_s(self.link.path)
+        latency = UNKNOWN_LATENCY_S if latency is None else latency
+        self.margin_s = 2 * latency + HOST_MARGIN_S if self._margin_s is None else self._margin_s
+        self.tx_time_per_byte = 10_000.0 / self.baudrate  # milliseconds, the SDK's unit
+
+    def openPort(self) -> bool:
+        """Open exclusively; raises PortMissing, PortBusy or PortPermission instead of returning False."""
+        return self.setupPort(self.baudrate)
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """As ``openPort``, at a rate."""
+        self.link.baud = self.baudrate = cflag_baud
+        self.link.open()
+        self.ser = self.link.serial
+        self.is_open, self.is_using = True, False
+        self.suspects.clear()
+        self._held.clear()
+        self._tune()
+        return True
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Any rate, not only those of the SDK's list (4.5 Mbaud is real)."""
+        return self.setupPort(baudrate)
+
+    def closePort(self) -> None:
+        """Close; never raises."""
+        self.link.close()
+        self.is_open = self.is_using = False
+
+    def setPortName(self, port_name: str) -> None:
+        """Another device path for the next opening."""
+        super().setPortName(port_name)
+        self.link.path = port_name
+
+    def clearPort(self) -> None:
+        """Throw away all input (S3)."""
+        if self._held:
+            self._held.clear()
+        self.link.drain()
+
+    def getBytesAvailable(self) -> int:
+        """Bytes that can be read without waiting."""
+        self._held += self.link.read(0.0)
+        return len(self._held)
+
+    def readPort(self, length: int) -> bytes:
+        """At most ``length`` bytes, waiting for the first until the packet timeout (S12)."""
+        if not self._held:
+            self._held += self.link.read(self.deadline_s)
+        data = bytes(self._held[:length])
+        del self._held[:length]
+        return data
+
+    def writePort(self, packet: bytes) -> int:
+        """Send; returns the count sent."""
+        self.link.write(bytes(packet))
+        return len(packet)
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Deadline for a reply of ``packet_length`` bytes: wire time plus margin (S7)."""
+        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + self.margin_s * 1000.0)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Deadline so many milliseconds from now."""
+        super().setPacketTimeoutMillis(msec)
+        self.deadline_s = time.monotonic() + msec / 1000.0
+
+    def isPacketTimeout(self) -> bool:
+        """True behind the deadline."""
+        return time.monotonic() > self.deadline_s
+
+    def getCurrentTime(self) -> float:
+        """Milliseconds on the monotonic clock (S8)."""
+        return time.monotonic() * 1000.0
+
+    @property
+    def is_using(self) -> bool:
+        """True in the middle of a transaction. Setting it begins or ends one (S5, S9).
+
+        Raises
+        ------
+        DriverError : another thread is in the middle of a transaction.
+        """
+        return self._busy.locked()
+
+    @is_using.setter
+    def is_using(self, value: bool) -> None:
+        if not value:
+            if self._busy.locked():
+                self._busy.release()
+        elif not self._busy.acquire(blocking=False):
+            raise DriverError(
+                f"port {self.port_name} is used from two threads at once",
+                hint="let one thread do all reads and writes of a bus",
+                port=self.port_name,
+            )
