@@ -14,9 +14,8 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.channels import build_table, servo_specs
+from controller.channels import build_table, limiter_of, servo_specs
 from controller.clock import Clock, Samples
-from controller.motion import MotionLimiter
 from controller.parameters import Parameters
 from controller.robot import BusSettings, ChannelSettings
 from drivers import open_bus
@@ -61,9 +60,7 @@ class BusLoop:
         self.held = 0
         self.error: DriverError | None = None
         self._newest = newest
-        self._limiter = MotionLimiter(
-            self.table.max_speed_rad_s, self.table.max_accel_rad_s2, self.table.low_rad, self.table.high_rad
-        )
+        self._limiter = limiter_of(self.table, 1.0 / settings.rate_hz)
         self._sent = np.zeros(len(channels))
         self._last_stamp = 0
         self._stopping = threading.Event()

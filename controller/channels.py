@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.motion import MotionLimiter
 from controller.parameters import Parameters
 from controller.robot import ChannelSettings
 from drivers.bus import ServoSpec
@@ -62,6 +63,13 @@ class ChannelTable:
         wanted = self.start_rad + (pieces * self.slopes).sum(axis=1)
         held = np.clip(wanted, self.low_rad, self.high_rad)
         return held, int(np.count_nonzero(held != wanted))
+
+
+def limiter_of(table: ChannelTable, period_s: float) -> MotionLimiter:
+    """Keeps the table's limits of position (rad), speed and acceleration at a bus that cycles every ``period_s``."""
+    return MotionLimiter(
+        table.max_speed_rad_s, table.max_accel_rad_s2, table.low_rad, table.high_rad, response_s=period_s
+    )
 
 
 def build_table(channels: Sequence[ChannelSettings], parameters: Parameters) -> ChannelTable:

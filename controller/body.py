@@ -1,0 +1,176 @@
+"""The body: links, layers, motion limits and buses, in a process of its own.
+
+The control loop turns commands into parameters at ``control_hz`` and publishes them; each bus drives its servos
+at its own rate from the newest ones. The process stops its servos safely on every way out: told to, main gone,
+SIGTERM, or a fault of its own.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from contextlib import ExitStack
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.busloop import BusLoop
+from controller.clock import Clock
+from controller.commands import CommandState
+from controller.errors import OMOTE_ERRORS
+from controller.linelink import LineLink
+from controller.links import open_links
+from controller.livelink import Take, TakePlayer
+from controller.mailbox import Mailbox
+from controller.parameters import PARAMETERS, Parameters
+from controller.stage import Stage, load_stage
+from controller.wire import BodyOrders, Failed, Finished, Ready, Report
+
+Floats = NDArray[np.float64]
+
+_POLL_S = 0.1
+
+
+class Body:
+    """Everything between the links and the wires of one stage.
+
+    Parameters
+    ----------
+    stage : what to run.
+    parameters : the vocabulary.
+    mailbox : where the parameters are published, one per entry of ``parameters.names``.
+    take : a recorded take played into the live-capture layer; None for none.
+    """
+
+    def __init__(
+        self, stage: Stage, parameters: Parameters, mailbox: Mailbox, take: Take | None = None
+    ) -> None:
+        self.stage = stage
+        self.state = CommandState(parameters)
+        self.clock = Clock(stage.settings.control_hz)
+        self.player = TakePlayer(take, self.state) if take is not None else None
+        self.links: list[LineLink] = []
+        self.buses = [
+            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest)
+            for robot in stage.robots
+            for bus in robot.buses
+        ]
+        self._mailbox = mailbox
+        self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
+        self._stopping = threading.Event()
+        self._closers = ExitStack()
+        self._thread = threading.Thread(target=self._control, name="control", daemon=True)
+
+    def newest(self) -> tuple[Floats, int]:
+        """The newest parameters and the arrival time (monotonic ns) of the command behind them."""
+        return self._newest
+
+    @property
+    def finished(self) -> bool:
+        """True once a take has been played to its end."""
+        return self.player is not None and self.player.finished
+
+    def start(self) -> None:
+        """Bring up buses first, then links: no command is taken before the servos stand.
+
+        Raises
+        ------
+        ControllerError, DriverError
+            when a port, servo or link does not come up; what was up is shut down again.
+        """
+        try:
+            for bus in self.buses:
+                bus.start()
+                self._closers.callback(bus.stop)
+            if self.player is None:
+                self.links = open_links(self.stage.settings.links, self.state, self._closers)
+            self._thread.start()
+        except BaseException:
+            self._closers.close()
+            raise
+
+    def stop(self) -> None:
+        """Close links, then stop the servos; errors of one do not keep the others from being stopped."""
+        self._stopping.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._closers.close()
+
+    def _control(self) -> None:
+        values = self._newest[0].copy()
+        last = time.monotonic_ns()
+        for now in self.clock.run(lambda: not self._stopping.is_set()):
+            if self.player is not None:
+                self.player.tick(now)
+            stamp = self.state.tick(now, (now - last) / 1e9, values)
+            last = now
+            self._newest = (values.copy(), stamp)
+            self._mailbox.publish(values, stamp)
+
+    def report(self) -> dict[str, object]:
+        """What was measured by the control loop, the links and the buses."""
+        return {
+            "control": self.clock.report(),
+            "links": [link.report() for link in self.links],
+            "buses": [bus.report() for bus in self.buses],
+        }
+
+
+def body_main(orders: BodyOrders, pipe: Connection) -> None:
+    """Entry of the body's process.
+
+    Parameters
+    ----------
+    orders : what to do.
+    pipe : to main: one :class:`Ready` or :class:`Failed`, perhaps :class:`Finished`, at the end a
+        :class:`Report`. Anything main sends means stop, and so does main's end.
+    """
+    stop = threading.Event()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
+    signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    try:
+        _serve(orders, pipe, stop)
+    except OMOTE_ERRORS as error:
+        _tell(pipe, Failed(str(error), error.hint))
+    except Exception as error:  # noqa: BLE001  main must hear of it whatever it was
+        if os.environ.get("OMOTE_DEBUG"):
+            raise
+        _tell(pipe, Failed(f"the body process failed: {type(error).__name__}: {error}"))
+
+
+def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
+    parameters = PARAMETERS
+    stage = load_stage(orders.stage, parameters)
+    take = Take.load(Path(orders.take), parameters) if orders.take else None
+    mailbox = Mailbox(orders.mailbox, len(parameters.names))
+    body = Body(stage, parameters, mailbox, take)
+    body.start()
+    try:
+        _tell(pipe, Ready())
+        _wait(body, pipe, stop)
+    finally:
+        body.stop()
+    _tell(pipe, Report(body.report()))
+
+
+def _wait(body: Body, pipe: Connection, stop: threading.Event) -> None:
+    """Until main says stop, main is gone, a signal comes, or a bus gave up."""
+    told = False
+    while not stop.is_set() and not pipe.poll(_POLL_S):
+        if body.finished and not told:
+            _tell(pipe, Finished())
+            told = True
+        for bus in body.buses:
+            if bus.error is not None:
+                raise bus.error
+
+
+def _tell(pipe: Connection, message: object) -> None:
+    try:
+        pipe.send(message)
+    except OSError:
+        pass  # main is gone; the servos are stopped all the same

@@ -1,0 +1,82 @@
+"""Finding out what a file is and checking it whole."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from controller.errors import ConfigError
+from controller.parameters import PARAMETERS, Parameters
+from controller.paths import find_config
+
+
+def check_anything(name: str) -> list[str]:
+    """Check a stage, robot, head or take; returns what it is, in a line or two.
+
+    Parameters
+    ----------
+    name : a path, or the name of a shipped stage, robot or head.
+
+    Raises
+    ------
+    ConfigError, SurfaceError
+        listing every fault.
+    """
+    path = _find(name)
+    if path.is_dir() or path.name == "head.toml":
+        return _check_head(path if path.is_dir() else path.parent)
+    if path.suffix.lower() == ".csv":
+        return _check_take(path)
+    return _check_toml(path)
+
+
+def _find(name: str) -> Path:
+    if Path(name).exists():
+        return Path(name)
+    for kind in ("stages", "robots", "heads"):
+        try:
+            return find_config(kind, name)
+        except ConfigError:
+            continue
+    raise ConfigError(f"{name}: no such file, and no stage, robot or head of that name", hint="omote check demo")
+
+
+def _check_head(folder: Path) -> list[str]:
+    from surface.head import Head
+
+    head = Head.load(folder)
+    vertices = sum(len(part.vertices) for part in head.parts)
+    return [f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, {len(head.parameters)} parameters: good"]
+
+
+def _check_take(path: Path) -> list[str]:
+    from controller.livelink import Take
+
+    take = Take.load(path, PARAMETERS)
+    return [f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz: good"]
+
+
+def _check_toml(path: Path) -> list[str]:
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        table = {}  # the reader below says what is wrong
+    if "channels" in table or "buses" in table:
+        return _check_robot(path, PARAMETERS)
+    return _check_stage(path, PARAMETERS)
+
+
+def _check_robot(path: Path, parameters: Parameters) -> list[str]:
+    from controller.robot import load_robot
+
+    robot = load_robot(path, parameters)
+    return [f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels: good"]
+
+
+def _check_stage(path: Path, parameters: Parameters) -> list[str]:
+    from controller.stage import load_stage
+
+    stage = load_stage(str(path), parameters)
+    links = ", ".join(f"{link.kind} on {link.port}" for link in stage.settings.links) or "none"
+    robots = ", ".join(robot.name for robot in stage.robots) or "none"
+    return [f"stage {stage.settings.name}: head {stage.head.name}, links: {links}, robots: {robots}: good"]

@@ -1,0 +1,144 @@
+"""``omote ports``, ``scan`` and ``simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from controller.errors import ConfigError
+
+console = Console(highlight=False)
+
+
+def register(app: typer.Typer) -> None:
+    """Add this module's commands to ``app``."""
+    app.command()(ports)
+    app.command()(scan)
+    simulators = typer.Typer(no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
+    simulators.command("dynamixel")(simulate_dynamixel)
+    simulators.command("robot")(simulate_robot)
+    simulators.command("host")(simulate_host)
+    app.add_typer(simulators, name="simulate")
+
+
+def ports() -> None:
+    """List the serial ports of this machine, and what to type where one cannot be used.
+
+    Example: omote ports
+    """
+    from drivers.ports import list_ports
+
+    found = list_ports()
+    if not found:
+        console.print("No serial port found. Plug the adapter in, or try: omote simulate dynamixel --link /tmp/head")
+        return
+    table = Table("port", "usb", "serial number", "description", "usable", "latency timer")
+    for record in found:
+        latency = "" if record.latency_s is None else f"{record.latency_s * 1000:g} ms"
+        usable = "yes" if record.usable else "[red]no[/]"
+        table.add_row(record.path, record.vid_pid, record.serial_number, record.description, usable, latency)
+    console.print(table)
+    for record in found:
+        if record.hint:
+            console.print(f"{record.device}: {record.hint}", soft_wrap=True)
+
+
+def scan(
+    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    baud: Annotated[
+        list[int] | None, typer.Option("--baud", help="Baud rate to try; may be repeated. All without it.")
+    ] = None,
+) -> None:
+    """Look for Dynamixel servos on a port; nothing moves.
+
+    Example: omote scan /dev/ttyUSB0 --baud 1000000
+    """
+    from controller.scanning import scan_port
+
+    table = Table("baud", "id", "model", "firmware", "voltage", "temperature", "error")
+    with console.status("scanning") as status:
+        rows = list(scan_port(port, baud, lambda text: status.update(f"scanning {text}")))
+    for row in rows:
+        table.add_row(*row)
+    if rows:
+        console.print(table)
+    else:
+        console.print(f"No servo answered on {port}. Check its power, the wiring and the adapter's direction switch.")
+
+
+def parse_ids(text: str) -> list[int]:
+    """``1-3,7`` as [1, 2, 3, 7].
+
+    Raises
+    ------
+    ConfigError
+        naming the part that is no id or range of ids.
+    """
+    ids: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdigit() or (dash and not last.isdigit()):
+            raise ConfigError(f"--ids {text}: {part.strip()!r} is no id", hint="for example --ids 1-24 or --ids 1,3,7-9")
+        ids += range(int(first), int(last or first) + 1)
+    wrong = [i for i in ids if i > 252]
+    if wrong or not ids or len(set(ids)) != len(ids):
+        raise ConfigError(f"--ids {text}: ids go from 0 to 252, each once", hint="for example --ids 1-24")
+    return ids
+
+
+Link = Annotated[Path | None, typer.Option("--link", help="Make this path a link to the pseudo-terminal.")]
+Wire = Annotated[bool, typer.Option("--wire", help="Bytes take the time they take at the baud rate.")]
+Faults = Annotated[
+    list[str] | None, typer.Option("--fault", metavar="SPEC", help="Fault to inject, for example mute:7; repeatable.")
+]
+
+
+def simulate_dynamixel(
+    ids: Annotated[str, typer.Option("--ids", help="Ids of the servos: 1-24 or 1,3,7-9.")] = "1-24",
+    model: Annotated[str, typer.Option(help="Model of the servos.")] = "xl330-m288",
+    baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
+    link: Link = None,
+    wire: Wire = False,
+    fault: Faults = None,
+) -> None:
+    """Serve simulated Dynamixel servos (Protocol 2.0) until interrupted; prints `ready PATH`.
+
+    Example: omote simulate dynamixel --ids 1-24 --model xl330-m288 --link /tmp/head
+    """
+    from controller.simulating import serve_servos
+
+    serve_servos({i: model for i in parse_ids(ids)}, baud, link, wire, fault or [], console)
+
+
+def simulate_robot(
+    robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],
+    bus: Annotated[str | None, typer.Option("--bus", help="Name of the bus; the first without it.")] = None,
+    link: Link = None,
+    wire: Wire = False,
+    fault: Faults = None,
+) -> None:
+    """Serve the simulated servos a robot file describes, until interrupted; prints `ready PATH`.
+
+    Example: omote simulate robot head24 --link /tmp/head
+    """
+    from controller.simulating import robot_servos, serve_servos
+
+    models, baud = robot_servos(robot, bus)
+    serve_servos(models, baud, link, wire, fault or [], console)
+
+
+def simulate_host(
+    script: Annotated[str, typer.Argument(help="Script: a name from configs/scripts.")] = "tour",
+    link: Link = None,
+) -> None:
+    """Serve a simulated robot host that writes omote line protocol, until interrupted; prints `ready PATH`.
+
+    Example: omote simulate host tour --link /tmp/robot
+    """
+    from controller.simulating import serve_host
+
+    serve_host(script, link, console)

@@ -1,0 +1,29 @@
+"""``omote check``: read a configuration, a head or a take and say everything that is wrong with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+console = Console(highlight=False)
+
+
+def register(app: typer.Typer) -> None:
+    """Add this module's command to ``app``."""
+    app.command()(check)
+
+
+def check(
+    file: Annotated[str, typer.Argument(help="A stage, robot, head folder or take: a path or a shipped name.")],
+) -> None:
+    """Check a stage, a robot, a head or a take without running it; lists every fault with its place.
+
+    Example: omote check configs/robots/head24.toml
+    """
+    from controller.checking import check_anything
+
+    for line in check_anything(file):
+        console.print(line)

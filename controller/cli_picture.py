@@ -1,0 +1,64 @@
+"""``omote render`` and ``fit``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+console = Console(highlight=False)
+
+
+def register(app: typer.Typer) -> None:
+    """Add this module's commands to ``app``."""
+    app.command()(render)
+    app.command()(fit)
+
+
+def render(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Picture to write (PNG).")],
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated.")
+    ] = None,
+    expression: Annotated[
+        list[str] | None,
+        typer.Option("--expression", "-e", metavar="NAME[=INTENSITY]", help="Add a named expression."),
+    ] = None,
+    size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "800x800",
+    camera: Annotated[str, typer.Option(help="front, three_quarter or profile.")] = "front",
+    quality: Annotated[str, typer.Option(help="full or fast.")] = "full",
+    head: Annotated[str, typer.Option(help="Head: a name from configs/heads or a folder.")] = "ict",
+    sheet: Annotated[
+        bool, typer.Option("--sheet", help="Draw every parameter at its end and every named expression.")
+    ] = False,
+) -> None:
+    """Draw one picture of the face, without a display.
+
+    Example: omote render --set jawOpen=0.8 --size 800x800 -o out.png
+    """
+    from controller.still import Still, draw_sheet, draw_still
+
+    still = Still.parse(settings or [], expression or [], size, camera, quality, head)
+    if sheet:
+        with console.status("drawing the sheet"):
+            draw_sheet(still, out)
+    else:
+        draw_still(still, out)
+    console.print(f"wrote {out}", soft_wrap=True)
+
+
+def fit(
+    mesh: Annotated[Path, typer.Argument(help="Mesh with UVs and expression shapes (.npz).")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the head to write.")],
+    name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
+) -> None:
+    """Turn a mesh with UVs and expression shapes into a head of control points.
+
+    Example: omote fit ict_neutral_and_expressions.npz -o heads/mine
+    """
+    from controller.fitting import fit_with_progress
+
+    for line in fit_with_progress(mesh, out, name or out.name, console):
+        console.print(line)

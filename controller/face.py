@@ -1,0 +1,162 @@
+"""The face at its own clock: the newest parameters to the head, the head to a picture.
+
+It reads parameters from a mailbox and never waits for links or servos.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.clock import Clock, Samples
+from controller.mailbox import Mailbox
+from controller.parameters import Parameters
+from controller.stage import FaceSettings
+
+if TYPE_CHECKING:
+    from surface.head import Head
+    from surface.view import Offscreen
+
+Floats = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+
+class HeadValues:
+    """Picks a head's parameters out of the full vector.
+
+    Parameters
+    ----------
+    mailbox : where the full vector (p,) is published.
+    parameters : names of the full vector.
+    wanted : names the head understands; names omote does not know stay 0.
+    """
+
+    def __init__(self, mailbox: Mailbox, parameters: Parameters, wanted: Sequence[str]) -> None:
+        place = {name: i for i, name in enumerate(parameters.names)}
+        self._mailbox = mailbox
+        self._full = np.zeros(len(parameters.names))
+        self._from = np.array([place[name] for name in wanted if name in place], dtype=np.intp)
+        self._to = np.array([i for i, name in enumerate(wanted) if name in place], dtype=np.intp)
+        self.values = np.zeros(len(wanted))
+        self.stamp_ns = 0
+
+    def __call__(self) -> Floats:
+        """The newest values in the head's order, (h,) float64; the same array each time."""
+        _, self.stamp_ns = self._mailbox.read(self._full)
+        self.values[self._to] = self._full[self._from]
+        return self.values
+
+
+class Recorder:
+    """Keeps a few small pictures of a run: frames for a clip, moments for a contact sheet.
+
+    Parameters
+    ----------
+    clip_fps : pictures per second in the clip.
+    height : height of the kept pictures (pixels).
+    """
+
+    def __init__(self, *, clip_fps: float = 12.5, height: int = 360) -> None:
+        self.clip_fps = clip_fps
+        self.height = height
+        self.frames: list[Image] = []
+        self.times_s: list[float] = []
+        self._next_s = 0.0
+
+    def wants(self, time_s: float) -> bool:
+        """Whether a picture is due."""
+        return time_s >= self._next_s
+
+    def keep(self, picture: Image, time_s: float) -> None:
+        """Keep the middle square of one picture (h, w, 3) uint8, made smaller."""
+        step = max(1, picture.shape[0] // self.height)
+        self.frames.append(_shrink(_middle_square(picture), step))
+        self.times_s.append(time_s)
+        self._next_s = (int(time_s * self.clip_fps) + 1) / self.clip_fps
+
+
+def _middle_square(picture: Image) -> Image:
+    h, w = picture.shape[:2]
+    side = min(h, w)
+    top, left = (h - side) // 2, (w - side) // 2
+    return picture[top : top + side, left : left + side]
+
+
+def _shrink(picture: Image, step: int) -> Image:
+    """Mean of ``step`` x ``step`` pixels."""
+    if step == 1:
+        return picture.copy()
+    h, w = picture.shape[0] // step * step, picture.shape[1] // step * step
+    blocks = picture[:h, :w].reshape(h // step, step, w // step, step, 3)
+    return blocks.mean(axis=(1, 3)).astype(np.uint8)
+
+
+class HeadlessFace:
+    """Draws frame after frame without a display.
+
+    Parameters
+    ----------
+    head : the head to draw.
+    settings : size, rate and quality.
+    values : gives the head's newest values, (h,) float64.
+    recorder : takes pictures along the way; None reads none back.
+    """
+
+    def __init__(
+        self,
+        head: Head,
+        settings: FaceSettings,
+        values: Callable[[], Floats],
+        recorder: Recorder | None = None,
+    ) -> None:
+        from surface.view import Camera, Offscreen
+
+        self._screen: Offscreen = Offscreen(head, settings.size, quality=settings.quality)
+        self._camera = getattr(Camera, settings.camera)()
+        self._values = values
+        self._recorder = recorder
+        self.settings = settings
+        self.clock = Clock(settings.fps)
+        self.frame_ms = Samples()
+        self.frames = 0
+        self.seconds = 0.0
+        self.moved = 0
+
+    def run(self, keep_going: Callable[[], bool]) -> None:
+        """Draw until ``keep_going()`` is false."""
+        started = time.monotonic_ns()
+        previous = np.zeros(0)
+        for now in self.clock.run(keep_going):
+            values = self._values()
+            self.moved += previous.size == values.size and bool((previous != values).any())
+            previous = values.copy()
+            self._draw(values, (now - started) / 1e9)
+            self.frame_ms.add((time.monotonic_ns() - now) / 1e6)
+            self.frames += 1
+        self.seconds = (time.monotonic_ns() - started) / 1e9
+
+    def _draw(self, values: Floats, time_s: float) -> None:
+        if self._recorder is not None and self._recorder.wants(time_s):
+            self._recorder.keep(self._screen.render(values, self._camera), time_s)
+        else:
+            self._screen.draw(values, self._camera)
+
+    def close(self) -> None:
+        """Give the graphics memory back."""
+        self._screen.__exit__(None, None, None)
+
+    def report(self) -> dict[str, object]:
+        """Frames, frames per second, milliseconds a frame, and how many frames differed from the one before."""
+        return {
+            "frames": self.frames,
+            "seconds": self.seconds,
+            "frames_per_second": self.frames / self.seconds if self.seconds else 0.0,
+            "frames_with_motion": self.moved,
+            "frame_ms": self.frame_ms.summary(),
+            "size": list(self.settings.size),
+            "quality": self.settings.quality,
+        }

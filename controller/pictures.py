@@ -1,0 +1,36 @@
+"""A contact sheet and a clip from the pictures a run kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from controller.face import Recorder
+from controller.files import replacing
+
+_MOMENTS = 12
+
+
+def write_pictures(recorder: Recorder, folder: Path) -> list[str]:
+    """Write ``sheet.png`` and ``face.webp`` into ``folder``; returns their paths, none without pictures.
+
+    Raises
+    ------
+    ViewError
+        when they cannot be written.
+    """
+    from surface.view.clip import write_clip
+    from surface.view.sheet import compose, write_png
+
+    if not recorder.frames:
+        return []
+    folder.mkdir(parents=True, exist_ok=True)
+    chosen = np.unique(np.linspace(0, len(recorder.frames) - 1, _MOMENTS).round().astype(int))
+    labels = [f"{recorder.times_s[i]:.1f} s" for i in chosen]
+    sheet, clip = folder / "sheet.png", folder / "face.webp"
+    with replacing(sheet) as path:
+        write_png(compose([recorder.frames[i] for i in chosen], labels, columns=4), path)
+    with replacing(clip) as path:
+        write_clip(recorder.frames, path, fps=recorder.clip_fps)
+    return [str(sheet), str(clip)]

@@ -1,0 +1,154 @@
+"""Running a stage: the body in its own process, the face in this one."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from controller.errors import ControllerError
+from controller.mailbox import Mailbox
+from controller.parameters import Parameters
+from controller.stage import Stage
+from controller.wire import BodyOrders, Failed, Finished, Ready, Report
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
+_START_TIMEOUT_S = 60.0
+_STOP_TIMEOUT_S = 30.0
+
+
+class BodyProcess:
+    """The body as main sees it; a context manager that always stops it.
+
+    Parameters
+    ----------
+    stage : what to run.
+    parameters : the vocabulary.
+    take : a recorded take to play instead of the links.
+    """
+
+    def __init__(self, stage: Stage, parameters: Parameters, take: Path | None = None) -> None:
+        from controller.body import body_main
+
+        self.mailbox = Mailbox.create(len(parameters.names))
+        self.finished = False
+        self.report: dict[str, object] = {}
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        orders = BodyOrders(str(stage.path), self.mailbox.path, str(take) if take else None)
+        self._process = context.Process(target=body_main, args=(orders, theirs), name="omote body")
+        self._process.start()
+        theirs.close()
+
+    def wait_ready(self) -> Ready:
+        """Wait until servos and links are up.
+
+        Raises
+        ------
+        ControllerError
+            with the body's own message when they do not come up.
+        """
+        message = self._receive(_START_TIMEOUT_S)
+        if not isinstance(message, Ready):
+            raise ControllerError(f"the body said {message!r} before it was ready")
+        return message
+
+    def alive(self) -> bool:
+        """Whether the body still runs and has something to play; takes in what it said.
+
+        Raises
+        ------
+        ControllerError
+            when the body gave up.
+        """
+        while self._pipe.poll():
+            self._take_in(self._receive(0.0))
+        return not self.finished
+
+    def stop(self) -> None:
+        """Ask the body to stop, wait for its servos to be safe, and keep its report."""
+        if not self._process.is_alive() and not self._pipe.poll():
+            return
+        try:
+            self._pipe.send("stop")
+            while not self.report:
+                self._take_in(self._receive(_STOP_TIMEOUT_S))
+        except BrokenPipeError:
+            pass
+        finally:
+            self._end_process()
+
+    def _take_in(self, message: object) -> None:
+        if isinstance(message, Report):
+            self.report = message.content
+        elif isinstance(message, Finished):
+            self.finished = True
+
+    def _receive(self, timeout_s: float) -> object:
+        try:
+            message = self._pipe.recv() if self._pipe.poll(timeout_s) else None
+        except (EOFError, OSError):
+            self._process.join(1.0)
+            message = Failed(f"the body process ended by itself (exit code {self._process.exitcode})")
+        if message is None:
+            raise ControllerError(f"the body did not answer within {timeout_s:g} s")
+        if isinstance(message, Failed):
+            self.report = self.report or {"failed": message.message}
+            raise ControllerError(message.message, hint=message.hint)
+        return message
+
+    def _end_process(self) -> None:
+        self._process.join(_STOP_TIMEOUT_S)
+        if self._process.is_alive():
+            self._process.terminate()
+            self._process.join(5.0)
+
+    def __enter__(self) -> BodyProcess:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if error is None:
+                self.stop()
+            else:
+                self._stop_quietly()
+        finally:
+            self._pipe.close()
+            self.mailbox.close()
+
+    def _stop_quietly(self) -> None:
+        """Stop while another error is on its way out; that one is the one to tell."""
+        try:
+            self.stop()
+        except ControllerError:
+            self._end_process()
+
+
+@dataclass
+class Deadline:
+    """True until ``seconds`` have passed since the first question; None never ends."""
+
+    seconds: float | None
+    _end: float | None = None
+
+    def __call__(self) -> bool:
+        if self.seconds is None:
+            return True
+        if self._end is None:
+            self._end = time.monotonic() + self.seconds
+        return time.monotonic() < self._end
+
+
+def yield_to_servos() -> None:
+    """Let this process give way to the body's: a late frame is seen less than a late servo target."""
+    if hasattr(os, "nice"):
+        os.nice(5)
+

@@ -1,0 +1,159 @@
+"""One picture, or one sheet of pictures, of a head."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.errors import ParameterError
+from controller.expression import Vocabulary
+from controller.files import replacing
+from controller.parameters import PARAMETERS
+from controller.paths import find_config
+
+_CAMERAS = ("front", "three_quarter", "profile")
+_QUALITIES = ("full", "fast")
+
+
+@dataclass(frozen=True)
+class Still:
+    """What to draw.
+
+    Attributes
+    ----------
+    values : (p,) float64, the full parameter vector.
+    size : width and height (pixels).
+    camera, quality : names.
+    head : folder of the head.
+    """
+
+    values: NDArray[np.float64]
+    size: tuple[int, int]
+    camera: str
+    quality: str
+    head: Path
+
+    @classmethod
+    def parse(
+        cls, settings: list[str], expressions: list[str], size: str, camera: str, quality: str, head: str
+    ) -> Still:
+        """Read the words of a command line.
+
+        Raises
+        ------
+        ParameterError, ConfigError
+            naming the word that is wrong and what would be right.
+        """
+        values = PARAMETERS.neutral()
+        for word in expressions:
+            _add_expression(values, word)
+        for word in settings:
+            index, value = parse_setting(word)
+            values[index] = value
+        _one_of("--camera", camera, _CAMERAS)
+        _one_of("--quality", quality, _QUALITIES)
+        return cls(values, parse_size(size), camera, quality, find_config("heads", head))
+
+
+def parse_setting(word: str) -> tuple[int, float]:
+    """``NAME=VALUE`` as parameter index and value; the value must lie in the parameter's range."""
+    name, equals, text = word.partition("=")
+    if not equals:
+        raise ParameterError(f"--set {word}: expected NAME=VALUE", hint="for example --set jawOpen=0.8")
+    index = PARAMETERS.index(name)
+    value = parse_number(f"--set {word}", text)
+    low, high = PARAMETERS.low[index], PARAMETERS.high[index]
+    if not low <= value <= high:
+        raise ParameterError(f"--set {word}: {PARAMETERS.names[index]} goes from {low:g} to {high:g}")
+    return index, value
+
+
+def parse_number(where: str, text: str) -> float:
+    """A finite number, or an error that says where it stood."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ParameterError(f"{where}: {text!r} is not a number")
+    return value
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """``800x600`` as (800, 600)."""
+    match = re.fullmatch(r"(\d{1,5})[xX](\d{1,5})", text.strip())
+    size = (int(match[1]), int(match[2])) if match else (0, 0)
+    if min(size) < 16 or max(size) > 16384:
+        raise ParameterError(f"--size {text}: expected WIDTHxHEIGHT, each 16 to 16384", hint="--size 800x800")
+    return size
+
+
+def _one_of(option: str, given: str, known: tuple[str, ...]) -> None:
+    if given not in known:
+        raise ParameterError(f"{option} {given}: must be one of {', '.join(known)}")
+
+
+def _add_expression(values: NDArray[np.float64], word: str) -> None:
+    name, equals, text = word.partition("=")
+    intensity = parse_number(f"--expression {word}", text) if equals else 1.0
+    if not 0.0 <= intensity <= 1.0:
+        raise ParameterError(f"--expression {word}: the intensity goes from 0 to 1")
+    for index, value in Vocabulary.load(PARAMETERS).expand(name, intensity).items():
+        values[index] = value
+
+
+def draw_still(still: Still, out: Path) -> None:
+    """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
+    from surface.head import Head
+    from surface.view import Camera, Offscreen
+    from surface.view.sheet import write_png
+
+    head = Head.load(still.head)
+    with Offscreen(head, still.size, quality=still.quality) as screen:
+        picture = screen.render(for_head(still.values, head.parameters), getattr(Camera, still.camera)())
+    with replacing(out) as path:
+        write_png(picture, path)
+
+
+def for_head(values: NDArray[np.float64], wanted: tuple[str, ...]) -> NDArray[np.float64]:
+    """The full vector (p,) in a head's own order (h,); names omote does not know stay 0."""
+    place = {name: i for i, name in enumerate(PARAMETERS.names)}
+    return np.array([values[place[name]] if name in place else 0.0 for name in wanted])
+
+
+def sheet_poses() -> list[tuple[str, NDArray[np.float64]]]:
+    """Label and full parameter vector of every picture of the sheet."""
+    poses = [("neutral", PARAMETERS.neutral())]
+    for index, name in enumerate(PARAMETERS.names):
+        for end in (PARAMETERS.low[index], PARAMETERS.high[index]):
+            if end:
+                values = PARAMETERS.neutral()
+                values[index] = end
+                poses.append((f"{name} {end:+g}" if PARAMETERS.low[index] < 0 else name, values))
+    expressions = Vocabulary.load(PARAMETERS)
+    for name in expressions.names:
+        values = PARAMETERS.neutral()
+        for index, value in expressions.expand(name, 1.0).items():
+            values[index] = value
+        poses.append((name, values))
+    return poses
+
+
+def draw_sheet(still: Still, out: Path) -> None:
+    """Draw every parameter and every named expression on one sheet (PNG)."""
+    from surface.head import Head
+    from surface.view import Camera, Offscreen
+    from surface.view.sheet import compose, write_png
+
+    head = Head.load(still.head)
+    poses = sheet_poses()
+    with Offscreen(head, (320, 320), quality=still.quality) as screen:
+        camera = getattr(Camera, still.camera)()
+        pictures = [screen.render(for_head(values, head.parameters), camera).copy() for _, values in poses]
+    with replacing(out) as path:
+        write_png(compose(pictures, [label for label, _ in poses], columns=8), path)
