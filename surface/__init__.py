@@ -4,6 +4,18 @@ from __future__ import annotations
 
 from .basis import blending
 from .dcp import DCPSurface
+from .domain import Domain, Slit
 from .errors import FitError, HeadFileError, SurfaceError, ViewError
+from .mesh import Mesh
 
-__all__ = ["DCPSurface", "FitError", "HeadFileError", "SurfaceError", "ViewError", "blending"]
+__all__ = [
+    "DCPSurface",
+    "Domain",
+    "FitError",
+    "HeadFileError",
+    "Mesh",
+    "Slit",
+    "SurfaceError",
+    "ViewError",
+    "blending",
+]

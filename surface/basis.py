@@ -106,7 +106,7 @@ def _check_degrees(degrees: Ints, name: str) -> None:
 
 
 def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
-    """Raise ``ValueError`` for knots that are not finite, decrease, or have fewer than two distinct values."""
+    """Raise ``ValueError`` for knots that are not finite, that decrease, or are all equal."""
     _check_degrees(degrees, name)
     finite = np.isfinite(padded).all(axis=1)
     if not finite.all():

@@ -19,6 +19,9 @@ from .bins import Bins, build_bins
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
+    from .domain import Domain
+    from .mesh import Mesh
+
 CHUNK = 8192  # samples per pass of basis_matrix: bounds its scratch memory
 
 
@@ -40,8 +43,8 @@ class DCPSurface:
 
     Notes
     -----
-    Blending functions are right-continuous as in NURBS. Where that leaves (u, v) uncovered, the limits from the
-    left are tried (first in u, then v, then both), which includes the right end of a clamped domain.
+    Blending functions are right-continuous as in NURBS. Where that leaves (u, v) uncovered, the limits from
+    the left are tried (first in u, then v, then both), which includes the right end of a clamped domain.
     """
 
     def __init__(self, points: ArrayLike, weights: ArrayLike, knots_u: Any, knots_v: Any) -> None:
@@ -53,7 +56,12 @@ class DCPSurface:
         self._set(xyz, w, (ku, kv), (pu, pv), None)
 
     def _set(
-        self, points: Floats, weights: Floats, knots: tuple[Floats, Floats], degrees: tuple[Ints, Ints], bins: Bins | None
+        self,
+        points: Floats,
+        weights: Floats,
+        knots: tuple[Floats, Floats],
+        degrees: tuple[Ints, Ints],
+        bins: Bins | None,
     ) -> None:
         self._points, self._weights = points, weights
         self._ku, self._kv = knots
@@ -72,7 +80,7 @@ class DCPSurface:
         control_points: ArrayLike,
         weights: ArrayLike | None = None,
     ) -> DCPSurface:
-        """The same surface as a NURBS surface; see :func:`surface.nurbs.nurbs_arrays` for arguments and errors.
+        """The same surface as a NURBS surface; arguments and errors as :func:`surface.nurbs.nurbs_arrays`.
 
         Point (i, j) of the net becomes control point ``i * nv + j``.
         """
@@ -104,11 +112,15 @@ class DCPSurface:
             knots = np.array(rows, dtype=np.float64, order="C", ndmin=2)
             p = np.array(degrees, dtype=np.int64, ndmin=1)
             if len(knots) != len(xyz) or len(p) != len(xyz) or len(w) != len(xyz):
-                raise ValueError(f"knots_{name}, degrees_{name}, weights: need one row per point ({len(xyz)})")
-            check_knots(knots, p, f"knots_{name}")
+                raise ValueError(
+                    f"knots_{name}, degrees_{name}, weights: need one row per point ({len(xyz)})"
+                )
             if (p + 2 > knots.shape[1]).any():
                 raise ValueError(f"degrees_{name}: needs more knots than the {knots.shape[1]} per row")
-            sides.append((np.take_along_axis(knots, np.minimum(np.arange(knots.shape[1]), p[:, None] + 1), 1), p))
+            check_knots(knots, p, f"knots_{name}")
+            sides.append(
+                (np.take_along_axis(knots, np.minimum(np.arange(knots.shape[1]), p[:, None] + 1), 1), p)
+            )
         surface = cls.__new__(cls)
         surface._set(xyz, w, (sides[0][0], sides[1][0]), (sides[0][1], sides[1][1]), None)
         return surface
@@ -198,11 +210,13 @@ class DCPSurface:
         return self._sample(uv, None)[1] >= 0
 
     def derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
-        """S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; arguments as in :meth:`evaluate`."""
+        """S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; as :meth:`evaluate`."""
         out = self._sample_derivatives(uv, side)
         return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()
 
-    def second_derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
+    def second_derivatives(
+        self, uv: ArrayLike, side: ArrayLike | None = None
+    ) -> tuple[Floats, Floats, Floats]:
         """S_uu, S_uv and S_vv, each (m, 3) float64, NaN rows where nothing covers."""
         out = self._sample_derivatives(uv, side)
         return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
@@ -235,6 +249,50 @@ class DCPSurface:
             k = 1 if derivative[0] else 2
             ratio = (data[:, k] - ratio * total[rows, k]) / total[rows, 0]
         return csr_matrix((ratio, columns, start), shape=(len(samples), self.n))
+
+    def tessellate(
+        self,
+        *,
+        max_points: int | None = None,
+        chord_error: float | None = None,
+        max_depth: int = 9,
+        min_depth: int = 0,
+        domain: Domain | None = None,
+        loop_error: float | None = None,
+        roots: tuple[int, int] | None = None,
+        flip: bool = False,
+    ) -> Mesh:
+        """A watertight mesh by quad tree (paper, 2.3).
+
+        Parameters
+        ----------
+        max_points : quarter cells until at most so many control points reach each
+        chord_error : quarter cells until the surface is this near to their chords, in units of the points;
+            if neither limit is given, a thousandth of the size of the control net
+        max_depth, min_depth : levels below the roots, at most 20
+        domain : where to draw; the rectangle of all subdomains if left out
+        loop_error : how near the mesh's border follows the loops; ``chord_error`` if left out
+        roots : cells along u and v before any quartering; chosen roughly square if left out
+        flip : turn normals and triangles against S_u x S_v
+
+        Raises
+        ------
+        ValueError
+            For limits out of range, or where they ask for millions of cells.
+        """
+        from .tessellate import tessellate
+
+        return tessellate(
+            self,
+            max_points=max_points,
+            chord_error=chord_error,
+            max_depth=max_depth,
+            min_depth=min_depth,
+            domain=domain,
+            loop_error=loop_error,
+            roots=roots,
+            flip=flip,
+        )
 
     def _sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
         """Checked samples, the side really used (-1: uncovered) and S."""

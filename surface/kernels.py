@@ -1,23 +1,25 @@
 """Compiled kernels that evaluate blending functions: single values, samples of a surface, weights by cell.
 
-Every kernel that calls :func:`blend` lives in this file, because numba's disk cache watches one file only.
+Every kernel that calls :func:`blend` lives in this file; see :mod:`surface.jit`.
 
-Layout: ``knots`` is ``(n, w)`` float64, row i holds the ``degree[i] + 2`` knots of point i and repeats the last
-one up to the width ``w``. ``side`` is a bit mask per sample: 1 takes the limit from the left in u, 2 in v.
-Bins (``bin_start``, ``bin_ids``) list, per cell of a regular grid over (u, v), the points that reach it.
+Layout: ``knots`` is ``(n, w)`` float64, row i holds the ``degree[i] + 2`` knots of point i and repeats the
+last one up to the width ``w``. ``side`` is a bit mask per sample: 1 takes the limit from the left in u, 2 in
+v. Bins (``bin_start``, ``bin_ids``) list, per cell of a regular grid over (u, v), the points that reach it.
 """
 
+# mypy: allow-untyped-defs
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .jit import inlined, kernel
 
 TINY = 1e-290  # denominators below this count as "nothing covers"
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def span(knots, i, p, x, left):
-    """Index j of the knot interval of point i that holds x: [t_j, t_j+1), or (t_j, t_j+1] from the left; -1 if none."""
+    """Index j of the knot interval that holds x, [t_j, t_j+1), or (t_j, t_j+1] from the left; -1 if none."""
     if left:
         if not (knots[i, 0] < x <= knots[i, p + 1]):
             return -1
@@ -33,15 +35,15 @@ def span(knots, i, p, x, left):
     return j
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def ratio(a, b):
     """a / b with 0 for b = 0, the convention for repeated knots (Piegl and Tiller, The NURBS Book, 2.2)."""
     return a / b if b > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def climb(knots, i, p, x, j, top, work):
-    """Fill ``work[0 .. p - top]`` with the blending functions of degree ``top`` over the knots of point i (Cox-de Boor)."""
+    """Fill ``work[0 .. p - top]`` with point i's blending functions of degree ``top`` (Cox-de Boor)."""
     for k in range(p + 2):
         work[k] = 0.0
     work[j] = 1.0
@@ -55,7 +57,7 @@ def climb(knots, i, p, x, j, top, work):
             work[a] = value
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def blend(knots, i, p, x, left, work):
     """Value of point i's blending function at x."""
     j = span(knots, i, p, x, left)
@@ -65,7 +67,7 @@ def blend(knots, i, p, x, left, work):
     return work[0]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def blend1(knots, i, p, x, left, work):
     """Value and first derivative of point i's blending function at x."""
     j = span(knots, i, p, x, left)
@@ -79,7 +81,7 @@ def blend1(knots, i, p, x, left, work):
     return (x - knots[i, 0]) * low + (knots[i, p + 1] - x) * high, p * (low - high)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def blend2(knots, i, p, x, left, work):
     """Value, first and second derivative of point i's blending function at x."""
     j = span(knots, i, p, x, left)
@@ -98,7 +100,7 @@ def blend2(knots, i, p, x, left, work):
     return (x - t0) * low + (s2 - x) * high, p * (low - high), p * bend
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def blend_samples(knots, p, x, left, out):
     """``out[s] = (value, first, second derivative)`` of one blending function at ``x[s]``."""
     work = np.zeros(12)
@@ -106,7 +108,7 @@ def blend_samples(knots, p, x, left, out):
         out[s, 0], out[s, 1], out[s, 2] = blend2(knots, 0, p, x[s], left, work)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def bin_of(u, v, grid, shape):
     """Bin of (u, v), or -1 outside the grid; ``grid`` = (u0, v0, bins per u, bins per v, u1, v1)."""
     if not (grid[0] <= u <= grid[4] and grid[1] <= v <= grid[5]):
@@ -116,7 +118,7 @@ def bin_of(u, v, grid, shape):
     return a * shape[1] + b
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fill_bins(knots_u, knots_v, grid, shape, start, ids, count_only):
     """Count, or write, the points whose closed support reaches each bin."""
     last_u, last_v = knots_u.shape[1] - 1, knots_v.shape[1] - 1
@@ -133,7 +135,7 @@ def fill_bins(knots_u, knots_v, grid, shape, start, ids, count_only):
                 start[cell] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sum_numerators(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
     """Add b w P and b w of the listed points into ``acc[0:4]``."""
     acc[:4] = 0.0
@@ -149,9 +151,9 @@ def sum_numerators(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, w
         acc[3] += bw
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
-    """Write S into ``out`` (NaN where nothing covers) and the side really used into ``side`` (-1: uncovered)."""
+    """Write S into ``out`` (NaN where nothing covers) and the side used into ``side`` (-1: uncovered)."""
     work, acc = np.zeros(12), np.zeros(4)
     for s in range(uv.shape[0]):
         u, v, wanted = uv[s, 0], uv[s, 1], side[s]
@@ -170,7 +172,7 @@ def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, 
                 break
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
     """Add b w (P, 1) and its derivatives into ``acc (6, 4)``: rows S, u, v, uu, uv, vv."""
     acc[:, :] = 0.0
@@ -190,9 +192,9 @@ def sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, 
             acc[5, c] += a0 * b2 * value
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
-    """Write S, S_u, S_v, S_uu, S_uv, S_vv into ``out (m, 6, 3)`` for resolved sides (quotient rule, NURBS Book 4.5)."""
+    """Write S, S_u, S_v, S_uu, S_uv, S_vv into ``out (m, 6, 3)`` (quotient rule, NURBS Book 4.5)."""
     work, acc = np.zeros(12), np.zeros((6, 4))
     for s in range(uv.shape[0]):
         if side[s] < 0:
@@ -200,7 +202,9 @@ def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, s
             continue
         cell = bin_of(uv[s, 0], uv[s, 1], grid, shape)
         ids = bins[start[cell] : start[cell + 1]]
-        sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, uv[s, 0], uv[s, 1], side[s], work, acc)
+        sum_derivatives(
+            knots_u, knots_v, pu, pv, points, weights, ids, uv[s, 0], uv[s, 1], side[s], work, acc
+        )
         w, wu, wv, wuu, wuv, wvv = acc[0, 3], acc[1, 3], acc[2, 3], acc[3, 3], acc[4, 3], acc[5, 3]
         for c in range(3):
             p = acc[0, c] / w
@@ -212,7 +216,7 @@ def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, s
             out[s, 5, c] = (acc[5, c] - 2.0 * wv * dv - wvv * p) / w
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def row_capacity(grid, shape, start, uv):
     """Upper bound of the number of influences of all samples together."""
     total = 0
@@ -223,9 +227,11 @@ def row_capacity(grid, shape, start, uv):
     return total
 
 
-@njit(cache=True, nogil=True)
-def fill_rows(knots_u, knots_v, pu, pv, weights, grid, shape, start, bins, uv, side, data, columns, row_start):
-    """Write b w and its two derivatives ``data (k, 3)`` row by row; returns how many entries were written."""
+@kernel
+def fill_rows(
+    knots_u, knots_v, pu, pv, weights, grid, shape, start, bins, uv, side, data, columns, row_start
+):
+    """Write b w and its two derivatives ``data (k, 3)`` row by row; returns the number of entries."""
     work, top = np.zeros(12), 0
     for s in range(uv.shape[0]):
         row_start[s] = top

@@ -51,6 +51,6 @@ def _windows(knots: ArrayLike, name: str, count: int, degree: int) -> Floats:
     row = np.asarray(knots, dtype=np.float64)
     if row.shape != (count + degree + 1,):
         raise ValueError(
-            f"{name}: shape {row.shape}, expected ({count + degree + 1},) for {count} points of degree {degree}"
+            f"{name}: shape {row.shape}, expected ({count + degree + 1},): {count} points of degree {degree}"
         )
     return np.lib.stride_tricks.sliding_window_view(row, degree + 2).copy()

@@ -126,10 +126,8 @@ def test_uncovered_is_nan_and_masked() -> None:
 
 
 def test_limits_from_both_sides_of_a_slit() -> None:
-    low, high = [0.0, 0.0, 1.0], [1.0, 2.0, 2.0]
-    surface = DCPSurface(
-        [[0, 0, 0], [0, 0, 5]], [1, 1], [[0, 0, 1, 1, 1], [0, 0, 1, 1, 1]], [[low[0], 1, 1], [1, *high[:1], 2]]
-    )
+    flat = [0, 0, 1, 1, 1]
+    surface = DCPSurface([[0, 0, 0], [0, 0, 5]], [1, 1], [flat, flat], [[0, 1, 1], [1, 1, 2]])
     at = [[0.5, 1.0]]
     assert surface.evaluate(at)[0, 2] == 5
     assert surface.evaluate(at, side=[2])[0, 2] == 0

@@ -1,0 +1,176 @@
+"""Group a mesh's vertices into cells that share one list of control points (paper, 2.4).
+
+A cell is a branch of the quad tree, chosen so that applying its weights costs least: a large cell wastes weights
+on points that reach only some of its vertices, a small one reads control points too often.
+"""
+
+# mypy: allow-untyped-defs
+from __future__ import annotations
+
+import numpy as np
+
+from .basis import Floats, Ints
+from .bins import Bins
+from .jit import kernel
+
+LANES = 8  # float32 numbers per vector operation
+PER_POINT = 10.0  # cost of reading a control point, in weights
+MOST = 4096  # vertices of the largest cell, so that a block's sums stay in the cache
+
+
+def morton(x: Ints, y: Ints) -> Ints:
+    """(m,) int64: bits of x and y in turn, for 0 <= x, y < 2**24."""
+    out = np.zeros(len(x), dtype=np.int64)
+    for bit in range(24):
+        out |= ((x >> bit) & 1) << (2 * bit)
+        out |= ((y >> bit) & 1) << (2 * bit + 1)
+    return out
+
+
+def group(code: Ints, depth: int, uv: Floats, supports: Floats, bins: Bins) -> Ints:
+    """First vertices of the cells.
+
+    Parameters
+    ----------
+    code : (m,) int64, rising; the low ``2 * depth`` bits are the Morton code of the leaf within its root
+    depth : deepest level of the tree
+    uv : (m, 2) float64 in the same order
+    supports : (n, 4) float64 subdomains
+    bins : the surface's bins
+
+    Returns
+    -------
+    (c + 1,) int64
+    """
+    start = np.zeros(len(code) + 1, dtype=np.int64)
+    count = _group(code, depth, uv, supports, bins.grid, bins.shape, bins.start, bins.ids, start)
+    start[count] = len(code)
+    return start[: count + 1].copy()
+
+
+@kernel
+def _bin(x, low, scale, count):
+    return max(0, min(int((x - low) * scale), count - 1))
+
+
+@kernel
+def reach(box, supports, grid, shape, start, ids, out):
+    """Points whose closed subdomain meets ``box``; writes them to ``out`` if it has room, returns the number."""
+    a0, a1 = _bin(box[0], grid[0], grid[2], shape[0]), _bin(box[1], grid[0], grid[2], shape[0])
+    b0, b1 = _bin(box[2], grid[1], grid[3], shape[1]), _bin(box[3], grid[1], grid[3], shape[1])
+    count = 0
+    for a in range(a0, a1 + 1):
+        for b in range(b0, b1 + 1):
+            for q in range(start[a * shape[1] + b], start[a * shape[1] + b + 1]):
+                i = ids[q]
+                if supports[i, 0] > box[1] or supports[i, 1] < box[0]:
+                    continue
+                if supports[i, 2] > box[3] or supports[i, 3] < box[2]:
+                    continue
+                # A point stands in several bins; it counts in the first one that the box shares with it.
+                if a != max(a0, _bin(supports[i, 0], grid[0], grid[2], shape[0])):
+                    continue
+                if b != max(b0, _bin(supports[i, 2], grid[1], grid[3], shape[1])):
+                    continue
+                if count < out.shape[0]:
+                    out[count] = i
+                count += 1
+    return count
+
+
+@kernel
+def count_open(rect, supports, grid, shape, start, ids, out):
+    """Number of points whose subdomain shares an area with each rectangle ``(k, 4)``."""
+    for r in range(rect.shape[0]):
+        box = rect[r]
+        a0, a1 = _bin(box[0], grid[0], grid[2], shape[0]), _bin(box[1], grid[0], grid[2], shape[0])
+        b0, b1 = _bin(box[2], grid[1], grid[3], shape[1]), _bin(box[3], grid[1], grid[3], shape[1])
+        count = 0
+        for a in range(a0, a1 + 1):
+            for b in range(b0, b1 + 1):
+                for q in range(start[a * shape[1] + b], start[a * shape[1] + b + 1]):
+                    i = ids[q]
+                    if supports[i, 0] >= box[1] or supports[i, 1] <= box[0]:
+                        continue
+                    if supports[i, 2] >= box[3] or supports[i, 3] <= box[2]:
+                        continue
+                    if a != max(a0, _bin(supports[i, 0], grid[0], grid[2], shape[0])):
+                        continue
+                    if b == max(b0, _bin(supports[i, 2], grid[1], grid[3], shape[1])):
+                        count += 1
+        out[r] = count
+
+
+@kernel
+def _box(uv, low, high, out):
+    out[0], out[1], out[2], out[3] = uv[low, 0], uv[low, 0], uv[low, 1], uv[low, 1]
+    for s in range(low + 1, high):
+        out[0], out[1] = min(out[0], uv[s, 0]), max(out[1], uv[s, 0])
+        out[2], out[3] = min(out[2], uv[s, 1]), max(out[3], uv[s, 1])
+
+
+@kernel
+def _cost(uv, low, high, supports, grid, shape, start, ids, box, none):
+    _box(uv, low, high, box)
+    points = reach(box, supports, grid, shape, start, ids, none)
+    return points * ((high - low + LANES - 1) // LANES * LANES + PER_POINT)
+
+
+@kernel
+def _group(code, depth, uv, supports, grid, shape, start, ids, out):
+    """Depth-first over the branches: split where the four parts together are cheaper."""
+    box, none = np.zeros(4), np.zeros(0, dtype=np.int32)
+    stack = [(0, code.shape[0], 2 * depth + 2)]
+    stack.pop()
+    low = 0
+    roots = [0]
+    for s in range(1, code.shape[0] + 1):
+        if s == code.shape[0] or (code[s] >> (2 * depth)) != (code[low] >> (2 * depth)):
+            roots.append(s)
+            low = s
+    for r in range(len(roots) - 1, 0, -1):
+        stack.append((roots[r - 1], roots[r], 2 * depth))
+    count = 0
+    while len(stack) > 0:
+        low, high, shift = stack.pop()
+        if shift == 0 or high - low <= LANES:
+            out[count] = low
+            count += 1
+            continue
+        edges = [low]
+        for s in range(low + 1, high):
+            if (code[s] >> (shift - 2)) != (code[s - 1] >> (shift - 2)):
+                edges.append(s)
+        edges.append(high)
+        parts = 0.0
+        if high - low <= MOST:
+            parts = -_cost(uv, low, high, supports, grid, shape, start, ids, box, none)
+            for e in range(len(edges) - 1):
+                parts += _cost(uv, edges[e], edges[e + 1], supports, grid, shape, start, ids, box, none)
+        if parts < 0.0 or high - low > MOST or len(edges) == 2:
+            for e in range(len(edges) - 1, 0, -1):
+                stack.append((edges[e - 1], edges[e], shift - 2))
+        else:
+            out[count] = low
+            count += 1
+    return count
+
+
+@kernel
+def _fill_lists(cell_start, uv, supports, grid, shape, start, ids, list_start, out):
+    box = np.zeros(4)
+    for c in range(cell_start.shape[0] - 1):
+        _box(uv, cell_start[c], cell_start[c + 1], box)
+        room = out[list_start[c] :]
+        list_start[c + 1] = list_start[c] + reach(box, supports, grid, shape, start, ids, room)
+
+
+def point_lists(cell_start: Ints, uv: Floats, supports: Floats, bins: Bins) -> tuple[Ints, np.ndarray]:
+    """Control points that may reach each cell: ``list_start (c + 1,)`` and ``list_ids (k,)``, rising per cell."""
+    start = np.zeros(len(cell_start), dtype=np.int64)
+    arrays = (cell_start, uv, supports, bins.grid, bins.shape, bins.start, bins.ids, start)
+    _fill_lists(*arrays, np.zeros(0, dtype=np.int32))
+    ids = np.zeros(int(start[-1]), dtype=np.int32)
+    _fill_lists(*arrays, ids)
+    cell = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    return start, ids[np.lexsort((ids, cell))]
