@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -46,9 +46,7 @@ class Body:
     take : a recorded take played into the live-capture layer; None for none.
     """
 
-    def __init__(
-        self, stage: Stage, parameters: Parameters, mailbox: Mailbox, take: Take | None = None
-    ) -> None:
+    def __init__(self, stage: Stage, parameters: Parameters, mailbox: Mailbox, take: Take | None = None) -> None:
         self.stage = stage
         self.state = CommandState(parameters)
         self.clock = Clock(stage.settings.control_hz)
@@ -136,7 +134,7 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
         _serve(orders, pipe, stop)
     except OMOTE_ERRORS as error:
         _tell(pipe, Failed(str(error), error.hint))
-    except Exception as error:  # noqa: BLE001  main must hear of it whatever it was
+    except Exception as error:
         if os.environ.get("OMOTE_DEBUG"):
             raise
         _tell(pipe, Failed(f"the body process failed: {type(error).__name__}: {error}"))
@@ -170,7 +168,5 @@ def _wait(body: Body, pipe: Connection, stop: threading.Event) -> None:
 
 
 def _tell(pipe: Connection, message: object) -> None:
-    try:
+    with suppress(OSError):  # main is gone; the servos are stopped all the same
         pipe.send(message)
-    except OSError:
-        pass  # main is gone; the servos are stopped all the same

@@ -57,7 +57,7 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
-    except Exception as error:  # noqa: BLE001  the last line of defence: users get a sentence, not a traceback
+    except Exception as error:
         if os.environ.get("OMOTE_DEBUG"):
             raise
         report_error(error)

@@ -82,7 +82,7 @@ def parse_ids(text: str) -> list[int]:
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
         if not first.isdigit() or (dash and not last.isdigit()):
-            raise ConfigError(f"--ids {text}: {part.strip()!r} is no id", hint="for example --ids 1-24 or --ids 1,3,7-9")
+            raise ConfigError(f"--ids {text}: {part.strip()!r} is no id", hint="for example --ids 1,3,7-9")
         ids += range(int(first), int(last or first) + 1)
     wrong = [i for i in ids if i > 252]
     if wrong or not ids or len(set(ids)) != len(ids):
@@ -111,7 +111,7 @@ def simulate_dynamixel(
     """
     from controller.simulating import serve_servos
 
-    serve_servos({i: model for i in parse_ids(ids)}, baud, link, wire, fault or [], console)
+    serve_servos(dict.fromkeys(parse_ids(ids), model), baud, link, wire, fault or [], console)
 
 
 def simulate_robot(

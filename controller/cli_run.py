@@ -112,8 +112,9 @@ def _run_and_report(
 
 def show_report(report: dict[str, Any]) -> None:
     """Print the table of what was measured."""
-    from controller.report import rows
     from rich.table import Table
+
+    from controller.report import rows
 
     table = Table("measured", "value", title=f"omote {report['stage']}", title_justify="left")
     for name, value in rows(report):

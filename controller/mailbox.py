@@ -43,7 +43,7 @@ class Mailbox:
         words = np.frombuffer(self._map, dtype=np.int64)
         self._head = words[:_HEADER]
         slot = 1 + count
-        self._stamps = words[_HEADER :: slot][:2]
+        self._stamps = words[_HEADER::slot][:2]
         values = np.frombuffer(self._map, dtype=np.float64)[_HEADER:].reshape(2, slot)
         self._slots = values[:, 1:]
 

@@ -27,9 +27,10 @@ def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
     found = []
     if control := report.get("control"):
         found.append(("control loop", _loop(control)))
-    for link in report.get("links", []):
-        found.append((f"link {link['port']}", f"{link['accepted']} lines accepted, {link['refused']} refused"))
-    return found
+    return found + [
+        (f"link {link['port']}", f"{link['accepted']} lines accepted, {link['refused']} refused")
+        for link in report.get("links", [])
+    ]
 
 
 def _buses(buses: list[dict[str, Any]]) -> list[tuple[str, str]]:

@@ -8,16 +8,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
 
 from controller.errors import ControllerError
 from controller.mailbox import Mailbox
 from controller.parameters import Parameters
 from controller.stage import Stage
 from controller.wire import BodyOrders, Failed, Finished, Ready, Report
-
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
 
 _START_TIMEOUT_S = 60.0
 _STOP_TIMEOUT_S = 30.0
@@ -151,4 +147,3 @@ def yield_to_servos() -> None:
     """Let this process give way to the body's: a late frame is seen less than a late servo target."""
     if hasattr(os, "nice"):
         os.nice(5)
-
