@@ -168,7 +168,7 @@ class _Reader:
 
 
 def sides(parameters: Parameters, name: str) -> list[int]:
-    """Positions that ``name`` means: itself, or its left and right when it names neither; empty when unknown."""
+    """Positions that ``name`` means: itself, or its left and right; empty when unknown."""
     found = []
     for spelling in (name, f"{name}Left", f"{name}Right"):
         try:

@@ -1,13 +1,13 @@
-"""Motion in time: minimum-jerk curves, envelopes of timed expressions, and the limiter every parameter passes.
+"""Motion in time: minimum-jerk curves, envelopes, and the limiter every parameter and servo passes.
 
 The limiter follows its target along the square-root braking curve with a linear end,
 
     v(e) = e / r                          for |e| <= a r^2
     v(e) = sqrt(2 a (|e| - a r^2 / 2))    beyond,
 
-so it brakes at no more than ``a`` and arrives like a critically damped spring of time constant ``r``. Each step
-chooses one constant acceleration for its whole length, so that speed and acceleration stay inside their limits
-whatever the length of the steps, and braking from any speed ends inside the range.
+so it brakes at no more than ``a`` and arrives like a critically damped spring of time constant ``r``. Each
+step chooses one constant acceleration for its whole length, so that speed and acceleration stay inside their
+limits whatever the length of the steps, and braking from any speed ends inside the range.
 """
 
 from __future__ import annotations
@@ -62,46 +62,76 @@ class Envelope:
 
 
 class MotionLimiter:
-    """Moves (P,) values towards targets inside their range, speed and acceleration.
+    """Moves (n,) values towards targets inside their range, speed and acceleration.
 
     Parameters
     ----------
-    parameters : gives range, ``max_speed``, ``max_acceleration``, ``response_s`` and ``smooth_s`` of each.
+    max_speed : (n,) units/s. max_acceleration : (n,) units/s^2.
+    low, high : (n,) range.
+    response_s : (n,) or one number, time constant of the approach.
+    smooth_s : (n,) or one number, time constant of the jerk filter; 0 is off.
 
     Attributes
     ----------
-    limited : (P,) bool, whether the last step was held back by a speed or acceleration limit.
+    limited : (n,) bool, whether the last step was held back by a speed or acceleration limit.
+
+    Raises
+    ------
+    ValueError : a limit or ``response_s`` is not positive, or ``low`` is above ``high``.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._low, self._high = parameters.low, parameters.high
-        self._speed, self._accel = parameters.max_speed, parameters.max_acceleration
-        self._response, self._smooth = parameters.response_s, parameters.smooth_s
+    def __init__(
+        self,
+        max_speed: Floats,
+        max_acceleration: Floats,
+        low: Floats,
+        high: Floats,
+        *,
+        response_s: Floats | float = 0.02,
+        smooth_s: Floats | float = 0.0,
+    ) -> None:
+        n = len(low)
+        self._low, self._high = _vector(low, n), _vector(high, n)
+        self._speed, self._accel = _vector(max_speed, n), _vector(max_acceleration, n)
+        self._response, self._smooth = _vector(response_s, n), _vector(smooth_s, n)
+        _check_limits(self._speed, self._accel, self._response, self._high - self._low)
         self._half_knee = 0.5 * self._accel * self._response**2
-        self._position, self._velocity = parameters.neutral(), parameters.neutral()
-        self._output = parameters.neutral()
-        self._target = parameters.neutral()
-        self.limited: NDArray[np.bool_] = np.zeros(len(parameters), dtype=bool)
-        self._work = [parameters.neutral() for _ in range(6)]
-        self._flags = [np.zeros(len(parameters), dtype=bool) for _ in range(2)]
+        self._position = np.clip(np.zeros(n), self._low, self._high)
+        self._velocity = np.zeros(n)
+        self._output, self._target = self._position.copy(), self._position.copy()
+        self.limited: NDArray[np.bool_] = np.zeros(n, dtype=bool)
+        self._work = [np.zeros(n) for _ in range(6)]
+        self._flags = [np.zeros(n, dtype=bool) for _ in range(2)]
+
+    @classmethod
+    def of(cls, parameters: Parameters) -> MotionLimiter:
+        """A limiter with the limits of ``parameters``."""
+        return cls(
+            parameters.max_speed,
+            parameters.max_acceleration,
+            parameters.low,
+            parameters.high,
+            response_s=parameters.response_s,
+            smooth_s=parameters.smooth_s,
+        )
 
     @property
     def velocity(self) -> Floats:
-        """(P,) float64, present speed in units/s, before the jerk filter."""
+        """(n,) float64, present speed in units/s, before the jerk filter."""
         return self._velocity
 
     def reset(self, values: Floats) -> None:
-        """Be at ``values`` : (P,), at rest."""
+        """Be at ``values`` : (n,), at rest."""
         np.clip(values, self._low, self._high, out=self._position)
         self._velocity[:] = 0.0
         self._output[:] = self._position
         self._target[:] = self._position
 
     def step(self, dt: float, targets: Floats, out: Floats) -> Floats:
-        """Move for ``dt`` seconds towards ``targets`` : (P,) and write the values to ``out`` : (P,).
+        """Move for ``dt`` seconds towards ``targets`` : (n,) and write the values to ``out`` : (n,).
 
-        A target that is not finite leaves the earlier one in force. A step longer than 0.1 s counts as 0.1 s: after
-        a pause of the machine the face goes on from where it was and does not leap.
+        A target that is not finite leaves the earlier one in force. A step longer than 0.1 s counts as 0.1 s:
+        after a pause of the machine the face goes on from where it was and does not leap.
         """
         np.copyto(self._target, targets, where=np.isfinite(targets))
         np.clip(self._target, self._low, self._high, out=self._target)
@@ -146,10 +176,8 @@ class MotionLimiter:
         far = np.greater(left, np.multiply(self._accel, self._response, out=self._work[5]), out=self._flags[0])
         np.copyto(out, left, where=far)
 
-    def _advance(
-        self, dt: float, error: Floats, sign: Floats, speed: Floats, wanted: Floats, work: Floats
-    ) -> None:
-        """Move with constant acceleration from ``speed`` to ``wanted``; stop where the target lies on the way."""
+    def _advance(self, dt: float, error: Floats, sign: Floats, speed: Floats, wanted: Floats, work: Floats) -> None:
+        """Accelerate evenly from ``speed`` to ``wanted``; stop where the target lies on the way."""
         arrived, braking = self._flags
         np.multiply(speed, 0.5 * dt, out=work)  # way it takes to stop evenly within the step
         np.greater_equal(work, error, out=arrived)
@@ -174,3 +202,16 @@ class MotionLimiter:
         np.subtract(self._position, self._output, out=self._work[5])
         self._work[5] *= work
         self._output += self._work[5]
+
+
+def _vector(values: Floats | float, n: int) -> Floats:
+    """A private (n,) float64 copy of one number or of (n,) numbers."""
+    return np.array(np.broadcast_to(np.asarray(values, dtype=np.float64), n))
+
+
+def _check_limits(speed: Floats, accel: Floats, response: Floats, span: Floats) -> None:
+    for name, limit in (("max_speed", speed), ("max_acceleration", accel), ("response_s", response)):
+        if not np.all(limit > 0):
+            raise ValueError(f"{name}[{int(np.argmin(limit > 0))}] must be positive")
+    if not np.all(span >= 0):
+        raise ValueError(f"low[{int(np.argmin(span >= 0))}] is above high")

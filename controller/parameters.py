@@ -45,7 +45,7 @@ class Parameters:
     low, high : range of each parameter.
     full_scale_rad : angle (rad) the value 1 stands for; NaN where the parameter is not an angle.
     max_speed : largest speed (units/s). max_acceleration : largest acceleration (units/s^2).
-    response_s : time constant (s) of the approach to a target. smooth_s : time constant (s) of the jerk filter.
+    response_s : time constant (s) of the approach to a target. smooth_s : the same of the jerk filter.
     aliases : other spellings, folded, to canonical names.
     """
 
@@ -102,7 +102,7 @@ class Parameters:
         return np.array([i for i, region in enumerate(self.regions) if region == name], dtype=np.intp)
 
     def clip(self, values: Floats, out: Floats) -> Floats:
-        """Write ``values`` : (P,) into ``out`` : (P,), kept in range; what is not finite leaves ``out`` as it was."""
+        """Write ``values`` : (P,), kept in range, to ``out``; what is not finite leaves ``out`` as it was."""
         np.copyto(out, values, where=np.isfinite(values))
         return np.clip(out, self.low, self.high, out=out)
 
@@ -122,7 +122,7 @@ class Parameters:
 
 
 def fold(name: str) -> str:
-    """One spelling for all: lower case, ``_L``/``_R`` (also with ``-``, ``.`` or blank) as left/right at the end."""
+    """One spelling for all: lower case, ``_L``/``_R`` (``-``, ``.``) as left/right at the end."""
     plain = re.sub(r"[\s_.\-]+", "_", name.strip()).lower()
     plain = re.sub(r"_l$", "left", plain)
     plain = re.sub(r"_r$", "right", plain)
@@ -192,13 +192,13 @@ def _build(path: Path, table: dict[str, Any]) -> Parameters:
 def _entry(name: str, given: Any, profiles: dict[str, Any], faults: list[str]) -> dict[str, Any]:
     where = f"parameters.{name}"
     if not isinstance(given, dict):
-        faults.append(f"{where}: must be a table like {{ region = \"mouth\", profile = \"mouth\" }}")
+        faults.append(f'{where}: must be a table like {{ region = "mouth", profile = "mouth" }}')
         return {}
     profile = given.get("profile")
     if profile is not None and profile not in profiles:
         faults.append(f"{where}.profile: unknown profile {profile!r}{did_you_mean(str(profile), profiles)}")
         return {}
-    merged = {**profiles.get(profile, {}), **given}
+    merged = {**profiles.get(str(profile), {}), **given}
     faults += [f"{where}.{key}: unknown key" for key in sorted(set(merged) - _KEYS)]
     return _numbers(where, merged, faults)
 
@@ -226,12 +226,12 @@ def _numbers(where: str, merged: dict[str, Any], faults: list[str]) -> dict[str,
 
 
 def _positive(where: str, key: str, merged: dict[str, Any], faults: list[str], *, zero: bool = False) -> float:
-    value = merged.get(key)
+    value: Any = merged.get(key)
     good = _finite(value) and (value > 0 or (zero and value == 0))
     if not good:
         faults.append(f"{where}.{key}: must be a {'number not below 0' if zero else 'positive number'} (is {value!r})")
         return 1.0
-    return float(value)  # type: ignore[arg-type]
+    return float(value)
 
 
 def _range(where: str, merged: dict[str, Any], faults: list[str]) -> tuple[float, float]:

@@ -1,0 +1,214 @@
+"""Layers: many sources, one parameter vector, and for every parameter the name of the layer that holds it.
+
+A layer keeps the latest value of each parameter it was given; nothing queues. From the lowest priority to the
+highest, with s the layer's share of a parameter (weight x fade) and v its value:
+
+    set  out <- out + s (v - out)      add  out <- out + s v      max  out <- max(out, s v)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.parameters import Floats, Parameters, did_you_mean
+
+Mode = Literal["set", "add", "max"]
+Indices = NDArray[np.intp] | Sequence[int] | slice
+
+
+@dataclass(frozen=True)
+class LayerSettings:
+    """What a layer is.
+
+    Attributes
+    ----------
+    name : unique name. priority : higher goes over lower. mode : how it joins what lies below.
+    weight : 0..1. fade_in_s, fade_out_s : times to take and to give back a parameter.
+    timeout_s : a parameter not written for so long is released; infinity keeps it.
+    """
+
+    name: str
+    priority: int
+    mode: Mode = "set"
+    weight: float = 1.0
+    fade_in_s: float = 0.0
+    fade_out_s: float = 0.4
+    timeout_s: float = math.inf
+
+    def __post_init__(self) -> None:
+        if self.mode not in ("set", "add", "max"):
+            raise ValueError(f"mode must be 'set', 'add' or 'max', not {self.mode!r}")
+        if not 0.0 <= self.weight <= 1.0:
+            raise ValueError(f"weight must be 0 to 1, not {self.weight}")
+        if not (self.fade_in_s >= 0 and self.fade_out_s >= 0 and self.timeout_s > 0):
+            raise ValueError("fade_in_s and fade_out_s must not be negative, timeout_s must be positive")
+
+
+DEFAULT_LAYERS = (
+    LayerSettings("expression", 10),
+    LayerSettings("idle", 20, "add"),
+    LayerSettings("gaze", 30, fade_in_s=0.1, fade_out_s=0.5, timeout_s=1.0),
+    LayerSettings("speech", 40, fade_in_s=0.05, fade_out_s=0.15, timeout_s=1.0),
+    LayerSettings("capture", 50, fade_in_s=0.2, fade_out_s=0.5, timeout_s=1.0),
+    LayerSettings("manual", 60, fade_out_s=0.5),
+)
+"""Base expression < idle < gaze < speech < live capture < manual (link and panel)."""
+
+
+class Layer:
+    """One source's place in a :class:`Mixer`; all arrays are views into the mixer's, (P,) each.
+
+    Attributes
+    ----------
+    values : latest values. held : which parameters the source has given and not released.
+    gain : factor on the values, for instance per region.
+    share : factor on the weight, for what blocks or fades the layer.
+    weight : 0..1. settings : what it was made from.
+    """
+
+    def __init__(self, settings: LayerSettings, arrays: Sequence[np.ndarray]) -> None:
+        self.settings = settings
+        self.name = settings.name
+        self.weight = settings.weight
+        self.fade_in_s, self.fade_out_s = settings.fade_in_s, settings.fade_out_s
+        self.values, self.stamp, self.level, self.gain, self.share, self.applied, self.held = arrays
+        self._fresh = np.zeros(len(self.values), dtype=bool)
+        self._rate = np.zeros(len(self.values))
+
+    def write(self, indices: Indices, values: Floats | Sequence[float] | float, now_s: float) -> None:
+        """Hold some parameters at ``values`` from ``now_s`` on; what is not finite changes nothing."""
+        given = np.asarray(values, dtype=np.float64)
+        if not np.isfinite(given).all():
+            indices, given = _only_finite(indices, given, len(self.values))
+        self.values[indices] = given
+        self.stamp[indices] = now_s
+        self.held[indices] = True
+
+    def write_masked(self, values: Floats, mask: NDArray[np.bool_], now_s: float) -> None:
+        """Hold the parameters of ``mask`` : (P,) bool at ``values`` : (P,); all others are released."""
+        np.isfinite(values, out=self._fresh)
+        self._fresh &= mask
+        np.copyto(self.values, values, where=self._fresh)
+        np.copyto(self.stamp, now_s, where=self._fresh)
+        np.copyto(self.held, mask)
+
+    def release(self, indices: Indices = slice(None), *, fade_s: float | None = None) -> None:
+        """Give parameters back to the layers below, over ``fade_s`` or the layer's own fade."""
+        self.held[indices] = False
+        self.fade_out_s = self.settings.fade_out_s if fade_s is None else fade_s
+
+    @property
+    def holding(self) -> int:
+        """How many parameters the layer holds."""
+        return int(np.count_nonzero(self.held))
+
+    def advance(self, now_s: float, dt: float) -> bool:
+        """Let fades and time-outs pass; True while the layer has any say."""
+        if math.isfinite(self.settings.timeout_s) and self.held.any():
+            np.greater(self.stamp, now_s - self.settings.timeout_s, out=self._fresh)
+            self.held &= self._fresh
+        rise = dt / self.fade_in_s if self.fade_in_s > dt else 1.0
+        fall = dt / self.fade_out_s if self.fade_out_s > dt else 1.0
+        self._rate.fill(-fall)
+        np.copyto(self._rate, rise, where=self.held)
+        self.level += self._rate
+        np.clip(self.level, 0.0, 1.0, out=self.level)
+        return bool(self.level.any())
+
+
+class Mixer:
+    """Mixes layers into one (P,) vector, without allocating.
+
+    Parameters
+    ----------
+    parameters : the registry. layers : what layers there are; order in priority, not in the list.
+
+    Raises
+    ------
+    ValueError : two layers of one name.
+    """
+
+    def __init__(self, parameters: Parameters, layers: Sequence[LayerSettings] = DEFAULT_LAYERS) -> None:
+        ordered = sorted(layers, key=lambda layer: layer.priority)
+        if len({layer.name for layer in ordered}) < len(ordered):
+            raise ValueError("layers must have different names")
+        n, p = len(ordered), len(parameters)
+        zeros = [np.zeros((n, p)) for _ in range(6)]
+        zeros[3][:] = 1.0  # gain
+        zeros[4][:] = 1.0  # share
+        held = np.zeros((n, p), dtype=bool)
+        self.layers = tuple(Layer(s, [a[i] for a in (*zeros, held)]) for i, s in enumerate(ordered))
+        self._by_name = {layer.name: layer for layer in self.layers}
+        self._work = np.zeros(p)
+        self._better = np.zeros(p, dtype=bool)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Layer names, lowest priority first."""
+        return tuple(self._by_name)
+
+    def __getitem__(self, name: str) -> Layer:
+        """The layer called ``name``. Raises KeyError with the nearest names."""
+        try:
+            return self._by_name[name]
+        except KeyError:
+            raise KeyError(f"unknown layer {name!r}{did_you_mean(name, self._by_name)}") from None
+
+    def mix(self, now_s: float, dt: float, out: Floats) -> Floats:
+        """Advance every layer by ``dt`` to ``now_s``; write their mix, not clipped, to ``out`` : (P,)."""
+        out.fill(0.0)
+        for layer in self.layers:
+            if layer.advance(now_s, dt):
+                self._apply(layer, out)
+            else:
+                layer.applied.fill(0.0)
+        return out
+
+    def holder(self, index: int) -> str | None:
+        """Name of the layer that decides a parameter since the last mix; None when none does.
+
+        The highest ``set`` or winning ``max`` layer; where only ``add`` layers act, the highest of those.
+        """
+        adding = None
+        for layer in reversed(self.layers):
+            if layer.applied[index] > 0.0:
+                if layer.settings.mode != "add":
+                    return layer.name
+                adding = adding or layer.name
+        return adding
+
+    def holders(self) -> list[str | None]:
+        """:meth:`holder` of every parameter."""
+        return [self.holder(i) for i in range(len(self._work))]
+
+    def _apply(self, layer: Layer, out: Floats) -> None:
+        share, work = layer.applied, self._work
+        np.multiply(layer.level, layer.weight, out=share)
+        share *= layer.share
+        np.multiply(layer.values, layer.gain, out=work)
+        if layer.settings.mode == "set":
+            work -= out
+            work *= share
+            out += work
+            return
+        work *= share
+        if layer.settings.mode == "add":
+            out += work
+            return
+        np.greater(work, out, out=self._better)
+        np.copyto(out, work, where=self._better)
+        share *= self._better
+
+
+def _only_finite(indices: Indices, values: Floats, count: int) -> tuple[NDArray[np.intp], Floats]:
+    """The finite part of ``values`` and the positions it belongs to."""
+    positions = np.arange(count)[indices]
+    spread = np.broadcast_to(values, positions.shape)
+    good = np.isfinite(spread)
+    return positions[good], spread[good]
