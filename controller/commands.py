@@ -1,0 +1,208 @@
+"""What commands do to the face: the layers, the expressions and the gaze behind one small interface.
+
+Links call the methods of :class:`CommandSink` from their own threads; the control loop calls
+:meth:`CommandState.tick`. Each holds one short lock.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.acting import Actor
+from controller.expression import Vocabulary
+from controller.gaze import Gaze
+from controller.mixer import DEFAULT_LAYERS, LayerSettings, Mixer
+from controller.motion import MotionLimiter
+from controller.parameters import Floats, Parameters
+
+StatusValue = str | int | float
+
+
+class CommandSink(Protocol):
+    """What a link may ask of the face. ``stamp_ns`` is when the command arrived (monotonic clock, ns)."""
+
+    def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
+        """Hold parameters at values, until released."""
+
+    def release(self, indices: Sequence[int], stamp_ns: int) -> None:
+        """Give held parameters back to the layers below."""
+
+    def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
+        """Show a named expression; without a duration until the next one."""
+
+    def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
+        """Look in a direction."""
+
+    def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        """Look at a point."""
+
+    def gaze_off(self, stamp_ns: int) -> None:
+        """Stop looking at anything."""
+
+    def neutral(self, seconds: float, stamp_ns: int) -> None:
+        """Release everything that was commanded and return to neutral."""
+
+    def snapshot(self, out: Floats) -> None:
+        """Copy the present parameters to ``out`` : (P,)."""
+
+    def holder(self, index: int) -> str | None:
+        """The layer that holds a parameter."""
+
+    def layer_names(self) -> tuple[str, ...]:
+        """Layers, lowest priority first."""
+
+    def status(self) -> dict[str, StatusValue]:
+        """How the face is, as short words and numbers."""
+
+
+class CommandState:
+    """The face's intentions: layers mixed, eased and clipped, once per tick.
+
+    Parameters
+    ----------
+    parameters : the registry.
+    vocabulary : the named expressions; the shipped ones without.
+    layers : the layers; must include ``expression``, ``gaze``, ``capture`` and ``manual``.
+
+    Raises
+    ------
+    ConfigError : the shipped expressions cannot be read.
+    """
+
+    def __init__(
+        self,
+        parameters: Parameters,
+        vocabulary: Vocabulary | None = None,
+        layers: Sequence[LayerSettings] = DEFAULT_LAYERS,
+    ) -> None:
+        self.parameters = parameters
+        self.vocabulary = vocabulary or Vocabulary.load(parameters)
+        self.mixer = Mixer(parameters, layers)
+        self.limiter = MotionLimiter.of(parameters)
+        self._actor = Actor(self.vocabulary["neutral"])
+        self._gaze = Gaze(parameters)
+        self._mixed, self._present = parameters.neutral(), parameters.neutral()
+        self._expression, self._looking = self.mixer["expression"], self.mixer["gaze"]
+        self._manual = self.mixer["manual"]
+        self._everything = np.ones(len(parameters), dtype=bool)
+        self._lock = threading.Lock()
+        self._stamp_ns = 0
+        self._now_s = 0.0
+        self._ticks = 0
+
+    def tick(self, now_ns: int, dt: float, out: Floats) -> int:
+        """Advance to ``now_ns`` (monotonic clock), ``dt`` seconds after the last tick.
+
+        Writes the parameters to ``out`` : (P,) and returns the arrival time (ns) of the newest command in them,
+        0 before the first.
+        """
+        with self._lock:
+            now_s = self._now_s = now_ns * 1e-9
+            self._write_layers(now_s)
+            self.mixer.mix(now_s, dt, self._mixed)
+            self.limiter.step(dt, self._mixed, self._present)
+            self._ticks += 1
+            out[:] = self._present
+            return self._stamp_ns
+
+    def _write_layers(self, now_s: float) -> None:
+        self._expression.write_masked(self._actor.update(now_s), self._everything, now_s)
+        if self._gaze.active:
+            self._looking.write(self._gaze.indices, self._gaze.update(self._present), now_s)
+
+    # What links call
+
+    def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._manual.write(list(indices), values, stamp_ns * 1e-9)
+            self._note(stamp_ns)
+
+    def release(self, indices: Sequence[int], stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._manual.release(list(indices))
+            self._note(stamp_ns)
+
+    def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
+        """See :class:`CommandSink`. Raises ParameterError for an unknown name."""
+        expression = self.vocabulary[name]
+        with self._lock:
+            self._actor.play(expression, intensity, duration_s, self._time(stamp_ns))
+            self._note(stamp_ns)
+
+    def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._gaze.look(yaw_rad, pitch_rad)
+            self._note(stamp_ns)
+
+    def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._gaze.look_at(x_mm, y_mm, z_mm)
+            self._note(stamp_ns)
+
+    def gaze_off(self, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._stop_looking()
+            self._note(stamp_ns)
+
+    def neutral(self, seconds: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._manual.release(fade_s=seconds)
+            self._stop_looking(seconds)
+            self._actor.rest(seconds, self._time(stamp_ns))
+            self._note(stamp_ns)
+
+    def capture(self, values: Floats, mask: NDArray[np.bool_], now_ns: int, stamp_ns: int = 0) -> None:
+        """Give the live-capture layer ``values`` : (P,) where ``mask`` : (P,) bool; released after 1 s of silence."""
+        with self._lock:
+            self.mixer["capture"].write_masked(values, mask, now_ns * 1e-9)
+            self._note(stamp_ns)
+
+    def snapshot(self, out: Floats) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            out[:] = self._present
+
+    def holder(self, index: int) -> str | None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            return self.mixer.holder(index)
+
+    def layer_names(self) -> tuple[str, ...]:
+        """See :class:`CommandSink`."""
+        return self.mixer.names
+
+    def status(self) -> dict[str, StatusValue]:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            yaw, pitch = self._gaze.direction_deg
+            return {
+                "expression": self._actor.name,
+                "intensity": round(self._actor.intensity, 3),
+                "gaze": f"{yaw:.1f},{pitch:.1f}" if self._gaze.active else "off",
+                "manual": self._manual.holding,
+                "capture": self.mixer["capture"].holding,
+                "limited": int(np.count_nonzero(self.limiter.limited)),
+                "ticks": self._ticks,
+            }
+
+    def _stop_looking(self, fade_s: float | None = None) -> None:
+        self._gaze.off()
+        self._looking.release(fade_s=fade_s)
+
+    def _note(self, stamp_ns: int) -> None:
+        self._stamp_ns = max(self._stamp_ns, stamp_ns)
+
+    def _time(self, stamp_ns: int) -> float:
+        """When a command takes effect: when it came, but not before the last tick."""
+        return max(stamp_ns * 1e-9, self._now_s)

@@ -1,0 +1,83 @@
+"""Gaze: one direction or point, shared between eyes and head.
+
+The head takes what lies beyond a comfortable eye angle; the eyes make up the difference to where the head is
+*now*. So on a large shift the eyes arrive first and turn back while the head follows, as people's do.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.parameters import Floats, Parameters
+
+EYE_OFFSET_MM = 32.0
+"""Distance of an eye's centre from the middle between the eyes."""
+
+_NAMES = ("headYaw", "headPitch", "leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
+_HEAD_SHARE = 0.75
+_COMFORT_YAW_RAD = math.radians(8.0)
+_COMFORT_PITCH_RAD = math.radians(6.0)
+
+
+class Gaze:
+    """Splits a direction or a point into head and eye parameters.
+
+    Directions are relative to the head's zero pose: yaw + to the subject's left, pitch + down.
+
+    Parameters
+    ----------
+    parameters : the registry; must have the head's and the eyes' angles.
+
+    Attributes
+    ----------
+    indices : (6,) positions of the parameters it drives. active : whether there is anything to look at.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.indices = parameters.indices(_NAMES)
+        self.active = False
+        self._scale = parameters.full_scale_rad[self.indices]
+        self._yaw = np.zeros(2)
+        self._pitch = 0.0
+        self._values = np.zeros(6)
+
+    def look(self, yaw_rad: float, pitch_rad: float) -> None:
+        """Look in a direction, with parallel eyes."""
+        self._yaw[:] = yaw_rad
+        self._pitch = pitch_rad
+        self.active = True
+
+    def look_at(self, x_mm: float, y_mm: float, z_mm: float) -> None:
+        """Look at a point; x to the subject's left, y up, z forward from the middle between the eyes."""
+        self._yaw[0] = math.atan2(x_mm - EYE_OFFSET_MM, z_mm)
+        self._yaw[1] = math.atan2(x_mm + EYE_OFFSET_MM, z_mm)
+        self._pitch = -math.atan2(y_mm, math.hypot(x_mm, z_mm))
+        self.active = True
+
+    def off(self) -> None:
+        """Look at nothing in particular."""
+        self.active = False
+
+    @property
+    def direction_deg(self) -> tuple[float, float]:
+        """Yaw and pitch, degrees, of the middle between both eyes' directions."""
+        return math.degrees(float(self._yaw.mean())), math.degrees(self._pitch)
+
+    def update(self, present: Floats) -> Floats:
+        """Values (6,) for :attr:`indices`, given the present (P,) parameters of the face; a view."""
+        values, scale = self._values, self._scale
+        values[0] = _head_part(float(self._yaw.mean()), _COMFORT_YAW_RAD) / scale[0]
+        values[1] = _head_part(self._pitch, _COMFORT_PITCH_RAD) / scale[1]
+        head_yaw = present[self.indices[0]] * scale[0]
+        head_pitch = present[self.indices[1]] * scale[1]
+        values[2] = (self._yaw[0] - head_yaw) / scale[2]
+        values[4] = (self._yaw[1] - head_yaw) / scale[4]
+        values[3] = values[5] = (self._pitch - head_pitch) / scale[3]
+        return np.clip(values, -1.0, 1.0, out=values)
+
+
+def _head_part(angle: float, comfort: float) -> float:
+    """What the head does of a gaze angle (rad)."""
+    return math.copysign(max(0.0, abs(angle) - comfort) * _HEAD_SHARE, angle)
