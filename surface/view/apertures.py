@@ -1,0 +1,103 @@
+"""The openings in the skin: lid margins and lips, found from the mesh's own boundary loops.
+
+The eye's shader darkens the eyeball under the upper lid and draws the wet line on the lower one; the mouth's
+shader lights teeth and tongue by what comes in between the lips. Both read the openings where they are now,
+so blinks and gaze shade rightly without a shadow map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Points of one lid handed to the eye's shader.
+LID_POINTS = 10
+
+
+@dataclass(frozen=True)
+class Aperture:
+    """An opening in a part.
+
+    Parameters
+    ----------
+    loop : (k,) vertex ids round the opening, in order, first = corner at least x.
+    upper, lower : (LID_POINTS,) vertex ids along either edge, from the corner at least x to the other.
+    """
+
+    loop: np.ndarray
+    upper: np.ndarray
+    lower: np.ndarray
+
+
+def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
+    """Closed loops of the edges that one triangle uses.
+
+    Parameters
+    ----------
+    triangles : (t, 3) vertex ids.
+
+    Returns
+    -------
+    list of (k,) vertex ids in order; loops that meet themselves are left out.
+    """
+    following = _boundary_successors(np.asarray(triangles, np.int64))
+    loops = []
+    while following:
+        start, current = following.popitem()
+        loop = [start]
+        while current != start and current in following:
+            loop.append(current)
+            current = following.pop(current)
+        if current == start and len(loop) >= 6:
+            loops.append(np.array(loop, np.int64))
+    return loops
+
+
+def _boundary_successors(triangles: np.ndarray) -> dict[int, int]:
+    """Vertex -> next vertex over the edges whose reverse no triangle has."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    size = int(triangles.max()) + 1 if len(triangles) else 0
+    keys, reverse = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
+    open_edges = edges[~np.isin(keys, reverse)]
+    return dict(zip(open_edges[:, 0].tolist(), open_edges[:, 1].tolist(), strict=True))
+
+
+def aperture(loop: np.ndarray, vertices: np.ndarray) -> Aperture:
+    """Split a boundary loop at its corners (least and greatest x) into upper and lower edge.
+
+    Parameters
+    ----------
+    loop : (k,) vertex ids in order.
+    vertices : (m, 3) positions at rest, head not turned.
+    """
+    loop = np.roll(loop, -int(np.argmin(vertices[loop, 0])))
+    corner = int(np.argmax(vertices[loop, 0]))
+    first, second = loop[: corner + 1], np.append(loop[corner:], loop[0])[::-1]
+    if vertices[first, 1].mean() < vertices[second, 1].mean():
+        first, second = second, first
+    return Aperture(loop, _spread(first, vertices), _spread(second, vertices))
+
+
+def _spread(path: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """LID_POINTS ids of `path` (k,), evenly spaced by length."""
+    steps = np.linalg.norm(np.diff(vertices[path], axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    wanted = np.linspace(0.0, along[-1], LID_POINTS)
+    return path[np.clip(np.searchsorted(along, wanted), 0, len(path) - 1)]
+
+
+def nearest_loop(loops: list[np.ndarray], vertices: np.ndarray, point: np.ndarray, reach: float) -> np.ndarray | None:
+    """The loop whose mean is nearest to `point` (3,), or None when none is within `reach` mm."""
+    if not loops:
+        return None
+    means = np.array([vertices[loop].mean(axis=0) for loop in loops])
+    distance = np.linalg.norm(means - point, axis=1)
+    best = int(np.argmin(distance))
+    return loops[best] if distance[best] <= reach else None
+
+
+def vector_area(ring: np.ndarray) -> np.ndarray:
+    """Vector area (3,) of a closed polygon (k, 3): half the sum of p_i x p_{i+1}, in mm^2."""
+    centred = ring - ring.mean(axis=0)
+    return 0.5 * np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)

@@ -1,0 +1,158 @@
+"""Materials: which program draws a part, and what it is told about the part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from surface.view.apertures import LID_POINTS
+from surface.view.openings import Openings
+from surface.view.parts import ViewPart
+from surface.view.programs import build
+from surface.view.theme import Theme
+
+if TYPE_CHECKING:
+    import moderngl
+
+Arrays = dict[str, np.ndarray]
+#: Millimetres of skin that one tile of the detail texture covers, and the span of the skin's (u, v) square.
+_DETAIL_TILES = 9.0
+_DETAIL_SIZE = 128
+
+
+@dataclass(frozen=True)
+class Material:
+    """How one kind of part is drawn.
+
+    Parameters
+    ----------
+    program : name in :func:`programs`.
+    static : part, theme, openings -> per-vertex data that never changes.
+    uniforms : part, theme, openings -> uniforms of this frame.
+    two_sided : whether back faces are drawn.
+    order : lower is drawn earlier; what hides most comes first.
+    """
+
+    program: str
+    static: Callable[[ViewPart, Theme, Openings], Arrays]
+    uniforms: Callable[[ViewPart, Theme, Openings], Mapping[str, Any]]
+    two_sided: bool = False
+    order: int = 0
+
+
+def programs(ctx: moderngl.Context, quality: str) -> dict[str, moderngl.Program]:
+    """Every program of a quality, by name."""
+    flat = ("flat.frag",)
+    made = {
+        "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), LID_POINTS=LID_POINTS),
+        "inner": build(ctx, ("light.glsl", "inner.vert"), flat),
+        "hair": build(ctx, ("light.glsl", "hair.vert"), flat),
+        "background": build(ctx, ("background.vert",), ("background.frag",)),
+    }
+    if quality == "full":
+        made["skin"] = build(ctx, ("light.glsl", "skin.glsl", "skin.vert"), ("light.glsl", "skin.glsl", "skin.frag"))
+    else:
+        made["skin"] = build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), flat)
+    return made
+
+
+def of(name: str) -> Material:
+    """The material of that name; an unknown one draws as skin."""
+    return MATERIALS.get(name, MATERIALS["skin"])
+
+
+def order(name: str) -> int:
+    """Drawing order of a material."""
+    return of(name).order
+
+
+def attribute(part: ViewPart, name: str, default: tuple[float, ...]) -> np.ndarray:
+    """A part's static attribute (m, k) float32, or `default` for every vertex."""
+    data = part.attributes.get(name)
+    if data is None:
+        return np.tile(np.asarray(default, np.float32), (len(part.vertices), 1))
+    return np.asarray(data, np.float32).reshape(len(part.vertices), -1)
+
+
+def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
+    albedo = attribute(part, "albedo", theme.albedo)[:, :3]
+    if not theme.use_painted:
+        albedo = np.tile(np.asarray(theme.albedo, np.float32), (len(albedo), 1))
+    occlusion = attribute(part, "occlusion", (1.0,))[:, :1]
+    packed = np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), np.clip(occlusion, 0.0, 1.0)])
+    gloss = attribute(part, "gloss", (0.3,))[:, :1]
+    uv = np.asarray(part.uv, np.float32) * _DETAIL_TILES
+    return {
+        "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
+        "surface_uv_gloss": np.hstack([uv, gloss, np.zeros_like(gloss)]).astype(np.float32),
+    }
+
+
+def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
+    return {"wrap": theme.wrap, "gloss_scale": theme.gloss, "detail_strength": 0.16 * theme.detail}
+
+
+def _eye_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
+    return {"local": openings.local(part)}
+
+
+def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
+    return {
+        "iris_colour": theme.iris,
+        "sclera_colour": theme.sclera,
+        "iris_radius": 0.49,
+        "pupil_radius": 0.185,
+        **openings.eye(part),
+    }
+
+
+def _inner(albedo: tuple[float, float, float], wrap: float, wetness: float, **options: Any) -> Material:
+    """A material inside the mouth."""
+
+    def static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
+        return {"occlusion": attribute(part, "occlusion", (1.0,))[:, :1]}
+
+    def uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
+        return {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness, **openings.mouth()}
+
+    return Material("inner", static, uniforms, **options)
+
+
+def _hair(albedo: tuple[float, float, float]) -> Material:
+    """Lashes and brows."""
+    return Material("hair", lambda part, theme, openings: {}, lambda *_: {"albedo": albedo}, two_sided=True, order=2)
+
+
+MATERIALS: dict[str, Material] = {
+    "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
+    "eye": Material("eye", _eye_static, _eye_uniforms, order=1),
+    "lash": _hair((0.020, 0.014, 0.011)),
+    "brow": _hair((0.070, 0.045, 0.030)),
+    "teeth": _inner((0.72, 0.66, 0.54), 0.3, 0.30, order=3),
+    "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.22, order=4),
+    "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),
+    "mouth": _inner((0.32, 0.09, 0.08), 0.3, 0.08, two_sided=True, order=6),
+}
+
+
+def detail_texture(ctx: moderngl.Context) -> moderngl.Texture:
+    """Tiling noise (rgb: bumps, a: mottling), the same every time."""
+    random = np.random.default_rng(7)
+    layers = [_tiling_noise(random, falloff) for falloff in (0.5, 0.5, 0.5, 1.0)]
+    data = np.clip(np.stack(layers, axis=-1) * 0.17 + 0.5, 0.0, 1.0)
+    texture = ctx.texture((_DETAIL_SIZE, _DETAIL_SIZE), 4, np.rint(data * 255.0).astype(np.uint8).tobytes())
+    texture.build_mipmaps()
+    texture.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
+    return texture
+
+
+def _tiling_noise(random: np.random.Generator, falloff: float) -> np.ndarray:
+    """Noise (size, size) that tiles, zero mean, unit deviation; amplitude falls as frequency**-falloff."""
+    frequency = np.fft.fftfreq(_DETAIL_SIZE) * _DETAIL_SIZE
+    radius = np.hypot(frequency[:, None], frequency[None, :])
+    shape = np.where(radius > 2.0, np.maximum(radius, 1.0) ** -falloff, 0.0)
+    noise = np.fft.ifft2(np.fft.fft2(random.standard_normal((_DETAIL_SIZE, _DETAIL_SIZE))) * shape).real
+    return (noise - noise.mean()) / noise.std()

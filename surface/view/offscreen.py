@@ -1,0 +1,119 @@
+"""Pictures without a window: an EGL context, a multisampled target, numpy arrays out."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surface.errors import ViewError
+from surface.view.camera import Camera
+from surface.view.parts import ViewHead
+from surface.view.renderer import Renderer
+from surface.view.target import Target
+from surface.view.theme import Theme
+
+if TYPE_CHECKING:
+    import moderngl
+
+#: Samples per pixel of each quality.
+SAMPLES = {"full": 4, "fast": 1}
+NO_OPENGL_HINT = "apt-get install libegl1 libgl1-mesa-dri"
+
+
+def open_context() -> moderngl.Context:
+    """A context of its own: EGL first (no display needed), then the platform's.
+
+    Raises
+    ------
+    ViewError : moderngl is missing, or no OpenGL 3.1 is to be had.
+    """
+    try:
+        import moderngl
+    except ImportError as error:
+        raise ViewError(f"pictures need moderngl ({error})", hint="pip install 'omote[view]'") from error
+    reasons = []
+    for settings in ({"backend": "egl"}, {}):
+        try:
+            ctx = moderngl.create_context(standalone=True, require=310, **settings)  # type: ignore[arg-type]
+        except Exception as error:  # noqa: BLE001 - glcontext raises bare Exception for every cause
+            reasons.append(str(error).strip())
+            continue
+        ctx.clear_errors()
+        return ctx
+    raise ViewError(f"no OpenGL 3.1 without a window: {'; '.join(reasons)}", hint=NO_OPENGL_HINT)
+
+
+class Offscreen:
+    """A head drawn without a display; use as a context manager.
+
+    Parameters
+    ----------
+    head : anything with the parts of `surface.view.parts.ViewHead`.
+    size : (width, height), pixels.
+    samples : per pixel; None = 4 for quality "full", 1 and smoothed edges for "fast".
+    quality, theme : see :class:`surface.view.renderer.Renderer`.
+
+    Raises
+    ------
+    ViewError : no OpenGL, or a size that no driver draws.
+    """
+
+    def __init__(
+        self,
+        head: ViewHead,
+        size: tuple[int, int] = (1280, 720),
+        samples: int | None = None,
+        quality: str = "full",
+        theme: str | Theme = "skin",
+    ) -> None:
+        self.head, self._closed = head, False
+        self.ctx = open_context()
+        limit = self.ctx.info["GL_MAX_VIEWPORT_DIMS"][0]
+        if not all(1 <= length <= limit for length in size):
+            self.ctx.release()
+            raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
+        self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme)
+        self.target = Target(self.ctx, size, SAMPLES[quality] if samples is None else samples)
+
+    def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
+        """Pose the head with `values` (P,) and draw it, without reading the picture back.
+
+        The frame before is waited for after the pose, so on a software renderer posing runs beside the
+        filling of the last frame and never more than one frame is under way.
+        """
+        self.head.pose(values)
+        self.ctx.finish()
+        self.renderer.update()
+        self.target.paint(self.renderer, camera or Camera.front())
+
+    def render(self, values: np.ndarray, camera: Camera | None = None) -> np.ndarray:
+        """As :meth:`draw`, and the picture as (height, width, 3) uint8, top row first."""
+        self.draw(values, camera)
+        return self.read()
+
+    def read(self) -> np.ndarray:
+        """The picture last drawn, (height, width, 3) uint8, top row first."""
+        return self.target.read()
+
+    def finish(self) -> None:
+        """Wait until the last frame is drawn."""
+        self.ctx.finish()
+
+    def close(self) -> None:
+        """Give everything back; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self.renderer.release()
+        self.target.release()
+        self.ctx.release()
+
+    def __enter__(self) -> Offscreen:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

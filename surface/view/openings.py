@@ -1,0 +1,111 @@
+"""Where lids, lips and eyeballs are now: the few numbers per frame that the shaders need to shade eyes and mouth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.view.apertures import LID_POINTS, Aperture, aperture, boundary_loops, nearest_loop, vector_area
+from surface.view.parts import ViewPart
+
+_INNER = ("teeth", "tongue", "gums", "mouth")
+#: Vertices of an eyeball that its rotation is read from.
+_SAMPLES = 48
+#: How far, in eyeball radii, a lid loop's mean may lie from the eyeball's centre.
+_LID_REACH = 2.0
+#: How far, millimetres, the lips' mean may lie from the front of the teeth.
+_LIP_REACH = 45.0
+_FALLBACK_AREA = (0.0, 0.0, 250.0)
+
+
+@dataclass(frozen=True)
+class EyeFrame:
+    """How to read an eyeball's rotation from its vertices.
+
+    Parameters
+    ----------
+    local : (m, 3) float32 unit directions in the eye's own frame, +z through the pupil.
+    ids : (k,) vertices used.
+    solve : (4, k) maps their positions to rotation times radius and centre (least squares).
+    lids : the skin's opening over it, or None.
+    """
+
+    local: np.ndarray
+    ids: np.ndarray
+    solve: np.ndarray
+    lids: Aperture | None
+
+
+class Openings:
+    """Lids, lips and eyeballs of a head at rest; reads them again each frame.
+
+    Parameters
+    ----------
+    parts : the head's parts, at rest.
+    """
+
+    def __init__(self, parts: Sequence[ViewPart]) -> None:
+        self._skin = max((p for p in parts if p.material == "skin"), key=lambda p: len(p.vertices), default=None)
+        loops = boundary_loops(self._skin.triangles) if self._skin is not None else []
+        self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
+        self._lips = self._find_lips(parts, loops)
+
+    def _eye(self, part: ViewPart, loops: list[np.ndarray]) -> EyeFrame:
+        """Frame and lids of one eyeball."""
+        local = part.attributes.get("eye_local")
+        vertices = np.asarray(part.vertices, float)
+        centre, radius = fit_sphere(vertices)
+        if local is None:
+            local = (vertices - centre) / radius
+        local = np.asarray(local, np.float32)
+        ids = np.unique(np.linspace(0, len(vertices) - 1, min(_SAMPLES, len(vertices))).astype(int))
+        solve = np.linalg.pinv(np.column_stack([local[ids], np.ones(len(ids))]))
+        lids = None
+        if self._skin is not None:
+            loop = nearest_loop(loops, self._skin.vertices, centre, _LID_REACH * radius)
+            lids = None if loop is None else aperture(loop, self._skin.vertices)
+        return EyeFrame(local, ids, solve, lids)
+
+    def _find_lips(self, parts: Sequence[ViewPart], loops: list[np.ndarray]) -> Aperture | None:
+        """The skin's opening nearest to the front of the mouth's inner parts."""
+        inner = [np.asarray(p.vertices) for material in _INNER for p in parts if p.material == material]
+        if not inner or self._skin is None:
+            return None
+        front = max((vertices[np.argmax(vertices[:, 2])] for vertices in inner), key=lambda point: point[2])
+        taken = [eye.lids.loop[0] for eye in self._eyes.values() if eye.lids is not None]
+        free = [loop for loop in loops if not np.isin(taken, loop).any()]
+        loop = nearest_loop(free, self._skin.vertices, np.array([0.0, *front[1:]]), _LIP_REACH)
+        return None if loop is None else aperture(loop, self._skin.vertices)
+
+    def local(self, part: ViewPart) -> np.ndarray:
+        """Directions of an eye part's vertices in the eye's own frame, (m, 3) float32."""
+        return self._eyes[part.name].local
+
+    def eye(self, part: ViewPart) -> dict[str, object]:
+        """Uniforms of an eye now: its rotation and its lid margins."""
+        frame = self._eyes[part.name]
+        columns = (frame.solve @ part.vertices[frame.ids])[:3].T
+        rotation = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
+        if frame.lids is None or self._skin is None:
+            none = np.zeros((LID_POINTS, 3), np.float32)
+            return {"eye_rotation": rotation, "lid_upper": none, "lid_lower": none, "lids": 0.0}
+        skin = self._skin.vertices
+        upper, lower = skin[frame.lids.upper], skin[frame.lids.lower]
+        return {"eye_rotation": rotation, "lid_upper": upper, "lid_lower": lower, "lids": 1.0}
+
+    def mouth(self) -> dict[str, object]:
+        """Uniforms of the opening between the lips now: centre and vector area, mm and mm^2."""
+        if self._lips is None or self._skin is None:
+            return {"opening_centre": (0.0, -35.0, 110.0), "opening_area": _FALLBACK_AREA}
+        ring = self._skin.vertices[self._lips.loop]
+        return {"opening_centre": ring.mean(axis=0), "opening_area": vector_area(ring)}
+
+
+def fit_sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Least-squares sphere of `points` (m, 3): centre (3,) and radius, mm."""
+    system = np.column_stack([2.0 * points, np.ones(len(points))])
+    solution = np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)[0]
+    centre = solution[:3]
+    return centre, float(np.sqrt(max(solution[3] + centre @ centre, 1e-9)))

@@ -1,0 +1,114 @@
+"""A head part on the graphics processor: buffers, and what is uploaded after each pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import moderngl
+
+#: Above this share of a part, one whole write into fresh storage beats many small ones.
+_WHOLE = 0.5
+_VERTEX_BYTES = 12
+
+
+class ViewPart(Protocol):
+    """What the picture needs of a head part; `surface.head` offers it.
+
+    `vertices` and `normals` (m, 3) float32 are current and updated in place, `triangles` (t, 3) int32,
+    `uv` (m, 2) float32, `changed` the vertex ranges [start, stop) the last pose touched, `attributes`
+    static (m, k) float32 arrays by name.
+    """
+
+    name: str
+    material: str
+
+    @property
+    def triangles(self) -> np.ndarray: ...
+    @property
+    def uv(self) -> np.ndarray: ...
+    @property
+    def vertices(self) -> np.ndarray: ...
+    @property
+    def normals(self) -> np.ndarray: ...
+    @property
+    def changed(self) -> Sequence[tuple[int, int]]: ...
+    @property
+    def attributes(self) -> Mapping[str, np.ndarray]: ...
+
+
+class ViewHead(Protocol):
+    """What the picture needs of a head."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]: ...
+    @property
+    def parts(self) -> Sequence[ViewPart]: ...
+    def pose(self, values: np.ndarray) -> None: ...
+
+
+class PartBuffers:
+    """Vertex and index buffers of one part, bound to one program.
+
+    Parameters
+    ----------
+    part : the head part.
+    program : its material's program, with inputs `position`, `normal` and any of `static`.
+    static : per-vertex data that never changes, by shader input name: (m, k) float32, or uint8 read as 0..1.
+    """
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        part: ViewPart,
+        program: moderngl.Program,
+        static: Mapping[str, np.ndarray],
+    ) -> None:
+        self.part = part
+        count = len(part.vertices)
+        self._position = ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True)
+        self._normal = ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True)
+        self._index = ctx.buffer(np.ascontiguousarray(part.triangles, np.int32).tobytes())
+        self._static: list[moderngl.Buffer] = []
+        content: list[tuple[moderngl.Buffer, str, str]] = [
+            (self._position, "3f", "position"),
+            (self._normal, "3f", "normal"),
+        ]
+        for name, data in static.items():
+            kind = "f1" if data.dtype == np.uint8 else "f"
+            self._static.append(ctx.buffer(np.ascontiguousarray(data).tobytes()))
+            content.append((self._static[-1], f"{data.shape[1]}{kind}", name))
+        kept = [entry for entry in content if entry[2] in program]
+        self._array = ctx.vertex_array(program, kept, index_buffer=self._index, index_element_size=4)
+        self.upload([(0, count)])
+
+    def upload(self, ranges: Sequence[tuple[int, int]]) -> int:
+        """Send the vertex ranges [start, stop) that changed; returns how many vertices were sent."""
+        vertices, normals = self.part.vertices, self.part.normals
+        touched = sum(stop - start for start, stop in ranges)
+        if touched > _WHOLE * len(vertices):
+            self._position.orphan()
+            self._normal.orphan()
+            ranges = [(0, len(vertices))]
+        for start, stop in ranges:
+            self._position.write(_contiguous(vertices[start:stop]), offset=start * _VERTEX_BYTES)
+            self._normal.write(_contiguous(normals[start:stop]), offset=start * _VERTEX_BYTES)
+        return touched
+
+    def draw(self) -> None:
+        """Draw the triangles with the part's program."""
+        self._array.render()
+
+    def release(self) -> None:
+        """Give the buffers back."""
+        self._array.release()
+        for buffer in (self._position, self._normal, self._index, *self._static):
+            buffer.release()
+
+
+def _contiguous(block: np.ndarray) -> np.ndarray:
+    """`block` (k, 3) as C-contiguous float32, copied only when it is not."""
+    return np.ascontiguousarray(block, np.float32)

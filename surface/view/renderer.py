@@ -1,0 +1,182 @@
+"""Draws a head: one program per material, three lights, a gradient behind.
+
+The shading runs in linear light and is encoded for the display at the end of each shader. What is drawn
+in front comes first, so that the depth test spares the software renderer the shading behind it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from surface.errors import ViewError
+from surface.view import materials
+from surface.view.camera import Camera
+from surface.view.openings import Openings
+from surface.view.parts import PartBuffers, ViewHead
+from surface.view.programs import put
+from surface.view.theme import THEMES, Colour, Light, Theme
+
+if TYPE_CHECKING:
+    import moderngl
+
+QUALITIES = ("full", "fast")
+Region = tuple[int, int, int, int]
+"""A rectangle of pixels: x, y (from the lower left corner), width, height."""
+_MARGIN = 3
+
+
+class Renderer:
+    """A head on an OpenGL context (3.1 or newer).
+
+    The head is put to rest (all parameters 0) once, to find lids and lips.
+
+    Parameters
+    ----------
+    ctx : the moderngl context that is current.
+    head : anything with the parts of `surface.view.parts.ViewHead`.
+    quality : "full" shades skin and mouth per pixel, "fast" per vertex.
+    theme : name in `surface.view.theme.THEMES`, or a :class:`Theme`.
+
+    Raises
+    ------
+    ValueError : unknown quality or theme.
+    ViewError : the driver refuses a shader.
+    """
+
+    def __init__(
+        self, ctx: moderngl.Context, head: ViewHead, *, quality: str = "full", theme: str | Theme = "skin"
+    ) -> None:
+        if quality not in QUALITIES:
+            raise ValueError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}")
+        self.ctx, self.head, self.quality = ctx, head, quality
+        self.theme = theme_named(theme)
+        head.pose(np.zeros(len(head.parameters)))
+        self.openings = Openings(head.parts)
+        self._programs = materials.programs(ctx, quality)
+        self._detail = materials.detail_texture(ctx)
+        self._background = ctx.vertex_array(self._programs["background"], [])
+        parts = sorted(head.parts, key=lambda part: materials.order(part.material))
+        self._parts = [self._buffers(part) for part in parts]
+        self._camera: tuple[Camera, float] | None = None
+        self._apply_theme()
+
+    def _buffers(self, part: Any) -> PartBuffers:
+        """Buffers of `part` with what its material reads."""
+        material = materials.of(part.material)
+        static = material.static(part, self.theme, self.openings)
+        return PartBuffers(self.ctx, part, self._programs[material.program], static)
+
+    def update(self) -> int:
+        """Upload what the last `head.pose` changed; call once after every pose. Returns vertices sent."""
+        return sum(buffers.upload(buffers.part.changed) for buffers in self._parts)
+
+    def draw(self, camera: Camera, target: moderngl.Framebuffer, region: Region | None = None) -> None:
+        """Draw the head and the background into `target`: all of it, or only the pixels of `region`."""
+        width, height = target.size
+        target.scissor = region or (0, 0, width, height)
+        target.use()
+        self.ctx.viewport = (0, 0, width, height)
+        self.ctx.enable_only(self.ctx.DEPTH_TEST)
+        self.ctx.depth_func = "<="
+        target.depth_mask = True
+        target.clear(depth=1.0)
+        self._aim(camera, width / max(height, 1))
+        self._detail.use(0)
+        for buffers in self._parts:
+            self._draw_part(buffers)
+        self.ctx.disable(self.ctx.CULL_FACE)
+        self._background.render(vertices=3)
+
+    def region(self, camera: Camera, size: tuple[int, int]) -> Region:
+        """The rectangle of a picture of `size` that the head can touch, as posed now."""
+        corners = np.concatenate([box_corners(buffers.part.vertices) for buffers in self._parts])
+        clip = np.column_stack([corners, np.ones(len(corners))]) @ camera.matrix(size[0] / size[1]).T
+        if clip[:, 3].min() < camera.near:
+            return 0, 0, *size
+        pixels = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * size
+        low = np.clip(np.floor(pixels.min(axis=0)) - _MARGIN, 0, size).astype(int)
+        high = np.clip(np.ceil(pixels.max(axis=0)) + _MARGIN, 0, size).astype(int)
+        return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])
+
+    def set_background(self, top: Colour, bottom: Colour) -> None:
+        """Change the gradient; sRGB colours 0..1."""
+        self.theme = replace(self.theme, background_top=top, background_bottom=bottom)
+        put(self._programs["background"], {"top": top, "bottom": bottom})
+
+    def _draw_part(self, buffers: PartBuffers) -> None:
+        """One part with its material's uniforms and culling."""
+        part = buffers.part
+        material = materials.of(part.material)
+        put(self._programs[material.program], material.uniforms(part, self.theme, self.openings))
+        if material.two_sided:
+            self.ctx.disable(self.ctx.CULL_FACE)
+        else:
+            self.ctx.enable(self.ctx.CULL_FACE)
+        buffers.draw()
+
+    def _apply_theme(self) -> None:
+        """Uniforms that hold until the theme changes."""
+        theme = self.theme
+        shared = {
+            "key_colour": theme.key.colour,
+            "fill_colour": theme.fill.colour,
+            "rim_colour": theme.rim.colour,
+            "sky": theme.sky,
+            "ground": theme.ground,
+            "detail": 0,
+        }
+        for program in self._programs.values():
+            put(program, shared)
+        self.set_background(theme.background_top, theme.background_bottom)
+
+    def _aim(self, camera: Camera, aspect: float) -> None:
+        """Camera and light uniforms, sent only when the camera or the picture's shape changed."""
+        if self._camera == (camera, aspect):
+            return
+        self._camera = (camera, aspect)
+        turn = self.theme.lights_follow * camera.yaw_deg
+        shared = {
+            "view_projection": camera.matrix(aspect),
+            "camera": camera.eye,
+            "key_direction": light_direction(self.theme.key, turn),
+            "fill_direction": light_direction(self.theme.fill, turn),
+            "rim_direction": light_direction(self.theme.rim, turn),
+        }
+        for program in self._programs.values():
+            put(program, shared)
+
+    def release(self) -> None:
+        """Give back every buffer and program."""
+        for buffers in self._parts:
+            buffers.release()
+        self._background.release()
+        self._detail.release()
+        for program in self._programs.values():
+            program.release()
+
+
+def theme_named(theme: str | Theme) -> Theme:
+    """The theme of that name, or `theme` itself; ViewError for an unknown name."""
+    if isinstance(theme, Theme):
+        return theme
+    if theme not in THEMES:
+        raise ViewError(f"there is no theme {theme!r}", hint=f"themes: {', '.join(sorted(THEMES))}")
+    return THEMES[theme]
+
+
+def light_direction(light: Light, turn_deg: float) -> np.ndarray:
+    """Unit vector (3,) towards `light`, turned about y by `turn_deg`."""
+    yaw, pitch = np.radians(light.yaw_deg + turn_deg), np.radians(light.pitch_deg)
+    return np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)], np.float32)
+
+
+def box_corners(points: np.ndarray) -> np.ndarray:
+    """Corners (8, 3) of the axis-parallel box round `points` (m, 3)."""
+    # Column by column: numpy's minimum along a short last axis is twenty times slower.
+    low = np.array([points[:, axis].min() for axis in range(3)])
+    high = np.array([points[:, axis].max() for axis in range(3)])
+    pick = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], bool)
+    return np.where(pick, high, low)

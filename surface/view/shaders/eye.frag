@@ -1,0 +1,68 @@
+uniform sampler2D detail;
+uniform mat3 eye_rotation;
+uniform vec3 iris_colour;
+uniform vec3 sclera_colour;
+uniform float iris_radius;            // sine of the iris' half angle
+uniform float pupil_radius;
+
+in vec3 v_local;
+in vec3 v_normal;
+in vec3 v_view;
+in vec2 v_lid;
+
+out vec4 colour;
+
+vec3 sclera(vec3 d, float r) {
+    float vein = texture(detail, d.xy * 0.55).w + texture(detail, d.yx * vec2(0.21, 0.9)).w - 1.0;
+    float rim = smoothstep(0.60, 1.0, r);
+    vec3 base = sclera_colour * mix(vec3(1.0), vec3(0.92, 0.70, 0.62), rim);
+    return base * (1.0 - clamp(vein, 0.0, 1.0) * (0.25 + rim) * vec3(0.05, 0.45, 0.50));
+}
+
+// Fibres run out from the pupil; `t` is 0 at the pupil's edge and 1 at the limbus.
+vec3 iris(vec2 p, float t) {
+    float angle = atan(p.y, p.x) * 0.31831;
+    float fibre = texture(detail, vec2(angle * 3.0, t * 0.22)).w + texture(detail, vec2(angle * 7.0, t * 0.10)).x;
+    float collarette = smoothstep(0.42, 0.18, abs(t - 0.26));
+    vec3 tint = iris_colour * (0.35 + 1.1 * fibre) + vec3(0.10, 0.065, 0.03) * collarette * fibre;
+    return tint * (1.0 - 0.8 * smoothstep(0.72, 1.0, t)) * smoothstep(-0.06, 0.12, t);
+}
+
+void main() {
+    vec3 d = normalize(v_local);
+    vec3 v = normalize(v_view);
+    vec3 n = normalize(v_normal);
+    float r = length(d.xy);
+
+    // The iris lies under the cornea: looked at from the side it slides away from the viewer.
+    vec3 v_own = v * eye_rotation;
+    vec2 p = d.xy - v_own.xy / max(v_own.z, 0.35) * 0.09 * smoothstep(1.25, 0.55, r / iris_radius);
+    float q = length(p) / iris_radius;
+    float pupil = pupil_radius / iris_radius;
+    float t = (q - pupil) / (1.0 - pupil);
+    vec3 albedo = mix(iris(p, t), sclera(d, r), smoothstep(0.90, 1.06, q));
+
+    // The cornea bulges: its normal leans out less than the eyeball's, its highlight is small and sharp.
+    vec3 axis = eye_rotation[2];
+    vec3 cornea = normalize(n + 0.45 * (n - axis * dot(n, axis)) * smoothstep(1.3, 0.7, r / iris_radius));
+    float upper = smoothstep(0.0, 4.5, v_lid.x);
+    float lower = smoothstep(0.0, 2.2, v_lid.y);
+    float shade = (0.22 + 0.78 * upper) * (0.55 + 0.45 * lower);
+
+    vec3 light = key_colour * wrapped(dot(n, key_direction), vec3(0.35, 0.25, 0.22))
+        + fill_colour * wrapped(dot(n, fill_direction), vec3(0.3)) + ambient(n);
+    // Light through the cornea gathers on the iris' far side.
+    float caustic = 1.0 + 1.2 * smoothstep(1.0, 0.5, q) * clamp(-dot(normalize(vec3(p, 0.35)).xy, (key_direction * eye_rotation).xy), 0.0, 1.0);
+    vec3 lit = albedo * light * shade * caustic;
+
+    vec3 mirrored = reflect(-v, cornea);
+    float key = lobe(dot(mirrored, key_direction), 220.0) * 1.6 + lobe(dot(mirrored, key_direction), 24.0) * 0.04;
+    float fill = lobe(dot(mirrored, fill_direction), 110.0) * 0.5;
+    float fresnel = 1.0 - clamp(dot(cornea, v), 0.0, 1.0);
+    fresnel = 0.03 + 0.5 * fresnel * fresnel * fresnel;
+    lit += (key * key_colour + fill * fill_colour) * smoothstep(0.0, 1.2, v_lid.x);
+    lit += fresnel * ambient(mirrored) * shade;
+    // Tears stand along the lower lid.
+    lit += (1.0 - smoothstep(0.15, 0.75, v_lid.y)) * 0.30 * key_colour * clamp(dot(n, key_direction) + 0.3, 0.0, 1.0);
+    colour = vec4(encode(lit), 1.0);
+}

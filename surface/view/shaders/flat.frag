@@ -1,0 +1,7 @@
+// The colour was worked out per vertex.
+in vec3 v_colour;
+out vec4 colour;
+
+void main() {
+    colour = vec4(v_colour, 1.0);
+}

@@ -1,0 +1,14 @@
+// Lashes and brows.
+uniform mat4 view_projection;
+uniform vec3 albedo;
+
+in vec3 position;
+in vec3 normal;
+
+out vec3 v_colour;
+
+void main() {
+    gl_Position = view_projection * vec4(position, 1.0);
+    vec3 light = ambient(normal) + key_colour * (0.25 + 0.35 * clamp(dot(normal, key_direction), 0.0, 1.0));
+    v_colour = encode(albedo * light);
+}

@@ -1,0 +1,24 @@
+// Skin whose soft light is worked out per vertex; the pixel adds grain and highlights.
+uniform mat4 view_projection;
+uniform vec3 camera;
+
+in vec3 position;
+in vec3 normal;
+in vec4 albedo_occlusion;   // square root of the linear albedo, occlusion
+in vec4 surface_uv_gloss;   // detail texture coordinates, gloss
+
+out vec3 v_diffuse;
+out vec4 v_normal_wide;     // normal, strength of the wide highlight
+out vec4 v_half_narrow;     // half way between key light and viewer, strength of the narrow highlight
+out vec2 v_uv;
+
+void main() {
+    gl_Position = view_projection * vec4(position, 1.0);
+    vec3 v = normalize(camera - position);
+    vec3 albedo = albedo_occlusion.rgb * albedo_occlusion.rgb;
+    float strength = highlight(normal, v) * albedo_occlusion.a;
+    v_diffuse = diffuse(normal, v, albedo, albedo_occlusion.a);
+    v_normal_wide = vec4(normal, WIDE * strength);
+    v_half_narrow = vec4(normalize(key_direction + v), NARROW * surface_uv_gloss.z * strength);
+    v_uv = surface_uv_gloss.xy;
+}

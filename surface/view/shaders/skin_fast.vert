@@ -1,0 +1,22 @@
+// Skin worked out per vertex, all of it.
+uniform mat4 view_projection;
+uniform vec3 camera;
+
+in vec3 position;
+in vec3 normal;
+in vec4 albedo_occlusion;
+in vec4 surface_uv_gloss;
+
+out vec3 v_colour;
+
+void main() {
+    gl_Position = view_projection * vec4(position, 1.0);
+    vec3 v = normalize(camera - position);
+    vec3 albedo = albedo_occlusion.rgb * albedo_occlusion.rgb;
+    float wide = lobe(dot(normal, normalize(key_direction + v)), WIDE_SHARPNESS);
+    float narrow = wide * wide;
+    narrow *= narrow;
+    float shine = highlight(normal, v) * albedo_occlusion.a * (WIDE * wide + NARROW * narrow * surface_uv_gloss.z);
+    vec3 lit = diffuse(normal, v, albedo, albedo_occlusion.a) + shine * key_colour;
+    v_colour = encode(lit);
+}

@@ -1,0 +1,72 @@
+"""Colours and lights of the picture: data, one :class:`Theme` per look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Light:
+    """A directional light.
+
+    Parameters
+    ----------
+    yaw_deg, pitch_deg : where it comes from, seen from the face; yaw + = subject's left, pitch + = above.
+    colour : (3,) linear RGB times intensity.
+    """
+
+    yaw_deg: float
+    pitch_deg: float
+    colour: Colour
+
+
+@dataclass(frozen=True)
+class Theme:
+    """One look. Colours are linear RGB unless said otherwise.
+
+    Parameters
+    ----------
+    albedo : skin where the head paints none.
+    use_painted : whether the head's own albedo is used.
+    wrap : how far light bends round the terminator per channel, 0..1; red far, blue little, for skin.
+    gloss : scale of the skin's highlights.
+    iris, sclera : eye colours.
+    key, fill, rim : the three lights.
+    sky, ground : the ambient light's upper and lower colour.
+    background_top, background_bottom : sRGB colours of the gradient behind the head.
+    lights_follow : 0 keeps the lights with the world, 1 turns them with the camera.
+    """
+
+    albedo: Colour = (0.60, 0.37, 0.28)
+    use_painted: bool = True
+    wrap: Colour = (0.42, 0.20, 0.14)
+    gloss: float = 1.0
+    detail: float = 1.0
+    iris: Colour = (0.10, 0.17, 0.21)
+    sclera: Colour = (0.62, 0.58, 0.55)
+    key: Light = Light(-34.0, 32.0, (1.95, 1.80, 1.62))
+    fill: Light = Light(48.0, 6.0, (0.36, 0.42, 0.52))
+    rim: Light = Light(152.0, 28.0, (1.10, 1.15, 1.30))
+    sky: Colour = (0.30, 0.33, 0.38)
+    ground: Colour = (0.16, 0.12, 0.10)
+    background_top: Colour = (0.20, 0.23, 0.27)
+    background_bottom: Colour = (0.42, 0.44, 0.46)
+    lights_follow: float = 0.5
+
+
+THEMES: dict[str, Theme] = {
+    "skin": Theme(),
+    "mask": Theme(
+        albedo=(0.66, 0.67, 0.69),
+        use_painted=False,
+        wrap=(0.12, 0.12, 0.12),
+        gloss=2.2,
+        detail=0.0,
+        iris=(0.03, 0.30, 0.42),
+        sclera=(0.55, 0.57, 0.60),
+        background_top=(0.10, 0.12, 0.15),
+        background_bottom=(0.27, 0.30, 0.34),
+    ),
+}
