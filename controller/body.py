@@ -28,7 +28,7 @@ from controller.livelink import Take, TakePlayer
 from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS, Parameters
 from controller.stage import Stage, load_stage
-from controller.wire import BodyOrders, Failed, Finished, Ready, Report
+from controller.wire import BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
 
 Floats = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
     ----------
     orders : what to do.
     pipe : to main: one :class:`Ready` or :class:`Failed`, perhaps :class:`Finished`, at the end a
-        :class:`Report`. Anything main sends means stop, and so does main's end.
+        :class:`Report`. Main may send what its panel wants; ``Stop`` and main's own end both mean stop.
     """
     stop = threading.Event()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
@@ -156,15 +156,38 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
 
 
 def _wait(body: Body, pipe: Connection, stop: threading.Event) -> None:
-    """Until main says stop, main is gone, a signal comes, or a bus gave up."""
+    """Serve main until it says stop or is gone, a signal comes, or a bus gave up."""
     told = False
-    while not stop.is_set() and not pipe.poll(_POLL_S):
+    while not stop.is_set():
+        if pipe.poll(_POLL_S) and not _obey(body.state, pipe):
+            return
         if body.finished and not told:
             _tell(pipe, Finished())
             told = True
         for bus in body.buses:
             if bus.error is not None:
                 raise bus.error
+
+
+def _obey(state: CommandState, pipe: Connection) -> bool:
+    """Do what main's panel wants; False when it said stop or is gone."""
+    try:
+        wish = pipe.recv()
+    except (EOFError, OSError):
+        return False
+    now = time.monotonic_ns()
+    match wish:
+        case Hold(index, None):
+            state.release([index], now)
+        case Hold(index, float(value)):
+            state.set_parameters([index], [value], now)
+        case Show(name, intensity):
+            state.expression(name, intensity, None, now)
+        case Calm(seconds):
+            state.neutral(seconds, now)
+        case _:
+            return False
+    return True
 
 
 def _tell(pipe: Connection, message: object) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +14,7 @@ from controller.errors import ControllerError
 from controller.mailbox import Mailbox
 from controller.parameters import Parameters
 from controller.stage import Stage
-from controller.wire import BodyOrders, Failed, Finished, Ready, Report
+from controller.wire import BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show, Stop
 
 _START_TIMEOUT_S = 60.0
 _STOP_TIMEOUT_S = 30.0
@@ -67,12 +68,17 @@ class BodyProcess:
             self._take_in(self._receive(0.0))
         return not self.finished
 
+    def tell(self, wish: Hold | Show | Calm) -> None:
+        """Pass on what the panel wants."""
+        with suppress(OSError):  # a body that is gone is told by alive()
+            self._pipe.send(wish)
+
     def stop(self) -> None:
         """Ask the body to stop, wait for its servos to be safe, and keep its report."""
         if not self._process.is_alive() and not self._pipe.poll():
             return
         try:
-            self._pipe.send("stop")
+            self._pipe.send(Stop())
             while not self.report:
                 self._take_in(self._receive(_STOP_TIMEOUT_S))
         except BrokenPipeError:

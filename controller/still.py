@@ -103,8 +103,8 @@ def _add_expression(values: NDArray[np.float64], word: str) -> None:
     intensity = parse_number(f"--expression {word}", text) if equals else 1.0
     if not 0.0 <= intensity <= 1.0:
         raise ParameterError(f"--expression {word}: the intensity goes from 0 to 1")
-    for index, value in Vocabulary.load(PARAMETERS).expand(name, intensity).items():
-        values[index] = value
+    values += _vector(Vocabulary.load(PARAMETERS).expand(name, intensity))
+    np.clip(values, PARAMETERS.low, PARAMETERS.high, out=values)
 
 
 def draw_still(still: Still, out: Path) -> None:
@@ -127,21 +127,22 @@ def for_head(values: NDArray[np.float64], wanted: tuple[str, ...]) -> NDArray[np
 
 
 def sheet_poses() -> list[tuple[str, NDArray[np.float64]]]:
-    """Label and full parameter vector of every picture of the sheet."""
-    poses = [("neutral", PARAMETERS.neutral())]
+    """Label and full parameter vector of every picture of the sheet: expressions first, then every parameter."""
+    vocabulary = Vocabulary.load(PARAMETERS)
+    poses = [(name, _vector(vocabulary.expand(name, 1.0))) for name in vocabulary.names]
     for index, name in enumerate(PARAMETERS.names):
-        for end in (PARAMETERS.low[index], PARAMETERS.high[index]):
-            if end:
-                values = PARAMETERS.neutral()
-                values[index] = end
-                poses.append((f"{name} {end:+g}" if PARAMETERS.low[index] < 0 else name, values))
-    expressions = Vocabulary.load(PARAMETERS)
-    for name in expressions.names:
-        values = PARAMETERS.neutral()
-        for index, value in expressions.expand(name, 1.0).items():
-            values[index] = value
-        poses.append((name, values))
+        two_sided = PARAMETERS.low[index] < 0
+        if two_sided:
+            poses.append((f"{name} \N{MINUS SIGN}", _vector({index: PARAMETERS.low[index]})))
+        poses.append((f"{name} +" if two_sided else name, _vector({index: PARAMETERS.high[index]})))
     return poses
+
+
+def _vector(values: dict[int, float]) -> NDArray[np.float64]:
+    vector = PARAMETERS.neutral()
+    for index, value in values.items():
+        vector[index] = value
+    return vector
 
 
 def draw_sheet(still: Still, out: Path) -> None:

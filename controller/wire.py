@@ -22,6 +22,40 @@ class BodyOrders:
 
 
 @dataclass(frozen=True)
+class Stop:
+    """Main to body: stop the servos and end."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Main to body, from the panel: hold one parameter at a value, or release it.
+
+    Attributes
+    ----------
+    index : which parameter.
+    value : its value; None gives it back to the layers below.
+    """
+
+    index: int
+    value: float | None
+
+
+@dataclass(frozen=True)
+class Show:
+    """Main to body, from the panel: show a named expression at an intensity 0..1."""
+
+    name: str
+    intensity: float
+
+
+@dataclass(frozen=True)
+class Calm:
+    """Main to body, from the panel: release everything and return to neutral over ``seconds``."""
+
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Ready:
     """The body is up.
 
