@@ -60,6 +60,7 @@ class Body:
         self._mailbox = mailbox
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping = threading.Event()
+        self._error: Exception | None = None
         self._closers = ExitStack()
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
 
@@ -91,6 +92,12 @@ class Body:
             self._closers.close()
             raise
 
+    def check(self) -> None:
+        """Raise what ended one of the loops, if any did."""
+        for error in (self._error, *(bus.error for bus in self.buses)):
+            if error is not None:
+                raise error
+
     def stop(self) -> None:
         """Close links, then stop the servos; errors of one do not keep the others from being stopped."""
         self._stopping.set()
@@ -99,6 +106,12 @@ class Body:
         self._closers.close()
 
     def _control(self) -> None:
+        try:
+            self._control_loop()
+        except Exception as error:  # noqa: BLE001  the body has to hear of it and stop the servos
+            self._error = error
+
+    def _control_loop(self) -> None:
         values = self._newest[0].copy()
         last = time.monotonic_ns()
         for now in self.clock.run(lambda: not self._stopping.is_set()):
@@ -164,9 +177,7 @@ def _wait(body: Body, pipe: Connection, stop: threading.Event) -> None:
         if body.finished and not told:
             _tell(pipe, Finished())
             told = True
-        for bus in body.buses:
-            if bus.error is not None:
-                raise bus.error
+        body.check()
 
 
 def _obey(state: CommandState, pipe: Connection) -> bool:

@@ -6,6 +6,7 @@ value, and leaves its own measurements as a latest value. It never waits for the
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -22,8 +23,12 @@ from drivers import open_bus
 from drivers.bus import Bus, BusState
 from drivers.errors import DriverError, PortLost
 
+log = logging.getLogger(__name__)
+
 Floats = NDArray[np.float64]
 Newest = Callable[[], tuple[Floats, int]]
+
+_RETRY_NS = 1_000_000_000
 
 
 class BusLoop:
@@ -58,11 +63,13 @@ class BusLoop:
         self.clock = Clock(settings.rate_hz)
         self.latency_ms = Samples()
         self.held = 0
-        self.error: DriverError | None = None
+        self.error: Exception | None = None
         self._newest = newest
         self._limiter = limiter_of(self.table, 1.0 / settings.rate_hz)
         self._sent = np.zeros(len(channels))
         self._last_stamp = 0
+        self._retry_ns: int | None = None
+        self._state: BusState | None = None
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -102,17 +109,21 @@ class BusLoop:
     def _resume(self) -> None:
         """Begin from where the servos are, so that the first goals are a ramp from there."""
         state = self._state = self.bus.read()
-        self._sent[:] = np.clip(state.position_rad, self.table.low_rad, self.table.high_rad)
+        known = np.isfinite(state.position_rad)
+        self._sent[known] = np.clip(state.position_rad, self.table.low_rad, self.table.high_rad)[known]
         self._limiter.reset(self._sent)
 
     def _run(self) -> None:
         try:
             for now in self.clock.run(lambda: not self._stopping.is_set()):
-                self._cycle(now)
-        except DriverError as error:
+                if self._retry_ns is None:
+                    self._cycle()
+                elif now >= self._retry_ns:
+                    self._reconnect(now)
+        except Exception as error:  # noqa: BLE001  the body has to hear of it and stop the servos
             self.error = error
 
-    def _cycle(self, now: int) -> None:
+    def _cycle(self) -> None:
         values, stamp = self._newest()
         angles, held = self.table.angles(values)
         self.held += held
@@ -121,8 +132,20 @@ class BusLoop:
             self.bus.write(self._sent)
             self._note_latency(stamp)
             self._state = self.bus.read()
-        except PortLost:
-            self._reconnect()
+        except PortLost as error:
+            log.warning("%s; trying again every %g s", error, _RETRY_NS / 1e9)
+            self._retry_ns = 0
+
+    def _reconnect(self, now: int) -> None:
+        """One attempt to get a lost port back; motion goes on from where the servos are found."""
+        try:
+            self.bus.reconnect()
+            self._resume()
+        except DriverError:
+            self._retry_ns = now + _RETRY_NS
+        else:
+            log.warning("bus %s is back", self.settings.name)
+            self._retry_ns = None
 
     def _note_latency(self, stamp: int) -> None:
         if stamp > self._last_stamp:
