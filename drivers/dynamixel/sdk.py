@@ -1,7 +1,7 @@
 """dynamixel-sdk with its known faults overridden, all in this one place.
 
-:class:`Port` and :class:`Packets` are the SDK's handlers and can be given to any SDK code (the port lies in
-drivers/dynamixel/port.py). What is mended, numbered as in docs/drivers.md; each has a test that shows the fault on the bare SDK:
+:class:`Port` (in drivers/dynamixel/port.py) and :class:`Packets` are the SDK's handlers and can be given to any
+SDK code. What is mended; each fault has a test in tests/drivers/test_sdk.py that shows it on the bare SDK:
 
 ====  ========================================================================================================
 S1    transmitted packets are byte-stuffed (the SDK builds the stuffed packet and throws it away)
@@ -176,9 +176,7 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
             port.is_using = False
         return found
 
-    def read_group(
-        self, port: Port, ids: Sequence[int], address: int, length: int, *, fast: bool = False
-    ) -> Exchange:
+    def read_group(self, port: Port, ids: Sequence[int], address: int, length: int, *, fast: bool = False) -> Exchange:
         """One sync read, or fast sync read, keeping every reply that arrived (S7, S10, S14).
 
         Servos in ``port.suspects`` are not asked and count as missing until :meth:`revive` brought them back.
@@ -274,9 +272,7 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         return _settle(port, dict(devices), {reply.id: reply for reply in replies}, len(raw) >= size)
 
 
-def _settle(
-    port: Port, wanted: Mapping[int, int], replies: dict[int, StatusPacket], corrupt: bool
-) -> Exchange:
+def _settle(port: Port, wanted: Mapping[int, int], replies: dict[int, StatusPacket], corrupt: bool) -> Exchange:
     """Remember who missed its time; who answered is in step."""
     missing = tuple(servo for servo in wanted if servo not in replies)
     if port.suspects:

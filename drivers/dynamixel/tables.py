@@ -76,14 +76,14 @@ class ControlTable(Mapping[str, Item]):
     ticks_per_turn, turn_rad, center : position steps over `turn_rad` radians, and the step of the zero angle.
     baud : bits per second by value of Baud Rate.
     voltage : usual supply, in the register's 0.1 V.
+    hardware_error : bit by cause (``voltage``, ``temperature``, ``overload`` ...) of Hardware Error Status and
+        Shutdown; the XL-320 orders them differently from every other model.
     indirect : (first Indirect Address, first Indirect Data, slots) of each indirect area.
     fast_read, time_profile, goal_torque : whether this firmware knows fast reads, the time-based profile and
         torque on by goal update.
     """
 
-    def __init__(
-        self, model: str, number: int, firmware: int, spec: dict[str, Any], items: list[Item]
-    ) -> None:
+    def __init__(self, model: str, number: int, firmware: int, spec: dict[str, Any], items: list[Item]) -> None:
         self.model, self.number, self.firmware = model, number, firmware
         self.items_by_name = {item.name: item for item in sorted(items, key=lambda item: item.address)}
         self.eeprom_end: int = spec["eeprom_end"]
@@ -93,9 +93,8 @@ class ControlTable(Mapping[str, Item]):
         self.center: int = spec["center"]
         self.baud: tuple[int, ...] = tuple(spec["baud"])
         self.voltage: int = spec["voltage"]
-        self.indirect: tuple[tuple[int, int, int], ...] = tuple(
-            tuple(area) for area in spec.get("indirect", ())
-        )
+        self.indirect: tuple[tuple[int, int, int], ...] = tuple(tuple(area) for area in spec.get("indirect", ()))
+        self.hardware_error: dict[str, int] = spec["hardware_error"]
         self.fast_read = 0 < spec.get("fast_read_firmware", 0) <= firmware
         self.time_profile = 0 < spec.get("time_profile_firmware", 0) <= firmware
         self.goal_torque = 0 < spec.get("goal_torque_firmware", 0) <= firmware
@@ -168,9 +167,7 @@ def model_number(model: str | int) -> int:
     if isinstance(model, int):
         if model in known_models():
             return model
-        raise DriverError(
-            f"there is no control table for model number {model}", hint=_some_models(numbers, "")
-        )
+        raise DriverError(f"there is no control table for model number {model}", hint=_some_models(numbers, ""))
     name = model.strip().lower().replace("_", "-")
     for candidate in (name, name.removesuffix("-t").removesuffix("-r"), name.replace("xl-320", "xl320")):
         if candidate in numbers:
@@ -278,9 +275,7 @@ def _indirect_items(spec: dict[str, Any]) -> list[Item]:
     slot = 1
     for pointers, data, count in spec.get("indirect", ()):
         for k in range(count):
-            items.append(
-                Item(f"Indirect Address {slot}", pointers + 2 * k, 2, False, True, data + k, low, high)
-            )
+            items.append(Item(f"Indirect Address {slot}", pointers + 2 * k, 2, False, True, data + k, low, high))
             items.append(Item(f"Indirect Data {slot}", data + k, 1))
             slot += 1
     return items
