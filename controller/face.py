@@ -147,7 +147,7 @@ class HeadlessFace:
 
     def close(self) -> None:
         """Give the graphics memory back."""
-        self._screen.__exit__(None, None, None)
+        self._screen.close()
 
     def report(self) -> dict[str, object]:
         """Frames, frames per second, milliseconds a frame, and how many frames differed from the one before."""
