@@ -53,7 +53,7 @@ def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
 
     Notes
     -----
-    Only the main thread receives signals; in another thread the handlers are left alone, the rest still holds.
+    Only the main thread receives signals; in another thread the handlers are left alone, all else still holds.
     """
     once = _Once(stop)
     at_exit = partial(_quietly, once)
