@@ -24,7 +24,15 @@ StatusValue = str | int | float
 
 
 class CommandSink(Protocol):
-    """What a link may ask of the face. ``stamp_ns`` is when the command arrived (monotonic clock, ns)."""
+    """What a link may ask of the face. ``stamp_ns`` is when the command arrived (monotonic clock, ns).
+
+    Attributes
+    ----------
+    parameters : the registry. vocabulary : the named expressions.
+    """
+
+    parameters: Parameters
+    vocabulary: Vocabulary
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         """Hold parameters at values, until released."""

@@ -106,7 +106,7 @@ _CRC = _crc_table()
 def checksum(data: bytes) -> int:
     """CRC-8/SMBUS of ``data``: polynomial 0x07, start 0, not reflected. Check value of b"123456789": 0xF4.
 
-    Unlike the XOR of NMEA it sees swapped neighbours and any burst of up to 8 wrong bits.
+    Unlike the XOR of NMEA it sees every swap of neighbouring ASCII characters and any burst of up to 8 bits.
     """
     crc = 0
     for byte in data:
