@@ -78,11 +78,7 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         """Stuff, sum and send a packet of the SDK's making (S1, S3, S5)."""
         if port.is_using:
             return int(robotis_def.COMM_PORT_BUSY)
-        length = txpacket[5] | txpacket[6] << 8
-        params = bytes(txpacket[8 : 5 + length])
-        if len(params) != length - 3:
-            raise ValueError(f"packet says {length - 3} bytes of parameters and holds {len(params)}")
-        self.send(port, encode_instruction(txpacket[4], txpacket[7], params))
+        self.send(port, encode_instruction(txpacket[4], txpacket[7], _params(txpacket)))
         return int(robotis_def.COMM_SUCCESS)
 
     def rxPacket(self, port: Port, fast_option: bool) -> tuple[list[int], int]:
@@ -110,7 +106,7 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
             result = self.txPacket(port, txpacket)
             port.is_using = False
             return None, result, 0
-        params = bytes(txpacket[8 : 5 + (txpacket[5] | txpacket[6] << 8)])
+        params = _params(txpacket)
         got = self.ask(port, servo, instruction, params, _reply_length(instruction, params))
         reply = got.replies.get(servo)
         if reply is None:
@@ -279,6 +275,14 @@ def _settle(port: Port, wanted: Mapping[int, int], replies: dict[int, StatusPack
         port.suspects.difference_update(replies)
     port.suspects.update(missing)
     return Exchange(replies, missing, corrupt and bool(missing))
+
+
+def _params(txpacket: Sequence[int]) -> bytes:
+    """Parameters of an instruction packet of the SDK; too little data leaves its list too short (S11)."""
+    length = txpacket[5] | txpacket[6] << 8
+    if len(txpacket) != 7 + length:
+        raise ValueError(f"packet of {7 + length} bytes was given {len(txpacket)}: its parameters are cut short")
+    return bytes(txpacket[8 : 5 + length])
 
 
 def _reply_length(instruction: int, params: bytes) -> int:
