@@ -82,9 +82,7 @@ class Trajectory:
         piece = next(piece for piece in reversed(self._pieces) if t >= piece[0])
         begin, position, velocity, acceleration = piece
         t -= begin
-        return Motion(
-            position + (velocity + 0.5 * acceleration * t) * t, velocity + acceleration * t, acceleration
-        )
+        return Motion(position + (velocity + 0.5 * acceleration * t) * t, velocity + acceleration * t, acceleration)
 
 
 def hold(now_s: float, position: float) -> Trajectory:
@@ -142,9 +140,7 @@ def plan_timed(
     return Trajectory(now_s, position, velocity, pieces, goal, profile)
 
 
-def plan_speed(
-    now_s: float, position: float, velocity: float, goal_velocity: float, acceleration: float
-) -> Trajectory:
+def plan_speed(now_s: float, position: float, velocity: float, goal_velocity: float, acceleration: float) -> Trajectory:
     """Ramp to a velocity and keep it."""
     change = goal_velocity - velocity
     pieces = [(abs(change) / acceleration, math.copysign(acceleration, change))]

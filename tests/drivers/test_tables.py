@@ -123,6 +123,17 @@ def test_indirect_area_depends_on_model_and_firmware(model, firmware, pointer, d
     assert "Indirect Address Read" not in table
 
 
+def test_hardware_error_bits_are_ordered_by_family():
+    assert load_table("xl330-m288").hardware_error == {
+        "voltage": 0x01,
+        "temperature": 0x04,
+        "encoder": 0x08,
+        "shock": 0x10,
+        "overload": 0x20,
+    }
+    assert load_table("xl320").hardware_error == {"overload": 0x01, "temperature": 0x02, "voltage": 0x04}
+
+
 def test_second_indirect_area_of_the_large_models():
     table = load_table("xm430-w350")
     assert (table["Indirect Address 29"].address, table["Indirect Data 29"].address) == (578, 634)

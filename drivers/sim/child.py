@@ -1,0 +1,99 @@
+"""The child process of ``SimulatedBus(process=True)``: settings and commands come as JSON lines on standard input.
+
+It answers ``ready PATH`` (or ``error WHY``) on standard output and ends when standard input does, so it cannot
+outlive its parent however that one ends.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import time
+from typing import Any
+
+from drivers.errors import DriverError
+from drivers.sim.bus import SimulatedChain
+from drivers.sim.device import SimulatedServo
+from drivers.sim.serve import PtyServer
+
+
+class Commands:
+    """Cuts the command lines out of what arrives and carries them out."""
+
+    def __init__(self, chain: SimulatedChain) -> None:
+        self._chain, self._rest = chain, b""
+
+    def __call__(self, data: bytes) -> None:
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        for line in lines:
+            if line.strip():
+                self._obey(json.loads(line))
+
+    def _obey(self, message: dict[str, Any]) -> None:
+        now_s = time.monotonic()
+        with self._chain.lock:
+            if "fault" in message:
+                self._chain.faults.add(message["fault"], now_s)
+            if "clear" in message:
+                self._chain.faults.clear(message["clear"], now_s)
+
+
+def build(settings: dict[str, Any]) -> PtyServer:
+    """The server that the settings describe."""
+    now_s = time.monotonic()
+    servos = [
+        SimulatedServo(device_id, model, now_s=now_s, baud=settings["baud"]) for device_id, model in settings["servos"]
+    ]
+    chain = SimulatedChain(servos, now_s, seed=settings["seed"])
+    server = PtyServer(
+        chain,
+        settings["link"],
+        baud=settings["baud"],
+        wire=settings["wire"],
+        latency_s=settings["latency_s"],
+        on_lines=Commands(chain),
+    )
+    try:
+        chain.faults.add(settings["faults"], now_s)
+    except DriverError:
+        server.port.close()
+        raise
+    return server
+
+
+def main() -> int:
+    """Serve until standard input ends. An interrupt of the terminal is the parent's business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    first = _first_line(sys.stdin.fileno())
+    if not first:
+        return 0
+    try:
+        server = build(json.loads(first))
+    except DriverError as error:
+        _say(f"error {error}")
+        return 1
+    _say(f"ready {server.port.path}")
+    server.run(sys.stdin.fileno())
+    return 0
+
+
+def _first_line(descriptor: int) -> bytes:
+    """One line, byte by byte, so that nothing behind it is taken away from the server's loop."""
+    line = b""
+    while not line.endswith(b"\n"):
+        byte = os.read(descriptor, 1)
+        if not byte:
+            return b""
+        line += byte
+    return line
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

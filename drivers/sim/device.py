@@ -1,0 +1,403 @@
+"""One simulated Dynamixel servo: what each instruction does to it, and what it does by itself.
+
+Behaviour follows the ROBOTIS e-Manual (Protocol 2.0 and control tables); where firmware differs or nobody has
+verified it, the choice is said at the method. A servo takes the time as an argument and never sleeps.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+
+from drivers.dynamixel.packet import ALERT, ErrorNumber
+from drivers.dynamixel.tables import Item, load_table
+from drivers.sim.drive import CURRENT, CURRENT_POSITION, EXTENDED, GOAL_TORQUE, PWM, Drive
+from drivers.sim.plant import Plant, Skin
+from drivers.sim.registers import GOALS, Change, Registers
+
+CLEAR_MULTI_TURN = b"\x01\x44\x58\x4c\x22"
+TRIPPED = 0xFF
+"""Bus Watchdog (98) after it has expired."""
+WATCHDOG_STEP_S = 0.02
+HEALTH_PERIOD_S = 0.05
+OVERLOAD_AFTER_S = 1.0
+
+
+class Heard:
+    """When the last instruction went over the wire; shared by the servos of a bus."""
+
+    __slots__ = ("at_s",)
+
+    def __init__(self, at_s: float) -> None:
+        self.at_s = at_s
+
+
+class SimulatedServo:
+    """A servo with its control table, motor and faults.
+
+    Parameters
+    ----------
+    device_id : 0 to 252.
+    model : model name or number.
+    now_s : time of power-up.
+    firmware : version; None = a current one.
+    baud : bit rate in its Baud Rate register; a rate the model lacks keeps the register's initial value.
+    position : Present Position at power-up, ticks; None = the middle of the range.
+    skin : load on the shaft.
+    boot_s : how long it is deaf after a reboot.
+
+    Attributes
+    ----------
+    eeprom_writes : number of writes by register name (wear).
+    watchdog_ignored : keeps turning when its bus watchdog trips (330-size firmware does, in current mode).
+    forced_alert : sets the alert bit without a hardware error.
+    eeprom_busy_s : how long it is deaf after a write below ``table.eeprom_end``.
+    next_health_s : when it looks after heat, supply and load again.
+    heard : when the last instruction went over the wire; a bus gives all its servos the same object.
+    on_change : called when id, secondary id or baud rate changed.
+    """
+
+    def __init__(
+        self,
+        device_id: int,
+        model: str | int = "xl330-m288",
+        *,
+        now_s: float = 0.0,
+        firmware: int | None = None,
+        baud: int = 1_000_000,
+        position: float | None = None,
+        skin: Skin | None = None,
+        boot_s: float = 0.25,
+    ) -> None:
+        self.table = table = load_table(model, firmware)
+        self.registers = Registers(table)
+        self.registers.reset(0, table.size)
+        self.eeprom_writes: Counter[str] = Counter()
+        self.on_change: Callable[[], None] = lambda: None
+        self.boot_s, self.deaf_until = boot_s, now_s
+        self.watchdog_ignored = self.forced_alert = self.shut_down = False
+        self.eeprom_busy_s = 0.0
+        self.heard = Heard(now_s)
+        self.next_health_s = now_s
+        self._sensed_at = -1.0
+        self._pending: list[Change] = []
+        self.registers.put("ID", device_id)
+        if baud in table.baud:
+            self.registers.put("Baud Rate", table.baud.index(baud))
+        start = float(table.center if position is None else position)
+        self.plant = Plant(now_s, start, self._no_load_speed(), table.voltage / 10, skin or Skin())
+        self.drive = Drive(self.registers, self.plant, now_s)
+        self._effects = self._effects_by_name()
+        self._boot(now_s)
+
+    def _no_load_speed(self) -> float:
+        limit = self.table.get("Velocity Limit")
+        if limit is None:
+            return 1023 * self.table["Moving Speed"].scale / self.table.rad_per_tick
+        return limit.initial * limit.scale / self.table.rad_per_tick
+
+    # ------------------------------------------------------------ what the bus needs to know
+    @property
+    def id(self) -> int:
+        """Number on the bus."""
+        return self.registers.memory[self.table["ID"].address]
+
+    @property
+    def secondary_id(self) -> int | None:
+        """Second number it listens to without answering, or None."""
+        item = self.table.get("Secondary(Shadow) ID")
+        value = self.registers.memory[item.address] if item else 255
+        return value if value <= 252 else None
+
+    @property
+    def baud(self) -> int:
+        """Bit rate it listens at."""
+        return self.table.baud[self.registers.get("Baud Rate")]
+
+    @property
+    def return_delay_s(self) -> float:
+        """Pause before a reply."""
+        return self.registers.get("Return Delay Time") * 2e-6
+
+    @property
+    def status_level(self) -> int:
+        """0 answers a ping only, 1 a read too, 2 everything."""
+        return self.registers.get("Status Return Level")
+
+    @property
+    def alert(self) -> int:
+        """`ALERT` while a hardware error is latched, else 0."""
+        return ALERT if self.forced_alert or self.registers.get("Hardware Error Status") else 0
+
+    # ------------------------------------------------------------ what tests and tools look at
+    @property
+    def torque(self) -> bool:
+        """Whether the motor is on."""
+        return self.plant.powered
+
+    @property
+    def goal(self) -> int:
+        """Goal Position register."""
+        return self.registers.get("Goal Position")
+
+    def position_ticks(self, now_s: float) -> int:
+        """Present Position."""
+        self.look(now_s)
+        return self.drive.to_register(self.plant.motion(now_s).position)
+
+    def register(self, name: str, now_s: float) -> int:
+        """Value of any register, up to date; KeyError where the model has none of that name."""
+        self.look(now_s)
+        self._sense(now_s)
+        return self.registers.get(name)
+
+    def force(self, name: str, value: int, now_s: float) -> None:
+        """Set a register whatever its access and range, with all that follows from it."""
+        self._store(self.table[name], value, now_s)
+        self._sensed_at = -1.0
+
+    def place(self, position: float, now_s: float) -> None:
+        """Move the limp shaft by hand to a Present Position.
+
+        Raises
+        ------
+        ValueError : the motor is on and holds the shaft.
+        """
+        if self.plant.powered:
+            raise ValueError(f"servo {self.id} holds its shaft: switch its torque off before moving it by hand")
+        self.plant.place(now_s, self.drive.to_shaft(round(position)))
+        self._sensed_at = -1.0
+
+    def latch(self, bits: int, now_s: float) -> None:
+        """Latch hardware errors; those in the Shutdown mask switch the motor off until a reboot."""
+        registers = self.registers
+        registers.put("Hardware Error Status", registers.get("Hardware Error Status") | bits)
+        if bits & registers.get("Shutdown") and not self.shut_down:
+            self.shut_down = True
+            if "Torque Limit" in self.table:
+                registers.put("Torque Limit", 0)
+            else:
+                registers.put("Torque Enable", 0)
+            self._set_power(False, now_s)
+
+    # ------------------------------------------------------------ what happens by itself
+    def look(self, now_s: float) -> None:
+        """Catch up: bus watchdog, heat, supply, overload."""
+        self.watch(now_s)
+        if now_s >= self.next_health_s:
+            self.next_health_s = now_s + HEALTH_PERIOD_S
+            self.check_health(now_s)
+
+    def watch(self, now_s: float) -> None:
+        """Trip the bus watchdog when no instruction (for any servo) was heard for its time."""
+        if not self.plant.powered or "Bus Watchdog" not in self.table:
+            return
+        period = self.registers.get("Bus Watchdog")
+        due = self.heard.at_s + period * WATCHDOG_STEP_S
+        if not 0 < period < 128 or now_s <= due:
+            return
+        self.registers.put("Bus Watchdog", TRIPPED)
+        self.registers.goals_locked = True
+        if not self._ignores_watchdog():
+            self.drive.stop(due)
+
+    def _ignores_watchdog(self) -> bool:
+        small = self.table.model.startswith(("xl330", "xc330"))
+        return self.watchdog_ignored or (small and self.registers.get("Operating Mode") == CURRENT)
+
+    def force_baud(self, baud: int) -> None:
+        """Set the bit rate it listens at, whatever the wire says; an unknown rate counts as the lowest.
+
+        This is how a bus comes to have a servo at the wrong rate.
+        """
+        rates = self.table.baud
+        self.registers.put("Baud Rate", rates.index(baud) if baud in rates else 0)
+
+    def check_health(self, now_s: float) -> None:
+        """Latch the hardware errors whose causes are there now."""
+        bits, registers = 0, self.registers
+        load = self._sense(now_s)
+        cause = self.table.hardware_error
+        self.plant.warm(now_s, load)
+        volts = 10.0 * self.plant.voltage(load)
+        if not registers.get("Min Voltage Limit") <= round(volts) <= registers.get("Max Voltage Limit"):
+            bits |= cause["voltage"]
+        if self.plant.temperature_c > registers.get("Temperature Limit"):
+            bits |= cause["temperature"]
+        if abs(load) >= 1.0 and self.plant.jammed_since is not None:
+            bits |= cause["overload"] if now_s - self.plant.jammed_since > OVERLOAD_AFTER_S else 0
+        if bits:
+            self.latch(bits, now_s)
+
+    def _sense(self, now_s: float) -> float:
+        self._sensed_at = now_s
+        return self.drive.sense(now_s)
+
+    # ------------------------------------------------------------ instructions
+    def read(self, address: int, length: int, now_s: float) -> tuple[int, bytes]:
+        """(error byte, data). A range that leaves the table gives Access (7) and no data."""
+        registers = self.registers
+        if not registers.readable(address, length):
+            return self.alert | ErrorNumber.ACCESS, b""
+        first, end = registers.span(address, length)
+        if end > self.drive.first_sensed and first < self.drive.last_sensed and now_s != self._sensed_at:
+            self._sense(now_s)
+        return self.alert, registers.read(address, length)
+
+    def write(self, address: int, data: bytes, now_s: float) -> int:
+        """Error byte of a write; nothing is changed unless all of it is allowed."""
+        changes = self.registers.parse(address, data)
+        if isinstance(changes, ErrorNumber):
+            return self.alert | changes
+        self._apply(changes, now_s)
+        return self.alert
+
+    def reg_write(self, address: int, data: bytes) -> int:
+        """Error byte; keeps an allowed write for `action`."""
+        changes = self.registers.parse(address, data)
+        if isinstance(changes, ErrorNumber):
+            return self.alert | changes
+        self._pending = changes
+        self.registers.put("Registered Instruction", 1)
+        return self.alert
+
+    def action(self, now_s: float) -> int:
+        """Error byte; runs the registered write, Instruction (2) where there is none."""
+        if not self.registers.get("Registered Instruction"):
+            return self.alert | ErrorNumber.INSTRUCTION
+        changes, self._pending = self._pending, []
+        self.registers.put("Registered Instruction", 0)
+        self._apply(changes, now_s)
+        return self.alert
+
+    def reboot(self, now_s: float) -> None:
+        """RAM to its initial values, errors cleared, deaf for `boot_s`."""
+        self._boot(now_s)
+        self.deaf_until = now_s + self.boot_s
+
+    def factory_reset(self, option: int, now_s: float) -> int:
+        """Error byte. 0xFF resets all, 1 keeps the id, 2 keeps id and baud rate."""
+        kept = {0xFF: (), 0x01: ("ID",), 0x02: ("ID", "Baud Rate")}.get(option)
+        if kept is None:
+            return self.alert | ErrorNumber.DATA_RANGE
+        values = {name: self.registers.get(name) for name in kept}
+        self.registers.reset(0, self.table.eeprom_end)
+        for name, value in values.items():
+            self.registers.put(name, value)
+        self.drive.configure()
+        self.reboot(now_s)
+        self.on_change()
+        return 0
+
+    def clear(self, params: bytes, now_s: float) -> int:
+        """Error byte. Multi-turn clear: Present Position back into one turn, only at rest, else Result Fail."""
+        if params != CLEAR_MULTI_TURN:
+            return self.alert | ErrorNumber.DATA_RANGE
+        if self.plant.motion(now_s).velocity:
+            return self.alert | ErrorNumber.RESULT_FAIL
+        self._one_turn(now_s)
+        return self.alert
+
+    # ------------------------------------------------------------ effects of writes
+    def _effects_by_name(self) -> dict[str, Callable[[int, float], None]]:
+        """What writing a register does beyond changing it."""
+        effects: dict[str, Callable[[int, float], None]] = {
+            "Torque Enable": self._write_torque,
+            "Bus Watchdog": self._write_watchdog,
+            "Operating Mode": self._write_mode,
+            "Hardware Error Status": lambda value, now_s: None,
+        }
+        effects.update(dict.fromkeys(GOALS | {"Moving Speed"}, self._write_goal))
+        effects.update(dict.fromkeys(("ID", "Secondary(Shadow) ID", "Baud Rate"), self._write_address))
+        for name in self.table:
+            if name.startswith("Indirect Address"):
+                effects[name] = lambda value, now_s: self.registers.remap()
+        return effects
+
+    def _apply(self, changes: list[Change], now_s: float) -> None:
+        for item, value in changes:
+            self._store(item, value, now_s)
+        self._sensed_at = -1.0
+
+    def _store(self, item: Item, value: int, now_s: float) -> None:
+        if item.name == "Torque Enable" and value and self.shut_down:
+            return  # only a reboot lets a servo that shut down have torque again
+        self.registers.store(item, value)
+        if item.address < self.table.eeprom_end:
+            self.eeprom_writes[item.name] += 1
+            self.deaf_until = max(self.deaf_until, now_s + self.eeprom_busy_s)
+            self.drive.configure()
+        effect = self._effects.get(item.name)
+        if effect is not None:
+            effect(value, now_s)
+
+    def _write_torque(self, value: int, now_s: float) -> None:
+        if bool(value) != self.plant.powered:
+            self._set_power(bool(value), now_s)
+
+    def _write_goal(self, value: int, now_s: float) -> None:
+        """A goal moves a powered motor. Drive Mode bit 3: it also switches the motor on."""
+        if self.plant.powered:
+            self.drive.plan(now_s)
+        elif self.table.goal_torque and self.registers.get("Drive Mode") & GOAL_TORQUE and not self.shut_down:
+            self.registers.put("Torque Enable", 1)
+            self._set_power(True, now_s)
+
+    def _write_watchdog(self, value: int, now_s: float) -> None:
+        """0 clears a tripped watchdog. (A period written while tripped re-arms it as well.)"""
+        self.registers.goals_locked = False
+
+    def _write_mode(self, value: int, now_s: float) -> None:
+        """Goals go back to those of a servo that stands still; Present Position back into one turn."""
+        self.registers.extended = value in (EXTENDED, CURRENT_POSITION)
+        self._one_turn(now_s)
+        self._reset_goals(now_s)
+
+    def _write_address(self, value: int, now_s: float) -> None:
+        self.on_change()
+
+    # ------------------------------------------------------------ states
+    def _set_power(self, on: bool, now_s: float) -> None:
+        self.plant.powered = on
+        self.registers.locked = on
+        if on:
+            self.drive.plan(now_s)
+        else:
+            self.drive.coast(now_s)
+
+    def _boot(self, now_s: float) -> None:
+        """Power-up. Startup Configuration bit 0 switches the motor on at once."""
+        registers = self.registers
+        registers.reset(self.table.eeprom_end, self.table.size)
+        registers.goals_locked = self.shut_down = False
+        self._pending = []
+        self.drive.born_s = now_s
+        self._set_power(False, now_s)
+        if "Operating Mode" in self.table:
+            registers.extended = registers.get("Operating Mode") in (EXTENDED, CURRENT_POSITION)
+        self._reset_goals(now_s)
+        self._sensed_at = -1.0
+        startup = self.table.get("Startup Configuration")
+        if startup and registers.get(startup.name) & 1:
+            registers.put("Torque Enable", 1)
+            self._set_power(True, now_s)
+
+    def _reset_goals(self, now_s: float) -> None:
+        """Goal Position where the shaft is; current and PWM at their limits but where they are the goal."""
+        registers = self.registers
+        registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))
+        if "Operating Mode" not in self.table:
+            return
+        mode = registers.get("Operating Mode")
+        registers.put("Goal Velocity", 0)
+        registers.put("Goal PWM", 0 if mode == PWM else registers.get("PWM Limit"))
+        if "Goal Current" in self.table:
+            registers.put("Goal Current", 0 if mode == CURRENT else registers.get("Current Limit"))
+
+    def _one_turn(self, now_s: float) -> None:
+        turn = self.table.ticks_per_turn
+        position = self.plant.motion(now_s).position
+        if not 0 <= position < turn:
+            self.plant.place(now_s, position % turn)
+        registers = self.registers
+        registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))

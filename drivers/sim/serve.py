@@ -1,0 +1,192 @@
+"""Serve a simulated bus on a pseudo-terminal: one loop that sleeps until there is something to do."""
+
+from __future__ import annotations
+
+import os
+import select
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+
+from drivers.sim.bus import SimulatedChain
+from drivers.sim.device import SimulatedServo
+from drivers.sim.faults import Fault
+from drivers.sim.ptyport import PtyPort
+from drivers.sim.wire import Timed, WireTiming, instruction_size, without_timing
+
+PAUSE_S = 0.1
+"""A packet that is not complete after this pause is given up."""
+
+
+class PtyServer:
+    """Moves bytes between a chain of servos and a pseudo-terminal.
+
+    Parameters
+    ----------
+    chain : the servos.
+    link : path that shall point at the terminal, or None.
+    baud : bit rate while no client has set one.
+    wire : bytes take their time.
+    latency_s : USB latency timer, with `wire`.
+    on_lines : called with what arrives at the descriptor of `run`, to take commands; it ends the loop at EOF.
+
+    Attributes
+    ----------
+    port : the terminal; its ``path`` is what a client opens.
+    """
+
+    def __init__(
+        self,
+        chain: SimulatedChain,
+        link: str | os.PathLike[str] | None = None,
+        *,
+        baud: int = 1_000_000,
+        wire: bool = False,
+        latency_s: float = 0.0,
+        on_lines: Callable[[bytes], None] | None = None,
+    ) -> None:
+        self.chain, self.baud = chain, baud
+        self.port = PtyPort(link)
+        self._link = link
+        self._timing = WireTiming(latency_s) if wire else None
+        self._on_lines = on_lines
+        self._queue: deque[Timed] = deque()
+        self._read_s = 0.0
+        chain.on_unplug = self._unplug
+
+    def run(self, control: int) -> None:
+        """Serve until the descriptor `control` reaches its end (or says anything, without `on_lines`)."""
+        try:
+            while True:
+                watched = [control, self.port.fileno()] if self.port.is_open else [control]
+                ready, _, _ = select.select(watched, [], [], self._timeout())
+                if control in ready and not self._command(control):
+                    return
+                if self.port.is_open and self.port.fileno() in ready:
+                    self._receive()
+                self._work_off()
+        finally:
+            self.port.close()
+
+    def _command(self, control: int) -> bool:
+        """Take commands; False when it is time to go."""
+        data = os.read(control, 65536)
+        if not data or self._on_lines is None:
+            return False
+        self._on_lines(data)
+        return True
+
+    def _timeout(self) -> float | None:
+        """Seconds until something is due; None = nothing is."""
+        due = self.chain.faults.next_change_s
+        if self._queue:
+            due = min(due, self._queue[0][0])
+        if self.chain.reader.pending:
+            due = min(due, self._read_s + PAUSE_S)
+        return None if due == float("inf") else max(due - time.monotonic(), 0.0)
+
+    def _receive(self) -> None:
+        data = self.port.read()
+        if not data:
+            return
+        now_s = self._read_s = time.monotonic()
+        chain = self.chain
+        chain.set_line_baud(self.port.baud())
+        if chain.echo:
+            self._send([(now_s, data)])
+        for packet in chain.reader.feed(data):
+            if self._timing is None:
+                self._send(without_timing(chain.handle(packet, now_s), now_s))
+                continue
+            baud = chain.line_baud or self.baud
+            at_s = self._timing.arrival(now_s, instruction_size(packet), baud)
+            self._send(self._timing.deliveries(chain.handle(packet, at_s), baud))
+
+    def _send(self, timed: list[Timed]) -> None:
+        """Write what is due, keep the rest in order."""
+        for time_s, data in timed:
+            if self._queue or time_s > time.monotonic():
+                self._queue.append((time_s, data))
+            elif self.port.is_open:
+                self.port.write(data)
+
+    def _work_off(self) -> None:
+        """Replies, faults and broken packets whose time has come."""
+        now_s = time.monotonic()
+        while self._queue and self._queue[0][0] <= now_s:
+            _, data = self._queue.popleft()
+            if self.port.is_open:
+                self.port.write(data)
+        if self.chain.reader.pending and now_s >= self._read_s + PAUSE_S:
+            for packet in self.chain.reader.flush():
+                self._send(without_timing(self.chain.handle(packet, now_s), now_s))
+        if now_s >= self.chain.faults.next_change_s:
+            with self.chain.lock:
+                self.chain.faults.advance(now_s)
+
+    def _unplug(self, fault: Fault, begins: bool) -> None:
+        """The port goes away with all that was under way, and comes back, perhaps under another name."""
+        if begins:
+            self.port.close()
+            self._queue.clear()
+            self.chain.reader.take_pending()
+        elif not self.port.is_open:
+            self.port.open(fault.alias or self._link)
+
+
+def make_servos(servos: Iterable[object], model: str | int, baud: int, now_s: float) -> list[SimulatedServo]:
+    """Simulated servos for ids, or for anything that has an ``id`` and a ``model`` (a ``ServoSpec``)."""
+    return [
+        SimulatedServo(
+            int(getattr(servo, "id", servo)),  # type: ignore[call-overload]
+            getattr(servo, "model", model),
+            now_s=now_s,
+            baud=baud,
+        )
+        for servo in servos
+    ]
+
+
+def serve_dynamixel(
+    ids: Iterable[object],
+    model: str | int = "xl330-m288",
+    baud: int = 1_000_000,
+    link: str | os.PathLike[str] | None = None,
+    wire: bool = False,
+    faults: Iterable[str | Fault] = (),
+    on_ready: Callable[[str], None] = lambda path: None,
+    *,
+    latency_s: float = 0.0,
+    stop: int | None = None,
+    seed: int = 0,
+) -> None:
+    """Serve a simulated Dynamixel bus until it is interrupted. Prints nothing.
+
+    Parameters
+    ----------
+    ids : servo ids, or specs with ``id`` and ``model``.
+    model : of the servos given as bare ids.
+    baud : bit rate of the servos.
+    link : path that shall point at the terminal.
+    wire : bytes take their time at the bit rate, with return delay and `latency_s`.
+    faults : specs, see ``drivers.sim.faults``.
+    on_ready : called with the path to open as soon as clients may come.
+    stop : descriptor; the end of it (or any byte) ends the service. None = until KeyboardInterrupt.
+    seed : of random faults.
+
+    Raises
+    ------
+    DriverError : unknown model, unreadable fault, or the terminal or link cannot be made.
+    """
+    now_s = time.monotonic()
+    chain = SimulatedChain(make_servos(ids, model, baud, now_s), now_s, seed=seed)
+    server = PtyServer(chain, link, baud=baud, wire=wire, latency_s=latency_s)
+    reading, writing = os.pipe()
+    try:
+        chain.faults.add(faults, now_s)
+        on_ready(server.port.path)
+        server.run(reading if stop is None else stop)
+    finally:
+        server.port.close()
+        os.close(reading)
+        os.close(writing)

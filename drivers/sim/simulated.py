@@ -1,0 +1,282 @@
+"""A simulated bus as one object: in a thread for tests, in a child process beside a program that is busy."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from drivers.errors import PortError
+from drivers.sim.bus import SimulatedChain
+from drivers.sim.faults import parse_fault
+from drivers.sim.serve import PtyServer, make_servos
+
+START_S = 20.0
+"""A child process that is not ready after this time is given up."""
+
+
+class ServoView:
+    """One servo of a running bus, seen from another thread: always up to date, never in the middle of a packet."""
+
+    def __init__(self, chain: SimulatedChain, device_id: int) -> None:
+        self._chain, self._servo = chain, chain.servo(device_id)
+
+    @property
+    def position_ticks(self) -> int:
+        """Present Position."""
+        with self._chain.lock:
+            return self._servo.position_ticks(time.monotonic())
+
+    @property
+    def goal(self) -> int:
+        """Goal Position."""
+        with self._chain.lock:
+            return self._servo.goal
+
+    @property
+    def torque(self) -> bool:
+        """Whether the motor is on."""
+        with self._chain.lock:
+            self._servo.look(time.monotonic())
+            return self._servo.torque
+
+    @property
+    def eeprom_writes(self) -> dict[str, int]:
+        """Writes to permanent registers so far, by name."""
+        with self._chain.lock:
+            return dict(self._servo.eeprom_writes)
+
+    def register(self, name: str) -> int:
+        """Value of a register; KeyError where the model has none of that name."""
+        with self._chain.lock:
+            return self._servo.register(name, time.monotonic())
+
+    def put(self, name: str, value: int) -> None:
+        """Set a register whatever its access, as it could have been left by somebody else."""
+        with self._chain.lock:
+            self._servo.force(name, value, time.monotonic())
+
+    def place(self, position: float) -> None:
+        """Move the limp shaft by hand, ticks; ValueError while the motor holds it."""
+        with self._chain.lock:
+            self._servo.place(position, time.monotonic())
+
+    def latch(self, bits: int) -> None:
+        """Latch hardware errors."""
+        with self._chain.lock:
+            self._servo.latch(bits, time.monotonic())
+
+
+class SimulatedBus:
+    """A simulated Dynamixel bus behind a pseudo-terminal; a context manager.
+
+    Parameters
+    ----------
+    servos : ids, or specs with ``id`` and ``model``.
+    link : path that shall point at the terminal.
+    faults : specs, see ``drivers.sim.faults``.
+    model : of the servos given as bare ids.
+    baud : bit rate of the servos.
+    wire, latency_s : bytes take their time.
+    process : serve from a child process (which ends with this one, however this one ends) instead of a thread.
+    seed : of random faults.
+
+    Attributes
+    ----------
+    path : what a client opens.
+    baud : bit rate.
+
+    Raises
+    ------
+    DriverError : on entering: unknown model, unreadable fault, no terminal, or the child does not start.
+    """
+
+    def __init__(
+        self,
+        servos: Iterable[Any],
+        link: str | os.PathLike[str] | None = None,
+        faults: Iterable[str] = (),
+        *,
+        model: str | int = "xl330-m288",
+        baud: int = 1_000_000,
+        wire: bool = False,
+        latency_s: float = 0.0,
+        process: bool = False,
+        seed: int = 0,
+    ) -> None:
+        self.baud = baud
+        self._wire, self._latency_s = wire, latency_s
+        self._servos = [(int(getattr(s, "id", s)), getattr(s, "model", model)) for s in servos]
+        self._link, self._faults, self._seed = link, list(faults), seed
+        self._process = process
+        self._path = ""
+        self._child: subprocess.Popen[bytes] | None = None
+        self._server: PtyServer | None = None
+        self._thread: threading.Thread | None = None
+        self._stop = -1
+
+    @property
+    def path(self) -> str:
+        """What a client opens; after an unplug and replug the new name (thread mode)."""
+        return self._server.port.path if self._server and self._server.port.is_open else self._path
+
+    @property
+    def chain(self) -> SimulatedChain:
+        """The servos themselves (thread mode only)."""
+        if self._server is None:
+            raise RuntimeError("the servos can be looked at only while the bus runs in a thread of this process")
+        return self._server.chain
+
+    def servo(self, device_id: int) -> ServoView:
+        """One servo (thread mode only); KeyError where nobody has the id."""
+        return ServoView(self.chain, device_id)
+
+    def fault(self, *specs: str) -> None:
+        """Set faults now.
+
+        Raises
+        ------
+        DriverError : a spec cannot be read; then none is set.
+        """
+        faults = [parse_fault(spec) for spec in specs]
+        if self._child:
+            self._tell({"fault": list(specs)})
+            return
+        with self.chain.lock:
+            self.chain.faults.add(faults, time.monotonic())
+        self._wake()
+
+    def clear(self, kind: str | None = None) -> None:
+        """End the faults of a kind; None: all."""
+        if self._child:
+            self._tell({"clear": kind})
+            return
+        with self.chain.lock:
+            self.chain.faults.clear(kind, time.monotonic())
+        self._wake()
+
+    def __enter__(self) -> Self:
+        if self._process:
+            self._start_child()
+        else:
+            self._start_thread()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Pull the plug and end the service; harmless when it has ended."""
+        if self._child:
+            _end_child(self._child)
+            self._child = None
+        if self._thread:
+            os.close(self._stop)
+            self._thread.join()
+            self._thread = self._server = None
+
+    # ------------------------------------------------------------ in a thread
+    def _start_thread(self) -> None:
+        now_s = time.monotonic()
+        servos = make_servos([_Entry(*entry) for entry in self._servos], 0, self.baud, now_s)
+        chain = SimulatedChain(servos, now_s, seed=self._seed)
+        server = PtyServer(
+            chain,
+            self._link,
+            baud=self.baud,
+            wire=self._wire,
+            latency_s=self._latency_s,
+            on_lines=lambda data: None,
+        )
+        try:
+            chain.faults.add(self._faults, now_s)
+        except BaseException:
+            server.port.close()
+            raise
+        self._server, self._path = server, server.port.path
+        reading, self._stop = os.pipe()
+        self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
+        self._thread.start()
+
+    def _wake(self) -> None:
+        """Let the loop see that its next appointment has changed."""
+        os.write(self._stop, b"\n")
+
+    # ------------------------------------------------------------ in a child process
+    def _start_child(self) -> None:
+        root = str(Path(__file__).resolve().parents[2])
+        environment = dict(os.environ)
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
+        self._child = subprocess.Popen(
+            [sys.executable, "-m", "drivers.sim.child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+        )
+        self._tell(
+            {
+                "servos": self._servos,
+                "link": None if self._link is None else os.fspath(self._link),
+                "baud": self.baud,
+                "faults": self._faults,
+                "seed": self._seed,
+                "wire": self._wire,
+                "latency_s": self._latency_s,
+            }
+        )
+        self._path = self._first_line(self._child)
+
+    def _first_line(self, child: subprocess.Popen[bytes]) -> str:
+        """The path the child serves."""
+        timer = threading.Timer(START_S, child.kill)
+        timer.start()
+        try:
+            words = (child.stdout.readline() if child.stdout else b"").decode().strip().partition(" ")
+        finally:
+            timer.cancel()
+        if words[0] == "ready":
+            return words[2]
+        _end_child(child)
+        self._child = None
+        raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
+
+    def _tell(self, message: dict[str, Any]) -> None:
+        if self._child and self._child.stdin:
+            self._child.stdin.write(json.dumps(message).encode() + b"\n")
+            self._child.stdin.flush()
+
+
+class _Entry:
+    """An id with a model, as ``make_servos`` takes it."""
+
+    def __init__(self, device_id: int, model: str | int) -> None:
+        self.id, self.model = device_id, model
+
+
+def _serve(server: PtyServer, reading: int) -> None:
+    try:
+        server.run(reading)
+    finally:
+        os.close(reading)
+
+
+def _end_child(child: subprocess.Popen[bytes]) -> None:
+    """The child goes when its standard input ends; one that does not is killed."""
+    if child.stdin:
+        child.stdin.close()
+    try:
+        child.wait(timeout=2.0)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
+    if child.stdout:
+        child.stdout.close()
