@@ -53,7 +53,7 @@ class SpeedGuard:
         elapsed = min(max(now_s - self._time_s, 0.0), BURST_S)
         self._time_s = now_s
         self._saved = np.minimum(self._saved + elapsed * self._speed, BURST_S * self._speed)
-        move = np.clip(target_rad - self._last, -self._saved, self._saved)
+        move = np.minimum(np.maximum(target_rad - self._last, -self._saved), self._saved)
         self._saved -= np.abs(move)
         self._last = self._last + move
         return self._last.copy()

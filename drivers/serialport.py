@@ -131,12 +131,7 @@ class SerialPort:
         ------
         PortLost : the device went away.
         """
-        try:
-            return self._take()
-        except BlockingIOError:
-            pass
-        if not self._wait(deadline_s):
-            return b""
+        self._wait(deadline_s)
         try:
             return self._take()
         except BlockingIOError:
@@ -151,11 +146,16 @@ class SerialPort:
         """
         count, end = 0, time.monotonic() + limit_s
         while True:
-            now = time.monotonic()
-            data = self.read(min(now + quiet_s, end))
-            count += len(data)
-            if not data or now > end:
+            try:
+                count += len(self._take() if quiet_s == 0.0 else self._awaited(quiet_s, end))
+            except BlockingIOError:
                 return count
+            if time.monotonic() > end:
+                return count
+
+    def _awaited(self, quiet_s: float, end_s: float) -> bytes:
+        self._wait(min(time.monotonic() + quiet_s, end_s))
+        return self._take()
 
     def _take(self) -> bytes:
         try:

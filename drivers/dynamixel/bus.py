@@ -257,12 +257,12 @@ class DynamixelBus(Bus):
         known = np.isfinite(wanted)
         self._report.refused_targets += int(np.count_nonzero(~known))
         target = np.where(known, wanted, self._target)
-        clipped = np.clip(target, self._low, self._high)
+        clipped = np.minimum(np.maximum(target, self._low), self._high)
         self._report.limits_hit += int(np.count_nonzero(clipped != target))
         self._target = clipped
         allowed = self._guard.step(clipped, now)
         self._report.speed_limited += int(np.count_nonzero(np.abs(allowed - clipped) > 1e-9))
-        return np.clip(self.scale.ticks(allowed), self.scale.low, self.scale.high)
+        return np.minimum(np.maximum(self.scale.ticks(allowed), self.scale.low), self.scale.high)
 
     def _after_a_pause(self, now: float) -> None:
         """Look at all watchdogs when the caller was away for so long that they may have tripped."""

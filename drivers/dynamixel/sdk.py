@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from dynamixel_sdk import protocol2_packet_handler, robotis_def
@@ -144,7 +145,7 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         if servo in port.suspects and instruction != Instruction.PING and not self.revive(port, servo):
             return Exchange({}, (servo,), False)
         frame = encode_instruction(servo, instruction, params)
-        return self.exchange(port, frame, {servo: length}, STATUS_SIZE + length + len(frame))
+        return self.exchange(port, frame, {servo: length})
 
     def hello(self, port: Port, servo: int) -> StatusPacket | None:
         """A servo's answer to a ping (``params``: model number low, high, firmware), or None."""
@@ -182,14 +183,11 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
             ids = [servo for servo in ids if servo not in left_out]
         if not ids:
             return Exchange({}, left_out, False)
-        head = bytes((address & 0xFF, address >> 8, length & 0xFF, length >> 8))
-        instruction = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
-        frame = encode_instruction(packet.BROADCAST_ID, instruction, head + bytes(ids))
+        frame = _group_read_frame(bytes(ids), address, length, fast)
         if fast:
             got = self._exchange_fast(port, frame, [(servo, length) for servo in ids])
         else:
-            size = len(frame) + len(ids) * (STATUS_SIZE + length)
-            got = self.exchange(port, frame, dict.fromkeys(ids, length), size)
+            got = self.exchange(port, frame, dict.fromkeys(ids, length))
         return got._replace(missing=got.missing + left_out) if left_out else got
 
     def write_group(self, port: Port, address: int, length: int, rows: bytes) -> None:
@@ -209,23 +207,37 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         head = bytes((address & 0xFF, address >> 8, length & 0xFF, length >> 8))
         self.tell(port, encode_instruction(packet.BROADCAST_ID, Instruction.SYNC_WRITE, head + rows))
 
-    def exchange(self, port: Port, frame: bytes, wanted: Mapping[int, int], size: int) -> Exchange:
+    def exchange(self, port: Port, frame: bytes, wanted: Mapping[int, int]) -> Exchange:
         """Send a packet and collect the replies to it.
 
         Parameters
         ----------
-        wanted : data bytes expected, by servo id.
-        size : bytes on the wire both ways, for the deadline.
+        wanted : data bytes expected, by servo id, in the order of the replies.
         """
+        size = len(wanted) * STATUS_SIZE + sum(wanted.values())
         self.send(port, frame)
         try:
-            port.setPacketTimeout(size)
-            return self._collect(port, wanted)
+            port.setPacketTimeout(len(frame) + size)
+            data = self._fill(port, size)
+            replies = _in_order(data, wanted) if len(data) == size else None
+            return _settle(port, wanted, replies, False) if replies else self._collect(port, wanted, data)
         finally:
             port.is_using = False
 
-    def _collect(self, port: Port, wanted: Mapping[int, int]) -> Exchange:
+    def _fill(self, port: Port, size: int) -> bytes:
+        """Received bytes, at least ``size`` of them unless the deadline passes."""
+        data = port.link.read(port.deadline_s)
+        while len(data) < size:
+            more = port.link.read(port.deadline_s)
+            if not more:
+                break
+            data += more
+        return data
+
+    def _collect(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange:
+        """The replies in ``data`` and in what still comes, whatever lies between them."""
         reader, replies, late = StatusReader(), dict[int, StatusPacket](), 0
+        self._sort(port, reader.feed(data), wanted, replies)
         while len(replies) < len(wanted) and late < _LATE_CHUNKS:
             data = port.link.read(port.deadline_s)
             if not data:
@@ -275,6 +287,37 @@ def _settle(port: Port, wanted: Mapping[int, int], replies: dict[int, StatusPack
         port.suspects.difference_update(replies)
     port.suspects.update(missing)
     return Exchange(replies, missing, corrupt and bool(missing))
+
+
+@lru_cache(maxsize=256)
+def _group_read_frame(ids: bytes, address: int, length: int, fast: bool) -> bytes:
+    head = bytes((address & 0xFF, address >> 8, length & 0xFF, length >> 8))
+    instruction = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
+    return encode_instruction(packet.BROADCAST_ID, instruction, head + ids)
+
+
+@lru_cache(maxsize=1024)
+def _status_head(servo: int, length: int) -> tuple[bytes, int]:
+    """Bytes of an unstuffed status packet before its error byte, and their CRC."""
+    size = length + 4
+    head = packet.HEADER + bytes((0, servo, size & 0xFF, size >> 8, Instruction.STATUS))
+    return head, packet.crc16(head)
+
+
+def _in_order(data: bytes, wanted: Mapping[int, int]) -> dict[int, StatusPacket] | None:
+    """The usual case, quickly: exactly the replies asked for, in order, unstuffed. None when it is not that."""
+    at, replies = 0, {}
+    for servo, length in wanted.items():
+        head, crc = _status_head(servo, length)
+        end = at + STATUS_SIZE + length
+        body = data[at + 8 : end - 2]
+        if not data.startswith(head, at) or packet.HEADER in body:
+            return None
+        if packet.crc16(body, crc) != data[end - 2] | data[end - 1] << 8:
+            return None
+        replies[servo] = StatusPacket(servo, body[0], body[1:])
+        at = end
+    return replies
 
 
 def _params(txpacket: Sequence[int]) -> bytes:
