@@ -1,7 +1,8 @@
 """Acting named expressions: rising, holding and falling, from whatever the face shows at that moment.
 
 There is one mood, held until the next, and at most one timed expression over it; when its time is over the face
-returns to the mood. Every change starts at the present face, so interrupting never makes it jump.
+returns to the mood. A timed gesture moves only what it names, so a wink keeps the smile it is given with. Every
+change starts at the present face, so interrupting never makes it jump.
 """
 
 from __future__ import annotations
@@ -77,6 +78,9 @@ class Actor:
             self._fall_at_s = np.inf
             self._go(pose, expression.onset_s, now_s)
         else:
+            if expression.kind == "gesture":
+                stronger = np.abs(pose.goal) > np.abs(self._mood.goal)
+                pose.goal = np.where(stronger, pose.goal, self._mood.goal)
             self._fall_at_s = now_s + duration_s
             self._go(pose, min(expression.onset_s, duration_s), now_s)
 

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from controller.config import config_error
 from controller.errors import ParameterError
-from controller.parameters import Floats, Parameters, did_you_mean, fold, read_toml
+from controller.parameters import Floats, Parameters, did_you_mean, file_error, fold, read_toml
 from controller.paths import config_dir
 
 KINDS = ("emotion", "gesture", "user")
@@ -67,7 +66,7 @@ class Vocabulary:
         expressions = {name: reader.expression(name, given) for name, given in read_toml(path).items()}
         aliases = reader.aliases(expressions)
         if reader.faults:
-            raise config_error(path, reader.faults)
+            raise file_error(path, reader.faults)
         return cls(expressions, aliases)
 
     @property

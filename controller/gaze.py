@@ -53,7 +53,7 @@ class Gaze:
         """Look at a point; x to the subject's left, y up, z forward from the middle between the eyes."""
         self._yaw[0] = math.atan2(x_mm - EYE_OFFSET_MM, z_mm)
         self._yaw[1] = math.atan2(x_mm + EYE_OFFSET_MM, z_mm)
-        self._pitch = -math.atan2(y_mm, math.hypot(x_mm, z_mm))
+        self._pitch = math.atan2(-y_mm, math.hypot(x_mm, z_mm))
         self.active = True
 
     def off(self) -> None:
@@ -63,7 +63,7 @@ class Gaze:
     @property
     def direction_deg(self) -> tuple[float, float]:
         """Yaw and pitch, degrees, of the middle between both eyes' directions."""
-        return math.degrees(float(self._yaw.mean())), math.degrees(self._pitch)
+        return math.degrees(float(self._yaw.mean())) + 0.0, math.degrees(self._pitch) + 0.0
 
     def update(self, present: Floats) -> Floats:
         """Values (6,) for :attr:`indices`, given the present (P,) parameters of the face; a view."""

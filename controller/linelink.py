@@ -100,6 +100,7 @@ class LineLink:
             if data:
                 self._counts["bytes_in"] += len(data)
                 self._reply(self._session.feed(data, now_ns))
+                self._flush()
             self._stream(now_ns)
             self._flush()
 

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.config import config_error
 from controller.errors import ConfigError, ParameterError
 from controller.paths import config_dir
 
@@ -148,6 +147,13 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: not valid TOML: {error}", hint="mend the line named above") from error
 
 
+def file_error(path: Path, faults: list[str]) -> ConfigError:
+    """One error for all faults of a file. Imports the models of configuration only when there is one to report."""
+    from controller.config import config_error
+
+    return config_error(path, faults)
+
+
 @cache
 def standard() -> Parameters:
     """The shipped parameters, read once."""
@@ -181,7 +187,7 @@ def _build(path: Path, table: dict[str, Any]) -> Parameters:
     faults += [f"aliases.{a}: unknown parameter {n!r}{did_you_mean(str(n), entries)}"
                for a, n in aliases.items() if n not in entries]  # fmt: skip
     if faults:
-        raise config_error(path, faults)
+        raise file_error(path, faults)
     arrays = {key: np.array([entry[key] for entry in entries.values()], dtype=np.float64) for key in _ARRAYS}
     for array in arrays.values():
         array.flags.writeable = False
