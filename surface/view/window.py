@@ -1,0 +1,283 @@
+"""The head in a window: imgui-bundle's runner owns window and panel, moderngl draws into its context."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from surface.errors import ViewError
+from surface.view.camera import Camera
+from surface.view.offscreen import SAMPLES
+from surface.view.parts import ViewHead
+from surface.view.renderer import Renderer
+from surface.view.target import Target
+from surface.view.theme import Theme
+from surface.view.viewpoint import Viewpoint
+
+if TYPE_CHECKING:
+    import moderngl
+
+HEADLESS_HINT = "add --headless, or start it under: xvfb-run -a"
+
+
+@dataclass(frozen=True)
+class WindowReport:
+    """What a window did: frames drawn, and the seconds from its first frame to its last."""
+
+    frames: int
+    seconds: float
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames per second."""
+        return (self.frames - 1) / self.seconds if self.seconds > 0.0 else 0.0
+
+
+def run_window(
+    head: ViewHead,
+    source: Callable[[], np.ndarray],
+    *,
+    size: tuple[int, int] = (1280, 720),
+    title: str = "omote",
+    gui: Callable[[], None] | None = None,
+    seconds: float | None = None,
+    keep_going: Callable[[], bool] | None = None,
+    camera: Camera | None = None,
+    quality: str = "full",
+    theme: str | Theme = "skin",
+    full_screen: bool = False,
+) -> WindowReport:
+    """Show the head until the window is closed.
+
+    Drag turns the head, right drag moves it, the wheel zooms, 1 to 5 choose a preset view, 0 goes back.
+
+    Parameters
+    ----------
+    source : called once per frame, gives values (P,) in `head.parameters` order.
+    gui : draws ImGui panels, once per frame.
+    seconds : close by itself after this long.
+    keep_going : asked once per frame; the window closes when it says False.
+    quality, theme : see :class:`surface.view.renderer.Renderer`.
+    full_screen : cover the whole monitor (kiosk).
+
+    Raises
+    ------
+    ViewError : no display, no OpenGL, or imgui-bundle is missing. What `source` or `gui` raise comes
+        through after the window is closed.
+    """
+    _require_display()
+    runner = _imgui()
+    window = _Window(head, source, Viewpoint(camera), quality, theme)
+    window.gui, window.seconds, window.keep_going = gui, seconds, keep_going
+    params = _parameters(runner, window, size, title, full_screen)
+    try:
+        runner.run(params)
+    except Exception as error:
+        raise window.failure or _no_window(error) from error
+    if window.failure is not None:
+        raise window.failure
+    if window.frames == 0:
+        raise ViewError("the window closed before it drew anything", hint=HEADLESS_HINT)
+    return WindowReport(window.frames, window.last - window.first)
+
+
+def has_display() -> bool:
+    """Whether this session has a display to open a window on."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _require_display() -> None:
+    """ViewError without a display: the window library would end the process instead."""
+    if not has_display():
+        raise ViewError("there is no display to open a window on (DISPLAY is not set)", hint=HEADLESS_HINT)
+
+
+def _no_window(error: Exception) -> ViewError:
+    """Why the runner gave up; its own words name only its source line."""
+    display = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY", "")
+    return ViewError(f"no window on display {display!r}: {str(error).splitlines()[0]}", hint=HEADLESS_HINT)
+
+
+def _imgui() -> Any:
+    """The runner module of imgui-bundle."""
+    try:
+        from imgui_bundle import hello_imgui
+    except ImportError as error:
+        raise ViewError(f"the window needs imgui-bundle ({error})", hint="pip install 'omote[view]'") from error
+    return hello_imgui
+
+
+class _Window:
+    """What the runner's callbacks do; keeps the first failure, since none may leave a callback."""
+
+    def __init__(
+        self,
+        head: ViewHead,
+        source: Callable[[], np.ndarray],
+        viewpoint: Viewpoint,
+        quality: str,
+        theme: str | Theme,
+    ) -> None:
+        self.head, self.source = head, source
+        self.viewpoint, self.quality, self.theme = viewpoint, quality, theme
+        self.gui: Callable[[], None] | None = None
+        self.seconds: float | None = None
+        self.keep_going: Callable[[], bool] | None = None
+        self.frames, self.first, self.last = 0, 0.0, 0.0
+        self.failure: BaseException | None = None
+        self._ctx: moderngl.Context | None = None
+        self._renderer: Renderer | None = None
+        self._target: Target | None = None
+
+    def guarded(self, action: Callable[[], None]) -> Callable[[], None]:
+        """`action` as a callback: what it raises is kept and closes the window."""
+
+        def call() -> None:
+            if self.failure is not None:
+                return
+            try:
+                action()
+            except BaseException as error:  # noqa: BLE001 - C++ is the caller; re-raised by run_window
+                self.failure = error
+                self.close()
+
+        return call
+
+    @staticmethod
+    def close() -> None:
+        """Ask the runner to stop after this frame."""
+        from imgui_bundle import hello_imgui
+
+        hello_imgui.get_runner_params().app_shall_exit = True
+
+    def start(self) -> None:
+        """Attach moderngl to the window's context."""
+        import moderngl
+
+        try:
+            self._ctx = moderngl.create_context(require=310)
+        except Exception as error:
+            raise ViewError(
+                f"the window has no OpenGL 3.1: {error}", hint="set LIBGL_ALWAYS_SOFTWARE=1 to draw in software"
+            ) from error
+        self._ctx.clear_errors()
+        self._renderer = Renderer(self._ctx, self.head, quality=self.quality, theme=self.theme)
+
+    def background(self) -> None:
+        """One frame of the head, under the panels."""
+        if self._ctx is None or self._renderer is None:
+            return
+        # The runner's own drawing changes OpenGL's state behind moderngl's back: begin from what is there.
+        screen = self._ctx.detect_framebuffer()
+        size = _pixels()
+        if size[0] < 1 or size[1] < 1:
+            return
+        target = self._fitting(self._ctx, size)
+        self.head.pose(self.source())
+        self._renderer.update()
+        target.paint(self._renderer, self.viewpoint.camera)
+        target.picture.scissor = (0, 0, *size)
+        screen.viewport = screen.scissor = (0, 0, *size)
+        self._ctx.copy_framebuffer(screen, target.picture)
+        screen.use()
+        self._ctx.enable_only(self._ctx.NOTHING)
+        self._count()
+
+    def panels(self) -> None:
+        """Mouse, keys and the caller's panels."""
+        _steer(self.viewpoint)
+        if self.gui is not None:
+            self.gui()
+
+    def stop(self) -> None:
+        """Give back what was drawn with, while the context still lives."""
+        if self._target is not None:
+            self._target.release()
+        if self._renderer is not None:
+            self._renderer.release()
+        self._target = self._renderer = None
+
+    def _fitting(self, ctx: moderngl.Context, size: tuple[int, int]) -> Target:
+        """The target, made anew when the window changed its size."""
+        if self._target is None or self._target.size != size:
+            if self._target is not None:
+                self._target.release()
+            self._target = Target(ctx, size, SAMPLES[self.quality])
+        return self._target
+
+    def _count(self) -> None:
+        """Note the frame, and close when the time is over."""
+        self.last = time.perf_counter()
+        self.first = self.first if self.frames else self.last
+        self.frames += 1
+        over = self.seconds is not None and self.last - self.first >= self.seconds
+        if over or (self.keep_going is not None and not self.keep_going()):
+            self.close()
+
+
+def _pixels() -> tuple[int, int]:
+    """Size of the window's framebuffer, pixels."""
+    from imgui_bundle import imgui
+
+    io = imgui.get_io()
+    scale = io.display_framebuffer_scale
+    return round(io.display_size.x * scale.x), round(io.display_size.y * scale.y)
+
+
+def _steer(viewpoint: Viewpoint) -> None:
+    """Apply this frame's mouse and keys to the camera, where no panel wants them."""
+    from imgui_bundle import imgui
+
+    io = imgui.get_io()
+    if not io.want_capture_mouse:
+        moved = io.mouse_delta
+        if imgui.is_mouse_down(imgui.MouseButton_.left):
+            viewpoint.turn(moved.x, moved.y)
+        elif imgui.is_mouse_down(imgui.MouseButton_.right):
+            viewpoint.shift(moved.x, moved.y, int(io.display_size.y))
+        if io.mouse_wheel:
+            viewpoint.zoom(io.mouse_wheel)
+    if not io.want_text_input:
+        for digit in range(6):
+            if imgui.is_key_pressed(getattr(imgui.Key, f"_{digit}"), repeat=False):
+                viewpoint.press(str(digit))
+
+
+def _parameters(runner: Any, window: _Window, size: tuple[int, int], title: str, full_screen: bool) -> Any:
+    """The runner's settings: OpenGL, no files left behind, our callbacks."""
+    params = runner.RunnerParams()
+    params.app_window_params.window_title = title
+    params.app_window_params.window_geometry.size = size
+    if full_screen:
+        params.app_window_params.window_geometry.full_screen_mode = runner.FullScreenMode.full_screen_desktop_resolution
+    params.ini_disable = True
+    params.imgui_window_params.default_imgui_window_type = runner.DefaultImGuiWindowType.no_default_window
+    params.fps_idling.enable_idling = False
+    _choose_opengl(runner, params)
+    callbacks = params.callbacks
+    callbacks.post_init = window.guarded(window.start)
+    callbacks.custom_background = window.guarded(window.background)
+    callbacks.show_gui = window.guarded(window.panels)
+    callbacks.before_exit = window.stop
+    return params
+
+
+def _choose_opengl(runner: Any, params: Any) -> None:
+    """OpenGL 3.1 as the floor; macOS offers nothing below its own 3.3 core."""
+    params.renderer_backend_type = runner.RendererBackendType.open_gl3
+    options = runner.OpenGlOptions()
+    options.anti_aliasing_samples = 0
+    if sys.platform != "darwin":
+        options.major_version, options.minor_version = 3, 1
+        options.glsl_version = "#version 140"
+        options.use_core_profile = False
+        options.use_forward_compat = False
+    params.renderer_backend_options.open_gl_options = options
