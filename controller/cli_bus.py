@@ -109,9 +109,9 @@ def simulate_dynamixel(
 
     Example: omote simulate dynamixel --ids 1-24 --model xl330-m288 --link /tmp/head
     """
-    from controller.simulating import serve_servos
+    from controller.simulating import SimulatedId, serve_servos
 
-    serve_servos(dict.fromkeys(parse_ids(ids), model), baud, link, wire, fault or [], console)
+    serve_servos([SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console)
 
 
 def simulate_robot(

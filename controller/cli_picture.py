@@ -42,8 +42,8 @@ def render(
 
     still = Still.parse(settings or [], expression or [], size, camera, quality, head)
     if sheet:
-        with console.status("drawing the sheet"):
-            draw_sheet(still, out)
+        with console.status("drawing") as status:
+            draw_sheet(still, out, lambda done, total: status.update(f"drawing {done} of {total}"))
     else:
         draw_still(still, out)
     console.print(f"wrote {out}", soft_wrap=True)

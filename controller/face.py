@@ -19,7 +19,7 @@ from controller.stage import FaceSettings
 
 if TYPE_CHECKING:
     from surface.head import Head
-    from surface.view import Offscreen
+    from surface.view.offscreen import Offscreen
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -56,12 +56,12 @@ class Recorder:
 
     Parameters
     ----------
-    clip_fps : pictures per second in the clip.
+    clip_hz : pictures per second in the clip.
     height : height of the kept pictures (pixels).
     """
 
-    def __init__(self, *, clip_fps: float = 12.5, height: int = 360) -> None:
-        self.clip_fps = clip_fps
+    def __init__(self, *, clip_hz: float = 12.5, height: int = 360) -> None:
+        self.clip_hz = clip_hz
         self.height = height
         self.frames: list[Image] = []
         self.times_s: list[float] = []
@@ -76,7 +76,7 @@ class Recorder:
         step = max(1, picture.shape[0] // self.height)
         self.frames.append(_shrink(_middle_square(picture), step))
         self.times_s.append(time_s)
-        self._next_s = (int(time_s * self.clip_fps) + 1) / self.clip_fps
+        self._next_s = (int(time_s * self.clip_hz) + 1) / self.clip_hz
 
 
 def _middle_square(picture: Image) -> Image:
@@ -113,7 +113,8 @@ class HeadlessFace:
         values: Callable[[], Floats],
         recorder: Recorder | None = None,
     ) -> None:
-        from surface.view import Camera, Offscreen
+        from surface.view.camera import Camera
+        from surface.view.offscreen import Offscreen
 
         self._screen: Offscreen = Offscreen(head, settings.size, quality=settings.quality)
         self._camera = getattr(Camera, settings.camera)()

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from controller.face import Recorder
-from controller.files import replacing
 
 _MOMENTS = 12
+_COLUMNS = 4
 
 
 def write_pictures(recorder: Recorder, folder: Path) -> list[str]:
@@ -29,8 +29,6 @@ def write_pictures(recorder: Recorder, folder: Path) -> list[str]:
     chosen = np.unique(np.linspace(0, len(recorder.frames) - 1, _MOMENTS).round().astype(int))
     labels = [f"{recorder.times_s[i]:.1f} s" for i in chosen]
     sheet, clip = folder / "sheet.png", folder / "face.webp"
-    with replacing(sheet) as path:
-        write_png(compose([recorder.frames[i] for i in chosen], labels, columns=4), path)
-    with replacing(clip) as path:
-        write_clip(recorder.frames, path, fps=recorder.clip_fps)
+    write_png(compose([recorder.frames[i] for i in chosen], labels, columns=_COLUMNS), sheet)
+    write_clip(recorder.frames, clip, fps=recorder.clip_hz)
     return [str(sheet), str(clip)]

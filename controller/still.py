@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 from controller.errors import ParameterError
 from controller.expression import Vocabulary
-from controller.files import replacing
 from controller.parameters import PARAMETERS
 from controller.paths import find_config
 
@@ -110,14 +110,14 @@ def _add_expression(values: NDArray[np.float64], word: str) -> None:
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
     from surface.head import Head
-    from surface.view import Camera, Offscreen
+    from surface.view.camera import Camera
+    from surface.view.offscreen import Offscreen
     from surface.view.sheet import write_png
 
     head = Head.load(still.head)
     with Offscreen(head, still.size, quality=still.quality) as screen:
         picture = screen.render(for_head(still.values, head.parameters), getattr(Camera, still.camera)())
-    with replacing(out) as path:
-        write_png(picture, path)
+    write_png(picture, out)
 
 
 def for_head(values: NDArray[np.float64], wanted: tuple[str, ...]) -> NDArray[np.float64]:
@@ -145,16 +145,13 @@ def _vector(values: dict[int, float]) -> NDArray[np.float64]:
     return vector
 
 
-def draw_sheet(still: Still, out: Path) -> None:
-    """Draw every parameter and every named expression on one sheet (PNG)."""
+def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Draw every parameter and every named expression on one sheet (PNG); ``progress(done, total)`` is told."""
     from surface.head import Head
-    from surface.view import Camera, Offscreen
-    from surface.view.sheet import compose, write_png
+    from surface.view.camera import Camera
+    from surface.view.sheet import contact_sheet, write_png
 
     head = Head.load(still.head)
-    poses = sheet_poses()
-    with Offscreen(head, (320, 320), quality=still.quality) as screen:
-        camera = getattr(Camera, still.camera)()
-        pictures = [screen.render(for_head(values, head.parameters), camera).copy() for _, values in poses]
-    with replacing(out) as path:
-        write_png(compose(pictures, [label for label, _ in poses], columns=8), path)
+    entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses()]
+    camera = getattr(Camera, still.camera)()
+    write_png(contact_sheet(head, entries, views=[camera], quality=still.quality, progress=progress), out)

@@ -18,7 +18,8 @@ from controller.parameters import PARAMETERS
 from controller.stage import Stage, load_stage
 from drivers.sim import SimulatedBus
 from surface.head import Head
-from surface.view import Camera, Offscreen
+from surface.view.camera import Camera
+from surface.view.offscreen import Offscreen
 
 JAW_ID = 4
 
@@ -68,7 +69,7 @@ def host() -> Iterator[Host]:
 
 @pytest.fixture
 def servos() -> Iterator[SimulatedBus]:
-    with SimulatedBus(dict.fromkeys(range(1, 25), "xl330-m288")) as bus:
+    with SimulatedBus(range(1, 25)) as bus:
         yield bus
 
 

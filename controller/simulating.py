@@ -1,0 +1,71 @@
+"""Serving simulated hardware until interrupted, for ``omote simulate``."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from controller.errors import ConfigError
+from controller.parameters import PARAMETERS
+from controller.paths import find_config
+from controller.robot import load_robot
+
+
+@dataclass(frozen=True)
+class SimulatedId:
+    """A servo to simulate: ``id`` on the bus and vendor ``model`` name."""
+
+    id: int
+    model: str
+
+
+def serve_servos(
+    servos: list[SimulatedId], baud: int, link: Path | None, wire: bool, faults: list[str], console: Console
+) -> None:
+    """Serve simulated Dynamixel servos; prints ``ready PATH`` and returns when interrupted."""
+    from drivers.sim import serve_dynamixel
+
+    def ready(path: str) -> None:
+        console.print(f"ready {link or path}", soft_wrap=True)
+
+    _until_stopped(
+        lambda stop: serve_dynamixel(servos, baud=baud, link=link, wire=wire, faults=faults, on_ready=ready, stop=stop)
+    )
+
+
+def robot_servos(name: str, bus: str | None) -> tuple[list[SimulatedId], int]:
+    """The servos on one bus of a robot file, and its baud rate; the first bus without a name.
+
+    Raises
+    ------
+    ConfigError
+        when the file is wrong or has no such bus.
+    """
+    robot = load_robot(find_config("robots", name), PARAMETERS)
+    names = [entry.name for entry in robot.buses]
+    if bus is not None and bus not in names:
+        raise ConfigError(f"robot {robot.name} has no bus called {bus!r}", hint=f"its buses: {', '.join(names)}")
+    chosen = robot.buses[names.index(bus) if bus else 0]
+    return [SimulatedId(channel.id, channel.model) for channel in robot.on_bus(chosen.name)], chosen.baud
+
+
+def _until_stopped(serve: Callable[[int], None]) -> None:
+    """Run ``serve(stop)`` until SIGINT or SIGTERM; the descriptor ``stop`` becomes readable then."""
+    reading, writing = os.pipe()
+
+    def note(_number: int, _frame: object) -> None:
+        os.write(writing, b"x")
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        serve(reading)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        os.close(reading)
+        os.close(writing)
