@@ -1,0 +1,168 @@
+"""Turn a mesh with texture coordinates and expression shapes into a head."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.chart import Chart, make_chart
+from surface.fit.crowns import crown_chart, split_teeth
+from surface.fit.eyeball import BACK, eyeball_surface
+from surface.fit.islands import Island, find_islands
+from surface.fit.joins import find_seams
+from surface.fit.mesh import FitMesh, load_mesh
+from surface.fit.names import sources_of
+from surface.fit.recipe import PartRecipe, Recipe, recipe_for
+from surface.fit.refine import Fitted, fit_chart
+from surface.fit.relax import open_flat_holes
+from surface.fit.report import FitReport, PartReport, measure
+from surface.fit.rigging import find_jaw, lid_share, make_groups, neck_share
+from surface.fit.seat import close_lips, seat_lids
+from surface.head.data import HeadData, Jaw, PartData
+from surface.head.file import save_data
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+
+def fit_head(mesh_path: str | Path, out_dir: str | Path, *, name: str, progress: Progress | None = None) -> FitReport:
+    """Fit a head to a mesh and write it.
+
+    Parameters
+    ----------
+    mesh_path : .npz in the layout of :mod:`surface.fit.mesh`.
+    out_dir : folder that gets head.toml and head.npz.
+    name : the head's short name.
+    progress : called with the part being fitted and the fraction done, 0..1.
+
+    Raises
+    ------
+    FitError : the mesh cannot be read, has no texture coordinates or faces, holds NaN, or does not fit together.
+        Nothing is written then.
+    """
+    mesh = load_mesh(mesh_path)
+    data, report = fit_mesh(mesh, recipe_for(mesh), name, progress or (lambda part, done: None))
+    save_data(out_dir, data)
+    return report
+
+
+def fit_mesh(mesh: FitMesh, recipe: Recipe, name: str, progress: Progress) -> tuple[HeadData, FitReport]:
+    """Fit all parts of a mesh in memory."""
+    mesh = _prepare(mesh, recipe)
+    sources = sources_of(mesh.names)
+    eyes, radius = _eyes(recipe)
+    jaw = find_jaw(mesh, sources, np.arange(*recipe.jaw_teeth), np.array(recipe.hinge or (0.0, 0.0, 0.0)))
+    steps = _Steps(recipe, progress)
+    parts, reports, charts = [], [], {}
+    for part, islands in _islands_of(mesh, recipe):
+        chart = make_chart(mesh, islands, normalise=len(islands) > 1 or not _unit_square(islands[0]))
+        fitted = fit_chart(mesh if part.follows == "skin" else replace(mesh, names=(), deltas=mesh.deltas[:0]),
+                           chart, part.wish, steps.of(part))  # fmt: skip
+        parts.append(_part_data(part, chart, fitted, sources, jaw, eyes, radius))
+        reports.append(measure(part.name, chart, fitted, mesh.names))
+        charts[part.name] = chart
+    for part in recipe.teeth:
+        data, report = _teeth(mesh, part, steps)
+        parts.append(data)
+        reports.append(report)
+    if recipe.eyes is not None:
+        parts += [_eyeball(side, eye, radius) for side, eye in zip(("left", "right"), eyes, strict=True)]
+    head = HeadData(name, _provenance(recipe), recipe.neck or _low_middle(mesh), eyes, radius, jaw, parts,
+                    find_seams(charts), [])  # fmt: skip
+    return head, FitReport(name, reports, sorted(set(sources)))
+
+
+def _prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
+    mesh = close_lips(mesh, recipe.lips_close)
+    if recipe.lids_on is not None and recipe.eyes is not None:
+        mesh = seat_lids(mesh, recipe.lids_on, recipe.eyes, recipe.seated)
+    return mesh
+
+
+def _islands_of(mesh: FitMesh, recipe: Recipe) -> list[tuple[PartRecipe, list[Island]]]:
+    """Every part with its islands, flat holes opened; parts without an island are left out."""
+    islands = find_islands(mesh)
+    out = []
+    for part in recipe.parts:
+        own = [open_flat_holes(i) for i in islands if part.holds(float(np.median(i.vertex)))]
+        if own:
+            out.append((part, own))
+    return out
+
+
+def _unit_square(island: Island) -> bool:
+    return bool(island.uv.min() > -0.05 and island.uv.max() < 1.05 and np.ptp(island.uv, axis=0).min() > 0.7)
+
+
+class _Steps:
+    """Progress over all parts, by their number of points."""
+
+    def __init__(self, recipe: Recipe, progress: Progress) -> None:
+        self._progress = progress
+        self._total = float(sum(p.wish.points for p in recipe.parts) or 1)
+        self._before = 0.0
+
+    def of(self, part: PartRecipe) -> Callable[[float], None]:
+        """Progress of one part, 0..1."""
+        start = self._before
+        self._before += part.wish.points / self._total
+        return lambda done: self._progress(part.name, min(1.0, start + done * part.wish.points / self._total))
+
+
+def _part_data(part: PartRecipe, chart: Chart, fitted: Fitted, sources: dict[str, list[int]], jaw: Jaw,
+               eyes: Floats, radius: float) -> PartData:  # fmt: skip
+    n, skin = len(fitted.net), part.follows == "skin"
+    groups, share = make_groups(fitted.points, fitted.moves, sources, jaw) if skin else ([], np.zeros(n))
+    slits = np.array([[c.v, c.start, c.end] for c in chart.cuts]).reshape(-1, 3)
+    return PartData(
+        part.name, part.material, part.follows, fitted.points, np.ones(n),
+        fitted.net.knots_u, fitted.net.knots_v, np.full((n, 2), 3), chart.loops, slits, part.budget, groups, share,
+        neck_share(fitted.points) if skin else np.ones(n),
+        lid_share(fitted.points, eyes, radius) if skin and radius > 0 else np.zeros(n),
+    )  # fmt: skip
+
+
+def _teeth(mesh: FitMesh, part: PartRecipe, steps: _Steps) -> tuple[PartData, PartReport]:
+    """One patch per tooth, all in one part."""
+    first = mesh.faces[:, 0]
+    teeth = split_teeth(mesh, np.flatnonzero((first >= part.vertices[0][0]) & (first < part.vertices[0][1])))
+    chart, crowns = crown_chart(mesh, teeth, part.follows != "jaw")
+    wish = replace(part.wish, points=part.wish.points * len(teeth), coarse=0.4, deepest=1, neutral_mm=0.08)
+    fitted = fit_chart(crowns, chart, wish)
+    data = _part_data(part, chart, fitted, {}, Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0)), np.zeros((0, 3)), 0.0)
+    return data, measure(part.name, chart, fitted, ())
+
+
+def _eyeball(side: str, centre: Floats, radius: float) -> PartData:
+    """An exact sphere with a cornea; the pole is left out by a hair so that normals are defined everywhere."""
+    s = eyeball_surface(centre, radius)
+    none = np.zeros(s.n)
+    loop = np.array([[0.0, 1e-3], [1.0, 1e-3], [1.0, 1.0], [0.0, 1.0]])
+    return PartData(
+        f"eye_{side}", "eye", f"{side}_eye", s.points.copy(), s.weights.copy(), *(k.copy() for k in s.padded),
+        np.stack(s.degrees, axis=1), [loop], np.zeros((0, 3)), (0, 0.02 * radius / 12.0 * BACK, 6), [],
+        none, none, none,
+    )  # fmt: skip
+
+
+def _eyes(recipe: Recipe) -> tuple[Floats, float]:
+    """Centres (2, 3) and radius; a head without known eyes gets none (radius 0)."""
+    if recipe.eyes is None:
+        return np.zeros((2, 3)), 0.0
+    centre = np.array(recipe.eyes.centre)
+    return np.stack([centre, centre * [-1.0, 1.0, 1.0]]), recipe.eyes.radius
+
+
+def _low_middle(mesh: FitMesh) -> tuple[float, float, float]:
+    """A neck pivot for a head nothing is known of: a quarter up, in the middle."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    return (0.0, float(low[1] + 0.25 * (high[1] - low[1])), float(0.5 * (low[2] + high[2])))
+
+
+def _provenance(recipe: Recipe) -> dict[str, str]:
+    made = "fitted by least squares with omote fit; control points and displacements, not the source mesh"
+    return {"made": made, **{f"source_{k}": v for k, v in recipe.source.items()}}

@@ -1,0 +1,61 @@
+"""An eyeball as an exact rational surface: sclera and cornea are spheres, revolved about the optical axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface import DCPSurface
+
+Floats = NDArray[np.float64]
+IRIS = 0.49  # radius of the iris (limbus), in eyeball radii: 11.8 mm across at 24 mm
+CORNEA = 0.65  # radius of the cornea's sphere, in eyeball radii: 7.8 mm at 12 mm (Gullstrand)
+LIMBUS_V = 0.5  # v of the limbus; the pole is at v = 0
+BACK = np.radians(140.0)  # how far round the sclera reaches from the optical axis
+
+
+def eyeball_surface(centre: Floats, radius: float) -> DCPSurface:
+    """Cornea and sclera with the pupil towards +z.
+
+    u in 0..1 goes once around the optical axis, clockwise seen from the front so that normals point out; v goes from the cornea's apex (0) over the limbus
+    (:data:`LIMBUS_V`) to the back (1). Both spheres are exact: degree 2 in both directions.
+    """
+    limbus = np.arcsin(IRIS)
+    cornea_angle = np.arcsin(IRIS / CORNEA)
+    cornea_z = np.cos(limbus) - CORNEA * np.cos(cornea_angle)
+    middle = 0.5 * (limbus + BACK)
+    net, weight = _join(
+        [_arc(0.0, cornea_angle, CORNEA, cornea_z), _arc(limbus, middle, 1.0, 0.0), _arc(middle, BACK, 1.0, 0.0)]
+    )
+    knots_v = [0, 0, 0, LIMBUS_V, LIMBUS_V, 0.75, 0.75, 1, 1, 1]
+    ring, ring_weight = _circle()
+    points = np.empty((len(ring), len(net), 3))
+    points[..., :2] = ring[:, None, :] * net[None, :, :1]
+    points[..., 2] = net[None, :, 1]
+    knots_u = [0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1]
+    return DCPSurface.from_nurbs(
+        2, 2, knots_u, knots_v, centre + radius * points, ring_weight[:, None] * weight[None, :]
+    )
+
+
+def _arc(start: float, end: float, radius: float, z: float) -> tuple[Floats, Floats]:
+    """Control points (3, 2) as (distance from the axis, z), and weights, of a circular arc by polar angle."""
+    half = 0.5 * (end - start)
+    angles = np.array([start, start + half, end])
+    reach = radius * np.array([1.0, 1.0 / np.cos(half), 1.0])
+    points = np.column_stack([reach * np.sin(angles), z + reach * np.cos(angles)])
+    return points, np.array([1.0, np.cos(half), 1.0])
+
+
+def _join(arcs: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    points = [arcs[0][0][:1], *(p[1:] for p, _ in arcs)]
+    weights = [arcs[0][1][:1], *(w[1:] for _, w in arcs)]
+    return np.concatenate(points), np.concatenate(weights)
+
+
+def _circle() -> tuple[Floats, Floats]:
+    """The unit circle in nine points of degree 2."""
+    steps = np.arange(9) * (np.pi / 4)
+    reach = np.where(np.arange(9) % 2, np.sqrt(2.0), 1.0)
+    points = reach[:, None] * np.column_stack([np.cos(steps), -np.sin(steps)])
+    return points, np.where(np.arange(9) % 2, np.sqrt(0.5), 1.0)

@@ -1,0 +1,88 @@
+"""How a mesh is taken apart into the parts of a head."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.mesh import FitMesh
+from surface.fit.refine import Wish
+from surface.fit.seat import Eyeball
+
+RECIPES = Path(__file__).parent / "recipes"
+
+
+@dataclass(frozen=True)
+class PartRecipe:
+    """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted."""
+
+    name: str
+    material: str
+    follows: str
+    vertices: list[tuple[int, int]]
+    wish: Wish
+    budget: tuple[int, float, int]
+
+    def holds(self, vertex: float) -> bool:
+        """Is the vertex in one of the ranges?"""
+        return any(a <= vertex < b for a, b in self.vertices)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that is known about a kind of mesh beforehand; every field may be empty."""
+
+    parts: list[PartRecipe]
+    teeth: list[PartRecipe] = field(default_factory=list)
+    neck: tuple[float, float, float] | None = None
+    hinge: tuple[float, float, float] | None = None
+    jaw_teeth: tuple[int, int] = (0, 0)
+    lids_on: Eyeball | None = None
+    eyes: Eyeball | None = None
+    seat: list[tuple[int, int]] = field(default_factory=list)
+    lips_close: float = 0.0
+    source: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def seated(self) -> NDArray[np.int64]:
+        """Vertices that are moved with the lids."""
+        return np.concatenate([np.arange(a, b) for a, b in self.seat]) if self.seat else np.zeros(0, np.int64)
+
+
+def recipe_for(mesh: FitMesh) -> Recipe:
+    """The recipe made for meshes of this size, or one skin for all of an unknown mesh."""
+    for path in sorted(RECIPES.glob("*.toml")):
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        if (table["vertices"], table["faces"]) == (len(mesh.vertices), len(mesh.faces)):
+            return _read(table)
+    whole = PartRecipe("face", "skin", "skin", [(0, len(mesh.vertices))], Wish(2500), (0, 0.2, 8))
+    return Recipe([whole])
+
+
+def _read(table: dict[str, Any]) -> Recipe:
+    eyes, pivots = table["eyes"], table["pivots"]
+    return Recipe(
+        parts=[_part(t) for t in table["parts"]],
+        teeth=[_part({"material": "teeth", **t, "vertices": [t["vertices"]]}) for t in table["teeth"]],
+        neck=tuple(pivots["neck"]),
+        hinge=tuple(pivots["hinge"]),
+        jaw_teeth=tuple(pivots["jaw_teeth"]),
+        lids_on=Eyeball(tuple(eyes["lids_on"]["centre"]), eyes["lids_on"]["radius"]),
+        eyes=Eyeball(tuple(eyes["centre"]), eyes["radius"]),
+        seat=[tuple(r) for r in eyes["seat"]],
+        lips_close=table["lips"]["close"],
+        source=table["source"],
+    )
+
+
+def _part(t: dict[str, Any]) -> PartRecipe:
+    wish = {k: t[k] for k in ("points", "coarse", "neutral_mm", "shape_mm", "fair", "deepest") if k in t}
+    return PartRecipe(
+        t["name"], t["material"], t.get("follows", "skin"), [tuple(r) for r in t["vertices"]],
+        Wish(**wish), tuple(t["budget"]),
+    )  # fmt: skip

@@ -1,0 +1,69 @@
+"""How well a fit fits: figures per part and per shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.chart import Chart
+from surface.fit.refine import Fitted
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Distances between samples of the mesh and the surface at the same (u, v), mm."""
+
+    rms: float
+    p99: float
+    max: float
+
+
+@dataclass(frozen=True)
+class PartReport:
+    """One part: its control points, the errors of neutral and of every shape it has.
+
+    Samples inside folds (nostrils, ear canals) are held only loosely and not counted; ``folded`` says how many.
+    """
+
+    name: str
+    points: int
+    samples: int
+    folded: int
+    neutral: Errors
+    shapes: dict[str, Errors]
+
+    @property
+    def mean_shape_rms(self) -> float:
+        """Mean over shapes of their RMS, mm; 0 without shapes."""
+        return float(np.mean([e.rms for e in self.shapes.values()])) if self.shapes else 0.0
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """The whole head."""
+
+    name: str
+    parts: list[PartReport]
+    parameters: list[str]
+
+    @property
+    def points(self) -> int:
+        """Control points of all fitted parts."""
+        return sum(p.points for p in self.parts)
+
+
+def measure(name: str, chart: Chart, fitted: Fitted, names: tuple[str, ...]) -> PartReport:
+    """Errors of a fitted chart over all samples outside folds."""
+    counted = ~chart.folded
+    shapes = {n: _errors(e[counted]) for n, e in zip(names, fitted.shape_error, strict=False)}
+    return PartReport(
+        name, len(fitted.net), int(counted.sum()), int((~counted).sum()), _errors(fitted.error[counted]), shapes
+    )
+
+
+def _errors(distance: NDArray[np.float64]) -> Errors:
+    if not len(distance):
+        return Errors(0.0, 0.0, 0.0)
+    return Errors(float(np.sqrt((distance**2).mean())), float(np.percentile(distance, 99)), float(distance.max()))

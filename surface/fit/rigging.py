@@ -1,0 +1,93 @@
+"""From fitted displacements to a rig: groups, the jaw's path, shares of jaw, neck and lids."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.mesh import FitMesh
+from surface.head.data import Group, Jaw
+from surface.head.rig import jaw_path
+
+Floats = NDArray[np.float64]
+LEAST_MM = 0.004  # displacements smaller than this are dropped
+TILTS = ("jawForward", "jawLeft", "jawRight")
+NECK_SLOPE = 0.35  # the neck's bend starts lower at the chin than at the nape
+NECK_FROM_TO = (-152.0, -78.0)  # where along it the head's rotation begins and is whole, mm
+
+
+def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: NDArray[np.int64], hinge: Floats) -> Jaw:
+    """The jaw's path out of the lower teeth, which are rigid: rotation about the hinge and what is left, a glide."""
+    rest = mesh.vertices[teeth]
+    if "jawOpen" not in sources or not len(teeth):
+        return Jaw(tuple(hinge.tolist()), 0.0, (0.0, 0.0, 0.0))
+    turn, shift = rigid_fit(rest, rest + _total(mesh, sources["jawOpen"])[teeth])
+    angle = float(np.arctan2(turn[2, 1], turn[1, 1]))
+    glide = turn @ hinge + shift - hinge
+    glide[0] = 0.0
+    tilts = {n: affine_fit(rest, _total(mesh, sources[n])[teeth]) for n in TILTS if n in sources}
+    return Jaw(tuple(hinge.tolist()), angle, tuple(glide.tolist()), tilts)
+
+
+def _total(mesh: FitMesh, indices: list[int]) -> Floats:
+    return mesh.deltas[indices].sum(axis=0)
+
+
+def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """Rotation (3, 3) and shift (3,) that bring points nearest to others (Kabsch, 1976)."""
+    b0, a0 = before.mean(axis=0), after.mean(axis=0)
+    u, _, vt = np.linalg.svd((before - b0).T @ (after - a0))
+    sign = np.sign(np.linalg.det(vt.T @ u.T))
+    turn = vt.T @ np.diag([1.0, 1.0, sign]) @ u.T
+    return turn, a0 - turn @ b0
+
+
+def affine_fit(points: Floats, moves: Floats) -> Floats:
+    """(3, 4) matrix with moves = points @ matrix[:, :3].T + matrix[:, 3], in least squares."""
+    system = np.column_stack([points, np.ones(len(points))])
+    return np.linalg.lstsq(system, moves, rcond=None)[0].T
+
+
+def jaw_share(points: Floats, opening: Floats, jaw: Jaw) -> Floats:
+    """(n,) how much of the jaw's rotation each point follows, so that little is left of its opening (n, 3)."""
+    turn, shift = jaw_path(jaw, 1.0)
+    whole = points @ turn.T + shift - points
+    share = (opening * whole).sum(axis=1) / np.maximum((whole * whole).sum(axis=1), 1e-9)
+    return np.clip(np.where(np.linalg.norm(opening, axis=1) > 0.05, share, 0.0), 0.0, 1.0)
+
+
+def make_groups(points: Floats, moves: Floats, sources: dict[str, list[int]], jaw: Jaw) -> tuple[list[Group], Floats]:
+    """Groups by parameter, and the jaw's shares; jawOpen keeps only what the rotation leaves over.
+
+    ``moves (k, n, 3)`` are the displacements of the control points for the mesh's k shapes.
+    """
+    share = np.zeros(len(points))
+    groups = []
+    for name, indices in sources.items():
+        field = moves[indices].sum(axis=0)
+        if name == "jawOpen":
+            share = jaw_share(points, field, jaw)
+            turn, shift = jaw_path(jaw, 1.0)
+            field = field - share[:, None] * (points @ turn.T + shift - points)
+        ids = np.flatnonzero(np.linalg.norm(field, axis=1) > LEAST_MM)
+        if len(ids):
+            groups.append(Group(name, ids.astype(np.int32), np.round(field[ids], 4).astype(np.float32)))
+    return groups, share
+
+
+def neck_share(points: Floats) -> Floats:
+    """(n,) how much of the head's rotation each point follows: all above the jaw, none at the shoulders."""
+    height = points[:, 1] + NECK_SLOPE * points[:, 2]
+    t = np.clip((height - NECK_FROM_TO[0]) / (NECK_FROM_TO[1] - NECK_FROM_TO[0]), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def lid_share(points: Floats, eyes: Floats, radius: float) -> Floats:
+    """(n,) how closely each point keeps to an eyeball: 1 on it, 0 some millimetres away; negative: right eye."""
+    out = np.zeros(len(points))
+    for eye, sign in zip(eyes, (1.0, -1.0), strict=True):
+        local = points - eye
+        above = np.linalg.norm(local, axis=1) - radius
+        t = np.clip((8.0 - above) / 5.0, 0.0, 1.0) * np.clip(local[:, 2] / 3.0 + 1.0, 0.0, 1.0)
+        out += sign * t * t * (3.0 - 2.0 * t)
+    return out

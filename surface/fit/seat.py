@@ -1,0 +1,75 @@
+"""Re-seat lids modelled on one eyeball onto another, and close parted lips: warps of the mesh before it is fitted.
+
+A warp is applied to the neutral vertices and to every shape's moved vertices, so that lids which slid over the
+old eyeball slide over the new one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.mesh import FitMesh
+
+Floats = NDArray[np.float64]
+HELD = 0.93  # of the radius: further out a sphere's front is too steep to seat a lid on
+
+
+@dataclass(frozen=True)
+class Eyeball:
+    """A sphere: centre (3,) of the left eye (x > 0; the right one is its mirror image), radius, mm."""
+
+    centre: tuple[float, float, float]
+    radius: float
+
+
+def seat_lids(mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: NDArray[np.int64]) -> FitMesh:
+    """Move the chosen vertices so that what touched the old eyeballs touches the new ones."""
+    rest = mesh.vertices.copy()
+    rest[vertices] = _warp(mesh.vertices[vertices], old, new)
+    deltas = mesh.deltas.copy()
+    for k, delta in enumerate(mesh.deltas):
+        moved = np.flatnonzero(np.abs(delta[vertices]).max(axis=1) > 1e-4)
+        at = vertices[moved]
+        deltas[k, at] = _warp(mesh.vertices[at] + delta[at], old, new) - rest[at]
+    return mesh.moved(rest, deltas)
+
+
+def _warp(points: Floats, old: Eyeball, new: Eyeball) -> Floats:
+    """Shift along z by the distance between the two spheres' fronts, fading with the distance from the old one."""
+    side = np.where(points[:, 0] >= 0, 1.0, -1.0)
+    local = points * np.column_stack([side, np.ones_like(side), np.ones_like(side)])
+    across_old = np.linalg.norm(local[:, :2] - old.centre[:2], axis=1)
+    across_new = np.linalg.norm(local[:, :2] - new.centre[:2], axis=1)
+    front_old = old.centre[2] + _bulge(across_old, old.radius)
+    front_new = new.centre[2] + _bulge(across_new, new.radius)
+    above = local[:, 2] - front_old
+    fade = 1.0 - _smooth(above, 1.5, 9.0)
+    fade *= 1.0 - _smooth(across_new, 1.05 * new.radius, 1.9 * new.radius)
+    out = points.copy()
+    out[:, 2] += fade * (front_new - front_old)
+    return out
+
+
+def _bulge(across: Floats, radius: float) -> Floats:
+    """Height of a sphere above its equator, held where it becomes steep."""
+    held = HELD * radius
+    over = 0.5 * (np.sqrt((across - held) ** 2 + 0.4) + across - held)  # max(0, across - held), rounded
+    return np.sqrt(radius**2 - np.minimum(across - over, held) ** 2)
+
+
+def _smooth(x: Floats, low: float, high: float) -> Floats:
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def close_lips(mesh: FitMesh, share: float, shape: str = "mouthClose") -> FitMesh:
+    """Bring parted lips together: the share of the closing shape becomes part of the neutral face."""
+    if shape not in mesh.names or share == 0:
+        return mesh
+    k = mesh.names.index(shape)
+    deltas = mesh.deltas.copy()
+    deltas[k] *= 1.0 - share
+    return mesh.moved(mesh.vertices + share * mesh.deltas[k], deltas)

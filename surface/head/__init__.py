@@ -1,0 +1,9 @@
+"""The head: parts, groups, parameters, and the file they are kept in."""
+
+from surface.head.data import Group, HeadData, Jaw, PartData, Seam
+from surface.head.file import load_data, save_data
+from surface.head.head import Head
+from surface.head.parameters import NAMES
+from surface.head.part import HeadPart
+
+__all__ = ["NAMES", "Group", "Head", "HeadData", "HeadPart", "Jaw", "PartData", "Seam", "load_data", "save_data"]

@@ -1,0 +1,128 @@
+"""The head: load it, pose it, read vertices and normals of its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.errors import HeadFileError
+from surface.head.data import Group, HeadData, PartData
+from surface.head.file import load_data
+from surface.head.paint import paint_part
+from surface.head.parameters import NAMES, read_pose, rotation
+from surface.head.part import HeadPart, RigidPart, SkinPart, domain_of, make_surface
+from surface.head.seams import Zipper
+
+RIGID = ("skull", "jaw", "left_eye", "right_eye")
+
+
+class Head:
+    """A face made of DCP surfaces that follows parameters.
+
+    Use :meth:`load`. One object belongs to one thread at a time.
+
+    Parameters
+    ----------
+    data : everything a head file holds; where : its path, for messages.
+    """
+
+    parameters: tuple[str, ...] = NAMES
+
+    def __init__(self, data: HeadData, where: str = "head") -> None:
+        self.data = data
+        self.parts: tuple[HeadPart, ...] = tuple(_make_part(p, data, where) for p in data.parts)
+        by_name = {p.name: p for p in self.parts}
+        self._zippers = [Zipper(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams]
+        for zipper in self._zippers:
+            zipper.close()
+        self._at = {name: i for i, name in enumerate(self.parameters)}
+
+    @classmethod
+    def load(cls, path: str | Path) -> Head:
+        """Read a head from its folder or its head.toml.
+
+        Raises
+        ------
+        HeadFileError : a file is missing, damaged, cut short or of another version; names file and key.
+        """
+        return cls(load_data(path), str(path))
+
+    @property
+    def name(self) -> str:
+        """The head's short name."""
+        return self.data.name
+
+    def part(self, name: str) -> HeadPart:
+        """The part of that name; KeyError if there is none."""
+        for p in self.parts:
+            if p.name == name:
+                return p
+        raise KeyError(f"no part {name!r}; there are {', '.join(p.name for p in self.parts)}")
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of all groups, in the order of the parameters."""
+        found = {g.name for p in self.data.parts for g in p.groups}
+        return tuple(n for n in self.parameters if n in found)
+
+    def group(self, name: str) -> dict[str, Group]:
+        """The group of that name: part name -> control points and their displacements per unit.
+
+        Raises
+        ------
+        KeyError : no group of that name.
+        """
+        found = {p.name: g for p in self.data.parts for g in p.groups if g.name == name}
+        if not found:
+            raise KeyError(f"no group {name!r}; there are {', '.join(self.groups)}")
+        return found
+
+    def values(self, given: Mapping[str, float]) -> NDArray[np.float64]:
+        """A parameter vector (P,) from names and values, 0 elsewhere; KeyError for an unknown name."""
+        out = np.zeros(len(self.parameters))
+        for name, value in given.items():
+            out[self._at[name]] = value
+        return out
+
+    def pose(self, values: NDArray[np.float64]) -> None:
+        """Move all parts to parameter values (P,) in the order of :attr:`parameters`; values are clipped.
+
+        Raises
+        ------
+        ValueError : wrong shape or a value that is not a number; the head keeps its pose.
+        """
+        pose = read_pose(values)
+        turn = rotation(*pose.head)
+        for part in self.parts:
+            part.pose(pose, turn)
+        for zipper in self._zippers:
+            zipper.close()
+
+
+def _make_part(part: PartData, head: HeadData, where: str) -> HeadPart:
+    if part.follows != "skin" and part.follows not in RIGID:
+        raise HeadFileError(
+            f"{where}: part {part.name!r}: follows: {part.follows!r} is not one of skin, {', '.join(RIGID)}"
+        )
+    try:
+        surface = make_surface(part)
+        _, chord, depth = part.budget
+        mesh = surface.tessellate(chord_error=chord, max_depth=depth, domain=domain_of(part), loop_error=0.4 * chord)
+    except ValueError as e:
+        raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e
+    attributes = paint_part(head.paint, part.name, mesh.uv, where)
+    attributes |= _eye_directions(part, head, mesh.vertices)
+    if part.follows == "skin":
+        return SkinPart(part, head, mesh, surface, attributes)
+    return RigidPart(part, head, mesh, surface, attributes)
+
+
+def _eye_directions(part: PartData, head: HeadData, vertices: NDArray) -> dict[str, NDArray[np.float32]]:
+    """``eye_local`` (m, 3): where a vertex of an eyeball lies in the eye's own frame, in radii, +z the pupil."""
+    if part.follows not in ("left_eye", "right_eye"):
+        return {}
+    local = (vertices - head.eyes[int(part.follows == "right_eye")]) / head.eye_radius
+    return {"eye_local": local.astype(np.float32)}

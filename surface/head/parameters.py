@@ -1,0 +1,107 @@
+"""The parameters a head understands, and what they mean for eyes and head.
+
+Expression parameters run from 0 to 1, angles from -1 to 1. Gaze can be given in two ways, as an angle and as
+eyeLook shapes; both add up to one gaze, which turns the eyeball and moves the lids.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+SIDES = ("Left", "Right")
+_EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
+_LOWER = (
+    "jawForward", "jawRight", "jawLeft", "jawOpen", "mouthClose", "mouthFunnel", "mouthPucker", "mouthRight",
+    "mouthLeft", "mouthSmileLeft", "mouthSmileRight", "mouthFrownLeft", "mouthFrownRight", "mouthDimpleLeft",
+    "mouthDimpleRight", "mouthStretchLeft", "mouthStretchRight", "mouthRollLower", "mouthRollUpper",
+    "mouthShrugLower", "mouthShrugUpper", "mouthPressLeft", "mouthPressRight", "mouthLowerDownLeft",
+    "mouthLowerDownRight", "mouthUpperUpLeft", "mouthUpperUpRight", "browDownLeft", "browDownRight", "browInnerUp",
+    "browOuterUpLeft", "browOuterUpRight", "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft",
+    "noseSneerRight", "tongueOut",
+)  # fmt: skip
+SHAPES = (*(f"eye{e}{s}" for s in SIDES for e in _EYE), *_LOWER)
+ANGLES = ("headYaw", "headPitch", "headRoll", "leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
+NAMES = SHAPES + ANGLES
+HEAD_RAD = np.radians([60.0, 40.0, 30.0])  # yaw, pitch, roll at full scale
+EYE_RAD = np.radians([35.0, 30.0])  # yaw, pitch at full scale
+_AT = {name: i for i, name in enumerate(NAMES)}
+_ANGLE = [_AT[n] for n in ANGLES]
+_LOOK = np.array([[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] for s in SIDES])
+_BLINK = np.array([_AT[f"eyeBlink{s}"] for s in SIDES])
+_OPENERS = np.array([[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES])
+_JAW, _CLOSE = _AT["jawOpen"], _AT["mouthClose"]
+_LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
+
+
+@dataclass
+class Pose:
+    """What a parameter vector asks of the head.
+
+    Attributes
+    ----------
+    shapes : (52,) float64, how far each group is moved; lids already follow the gaze.
+    jaw : how far the jaw is open, 0..1; closed : how much of that the lips make up for, 0..1.
+    head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
+    """
+
+    shapes: NDArray[np.float64]
+    jaw: float
+    closed: float
+    head: NDArray[np.float64]
+    gaze: NDArray[np.float64]
+
+
+def read_pose(values: NDArray[np.float64]) -> Pose:
+    """Parameter values (59,) in the order of NAMES, clipped, as a pose.
+
+    mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen.
+
+    Raises
+    ------
+    ValueError : wrong shape, or a value that is not a number (names the parameter).
+    """
+    v = np.asarray(values, float)
+    if v.shape != (len(NAMES),):
+        raise ValueError(f"values has shape {v.shape}, expected ({len(NAMES)},)")
+    if np.isnan(v).any():
+        raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
+    v = np.clip(v, _LOW, 1.0)
+    angle = v[_ANGLE]
+    shapes = v[: len(SHAPES)].copy()
+    gaze = np.array([_gaze(v, side, angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)])
+    for side in (0, 1):
+        outward = gaze[side, 0] * (1 - 2 * side)
+        shapes[_LOOK[side]] = np.maximum([gaze[side, 1], -outward, outward, -gaze[side, 1]], 0.0)
+        shapes[_OPENERS[side]] *= 1.0 - shapes[_BLINK[side]]  # a closing lid ends closed, wherever it started
+    jaw = float(v[_JAW])
+    shapes[_CLOSE] = min(shapes[_CLOSE], jaw)
+    closed = float(shapes[_CLOSE] / jaw) if jaw > 0 else 0.0
+    return Pose(shapes, jaw, closed, angle[:3] * HEAD_RAD, gaze * EYE_RAD)
+
+
+def _gaze(v: NDArray[np.float64], side: int, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes together."""
+    down, inward, outward, up = v[_LOOK[side]]
+    yaw = angle[0] + (outward - inward) * (1 - 2 * side)
+    return np.clip([yaw, angle[1] + down - up], -1.0, 1.0)
+
+
+def rotation(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]:
+    """(3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
+    (cy, cp, cr), (sy, sp, sr) = np.cos([yaw, pitch, roll]), np.sin([yaw, pitch, roll])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_x = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
+    about_z = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
+    return about_y @ about_x @ about_z
+
+
+def rotation_vector(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) axis times angle of a rotation by less than 180 degrees."""
+    axis = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    sine = 0.5 * float(np.linalg.norm(axis))
+    if sine < 1e-9:
+        return np.zeros(3)
+    return axis / (2 * sine) * float(np.arctan2(sine, 0.5 * (np.trace(matrix) - 1)))

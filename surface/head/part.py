@@ -1,0 +1,125 @@
+"""Parts of a head as the picture sees them: arrays that are current after every pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.dcp import DCPSurface
+from surface.deformation import Deformation
+from surface.domain import Domain
+from surface.head.data import HeadData, PartData
+from surface.head.parameters import Pose
+from surface.head.rig import SkinRig, rigid_motion
+from surface.mesh import Mesh
+
+Floats32 = NDArray[np.float32]
+
+
+class HeadPart:
+    """One surface of the head, tessellated.
+
+    Attributes
+    ----------
+    name, material : str.
+    triangles : (t, 3) int32; uv : (m, 2) float32.
+    vertices, normals : (m, 3) float32, current, in head space including the head's rotation.
+    changed : vertex ranges [start, stop) that the last pose touched.
+    attributes : static per-vertex arrays (m, k) float32 by name.
+    surface : the DCP surface at rest.
+    """
+
+    def __init__(self, data: PartData, mesh: Mesh, surface: DCPSurface, attributes: Mapping[str, Floats32]) -> None:
+        self.name, self.material, self.follows = data.name, data.material, data.follows
+        self.surface, self.mesh = surface, mesh
+        self.triangles = np.asarray(mesh.triangles, np.int32)
+        self.uv = np.asarray(mesh.uv, np.float32)
+        self.vertices = np.array(mesh.vertices, np.float32)
+        self.normals = np.array(mesh.normals, np.float32)
+        self.attributes = dict(attributes)
+        self.changed: list[tuple[int, int]] = [(0, len(self.vertices))]
+
+    def pose(self, pose: Pose, turn: NDArray[np.float64]) -> None:
+        """Move to a pose; ``turn`` is the head's rotation (3, 3)."""
+        raise NotImplementedError
+
+    @property
+    def control_points(self) -> NDArray[np.float64]:
+        """(n, 3) float64, where the control points stand now."""
+        raise NotImplementedError
+
+    def touch(self) -> None:
+        """Report every vertex as changed: a seam has written into the part."""
+        self.changed = [(0, len(self.vertices))]
+
+
+class SkinPart(HeadPart):
+    """A part whose control points move one by one; vertices follow by Eq. (2)."""
+
+    def __init__(self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface,
+                 attributes: Mapping[str, Floats32]) -> None:  # fmt: skip
+        super().__init__(data, mesh, surface, attributes)
+        self.rig = SkinRig(data, head)
+        self.deformation = Deformation(surface, mesh)
+        self._follow([(0, len(self.vertices))])
+
+    def pose(self, pose: Pose, turn: NDArray[np.float64]) -> None:
+        self.deformation.set_points(self.rig.apply(pose, turn))
+        self.changed = self.deformation.changed
+        self._follow(self.changed)
+
+    def _follow(self, ranges: list[tuple[int, int]]) -> None:
+        for start, stop in ranges:
+            self.vertices[start:stop] = self.deformation.vertices[start:stop]
+            self.normals[start:stop] = self.deformation.normals[start:stop]
+
+    @property
+    def control_points(self) -> NDArray[np.float64]:
+        return self.deformation.points
+
+
+class RigidPart(HeadPart):
+    """A part fixed to skull, jaw or eye.
+
+    A rational surface is carried along exactly by an affine map of its control points, so the map is applied
+    to the vertices themselves.
+    """
+
+    def __init__(self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface,
+                 attributes: Mapping[str, Floats32]) -> None:  # fmt: skip
+        super().__init__(data, mesh, surface, attributes)
+        self._head = head
+        self._rest, self._rest_normals = self.vertices.copy(), self.normals.copy()
+        self._linear, self._shift = np.eye(3), np.zeros(3)
+
+    def pose(self, pose: Pose, turn: NDArray[np.float64]) -> None:
+        linear, shift = rigid_motion(self.follows, self._head, pose, turn)
+        if np.array_equal(linear, self._linear) and np.array_equal(shift, self._shift):
+            self.changed = []
+            return
+        self._linear, self._shift = linear, shift
+        matrix = np.ascontiguousarray(linear.T, np.float32)
+        np.dot(self._rest, matrix, out=self.vertices)
+        self.vertices += shift.astype(np.float32)
+        np.dot(self._rest_normals, matrix, out=self.normals)
+        self.changed = [(0, len(self.vertices))]
+
+    @property
+    def control_points(self) -> NDArray[np.float64]:
+        return self.surface.points @ self._linear.T + self._shift
+
+
+def make_surface(data: PartData) -> DCPSurface:
+    """The part's DCP surface."""
+    return DCPSurface.from_padded(
+        data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1]
+    )
+
+
+def domain_of(data: PartData) -> Domain:
+    """The rectangle around the part's loops, trimmed by them."""
+    every = np.concatenate(data.loops)
+    (u0, v0), (u1, v1) = every.min(axis=0), every.max(axis=0)
+    return Domain((u0, u1, v0, v1), data.loops)
