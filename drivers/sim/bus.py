@@ -258,7 +258,7 @@ class SimulatedChain:
         if len(params) < 3:
             return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s, 2)
         address, data = params[0] | params[1] << 8, params[2:]
-        return self._act(packet, now_s, lambda servo: servo.write(address, data, now_s))
+        return self._act(packet, now_s, lambda servo: self._put(servo, packet.id, address, data, now_s))
 
     def _reg_write(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
         params = packet.params
@@ -406,7 +406,14 @@ class SimulatedChain:
 
     def _write_quietly(self, device_id: int, address: int, data: bytes, now_s: float) -> None:
         for servo in self._group(device_id, now_s):
-            servo.write(address, data, now_s)
+            self._put(servo, device_id, address, data, now_s)
+
+    @staticmethod
+    def _put(servo: SimulatedServo, device_id: int, address: int, data: bytes, now_s: float) -> int:
+        """A write; one to a secondary id reaches RAM only."""
+        if address < servo.table.eeprom_end and servo.secondary_id == device_id != servo.id:
+            return ErrorNumber.ACCESS
+        return servo.write(address, data, now_s)
 
     # ------------------------------------------------------------ faults
     def _fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:

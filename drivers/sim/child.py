@@ -16,28 +16,7 @@ from typing import Any
 from drivers.errors import DriverError
 from drivers.sim.bus import SimulatedChain
 from drivers.sim.device import SimulatedServo
-from drivers.sim.serve import PtyServer
-
-
-class Commands:
-    """Cuts the command lines out of what arrives and carries them out."""
-
-    def __init__(self, chain: SimulatedChain) -> None:
-        self._chain, self._rest = chain, b""
-
-    def __call__(self, data: bytes) -> None:
-        *lines, self._rest = (self._rest + data).split(b"\n")
-        for line in lines:
-            if line.strip():
-                self._obey(json.loads(line))
-
-    def _obey(self, message: dict[str, Any]) -> None:
-        now_s = time.monotonic()
-        with self._chain.lock:
-            if "fault" in message:
-                self._chain.faults.add(message["fault"], now_s)
-            if "clear" in message:
-                self._chain.faults.clear(message["clear"], now_s)
+from drivers.sim.serve import Commands, PtyServer
 
 
 def build(settings: dict[str, Any]) -> PtyServer:

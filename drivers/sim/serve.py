@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import select
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from typing import Any
 
 from drivers.sim.bus import SimulatedChain
 from drivers.sim.device import SimulatedServo
@@ -16,6 +18,35 @@ from drivers.sim.wire import Timed, WireTiming, instruction_size, without_timing
 
 PAUSE_S = 0.1
 """A packet that is not complete after this pause is given up."""
+
+
+class Commands:
+    """Carries out command lines (JSON): ``{"fault": [SPEC, ...]}`` and ``{"clear": KIND or null}``.
+
+    They run in the server's own loop, so a port is never pulled away while somebody waits on it.
+
+    Parameters
+    ----------
+    chain : the servos.
+    done : called after each line.
+    """
+
+    def __init__(self, chain: SimulatedChain, done: Callable[[], None] = lambda: None) -> None:
+        self._chain, self._done, self._rest = chain, done, b""
+
+    def __call__(self, data: bytes) -> None:
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        for line in lines:
+            self._obey(json.loads(line))
+            self._done()
+
+    def _obey(self, message: dict[str, Any]) -> None:
+        now_s = time.monotonic()
+        with self._chain.lock:
+            if "fault" in message:
+                self._chain.faults.add(message["fault"], now_s)
+            if "clear" in message:
+                self._chain.faults.clear(message["clear"], now_s)
 
 
 class PtyServer:

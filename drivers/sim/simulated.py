@@ -16,7 +16,7 @@ from typing import Any, Self
 from drivers.errors import PortError
 from drivers.sim.bus import SimulatedChain
 from drivers.sim.faults import parse_fault
-from drivers.sim.serve import PtyServer, make_servos
+from drivers.sim.serve import Commands, PtyServer, make_servos
 
 START_S = 20.0
 """A child process that is not ready after this time is given up."""
@@ -121,6 +121,7 @@ class SimulatedBus:
         self._server: PtyServer | None = None
         self._thread: threading.Thread | None = None
         self._stop = -1
+        self._obeyed = threading.Event()
 
     @property
     def path(self) -> str:
@@ -145,22 +146,13 @@ class SimulatedBus:
         ------
         DriverError : a spec cannot be read; then none is set.
         """
-        faults = [parse_fault(spec) for spec in specs]
-        if self._child:
-            self._tell({"fault": list(specs)})
-            return
-        with self.chain.lock:
-            self.chain.faults.add(faults, time.monotonic())
-        self._wake()
+        for spec in specs:
+            parse_fault(spec)
+        self._tell({"fault": specs})
 
     def clear(self, kind: str | None = None) -> None:
         """End the faults of a kind; None: all."""
-        if self._child:
-            self._tell({"clear": kind})
-            return
-        with self.chain.lock:
-            self.chain.faults.clear(kind, time.monotonic())
-        self._wake()
+        self._tell({"clear": kind})
 
     def __enter__(self) -> Self:
         if self._process:
@@ -195,7 +187,7 @@ class SimulatedBus:
             baud=self.baud,
             wire=self._wire,
             latency_s=self._latency_s,
-            on_lines=lambda data: None,
+            on_lines=Commands(chain, self._obeyed.set),
         )
         try:
             chain.faults.add(self._faults, now_s)
@@ -206,10 +198,6 @@ class SimulatedBus:
         reading, self._stop = os.pipe()
         self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
         self._thread.start()
-
-    def _wake(self) -> None:
-        """Let the loop see that its next appointment has changed."""
-        os.write(self._stop, b"\n")
 
     # ------------------------------------------------------------ in a child process
     def _start_child(self) -> None:
@@ -250,9 +238,15 @@ class SimulatedBus:
         raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
 
     def _tell(self, message: dict[str, Any]) -> None:
+        """Send a command; a bus in a thread has carried it out when this returns."""
+        line = json.dumps(message).encode() + b"\n"
         if self._child and self._child.stdin:
-            self._child.stdin.write(json.dumps(message).encode() + b"\n")
+            self._child.stdin.write(line)
             self._child.stdin.flush()
+        elif self._thread:
+            self._obeyed.clear()
+            os.write(self._stop, line)
+            self._obeyed.wait(START_S)
 
 
 class _Entry:
