@@ -5,8 +5,10 @@ It reads parameters from a mailbox and never waits for links or servos.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,12 +35,17 @@ class HeadValues:
     mailbox : where the full vector (p,) is published.
     parameters : names of the full vector.
     wanted : names the head understands; names omote does not know stay 0.
+
+    Attributes
+    ----------
+    full : (p,) float64, the full vector of the last call.
+    values : (h,) float64, the head's share of it.
     """
 
     def __init__(self, mailbox: Mailbox, parameters: Parameters, wanted: Sequence[str]) -> None:
         place = {name: i for i, name in enumerate(parameters.names)}
         self._mailbox = mailbox
-        self._full = np.zeros(len(parameters.names))
+        self.full = np.zeros(len(parameters.names))
         self._from = np.array([place[name] for name in wanted if name in place], dtype=np.intp)
         self._to = np.array([i for i, name in enumerate(wanted) if name in place], dtype=np.intp)
         self.values = np.zeros(len(wanted))
@@ -46,8 +53,8 @@ class HeadValues:
 
     def __call__(self) -> Floats:
         """The newest values in the head's order, (h,) float64; the same array each time."""
-        _, self.stamp_ns = self._mailbox.read(self._full)
-        self.values[self._to] = self._full[self._from]
+        _, self.stamp_ns = self._mailbox.read(self.full)
+        self.values[self._to] = self.full[self._from]
         return self.values
 
 
@@ -95,6 +102,62 @@ def _shrink(picture: Image, step: int) -> Image:
     return blocks.mean(axis=(1, 3)).astype(np.uint8)
 
 
+class FrameLog:
+    """Counts frames, and what they cost.
+
+    Attributes
+    ----------
+    frames : frames drawn.
+    moved : frames whose values differed from the frame before.
+    frame_ms : time each frame took (ms).
+    """
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self.moved = 0
+        self.frame_ms = Samples()
+        self._previous: Floats | None = None
+        self._first_ns = self._last_ns = 0
+        self._start_to_first_s = 0.0
+
+    def add(self, values: Floats, began_ns: int, ended_ns: int) -> None:
+        """Note one frame of ``values`` : (h,), drawn between two monotonic times (ns)."""
+        if self._previous is None:
+            self._first_ns = began_ns
+            self._start_to_first_s = process_age_s()
+        else:
+            self.moved += bool((self._previous != values).any())
+        self._previous = values.copy()
+        self._last_ns = ended_ns
+        self.frames += 1
+        self.frame_ms.add((ended_ns - began_ns) / 1e6)
+
+    def report(self, settings: FaceSettings, renderer: str) -> dict[str, object]:
+        """Frames, frames per second, milliseconds a frame, and how many frames differed from the one before."""
+        seconds = (self._last_ns - self._first_ns) / 1e9
+        return {
+            "frames": self.frames,
+            "seconds": seconds,
+            "frames_per_second": self.frames / seconds if seconds else 0.0,
+            "frames_with_motion": self.moved,
+            "frame_ms": self.frame_ms.summary(),
+            "start_to_first_frame_s": self._start_to_first_s,
+            "size": list(settings.size),
+            "quality": settings.quality,
+            "renderer": renderer,
+        }
+
+
+def process_age_s() -> float:
+    """Seconds since the operating system started this process; 0 where it does not tell."""
+    try:
+        fields = Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()
+        uptime = float(Path("/proc/uptime").read_text().split()[0])
+        return uptime - int(fields[19]) / os.sysconf("SC_CLK_TCK")
+    except (OSError, IndexError, ValueError):
+        return 0.0
+
+
 class HeadlessFace:
     """Draws frame after frame without a display.
 
@@ -104,6 +167,11 @@ class HeadlessFace:
     settings : size, rate and quality.
     values : gives the head's newest values, (h,) float64.
     recorder : takes pictures along the way; None reads none back.
+
+    Raises
+    ------
+    ViewError
+        when there is no OpenGL.
     """
 
     def __init__(
@@ -120,25 +188,16 @@ class HeadlessFace:
         self._camera = getattr(Camera, settings.camera)()
         self._values = values
         self._recorder = recorder
-        self.settings = settings
-        self.clock = Clock(settings.fps)
-        self.frame_ms = Samples()
-        self.frames = 0
-        self.seconds = 0.0
-        self.moved = 0
+        self._settings = settings
+        self._log = FrameLog()
 
     def run(self, keep_going: Callable[[], bool]) -> None:
-        """Draw until ``keep_going()`` is false."""
+        """Draw until ``keep_going()`` is false, at most ``fps`` times a second."""
         started = time.monotonic_ns()
-        previous = np.zeros(0)
-        for now in self.clock.run(keep_going):
+        for now in Clock(self._settings.fps).run(keep_going):
             values = self._values()
-            self.moved += previous.size == values.size and bool((previous != values).any())
-            previous = values.copy()
             self._draw(values, (now - started) / 1e9)
-            self.frame_ms.add((time.monotonic_ns() - now) / 1e6)
-            self.frames += 1
-        self.seconds = (time.monotonic_ns() - started) / 1e9
+            self._log.add(values, now, time.monotonic_ns())
 
     def _draw(self, values: Floats, time_s: float) -> None:
         if self._recorder is not None and self._recorder.wants(time_s):
@@ -151,13 +210,5 @@ class HeadlessFace:
         self._screen.close()
 
     def report(self) -> dict[str, object]:
-        """Frames, frames per second, milliseconds a frame, and how many frames differed from the one before."""
-        return {
-            "frames": self.frames,
-            "seconds": self.seconds,
-            "frames_per_second": self.frames / self.seconds if self.seconds else 0.0,
-            "frames_with_motion": self.moved,
-            "frame_ms": self.frame_ms.summary(),
-            "size": list(self.settings.size),
-            "quality": self.settings.quality,
-        }
+        """What was drawn; see :meth:`FrameLog.report`."""
+        return self._log.report(self._settings, self._screen.ctx.info["GL_RENDERER"])

@@ -28,16 +28,6 @@ def has_display() -> bool:
     return True
 
 
-def process_age_s() -> float:
-    """Seconds since this process was started by the operating system; 0 where it does not tell."""
-    try:
-        fields = Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()
-        uptime = float(Path("/proc/uptime").read_text().split()[0])
-        return uptime - int(fields[19]) / os.sysconf("SC_CLK_TCK")
-    except (OSError, IndexError, ValueError):
-        return 0.0
-
-
 class Session:
     """One stage, ready to run.
 
@@ -90,7 +80,8 @@ class Session:
         with stop_flag() as flag, self._body() as body:
             yield_to_servos()
             head = load_head(self.stage)
-            face = WindowFace(head, self.stage.settings, HeadValues(body.mailbox, PARAMETERS, head.parameters), body)
+            values = HeadValues(body.mailbox, PARAMETERS, head.parameters)
+            face = WindowFace(head, self.stage.settings.face, values, body)
             body.wait_ready()
             deadline = Deadline(seconds)
             face.run(lambda: not flag.is_set() and deadline() and body.alive())

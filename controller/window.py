@@ -1,0 +1,83 @@
+"""The face in a window, with the panel over it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.face import FrameLog, HeadValues
+from controller.panel import Panel
+from controller.parameters import PARAMETERS
+from controller.stage import FaceSettings
+
+if TYPE_CHECKING:
+    from controller.run import BodyProcess
+    from surface.head import Head
+
+_TITLE = "omote"
+
+
+class _TimeToClose(Exception):
+    """Raised inside the window's frame to end it; never leaves this module."""
+
+
+class WindowFace:
+    """Draws the head in a window until it is closed.
+
+    Parameters
+    ----------
+    head : the head to draw.
+    settings : size, quality and camera.
+    values : gives the head's newest values.
+    body : hears what the panel wants.
+    """
+
+    def __init__(self, head: Head, settings: FaceSettings, values: HeadValues, body: BodyProcess) -> None:
+        self._head = head
+        self._settings = settings
+        self._values = values
+        self._panel = Panel(PARAMETERS, lambda: values.full, body.tell)
+        self._log = FrameLog()
+
+    def run(self, keep_going: Callable[[], bool]) -> None:
+        """Show the window until it is closed or ``keep_going()`` is false.
+
+        Raises
+        ------
+        ViewError
+            when no window can be opened.
+        """
+        from surface.view.camera import Camera
+        from surface.view.window import run_window
+
+        began = time.monotonic_ns()
+
+        def source() -> NDArray[np.float64]:
+            nonlocal began
+            if not keep_going():
+                raise _TimeToClose
+            values = self._values()
+            now = time.monotonic_ns()
+            self._log.add(values, began, now)
+            began = now
+            return values
+
+        with suppress(_TimeToClose):
+            run_window(
+                self._head,
+                source,
+                size=self._settings.size,
+                title=_TITLE,
+                gui=self._panel,
+                camera=getattr(Camera, self._settings.camera)(),
+                quality=self._settings.quality,
+            )
+
+    def report(self) -> dict[str, object]:
+        """What was drawn; see :meth:`controller.face.FrameLog.report`."""
+        return self._log.report(self._settings, "window")
