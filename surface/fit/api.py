@@ -24,6 +24,8 @@ from surface.fit.rigging import find_jaw, lid_share, make_groups, neck_share
 from surface.fit.seat import close_lips, seat_lids
 from surface.head.data import HeadData, Jaw, PartData
 from surface.head.file import save_data
+from surface.head.meshes import pack, tessellate
+from surface.head.part import make_surface
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -71,8 +73,10 @@ def fit_mesh(mesh: FitMesh, recipe: Recipe, name: str, progress: Progress) -> tu
         reports.append(report)
     if recipe.eyes is not None:
         parts += [_eyeball(side, eye, radius) for side, eye in zip(("left", "right"), eyes, strict=True)]
-    head = HeadData(name, _provenance(recipe), recipe.neck or _low_middle(mesh), eyes, radius, jaw, parts,
-                    find_seams(charts), [])  # fmt: skip
+    parts = [_with_mesh(p) for p in parts]
+    head = HeadData(
+        name, _provenance(recipe), recipe.neck or _low_middle(mesh), eyes, radius, jaw, parts, find_seams(charts), []
+    )
     return head, FitReport(name, reports, sorted(set(sources)))
 
 
@@ -135,6 +139,11 @@ def _teeth(mesh: FitMesh, part: PartRecipe, steps: _Steps) -> tuple[PartData, Pa
     fitted = fit_chart(crowns, chart, wish)
     data = _part_data(part, chart, fitted, {}, Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0)), np.zeros((0, 3)), 0.0)
     return data, measure(part.name, chart, fitted, ())
+
+
+def _with_mesh(part: PartData) -> PartData:
+    """The part with its tessellation, so that a face starts at once."""
+    return replace(part, mesh=pack(tessellate(part, make_surface(part)), part.budget))
 
 
 def _eyeball(side: str, centre: Floats, radius: float) -> PartData:

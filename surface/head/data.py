@@ -42,6 +42,7 @@ class PartData:
     groups : displacements of its control points.
     jaw : (n,) how much of the jaw's rotation each point follows; neck : (n,) the same for the head's.
     lids : (n,) signed: how closely a point keeps to the left (+) or right (-) eyeball when lids move.
+    mesh : the kept tessellation as arrays (see :mod:`surface.head.meshes`); may be empty.
     """
 
     name: str
@@ -59,6 +60,7 @@ class PartData:
     jaw: Floats
     neck: Floats
     lids: Floats
+    mesh: dict[str, NDArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from surface.errors import HeadFileError
 from surface.head.data import Group, HeadData, Jaw, PartData, Seam
+from surface.head.meshes import KEYS
 from surface.head.toml import toml_text
 
 VERSION = 1
@@ -134,6 +135,7 @@ def _part(src: Source, t: dict[str, Any], where: str) -> PartData:
         _split(src, f"{name}/loop_ends", a["loops"], a["loop_ends"]), a["slits"],
         _budget(src, t, where), _groups(src, t, name, n, a, where),
         a["jaw"], a["neck"], a["lids"],
+        {k: src.arrays[f"{name}/{k}"] for k in KEYS if f"{name}/{k}" in src.arrays},
     )  # fmt: skip
 
 
@@ -195,7 +197,7 @@ def _part_arrays(p: PartData) -> dict[str, NDArray]:
         "group_ids": np.concatenate([g.ids for g in p.groups]) if p.groups else np.zeros(0, np.int32),
         "group_ends": np.cumsum([len(g.ids) for g in p.groups]).astype(np.int32),
         "group_moves": np.concatenate([g.moves for g in p.groups]) if p.groups else np.zeros((0, 3), np.float32),
-        "jaw": p.jaw, "neck": p.neck, "lids": p.lids,
+        "jaw": p.jaw, "neck": p.neck, "lids": p.lids, **p.mesh,
     }  # fmt: skip
 
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from surface.errors import HeadFileError
 from surface.head.data import Group, HeadData, PartData
 from surface.head.file import load_data
+from surface.head.meshes import tessellate, unpack
 from surface.head.paint import paint_part
 from surface.head.parameters import NAMES, read_pose, rotation
-from surface.head.part import HeadPart, RigidPart, SkinPart, domain_of, make_surface
+from surface.head.part import HeadPart, RigidPart, SkinPart, make_surface
 from surface.head.seams import Zipper
 
 RIGID = ("skull", "jaw", "left_eye", "right_eye")
@@ -109,8 +110,7 @@ def _make_part(part: PartData, head: HeadData, where: str) -> HeadPart:
         )
     try:
         surface = make_surface(part)
-        _, chord, depth = part.budget
-        mesh = surface.tessellate(chord_error=chord, max_depth=depth, domain=domain_of(part), loop_error=0.4 * chord)
+        mesh = unpack(part.mesh, surface, part.budget) or tessellate(part, surface)
     except ValueError as e:
         raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e
     attributes = paint_part(head.paint, part.name, mesh.uv, where)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from surface.dcp import DCPSurface
 from surface.deformation import Deformation
-from surface.domain import Domain
 from surface.head.data import HeadData, PartData
 from surface.head.parameters import Pose
 from surface.head.rig import SkinRig, rigid_motion
@@ -116,10 +115,3 @@ def make_surface(data: PartData) -> DCPSurface:
     return DCPSurface.from_padded(
         data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1]
     )
-
-
-def domain_of(data: PartData) -> Domain:
-    """The rectangle around the part's loops, trimmed by them."""
-    every = np.concatenate(data.loops)
-    (u0, v0), (u1, v1) = every.min(axis=0), every.max(axis=0)
-    return Domain((u0, u1, v0, v1), data.loops)
