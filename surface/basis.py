@@ -100,9 +100,7 @@ def _check_degrees(degrees: Ints, name: str) -> None:
     bad = (degrees < 0) | (degrees > MAX_DEGREE)
     if bad.any():
         i = int(np.argmax(bad))
-        raise ValueError(
-            f"{name}[{i}]: {degrees[i] + 2} knots; a point has degree + 2 knots, degree 0 to {MAX_DEGREE}"
-        )
+        raise ValueError(f"{name}[{i}]: {degrees[i] + 2} knots; a point has degree + 2 knots, degree 0 to {MAX_DEGREE}")
 
 
 def check_knots(padded: Floats, degrees: Ints, name: str) -> None:

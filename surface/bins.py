@@ -54,5 +54,7 @@ def build_bins(knots_u: Floats, knots_v: Floats) -> Bins:
 def _axis(knots: Floats) -> tuple[float, float, float, int]:
     """Low end, high end, median support and wanted number of bins along one direction."""
     low, high = float(knots[:, 0].min()), float(knots[:, -1].max())
-    support = float(np.median(knots[:, -1] - knots[:, 0]))
+    if high <= low:
+        high = low + 1.0
+    support = max(float(np.median(knots[:, -1] - knots[:, 0])), (high - low) / 1024)
     return low, high, support, int(np.clip(6.0 * (high - low) / support, 1, 1024))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .basis import Floats, Ints
-from .bins import Bins
+from .bins import Bins, build_bins
 from .jit import kernel
 
 LANES = 8  # float32 numbers per vector operation
@@ -109,6 +109,19 @@ def _box(uv, low, high, out):
         out[2], out[3] = min(out[2], uv[s, 1]), max(out[3], uv[s, 1])
 
 
+def cell_boxes(cell_start: Ints, uv: Floats) -> tuple[Floats, Bins]:
+    """Rectangles ``(c, 4)`` around every cell's vertices, and bins over them."""
+    boxes = np.zeros((len(cell_start) - 1, 4))
+    _fill_boxes(cell_start, uv, boxes)
+    return boxes, build_bins(np.ascontiguousarray(boxes[:, :2]), np.ascontiguousarray(boxes[:, 2:]))
+
+
+@kernel
+def _fill_boxes(cell_start, uv, boxes):
+    for c in range(boxes.shape[0]):
+        _box(uv, cell_start[c], cell_start[c + 1], boxes[c])
+
+
 @kernel
 def _cost(uv, low, high, supports, grid, shape, start, ids, box, none):
     _box(uv, low, high, box)
@@ -117,42 +130,51 @@ def _cost(uv, low, high, supports, grid, shape, start, ids, box, none):
 
 
 @kernel
+def _next_edge(code, low, high, shift):
+    """End of the run from ``low`` on with equal ``code >> shift``."""
+    end = low + 1
+    while end < high and (code[end] >> shift) == (code[low] >> shift):
+        end += 1
+    return end
+
+
+@kernel
+def _splits(code, uv, low, high, shift, supports, grid, shape, start, ids, box, none):
+    """Are the four parts of a branch cheaper than the whole?"""
+    if shift == 0 or high - low <= LANES:
+        return False
+    if high - low > MOST or _next_edge(code, low, high, shift - 2) == high:
+        return True
+    parts, a = 0.0, low
+    while a < high:
+        b = _next_edge(code, a, high, shift - 2)
+        parts += _cost(uv, a, b, supports, grid, shape, start, ids, box, none)
+        a = b
+    return parts < _cost(uv, low, high, supports, grid, shape, start, ids, box, none)
+
+
+@kernel
 def _group(code, depth, uv, supports, grid, shape, start, ids, out):
-    """Depth-first over the branches: split where the four parts together are cheaper."""
+    """Walk over the branches in order: go down a level where that is cheaper, else take the branch as a cell."""
     box, none = np.zeros(4), np.zeros(0, dtype=np.int32)
-    stack = [(0, code.shape[0], 2 * depth + 2)]
-    stack.pop()
-    low = 0
-    roots = [0]
-    for s in range(1, code.shape[0] + 1):
-        if s == code.shape[0] or (code[s] >> (2 * depth)) != (code[low] >> (2 * depth)):
-            roots.append(s)
-            low = s
-    for r in range(len(roots) - 1, 0, -1):
-        stack.append((roots[r - 1], roots[r], 2 * depth))
-    count = 0
-    while len(stack) > 0:
-        low, high, shift = stack.pop()
-        if shift == 0 or high - low <= LANES:
-            out[count] = low
-            count += 1
+    ends, shifts = np.zeros(depth + 2, dtype=np.int64), np.zeros(depth + 2, dtype=np.int64)
+    count, low, top = 0, 0, -1
+    while low < code.shape[0]:
+        if top < 0:
+            top, shifts[0] = 0, 2 * depth
+            ends[0] = _next_edge(code, low, code.shape[0], 2 * depth)
+        high, shift = ends[top], shifts[top]
+        if _splits(code, uv, low, high, shift, supports, grid, shape, start, ids, box, none):
+            top += 1
+            shifts[top], ends[top] = shift - 2, _next_edge(code, low, high, shift - 2)
             continue
-        edges = [low]
-        for s in range(low + 1, high):
-            if (code[s] >> (shift - 2)) != (code[s - 1] >> (shift - 2)):
-                edges.append(s)
-        edges.append(high)
-        parts = 0.0
-        if high - low <= MOST:
-            parts = -_cost(uv, low, high, supports, grid, shape, start, ids, box, none)
-            for e in range(len(edges) - 1):
-                parts += _cost(uv, edges[e], edges[e + 1], supports, grid, shape, start, ids, box, none)
-        if parts < 0.0 or high - low > MOST or len(edges) == 2:
-            for e in range(len(edges) - 1, 0, -1):
-                stack.append((edges[e - 1], edges[e], shift - 2))
-        else:
-            out[count] = low
-            count += 1
+        out[count] = low
+        count, low = count + 1, high
+        while top >= 0 and ends[top] == low:  # up to the first branch with a part left, then to that part
+            top -= 1
+        if top >= 0:
+            top += 1
+            ends[top] = _next_edge(code, low, ends[top - 1], shifts[top])
     return count
 
 

@@ -19,6 +19,7 @@ from .bins import Bins, build_bins
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
+    from .deformation import Deformation
     from .domain import Domain
     from .mesh import Mesh
 
@@ -112,15 +113,11 @@ class DCPSurface:
             knots = np.array(rows, dtype=np.float64, order="C", ndmin=2)
             p = np.array(degrees, dtype=np.int64, ndmin=1)
             if len(knots) != len(xyz) or len(p) != len(xyz) or len(w) != len(xyz):
-                raise ValueError(
-                    f"knots_{name}, degrees_{name}, weights: need one row per point ({len(xyz)})"
-                )
+                raise ValueError(f"knots_{name}, degrees_{name}, weights: need one row per point ({len(xyz)})")
             if (p + 2 > knots.shape[1]).any():
                 raise ValueError(f"degrees_{name}: needs more knots than the {knots.shape[1]} per row")
             check_knots(knots, p, f"knots_{name}")
-            sides.append(
-                (np.take_along_axis(knots, np.minimum(np.arange(knots.shape[1]), p[:, None] + 1), 1), p)
-            )
+            sides.append((np.take_along_axis(knots, np.minimum(np.arange(knots.shape[1]), p[:, None] + 1), 1), p))
         surface = cls.__new__(cls)
         surface._set(xyz, w, (sides[0][0], sides[1][0]), (sides[0][1], sides[1][1]), None)
         return surface
@@ -214,9 +211,7 @@ class DCPSurface:
         out = self._sample_derivatives(uv, side)
         return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()
 
-    def second_derivatives(
-        self, uv: ArrayLike, side: ArrayLike | None = None
-    ) -> tuple[Floats, Floats, Floats]:
+    def second_derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
         """S_uu, S_uv and S_vv, each (m, 3) float64, NaN rows where nothing covers."""
         out = self._sample_derivatives(uv, side)
         return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
@@ -293,6 +288,22 @@ class DCPSurface:
             roots=roots,
             flip=flip,
         )
+
+    def deformation(self, mesh: Mesh, *, normals: bool = True) -> Deformation:
+        """A mesh that follows moves of control points, changes of weights and of knots (Eq. 2).
+
+        Parameters
+        ----------
+        mesh : from :meth:`tessellate`
+        normals : also keep exact normals
+        """
+        from .deformation import Deformation
+
+        return Deformation(self, mesh, normals=normals)
+
+    def resolve_sides(self, uv: ArrayLike, side: ArrayLike | None = None) -> Ints:
+        """(m,) int64: the limit each evaluation really takes, -1 where nothing covers (see Notes of the class)."""
+        return self._sample(uv, side)[1]
 
     def _sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
         """Checked samples, the side really used (-1: uncovered) and S."""

@@ -19,9 +19,7 @@ def kernel(function: Callable) -> Any:
 
 def fast_kernel(function: Callable) -> Any:
     """As :func:`kernel`, and sums may be reordered for vector units; for float32 output only."""
-    return njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"}, error_model="numpy")(
-        function
-    )
+    return njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"}, error_model="numpy")(function)
 
 
 def inlined(function: Callable) -> Any:

@@ -202,9 +202,7 @@ def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, s
             continue
         cell = bin_of(uv[s, 0], uv[s, 1], grid, shape)
         ids = bins[start[cell] : start[cell + 1]]
-        sum_derivatives(
-            knots_u, knots_v, pu, pv, points, weights, ids, uv[s, 0], uv[s, 1], side[s], work, acc
-        )
+        sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, uv[s, 0], uv[s, 1], side[s], work, acc)
         w, wu, wv, wuu, wuv, wvv = acc[0, 3], acc[1, 3], acc[2, 3], acc[3, 3], acc[4, 3], acc[5, 3]
         for c in range(3):
             p = acc[0, c] / w
@@ -228,9 +226,7 @@ def row_capacity(grid, shape, start, uv):
 
 
 @kernel
-def fill_rows(
-    knots_u, knots_v, pu, pv, weights, grid, shape, start, bins, uv, side, data, columns, row_start
-):
+def fill_rows(knots_u, knots_v, pu, pv, weights, grid, shape, start, bins, uv, side, data, columns, row_start):
     """Write b w and its two derivatives ``data (k, 3)`` row by row; returns the number of entries."""
     work, top = np.zeros(12), 0
     for s in range(uv.shape[0]):
@@ -254,3 +250,76 @@ def fill_rows(
             top += 1
     row_start[uv.shape[0]] = top
     return top
+
+
+@kernel
+def _weigh(knots_u, knots_v, pu, pv, weights, i, uv, side, first, last, work, out):
+    """b w and its derivatives of point i at vertices first..last into ``out (3, >= last - first)``; any nonzero?"""
+    found = False
+    for s in range(first, last):
+        j = s - first
+        out[0, j], out[1, j], out[2, j] = 0.0, 0.0, 0.0
+        a0, a1 = blend1(knots_u, i, pu[i], uv[s, 0], side[s] & 1, work)
+        if a0 == 0.0 and a1 == 0.0:
+            continue
+        b0, b1 = blend1(knots_v, i, pv[i], uv[s, 1], side[s] & 2, work)
+        if b0 == 0.0 and b1 == 0.0:
+            continue
+        out[0, j], out[1, j], out[2, j] = a0 * b0 * weights[i], a1 * b0 * weights[i], a0 * b1 * weights[i]
+        found = True
+    return found
+
+
+@kernel
+def _put_row(value, slope, at, rows, row, tiles, numbers):
+    """Write one point's numbers ``(3, m)`` into a block of ``tiles`` tiles of ``rows`` rows of 8 lanes."""
+    for t in range(tiles):
+        for j in range(8):
+            place = (t * rows + row) * 8
+            value[at + place + j] = numbers[0, 8 * t + j]
+            if slope.shape[0] > 0:
+                slope[2 * (at + place) + j] = numbers[1, 8 * t + j]
+                slope[2 * (at + place) + 8 + j] = numbers[2, 8 * t + j]
+
+
+@kernel
+def fill_blocks(
+    knots_u, knots_v, pu, pv, weights, uv, side, cell_start, list_start, list_ids, value, slope, at, rows, ids, ids_at
+):
+    """Weights of all cells, block after block, without rows that are all zero; layout in :mod:`surface.lists`."""
+    work, most, widest = np.zeros(12), 0, 0
+    for c in range(cell_start.shape[0] - 1):
+        most = max(most, list_start[c + 1] - list_start[c])
+        widest = max(widest, (cell_start[c + 1] - cell_start[c] + 7) // 8 * 8)
+    numbers = np.zeros((most, 3, widest))
+    for c in range(cell_start.shape[0] - 1):
+        first, last = cell_start[c], cell_start[c + 1]
+        tiles = (last - first + 7) // 8
+        count = 0
+        for q in range(list_start[c], list_start[c + 1]):
+            i = list_ids[q]
+            if _weigh(knots_u, knots_v, pu, pv, weights, i, uv, side, first, last, work, numbers[count]):
+                ids[ids_at[c] + count] = i
+                count += 1
+        for row in range(count):
+            numbers[row, :, last - first :] = 0.0
+            _put_row(value, slope, at[c], count, row, tiles, numbers[row])
+        rows[c] = count
+        at[c + 1] = at[c] + count * tiles * 8
+        ids_at[c + 1] = ids_at[c] + count
+
+
+@kernel
+def rewrite_rows(
+    knots_u, knots_v, pu, pv, weights, uv, side, cell_start, i, cells, places, value, slope, at, rows, nonzero
+):
+    """Compute the rows ``places`` of point i in ``cells`` anew; ``nonzero`` says which rows are not all zero."""
+    work = np.zeros(12)
+    for q in range(cells.shape[0]):
+        c = cells[q]
+        first, last = cell_start[c], cell_start[c + 1]
+        tiles = (last - first + 7) // 8
+        numbers = np.zeros((3, tiles * 8))
+        nonzero[q] = _weigh(knots_u, knots_v, pu, pv, weights, i, uv, side, first, last, work, numbers)
+        if places[q] >= 0:
+            _put_row(value, slope, at[c], rows[c], places[q], tiles, numbers)

@@ -160,6 +160,6 @@ def wanted_size(ring, sharp, error, floor, out):
             along = abs(arc[i] - arc[j])
             along = min(along, arc[k] - along)
             gap = np.hypot(ring[i, 0] - ring[j, 0], ring[i, 1] - ring[j, 1])
-            if gap < size and along > 2.5 * gap and along > 0.0:
+            if gap < size and along > 1.5 * gap and along > 0.0:
                 size = min(size, gap)
         out[i] = max(size, floor)

@@ -11,7 +11,7 @@ from .basis import Floats, Ints
 from .domain import Domain
 from .mesh import Mesh
 from .quadtree import Lattice, Leaves
-from .trim import Flat, compact, trim
+from .trim import Flat, trim
 
 if TYPE_CHECKING:
     from .dcp import DCPSurface
@@ -77,9 +77,7 @@ def _lengths(surface: DCPSurface, domain: Domain) -> tuple[float, float]:
     return max(lengths[0], low), max(lengths[1], low)
 
 
-def _lattice(
-    domain: Domain, scale: tuple[float, float], depth: int, roots: tuple[int, int] | None
-) -> Lattice:
+def _lattice(domain: Domain, scale: tuple[float, float], depth: int, roots: tuple[int, int] | None) -> Lattice:
     """Roots bordered by the rectangle and by the lines of all slits, roughly square on the surface."""
     u0, u1, v0, v1 = domain.rect
     cuts: tuple[list[float], list[float]] = ([u0, u1], [v0, v1])
@@ -87,13 +85,13 @@ def _lattice(
         along, across = (0, 1) if slit.axis == "u" else (1, 0)
         cuts[along].extend([slit.start, slit.end])
         cuts[across].append(slit.at)
-    borders = [np.unique(np.clip(c, *domain.rect[2 * k : 2 * k + 2])) for k, c in enumerate(cuts)]
+    lines_u, lines_v = np.unique(np.clip(cuts[0], u0, u1)), np.unique(np.clip(cuts[1], v0, v1))
     if roots is not None:
-        return Lattice(*(_divide(b, (b[-1] - b[0]) / r) for b, r in zip(borders, roots, strict=True)), depth)
-    extent = [(b[-1] - b[0]) * s for b, s in zip(borders, scale, strict=True)]
-    gaps = np.concatenate([np.diff(b) * s for b, s in zip(borders, scale, strict=True)])
-    edge = max(min(*extent, 2.0 * float(gaps.min())), max(extent) / MOST_ROOTS)
-    return Lattice(*(_divide(b, edge / s) for b, s in zip(borders, scale, strict=True)), depth)
+        return Lattice(_divide(lines_u, (u1 - u0) / roots[0]), _divide(lines_v, (v1 - v0) / roots[1]), depth)
+    extent = (u1 - u0) * scale[0], (v1 - v0) * scale[1]
+    least = min(float(np.diff(lines_u).min()) * scale[0], float(np.diff(lines_v).min()) * scale[1])
+    edge = max(min(*extent, 2.0 * least), max(extent) / MOST_ROOTS)
+    return Lattice(_divide(lines_u, edge / scale[0]), _divide(lines_v, edge / scale[1]), depth)
 
 
 def _divide(borders: Floats, edge: float) -> Floats:
@@ -110,9 +108,7 @@ class _Tests:
     chord_error: float | None = None
     min_depth = 0
 
-    def __init__(
-        self, surface: DCPSurface, domain: Domain, lattice: Lattice, scale: tuple[float, float]
-    ) -> None:
+    def __init__(self, surface: DCPSurface, domain: Domain, lattice: Lattice, scale: tuple[float, float]) -> None:
         self.surface, self.domain, self.lattice, self.scale = surface, domain, lattice, scale
         self.rings: list[tuple[Floats, Floats]] = []
 
@@ -124,7 +120,7 @@ class _Tests:
             step = max(2.0 * error, float(around) / 2000)
             points, sharp = loops.resample(ring, self.scale, step)
             size = np.zeros(len(points))
-            loops.wanted_size(points * np.asarray(self.scale), sharp, error, 6.0 * error, size)
+            loops.wanted_size(points * np.asarray(self.scale), sharp, error, 3.0 * error, size)
             self.rings.append((points, size))
 
     def split(self, level: int, cells: Ints) -> np.ndarray:
@@ -228,14 +224,12 @@ def _off_line(a: Floats, middle: Floats, b: Floats) -> Floats:
     return np.linalg.norm(offset - part[:, None] * along, axis=1)
 
 
-def _finish(
-    surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool
-) -> Mesh:
+def _finish(surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool) -> Mesh:
     """Split vertices on slits, evaluate, drop uncovered triangles, order by cell, make the lists."""
     flat, side = _open_slits(flat, domain)
     points, su, sv = surface.derivatives(flat.uv, side=side)
-    covered = np.isfinite(points).all(axis=1)
-    keep = covered[flat.triangles].all(axis=1)
+    side = surface.resolve_sides(flat.uv, side)
+    keep = (side >= 0)[flat.triangles].all(axis=1)
     order, code = _order(Flat(flat.uv, flat.triangles[keep], flat.owner[keep]), lattice, leaves)
     rank = np.zeros(len(flat.uv), dtype=np.int32)
     rank[order] = np.arange(len(order))

@@ -107,8 +107,9 @@ def _weights_in(flat: Flat, point: Floats) -> Floats:
     """(t, 3): barycentric coordinates of a point in every triangle."""
     a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
     area = _cross(b - a, c - a)
-    return np.stack([_cross(b - point, c - point), _cross(c - point, a - point), _cross(a - point, b - point)], 1) / (
-        area[:, None]
+    return (
+        np.stack([_cross(b - point, c - point), _cross(c - point, a - point), _cross(a - point, b - point)], 1)
+        / (area[:, None])
     )
 
 
@@ -119,21 +120,49 @@ def _cross(a: Floats, b: Floats) -> Floats:
 def _place_corners(
     flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, fixed: np.ndarray
 ) -> tuple[Flat, Ints, np.ndarray]:
-    """Put a vertex at every sharp corner of a loop: move a close one there, or split a triangle."""
-    for tip in _all_corners(domain, scale):
-        inside = _weights_in(flat, tip)
-        triangle = int(np.argmax(inside.min(axis=1)))
-        share = inside[triangle]
-        if share.min() < -1e-9:
-            continue
-        nearest = flat.triangles[triangle, int(np.argmax(share))]
-        if share.max() > 0.7 and line[nearest] == -1 and not fixed[nearest]:
-            flat.uv[nearest] = tip
-            fixed[nearest] = True
-        elif share.max() < 0.999:
-            flat = _insert(flat, tip, triangle, share)
-            line, fixed = np.append(line, -1), np.append(fixed, True)
+    """Put a vertex at every sharp corner of a loop, and one where each of its two sides leaves the corner's fan.
+
+    So the sides at a corner are edges of the mesh, and a wedge narrower than a triangle is not lost.
+    """
+    tips = _all_corners(domain, scale)
+    for tip in tips:
+        flat, line, fixed = _place(flat, tip, line, fixed)
+    for tip in tips:
+        at = np.flatnonzero((flat.uv == tip).all(axis=1) & fixed)
+        for point in _leaving(flat, domain, int(at[0])) if len(at) else ():
+            flat, line, fixed = _place(flat, point, line, fixed)
     return flat, line, fixed
+
+
+def _place(flat: Flat, point: Floats, line: Ints, fixed: np.ndarray) -> tuple[Flat, Ints, np.ndarray]:
+    """Move a close free vertex to ``point``, or split a triangle there."""
+    inside = _weights_in(flat, point)
+    triangle = int(np.argmax(inside.min(axis=1)))
+    share = inside[triangle]
+    if share.min() < -1e-9:
+        return flat, line, fixed
+    nearest = flat.triangles[triangle, int(np.argmax(share))]
+    if share.max() > 0.7 and line[nearest] == -1 and not fixed[nearest]:
+        flat.uv[nearest] = point
+        fixed[nearest] = True
+    elif share.max() < 0.9:
+        flat = _insert(flat, point, triangle, share)
+        line, fixed = np.append(line, -1), np.append(fixed, True)
+    return flat, line, fixed
+
+
+def _leaving(flat: Flat, domain: Domain, vertex: int) -> Floats:
+    """(k, 2): where loops cross the edges opposite to a vertex in the triangles around it."""
+    around = flat.triangles[(flat.triangles == vertex).any(axis=1)]
+    opposite = around[around != vertex].reshape(-1, 2)
+    a, b = flat.uv[opposite[:, 0]][:, None], flat.uv[opposite[:, 1]][:, None]
+    start, along = domain.segments[None, :, :2], domain.segments[None, :, 2:] - domain.segments[None, :, :2]
+    det = _cross(b - a, along)
+    safe = np.where(det == 0, 1.0, det)
+    t, s = _cross(start - a, along) / safe, _cross(start - a, b - a) / safe
+    hit = (det != 0) & (t >= 0) & (t <= 1) & (s >= 0) & (s < 1)
+    edge, segment = np.nonzero(hit)
+    return a[edge, 0] + t[edge, segment][:, None] * (b - a)[edge, 0]
 
 
 def _insert(flat: Flat, point: Floats, triangle: int, share: Floats) -> Flat:

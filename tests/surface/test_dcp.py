@@ -13,21 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surface import DCPSurface
-
-
-def scattered(n: int, seed: int, degrees: tuple[int, int] = (1, 7)) -> DCPSurface:
-    """Random points over the unit square, random degrees and knots, the whole square covered."""
-    rng = np.random.default_rng(seed)
-    knots = [[], []]
-    for _ in range(n):
-        for side in knots:
-            p = int(rng.integers(degrees[0], degrees[1] + 1))
-            low = rng.uniform(-0.3, 0.9)
-            side.append(np.sort(rng.uniform(low, low + rng.uniform(0.2, 0.8), p + 2)))
-    cover = np.array([-0.5, -0.2, 0.4, 1.2, 1.6])
-    knots[0].append(cover)
-    knots[1].append(cover)
-    return DCPSurface(rng.normal(size=(n + 1, 3)), rng.uniform(0.3, 3, n + 1), knots[0], knots[1])
+from tests.surface.shapes import scattered
 
 
 def from_case(case: dict) -> DCPSurface:

@@ -1,0 +1,270 @@
+"""Differential update of a mesh, Eq. (2): numerators and denominators are kept, a change touches its cells only.
+
+Drift is bounded in two ways. A cell takes at most ``LIMIT`` differences before it is computed anew from the
+float64 control points; and its numerators are those of positions relative to its own origin, so that a rounding
+error is 6e-8 of the cell's size, not of the head's.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .basis import pad_knots
+from .lists import build_lists
+from .mesh import Mesh
+
+if TYPE_CHECKING:
+    from .bins import Bins
+    from .dcp import DCPSurface
+
+LIMIT = 256  # differences a cell takes before it is computed anew
+BIAS = 2.0  # cost of adding one row's difference, in rows computed anew (measured)
+GAP = 256  # unchanged vertices between two changed ranges that are uploaded rather than left out
+MOST_MOVED = 0.75  # from this part of the points on, everything is computed anew
+
+
+class Deformation:
+    """A mesh that follows its control points.
+
+    Parameters
+    ----------
+    surface : the surface the mesh was made from
+    mesh : from :meth:`surface.DCPSurface.tessellate`
+    normals : also keep normals; without them an update costs a third
+
+    Notes
+    -----
+    One object belongs to one thread at a time. Nothing is allocated by :meth:`move` and :meth:`set_positions`
+    but the copy of arguments that are not already int64 and float64 arrays.
+    """
+
+    def __init__(self, surface: DCPSurface, mesh: Mesh, *, normals: bool = True) -> None:
+        self.mesh = mesh
+        self._lists = build_lists(surface, mesh, normals)
+        self._points = surface.points.copy()
+        self._weights = surface.weights.copy()
+        self._knots = [knots.copy() for knots in surface.padded]
+        self._degrees = [degrees.copy() for degrees in surface.degrees]
+        self._allocate(normals)
+        self._sum_weights(np.arange(len(mesh.cell_start) - 1))
+        self.refresh()
+
+    def _allocate(self, normals: bool) -> None:
+        n, m, cells = len(self._points), len(self.mesh.vertices), len(self.mesh.cell_start) - 1
+        self._sign = np.float32(-1 if self.mesh.flip else 1)
+        starts = self.mesh.cell_start[:-1]
+        self._origin = np.zeros((cells, 3))
+        if m:
+            self._origin[:] = np.add.reduceat(self.mesh.vertices, starts) / np.diff(self.mesh.cell_start)[:, None]
+        self._state = np.zeros(int(self._lists.tile_start[-1]) * 96, dtype=np.float32)
+        self._kept = np.full(cells, -1, dtype=np.int64)
+        self._vertices = np.zeros(3 * m, dtype=np.float32)
+        self._normals = np.zeros(3 * m if normals else 0, dtype=np.float32)
+        self._hits = np.zeros(cells, dtype=np.int64)
+        self._touched = np.zeros(cells, dtype=np.int32)
+        self._ranges = np.zeros((cells, 2), dtype=np.int64)
+        self._changed_ids, self._delta = np.zeros(n, dtype=np.int64), np.zeros((n, 3))
+        self._all = np.arange(n)
+        self._cell_boxes: tuple[np.ndarray, Bins] | None = None
+        self._spare = np.zeros(24, dtype=np.float32)
+        self._count = 0
+        self._reserve_local()
+        self.vertices = _view(self._vertices)
+        self.normals = _view(self._normals)
+
+    def _reserve_local(self) -> None:
+        self._local = np.zeros((int(self._lists.rows.max(initial=0)), 3), dtype=np.float32)
+
+    @property
+    def points(self) -> np.ndarray:
+        """(n, 3) float64 control points as they stand now, read-only."""
+        view = self._points.view()
+        view.flags.writeable = False
+        return view
+
+    @property
+    def changed(self) -> list[tuple[int, int]]:
+        """Vertex ranges (start, stop) that the last update touched, rising."""
+        return [(int(a), int(b)) for a, b in self._ranges[: self._count]]
+
+    @property
+    def surface(self) -> DCPSurface:
+        """A new surface with the points, weights and knots as they stand now."""
+        from .dcp import DCPSurface
+
+        return DCPSurface.from_padded(self._points, self._weights, *self._knots, *self._degrees)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of weights and lists."""
+        return self._lists.nbytes
+
+    def move(self, ids: ArrayLike, delta: ArrayLike) -> None:
+        """Move points by ``delta (k, 3)`` (or one (3,) for all); an id that stands twice moves twice.
+
+        Raises
+        ------
+        ValueError
+            For ids out of range, wrong shapes or numbers that are not finite; nothing is changed then.
+        """
+        which = self._check_ids(ids)
+        step = np.asarray(delta, dtype=np.float64)
+        if step.shape == (3,):
+            step = np.broadcast_to(step, (len(which), 3))
+        _check_rows(step, len(which), "delta")
+        if len(np.unique(which)) < len(which):
+            which, back = np.unique(which, return_inverse=True)
+            total = np.zeros((len(which), 3))
+            np.add.at(total, back, step)
+            step = total
+        self._place(which, self._points[which] + step)
+
+    def set_positions(self, ids: ArrayLike, xyz: ArrayLike) -> None:
+        """Put points ``ids (k,)`` at ``xyz (k, 3)``; points that stand there already cost next to nothing.
+
+        Raises
+        ------
+        ValueError
+            As :meth:`move`.
+        """
+        which = self._check_ids(ids)
+        target = np.ascontiguousarray(xyz, dtype=np.float64)
+        _check_rows(target, len(which), "xyz")
+        self._place(which, target)
+
+    def set_points(self, xyz: np.ndarray) -> None:
+        """Put all points at ``xyz (n, 3)``: :meth:`set_positions` without a list of ids."""
+        target = np.ascontiguousarray(xyz, dtype=np.float64)
+        _check_rows(target, len(self._points), "xyz")
+        self._place(self._all, target)
+
+    def set_weights(self, ids: ArrayLike, weights: ArrayLike) -> None:
+        """Give points ``ids (k,)`` the weights ``(k,)``, positive.
+
+        Raises
+        ------
+        ValueError
+            For ids out of range, wrong shapes or weights that are not positive and finite.
+        """
+        which = self._check_ids(ids)
+        w = np.asarray(weights, dtype=np.float64)
+        if w.shape != which.shape:
+            raise ValueError(f"weights: shape {w.shape}, expected {which.shape}")
+        good = np.isfinite(w) & (w > 0)
+        if not good.all():
+            i = int(np.argmin(good))
+            raise ValueError(f"weights[{i}]: must be positive and finite, got {w[i]}")
+        self._weights[which] = w
+        cells = [self._rewrite(int(i)) for i in which]
+        self._recompute(np.unique(np.concatenate(cells)) if cells else np.zeros(0, dtype=np.int64))
+
+    def set_knots(self, index: int, knots_u: ArrayLike, knots_v: ArrayLike) -> None:
+        """Give one point other knots, and so another subdomain; lists change only where the old or new one reaches.
+
+        Raises
+        ------
+        ValueError
+            For bad knots, or where a vertex of the mesh would be covered by no point; nothing is changed then.
+        """
+        from .relist import change_knots
+
+        index = int(self._check_ids([index])[0])
+        rows = [pad_knots([k], name, 1) for k, name in ((knots_u, "knots_u"), (knots_v, "knots_v"))]
+        self._apply(change_knots(self, index, [r[0][0] for r in rows], [int(r[1][0]) for r in rows]))
+
+    def refresh(self) -> None:
+        """Compute everything anew from the control points."""
+        from . import apply
+
+        cells = len(self._kept)
+        apply.apply_cells(0, cells, *self._inputs())
+        self._ranges[0] = 0, len(self.vertices)
+        self._count = 1
+
+    def _place(self, which: np.ndarray, target: np.ndarray) -> None:
+        from . import apply
+
+        moved = apply.difference(which, target, self._points, self._changed_ids, self._delta)
+        if moved > MOST_MOVED * len(self._points):
+            self.refresh()
+            return
+        total = apply.update(
+            self._changed_ids, moved, self._delta, self._points, self._origin, self._tables(), self._back(),
+            *self._inputs()[3:], self._hits, self._touched, LIMIT, BIAS,
+        )  # fmt: skip
+        self._count = apply.ranges(self._touched, total, self._lists.cell_start, GAP, self._ranges)
+
+    def _rewrite(self, i: int) -> np.ndarray:
+        """Compute the rows of point i anew; returns the cells it stands in."""
+        from . import kernels
+
+        lists = self._lists
+        entries = slice(lists.back_start[i], lists.back_start[i] + lists.back_count[i])
+        cells = lists.back_cell[entries].astype(np.int64)
+        places = lists.back_row[entries].astype(np.int64)
+        nonzero = np.zeros(len(cells), dtype=np.bool_)
+        kernels.rewrite_rows(
+            *self._knots, *self._degrees, self._weights, self.mesh.uv, self.mesh.side, lists.cell_start, i,
+            cells, places, lists.value, lists.slope, lists.at, lists.room, nonzero,
+        )  # fmt: skip
+        return cells
+
+    def _sum_weights(self, cells: np.ndarray) -> int:
+        from . import apply
+
+        return apply.denominators(cells, self._tables(), self._state)
+
+    def _recompute(self, cells: np.ndarray) -> None:
+        """Denominators and vertices of the given rising cells."""
+        self._sum_weights(cells)
+        self._apply(cells)
+
+    def _apply(self, cells: np.ndarray) -> None:
+        """Vertices of the given rising cells."""
+        from . import apply
+
+        for c in cells:
+            apply.apply_cells(c, c + 1, *self._inputs())
+        self._count = apply.ranges(cells, len(cells), self._lists.cell_start, GAP, self._ranges)
+
+    def _tables(self) -> tuple[np.ndarray, ...]:
+        x = self._lists
+        return x.cell_start, x.tile_start, x.rows, x.room, x.at, x.ids_at, x.ids, x.value, x.slope
+
+    def _back(self) -> tuple[np.ndarray, ...]:
+        x = self._lists
+        return x.back_start, x.back_count, x.back_cell, x.back_row
+
+    def _inputs(self) -> tuple:
+        return (
+            self._points, self._origin, self._tables(), self._state, self._kept, self._sign,
+            self._vertices, self._normals, self._local, self._spare,
+        )  # fmt: skip
+
+    def _check_ids(self, ids: ArrayLike) -> np.ndarray:
+        which = np.ascontiguousarray(ids)
+        if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
+            raise ValueError(f"ids: needs a flat sequence of integers, got shape {which.shape} of {which.dtype}")
+        which = which.astype(np.int64, copy=False)
+        if which.size and (which.min() < 0 or which.max() >= len(self._points)):
+            k = int(np.argmax((which < 0) | (which >= len(self._points))))
+            raise ValueError(f"ids[{k}]: {which[k]} is not a control point (0 to {len(self._points) - 1})")
+        return which
+
+
+def _view(flat: np.ndarray) -> np.ndarray:
+    """(m, 3) read-only view."""
+    view = flat.reshape(-1, 3)
+    view.flags.writeable = False
+    return view
+
+
+def _check_rows(rows: np.ndarray, count: int, name: str) -> None:
+    if rows.shape != (count, 3):
+        raise ValueError(f"{name}: shape {rows.shape}, expected {(count, 3)}")
+    if not np.isfinite(rows).all():
+        k = int(np.argmin(np.isfinite(rows).all(axis=1)))
+        raise ValueError(f"{name}[{k}]: must be finite, got {rows[k].tolist()}")

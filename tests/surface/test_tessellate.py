@@ -1,0 +1,149 @@
+"""Quad-tree meshes: watertight, cut at slits, true to trim loops."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surface import DCPSurface, Domain, Slit
+from tests.surface import shapes
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from([0.6, 0.2, 0.08]))
+def test_a_scattered_surface_is_covered_without_cracks(seed: int, error: float) -> None:
+    surface = shapes.scattered(20, seed, degrees=(2, 5))
+    mesh = surface.tessellate(chord_error=error, max_depth=6, domain=Domain((0, 1, 0, 1)))
+    shapes.check_manifold(mesh)
+    areas = shapes.uv_areas(mesh)
+    assert areas.min() > 0
+    assert np.isclose(areas.sum(), 1, rtol=1e-12)
+    on_rim = ((mesh.uv == 0) | (mesh.uv == 1)).any(axis=1)
+    rim = shapes.border(mesh)
+    assert on_rim[rim].all()
+    assert len(rim) == np.count_nonzero(on_rim)  # one closed ring
+    assert np.allclose(mesh.vertices, surface.evaluate(mesh.uv), rtol=0, atol=1e-12)
+
+
+def test_normals_are_exact_and_agree_with_triangles() -> None:
+    surface = shapes.hills()
+    mesh = surface.tessellate(chord_error=0.1)
+    _, su, sv = surface.derivatives(mesh.uv)
+    exact = np.cross(su, sv)
+    assert np.allclose(mesh.normals, exact / np.linalg.norm(exact, axis=1)[:, None], rtol=0, atol=1e-12)
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    assert ((np.cross(b - a, c - a) * mesh.normals[mesh.triangles[:, 0]]).sum(axis=1) > 0).all()
+    turned = surface.tessellate(chord_error=0.1, flip=True)
+    assert np.array_equal(turned.normals, -mesh.normals)
+    assert np.array_equal(turned.triangles, mesh.triangles[:, ::-1])
+
+
+def test_chord_error_bounds_the_distance() -> None:
+    surface = shapes.hills()
+    coarse, fine = (surface.tessellate(chord_error=e) for e in (0.5, 0.05))
+    assert len(fine.vertices) > 3 * len(coarse.vertices)
+    for mesh, bound in ((coarse, 0.5), (fine, 0.05)):
+        corner = mesh.uv[mesh.triangles]
+        middle = surface.evaluate(corner.mean(axis=1))
+        flat = mesh.vertices[mesh.triangles].mean(axis=1)
+        normal = np.cross(*(mesh.vertices[mesh.triangles[:, k]] - mesh.vertices[mesh.triangles[:, 0]] for k in (1, 2)))
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        assert np.abs(((middle - flat) * normal).sum(axis=1)).max() < 1.5 * bound
+
+
+def test_max_points_bounds_the_lists_of_leaves() -> None:
+    surface = shapes.hills(35)  # 32 x 32 spans with 16 points each, 25 over two spans
+    assert surface.tessellate(max_points=16, roots=(1, 1)).leaves == 32 * 32
+    assert surface.tessellate(max_points=25, roots=(1, 1)).leaves == 16 * 16
+
+
+def test_lists_hold_every_point_that_reaches_a_vertex() -> None:
+    surface = shapes.scattered(60, 5)
+    mesh = surface.tessellate(chord_error=0.05, max_depth=6, domain=Domain((0, 1, 0, 1)))
+    assert np.array_equal(mesh.cell, np.repeat(np.arange(len(mesh.cell_start) - 1), np.diff(mesh.cell_start)))
+    matrix = surface.basis_matrix(mesh.uv, side=mesh.side)
+    for cell in range(len(mesh.cell_start) - 1):
+        rows = matrix[mesh.cell_start[cell] : mesh.cell_start[cell + 1]]
+        assert np.isin(np.unique(rows.indices), mesh.points_of(cell)).all()
+
+
+def test_a_slit_cuts_and_nothing_straddles_it() -> None:
+    surface = shapes.torn()
+    slit = Slit("u", 0.5, 0.25, 0.75)
+    mesh = surface.tessellate(chord_error=0.05, domain=Domain((0, 1, 0, 1), slits=[slit]), min_depth=2)
+    shapes.check_manifold(mesh)
+    v = mesh.uv[mesh.triangles][:, :, 1]
+    assert not ((v.min(axis=1) < 0.5) & (v.max(axis=1) > 0.5)).any()
+    on = slit.holds(mesh.uv)
+    below, above = on & (mesh.side == 2), on & (mesh.side == 0)
+    assert below.sum() == above.sum() > 0
+    assert np.array_equal(np.unique(mesh.uv[below], axis=0), np.unique(mesh.uv[above], axis=0))
+    assert np.allclose(mesh.vertices[below, 2], 0, atol=1e-12)
+    assert np.allclose(mesh.vertices[above, 2], 10, atol=1e-12)
+    for end in (0.25, 0.75):
+        assert ((mesh.uv == [end, 0.5]).all(axis=1)).sum() == 1
+    used_below = np.isin(mesh.triangles, np.flatnonzero(below)).any(axis=1)
+    assert (v[used_below].max(axis=1) <= 0.5).all()
+
+
+def test_loops_are_followed_within_the_error() -> None:
+    surface, domain = shapes.hills(), shapes.face_like()
+    for error in (0.2, 0.05):
+        mesh = surface.tessellate(chord_error=error, domain=domain)
+        shapes.check_manifold(mesh)
+        length = np.linalg.norm(domain.segments[:, 2:] - domain.segments[:, :2], axis=1).sum()
+        assert abs(shapes.uv_areas(mesh).sum() - domain.area) < length * error / 100
+        rim = mesh.uv[shapes.border(mesh)]
+        along = np.concatenate([rim[:, 0], rim.mean(axis=1), 0.7 * rim[:, 0] + 0.3 * rim[:, 1]])
+        assert shapes.distance_to_loops(along, domain).max() * 100 < 2.5 * error
+
+
+def test_trimmed_meshes_have_no_slivers() -> None:
+    mesh = shapes.hills().tessellate(chord_error=0.1, domain=shapes.face_like())
+    assert shapes.uv_areas(mesh).min() > 0
+    angles = shapes.least_angles(mesh)
+    assert angles.min() > 3
+    assert np.percentile(angles, 1) > 14
+
+
+def test_sharp_corners_of_loops_are_vertices() -> None:
+    outline = np.array([[0.1, 0.1], [0.92, 0.1], [0.9, 0.5], [0.9, 0.9], [0.13, 0.88]])
+    domain = Domain((0, 1, 0, 1), loops=[outline])
+    mesh = shapes.hills().tessellate(chord_error=0.3, domain=domain)
+    for tip in outline[[0, 1, 3, 4]]:  # corner 2 turns by a few degrees only
+        assert (mesh.uv == tip).all(axis=1).sum() == 1
+    assert np.isclose(shapes.uv_areas(mesh).sum(), domain.area, rtol=1e-3)
+
+
+def test_islands_side_by_side() -> None:
+    domain = Domain((0, 1, 0, 1), loops=[shapes.circle(0.25, 0.5, 0.2), shapes.circle(0.75, 0.5, 0.2)])
+    mesh = shapes.hills().tessellate(chord_error=0.04, domain=domain)
+    assert np.isclose(shapes.uv_areas(mesh).sum(), 2 * np.pi * 0.04, rtol=2e-3)
+    u = mesh.uv[mesh.triangles][:, :, 0]
+    assert not ((u.min(axis=1) < 0.5) & (u.max(axis=1) > 0.5)).any()
+
+
+def test_uncovered_parts_are_left_out() -> None:
+    knots = [[0, 0.2, 0.3, 0.4], [0.6, 0.7, 0.8, 1.0]]
+    surface = DCPSurface([[0, 0, 0], [1, 0, 0]], [1, 1], knots, [[0, 0, 1, 1], [0, 0, 1, 1]])
+    mesh = surface.tessellate(max_points=1, min_depth=5)
+    assert np.isfinite(mesh.vertices).all()
+    u = mesh.uv[:, 0]
+    assert not ((u > 0.4) & (u < 0.6)).any()
+
+
+@pytest.mark.parametrize(
+    ("limits", "name"),
+    [
+        ({"max_points": 0}, "max_points"),
+        ({"chord_error": -1.0}, "chord_error"),
+        ({"max_depth": 21}, "max_depth"),
+        ({"min_depth": 5, "max_depth": 3}, "min_depth"),
+        ({"max_points": 1, "max_depth": 20}, "max_depth"),
+    ],
+)
+def test_limits_out_of_range_are_named(limits: dict, name: str) -> None:
+    with pytest.raises(ValueError, match=name):
+        shapes.hills(8).tessellate(**limits)
