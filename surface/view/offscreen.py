@@ -84,6 +84,7 @@ class Offscreen:
         filling of the last frame and never more than one frame is under way.
         """
         self.head.pose(values)
+        self.ctx.__enter__()  # another context may have been current since
         self.ctx.finish()
         self.renderer.update()
         self.target.paint(self.renderer, camera or Camera.front())
@@ -95,10 +96,12 @@ class Offscreen:
 
     def read(self) -> np.ndarray:
         """The picture last drawn, (height, width, 3) uint8, top row first."""
+        self.ctx.__enter__()
         return self.target.read()
 
     def finish(self) -> None:
         """Wait until the last frame is drawn."""
+        self.ctx.__enter__()
         self.ctx.finish()
 
     def close(self) -> None:
@@ -106,6 +109,7 @@ class Offscreen:
         if self._closed:
             return
         self._closed = True
+        self.ctx.__enter__()
         self.renderer.release()
         self.target.release()
         self.ctx.release()

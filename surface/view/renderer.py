@@ -88,6 +88,8 @@ class Renderer:
         for buffers in self._parts:
             self._draw_part(buffers)
         self.ctx.disable(self.ctx.CULL_FACE)
+        theme = self.theme
+        put(self._programs["background"], {"top": theme.background_top, "bottom": theme.background_bottom})
         self._background.render(vertices=3)
 
     def region(self, camera: Camera, size: tuple[int, int]) -> Region:
@@ -104,7 +106,6 @@ class Renderer:
     def set_background(self, top: Colour, bottom: Colour) -> None:
         """Change the gradient; sRGB colours 0..1."""
         self.theme = replace(self.theme, background_top=top, background_bottom=bottom)
-        put(self._programs["background"], {"top": top, "bottom": bottom})
 
     def _draw_part(self, buffers: PartBuffers) -> None:
         """One part with its material's uniforms and culling."""
@@ -130,7 +131,6 @@ class Renderer:
         }
         for program in self._programs.values():
             put(program, shared)
-        self.set_background(theme.background_top, theme.background_bottom)
 
     def _aim(self, camera: Camera, aspect: float) -> None:
         """Camera and light uniforms, sent only when the camera or the picture's shape changed."""

@@ -23,6 +23,7 @@ Entry = tuple[str, np.ndarray]
 _PAPER = (24, 26, 29)
 _INK = (232, 233, 235)
 _GAP = 4
+_LEGIBLE = 9.0
 
 
 @dataclass(frozen=True)
@@ -151,8 +152,11 @@ def _write_label(sheet: Image, label: str, index: int, layout: Layout) -> None:
 
     draw: ImageDraw.ImageDraw = ImageDraw.Draw(sheet)
     x, y = layout.corner(index)
-    size = layout.label * 0.72
-    while size > 8 and draw.textlength(label, font=ImageFont.load_default(size)) > layout.tile[0] - 4:
+    size, room = layout.label * 0.72, layout.tile[0] - 6
+    while size > _LEGIBLE and draw.textlength(label, font=ImageFont.load_default(size)) > room:
         size *= 0.9
+    font = ImageFont.load_default(size)
+    while len(label) > 2 and draw.textlength(label, font=font) > room:
+        label = label[:-2] + "\N{HORIZONTAL ELLIPSIS}"
     middle = (x + layout.tile[0] // 2, y + layout.tile[1] + layout.label // 2)
-    draw.text(middle, label, fill=_INK, font=ImageFont.load_default(size), anchor="mm")
+    draw.text(middle, label, fill=_INK, font=font, anchor="mm")

@@ -1,0 +1,152 @@
+"""surface.view.renderer"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from ball_head import BallHead, values
+
+from surface.errors import ViewError
+from surface.view import Camera, Offscreen, Theme
+from surface.view.renderer import box_corners, light_direction, theme_named
+from surface.view.theme import THEMES, Light
+
+SIZE = (200, 160)
+
+
+@pytest.fixture(scope="module")
+def screens(gl: None) -> Iterator[dict[str, Offscreen]]:
+    made = {quality: Offscreen(BallHead(), SIZE, quality=quality) for quality in ("full", "fast")}
+    yield made
+    for screen in made.values():
+        screen.close()
+
+
+@pytest.fixture(params=["full", "fast"])
+def screen(request: pytest.FixtureRequest, screens: dict[str, Offscreen]) -> Offscreen:
+    return screens[request.param]
+
+
+def middle(picture: np.ndarray, x: float, y: float) -> np.ndarray:
+    """Mean colour round a place given in 0..1 from the upper left corner."""
+    row, column = int(y * SIZE[1]), int(x * SIZE[0])
+    return picture[row - 3 : row + 4, column - 3 : column + 4].reshape(-1, 3).mean(axis=0)
+
+
+def test_skin_is_warm_lit_and_not_blown(screen: Offscreen) -> None:
+    picture = screen.render(values())
+    red, green, blue = middle(picture, 0.5, 0.35)
+    assert red > green > blue
+    assert 120 < red < 250
+    assert (picture[SIZE[1] // 2] < 253).all()
+
+
+def test_the_key_light_comes_from_the_subjects_right(screen: Offscreen) -> None:
+    picture = screen.render(values())
+    assert middle(picture, 0.42, 0.55).sum() > middle(picture, 0.58, 0.55).sum() + 10
+
+
+def test_opening_the_mouth_changes_the_mouth_only(screen: Offscreen) -> None:
+    shut = screen.render(values()).astype(int)
+    opened = screen.render(values(jawOpen=1.0)).astype(int)
+    moved = np.abs(opened - shut).max(axis=2) > 12
+    assert moved[SIZE[1] // 2 :].sum() > 60
+    assert moved[: SIZE[1] // 2].sum() == 0
+
+
+def test_yaw_turns_to_the_subjects_left(screen: Offscreen) -> None:
+    ahead = screen.render(values()).astype(float)
+    turned = screen.render(values(headYaw=0.4)).astype(float)
+    columns = np.arange(SIZE[0])[None, :]
+    red = ahead[..., 0] - ahead[..., 2]
+    eyes = slice(int(0.40 * SIZE[1]), int(0.47 * SIZE[1]))
+    dark_ahead = np.clip(150 - ahead[eyes, 70:130].sum(axis=2) / 3, 0, None)
+    dark_turned = np.clip(150 - turned[eyes, 70:130].sum(axis=2) / 3, 0, None)
+    assert red.max() > 20
+    centre_ahead = (dark_ahead * columns[:, 70:130]).sum() / dark_ahead.sum()
+    centre_turned = (dark_turned * columns[:, 70:130]).sum() / dark_turned.sum()
+    assert centre_turned > centre_ahead + 1
+
+
+def test_gaze_moves_the_pupils(screen: Offscreen) -> None:
+    camera = Camera.around(0, 0, distance=200, target=(30, 20, 80))
+
+    def dark(amount: float) -> float:
+        picture = screen.render(values(leftEyeYaw=amount), camera).astype(float).sum(axis=2)
+        window = picture[60:100, 60:140]
+        weight = np.clip(120 - window, 0, None)
+        return float((weight * np.arange(80)).sum() / weight.sum())
+
+    assert dark(0.5) > dark(0.0) + 4
+    assert dark(-0.5) < dark(0.0) - 4
+
+
+def test_the_picture_depends_on_the_pose_alone(screen: Offscreen) -> None:
+    first = screen.render(values())
+    screen.render(values(jawOpen=1, headYaw=-1, eyeBlinkLeft=1), Camera.profile())
+    assert np.abs(screen.render(values()).astype(int) - first).max() <= 1
+
+
+def test_region_holds_everything_that_differs_from_the_background(screen: Offscreen) -> None:
+    camera = Camera.three_quarter()
+    picture = screen.render(values(headYaw=0.3), camera).astype(int)
+    x, y, width, height = screen.renderer.region(camera, SIZE)
+    screen.renderer.draw(camera.aimed((5000.0, 0.0, 0.0)), screen.target._drawn)
+    screen.target._bring_together((0, 0, *SIZE))
+    differs = np.flipud(np.abs(picture - screen.read()).max(axis=2) > 2)
+    inside = np.zeros_like(differs)
+    inside[y : y + height, x : x + width] = True
+    assert differs.any()
+    assert not differs[~inside].any()
+    assert width * height < 0.6 * SIZE[0] * SIZE[1]
+
+
+def test_a_camera_inside_the_head_draws_the_whole_picture(screen: Offscreen) -> None:
+    assert screen.renderer.region(Camera((0, 0, 10), (0, 0, 100)), SIZE) == (0, 0, *SIZE)
+
+
+def test_both_qualities_agree(screens: dict[str, Offscreen]) -> None:
+    full, fast = (screens[q].render(values(jawOpen=0.5)).astype(float) for q in ("full", "fast"))
+    assert np.abs(full - fast).mean() < 2.5
+
+
+def test_background_can_be_changed(screen: Offscreen) -> None:
+    theme = screen.renderer.theme
+    screen.renderer.set_background((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+    picture = screen.render(values())
+    screen.renderer.set_background(theme.background_top, theme.background_bottom)
+    assert picture[2, SIZE[0] // 2, 2] > 150
+    assert picture[-3, SIZE[0] // 2, 1] > 150
+    assert screen.render(values())[2, SIZE[0] // 2, 2] < 120
+
+
+def test_themes_differ(gl: None) -> None:
+    with Offscreen(BallHead(), SIZE, theme="mask") as screen:
+        red, _, blue = middle(screen.render(values()), 0.5, 0.35)
+    assert abs(red - blue) < 25
+
+
+def test_names_that_do_not_exist(gl: None) -> None:
+    with pytest.raises(ViewError, match="'clown'") as caught:
+        theme_named("clown")
+    assert "skin" in caught.value.hint
+    assert theme_named(Theme(gloss=2.0)).gloss == 2.0
+    with pytest.raises(ValueError, match="'best'"):
+        Offscreen(BallHead(), SIZE, quality="best")
+
+
+@pytest.mark.parametrize("name", THEMES)
+def test_lights_come_from_where_the_theme_says(name: str) -> None:
+    key = light_direction(THEMES[name].key, 0.0)
+    assert np.linalg.norm(key) == pytest.approx(1.0, abs=1e-6)
+    assert key[0] < 0 < key[1]
+    assert light_direction(Light(0, 0, (1, 1, 1)), 90.0) == pytest.approx([1, 0, 0], abs=1e-6)
+
+
+def test_box_corners() -> None:
+    corners = box_corners(np.array([[1.0, 2.0, 3.0], [0.0, 5.0, -1.0]]))
+    assert len(np.unique(corners, axis=0)) == 8
+    assert corners.min(axis=0) == pytest.approx([0, 2, -1])
+    assert corners.max(axis=0) == pytest.approx([1, 5, 3])
