@@ -1,0 +1,90 @@
+"""The same driver over a bus that is simulated beside it."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drivers.bus import ServoSpec
+from drivers.dynamixel.bus import DynamixelBus
+
+if TYPE_CHECKING:
+    from drivers.sim import SimulatedBus
+
+SIMULATED_MARGIN_S = 0.05
+"""A simulated servo competes for the processor with everything else, so it may take longer than a real one."""
+
+
+class SimulatedDynamixelBus(DynamixelBus):
+    """A :class:`~drivers.dynamixel.bus.DynamixelBus` that brings its own simulated servos.
+
+    They live in a child process from ``open`` to ``close`` and keep their state over ``reconnect``.
+
+    Parameters
+    ----------
+    servos : the servos in the order of all arrays; the simulated ones have the same ids and models.
+    port : path that shall point at the simulated port, so that other programs can find it; empty for a private one.
+    faults, wire, latency_s, seed, process : see :class:`drivers.sim.SimulatedBus`.
+    options : see :class:`~drivers.dynamixel.bus.DynamixelBus`.
+    """
+
+    def __init__(
+        self,
+        servos: Iterable[ServoSpec],
+        *,
+        port: str = "",
+        baud: int = 1_000_000,
+        faults: Sequence[str] = (),
+        wire: bool = False,
+        latency_s: float = 0.0,
+        seed: int = 0,
+        process: bool = True,
+        margin_s: float | None = SIMULATED_MARGIN_S,
+        **options: Any,
+    ) -> None:
+        super().__init__(servos, port=port, baud=baud, margin_s=margin_s, faults=faults, **options)
+        self.simulation: SimulatedBus | None = None
+        self._link = port
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._settings: dict[str, Any] = {
+            "faults": tuple(faults),
+            "baud": baud,
+            "wire": wire,
+            "latency_s": latency_s,
+            "seed": seed,
+            "process": process,
+        }
+
+    def open(self) -> None:
+        """Start the simulated servos if they do not run yet, and take their port."""
+        if self.simulation is None:
+            self._simulate()
+        try:
+            super().open()
+        except BaseException:
+            if not self.running:
+                self._release()
+            raise
+
+    def _simulate(self) -> None:
+        from drivers.sim import SimulatedBus  # only who simulates pays for it
+
+        link = self._link
+        if not link:
+            self._folder = tempfile.TemporaryDirectory(prefix="omote-")
+            link = str(Path(self._folder.name) / "servos")
+        simulation = SimulatedBus(self.servos, link=link, **self._settings)
+        simulation.__enter__()
+        self.simulation = simulation
+        self._port.setPortName(link)
+
+    def _release(self) -> None:
+        super()._release()
+        simulation, self.simulation = self.simulation, None
+        if simulation is not None:
+            simulation.close()
+        folder, self._folder = self._folder, None
+        if folder is not None:
+            folder.cleanup()
