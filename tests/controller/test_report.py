@@ -28,7 +28,7 @@ def test_every_part_of_a_run_has_its_rows() -> None:
         "channels_held_at_limit": 3,
         "bus": {"errors": {"no_reply": 2}, "limits_hit": 4},
     }
-    link = {"port": "/dev/x", "accepted": 7, "refused": 1}
+    link = {"port": "/dev/x", "accepted": 7, "refused": {"E_NAME": 1}}
     found = dict(rows({"stage": "s", "face": FACE, "control": LOOP, "links": [link], "buses": [bus]}))
     assert found["frames per second"] == "30.0"
     assert found["milliseconds a frame"] == "p50 1.00  p95 2.00  p99 3.25  max 4.00"
