@@ -395,6 +395,7 @@ class SimulatedServo:
             registers.put("Goal Current", 0 if mode == CURRENT else registers.get("Current Limit"))
 
     def _one_turn(self, now_s: float) -> None:
+        self._sensed_at = -1.0
         turn = self.table.ticks_per_turn
         position = self.plant.motion(now_s).position
         if not 0 <= position < turn:
