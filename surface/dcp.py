@@ -208,12 +208,12 @@ class DCPSurface:
 
     def derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
         """S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; as :meth:`evaluate`."""
-        out = self._sample_derivatives(uv, side)
+        out = self.sample_derivatives(uv, side)[1]
         return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()
 
     def second_derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
         """S_uu, S_uv and S_vv, each (m, 3) float64, NaN rows where nothing covers."""
-        out = self._sample_derivatives(uv, side)
+        out = self.sample_derivatives(uv, side, second=True)[1]
         return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
 
     def basis_matrix(
@@ -301,29 +301,33 @@ class DCPSurface:
 
         return Deformation(self, mesh, normals=normals)
 
-    def resolve_sides(self, uv: ArrayLike, side: ArrayLike | None = None) -> Ints:
-        """(m,) int64: the limit each evaluation really takes, -1 where nothing covers (see Notes of the class)."""
-        return self._sample(uv, side)[1]
+    def sample_derivatives(
+        self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False
+    ) -> tuple[Ints, Floats]:
+        """Derivatives, and the limits that were taken.
+
+        Returns
+        -------
+        side : (m,) int64, the limit each evaluation really takes, -1 where nothing covers
+        out : (m, 3, 3) float64 with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them
+        """
+        from . import kernels
+
+        samples = check_uv(uv)
+        sides = _sides(samples, side)
+        out = np.zeros((len(samples), 6 if second else 3, 3))
+        kernels.sample_derivatives(*self._arrays(), *self._bin_arrays(), samples, sides, out)
+        return sides, out
 
     def _sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
         """Checked samples, the side really used (-1: uncovered) and S."""
         from . import kernels
 
         samples = check_uv(uv)
-        sides = np.zeros(len(samples), dtype=np.int64)
-        if side is not None:
-            sides[:] = side
+        sides = _sides(samples, side)
         out = np.zeros((len(samples), 3))
         kernels.sample(*self._arrays(), *self._bin_arrays(), samples, sides, out)
         return samples, sides, out
-
-    def _sample_derivatives(self, uv: ArrayLike, side: ArrayLike | None) -> Floats:
-        from . import kernels
-
-        samples, sides, _ = self._sample(uv, side)
-        out = np.zeros((len(samples), 6, 3))
-        kernels.sample_derivatives(*self._arrays(), *self._bin_arrays(), samples, sides, out)
-        return out
 
     def _rows(self, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:
         """b w and its derivatives (k, 3), columns (k,) and row starts (m + 1,), a chunk at a time."""
@@ -349,6 +353,16 @@ class DCPSurface:
 
     def _bin_arrays(self) -> tuple[np.ndarray, ...]:
         return self.bins.grid, self.bins.shape, self.bins.start, self.bins.ids
+
+
+def _sides(samples: Floats, side: ArrayLike | None) -> Ints:
+    """(m,) int64 copy of the wanted limits."""
+    sides = np.zeros(len(samples), dtype=np.int64)
+    if side is not None:
+        sides[:] = side
+        if ((sides < 0) | (sides > 3)).any():
+            raise ValueError("side: must be 0, 1, 2 or 3")
+    return sides
 
 
 def check_points(points: ArrayLike, name: str = "points") -> Floats:

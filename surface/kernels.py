@@ -57,12 +57,33 @@ def climb(knots, i, p, x, j, top, work):
             work[a] = value
 
 
+@inlined
+def cubic(knots, i, x, j):
+    """Value and first derivative for degree 3 in knot interval j, written out: most surfaces are cubic."""
+    t0, t1, t2, t3, t4 = knots[i, 0], knots[i, 1], knots[i, 2], knots[i, 3], knots[i, 4]
+    low, high = 0.0, 0.0  # the two functions of degree 2
+    if j == 0:
+        low = (x - t0) * (x - t0) / ((t2 - t0) * (t1 - t0))
+    elif j == 1:
+        low = ((x - t0) * (t2 - x) / (t2 - t0) + (t3 - x) * (x - t1) / (t3 - t1)) / (t2 - t1)
+        high = (x - t1) * (x - t1) / ((t3 - t1) * (t2 - t1))
+    elif j == 2:
+        low = (t3 - x) * (t3 - x) / ((t3 - t1) * (t3 - t2))
+        high = ((x - t1) * (t3 - x) / (t3 - t1) + (t4 - x) * (x - t2) / (t4 - t2)) / (t3 - t2)
+    else:
+        high = (t4 - x) * (t4 - x) / ((t4 - t2) * (t4 - t3))
+    low, high = ratio(low, t3 - t0), ratio(high, t4 - t1)
+    return (x - t0) * low + (t4 - x) * high, 3.0 * (low - high)
+
+
 @kernel
 def blend(knots, i, p, x, left, work):
     """Value of point i's blending function at x."""
     j = span(knots, i, p, x, left)
     if j < 0:
         return 0.0
+    if p == 3:
+        return cubic(knots, i, x, j)[0]
     climb(knots, i, p, x, j, p, work)
     return work[0]
 
@@ -73,6 +94,8 @@ def blend1(knots, i, p, x, left, work):
     j = span(knots, i, p, x, left)
     if j < 0:
         return 0.0, 0.0
+    if p == 3:
+        return cubic(knots, i, x, j)
     if p == 0:
         return 1.0, 0.0
     climb(knots, i, p, x, j, p - 1, work)
@@ -173,9 +196,25 @@ def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, 
 
 
 @kernel
-def sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
-    """Add b w (P, 1) and its derivatives into ``acc (6, 4)``: rows S, u, v, uu, uv, vv."""
+def sum_slopes(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
+    """Add b w (P, 1) and its first derivatives into ``acc (6, 4)``: rows S, u, v."""
     acc[:, :] = 0.0
+    for q in range(ids.shape[0]):
+        i = ids[q]
+        a0, a1 = blend1(knots_u, i, pu[i], u, side & 1, work)
+        if a0 == 0.0 and a1 == 0.0:
+            continue
+        b0, b1 = blend1(knots_v, i, pv[i], v, side & 2, work)
+        for c in range(4):
+            value = weights[i] if c == 3 else weights[i] * points[i, c]
+            acc[0, c] += a0 * b0 * value
+            acc[1, c] += a1 * b0 * value
+            acc[2, c] += a0 * b1 * value
+
+
+@kernel
+def sum_bends(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
+    """Add the second derivatives of b w (P, 1) into ``acc (6, 4)``: rows uu, uv, vv from the fourth on."""
     for q in range(ids.shape[0]):
         i = ids[q]
         a0, a1, a2 = blend2(knots_u, i, pu[i], u, side & 1, work)
@@ -184,34 +223,48 @@ def sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, 
         b0, b1, b2 = blend2(knots_v, i, pv[i], v, side & 2, work)
         for c in range(4):
             value = weights[i] if c == 3 else weights[i] * points[i, c]
-            acc[0, c] += a0 * b0 * value
-            acc[1, c] += a1 * b0 * value
-            acc[2, c] += a0 * b1 * value
             acc[3, c] += a2 * b0 * value
             acc[4, c] += a1 * b1 * value
             acc[5, c] += a0 * b2 * value
 
 
 @kernel
+def quotient(acc, out, second):
+    """S, S_u, S_v, and S_uu, S_uv, S_vv if ``second``, into ``out (3 or 6, 3)`` (quotient rule, NURBS Book 4.5)."""
+    w, wu, wv, wuu, wuv, wvv = acc[0, 3], acc[1, 3], acc[2, 3], acc[3, 3], acc[4, 3], acc[5, 3]
+    for c in range(3):
+        p = acc[0, c] / w
+        du = (acc[1, c] - wu * p) / w
+        dv = (acc[2, c] - wv * p) / w
+        out[0, c], out[1, c], out[2, c] = p, du, dv
+        if second:
+            out[3, c] = (acc[3, c] - 2.0 * wu * du - wuu * p) / w
+            out[4, c] = (acc[4, c] - wu * dv - wv * du - wuv * p) / w
+            out[5, c] = (acc[5, c] - 2.0 * wv * dv - wvv * p) / w
+
+
+@kernel
 def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
-    """Write S, S_u, S_v, S_uu, S_uv, S_vv into ``out (m, 6, 3)`` (quotient rule, NURBS Book 4.5)."""
+    """As :func:`sample`, with derivatives: ``out (m, 3, 3)`` for S, S_u, S_v, ``(m, 6, 3)`` for second ones too."""
     work, acc = np.zeros(12), np.zeros((6, 4))
+    second = out.shape[1] == 6
     for s in range(uv.shape[0]):
-        if side[s] < 0:
-            out[s, :, :] = np.nan
+        u, v, wanted = uv[s, 0], uv[s, 1], side[s]
+        cell = bin_of(u, v, grid, shape)
+        out[s, :, :] = np.nan
+        side[s] = -1
+        if cell < 0:
             continue
-        cell = bin_of(uv[s, 0], uv[s, 1], grid, shape)
         ids = bins[start[cell] : start[cell + 1]]
-        sum_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, uv[s, 0], uv[s, 1], side[s], work, acc)
-        w, wu, wv, wuu, wuv, wvv = acc[0, 3], acc[1, 3], acc[2, 3], acc[3, 3], acc[4, 3], acc[5, 3]
-        for c in range(3):
-            p = acc[0, c] / w
-            du = (acc[1, c] - wu * p) / w
-            dv = (acc[2, c] - wv * p) / w
-            out[s, 0, c], out[s, 1, c], out[s, 2, c] = p, du, dv
-            out[s, 3, c] = (acc[3, c] - 2.0 * wu * du - wuu * p) / w
-            out[s, 4, c] = (acc[4, c] - wu * dv - wv * du - wuv * p) / w
-            out[s, 5, c] = (acc[5, c] - 2.0 * wv * dv - wvv * p) / w
+        for extra in range(4):
+            limit = wanted | extra
+            sum_slopes(knots_u, knots_v, pu, pv, points, weights, ids, u, v, limit, work, acc)
+            if acc[0, 3] > TINY:
+                if second:
+                    sum_bends(knots_u, knots_v, pu, pv, points, weights, ids, u, v, limit, work, acc)
+                side[s] = limit
+                quotient(acc, out[s], second)
+                break
 
 
 @kernel

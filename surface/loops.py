@@ -156,10 +156,14 @@ def wanted_size(ring, sharp, error, floor, out):
                 break
             open_ahead, open_behind = not sharp[b], not sharp[a]
             w += 1
+        square = size * size
         for j in range(k):
-            along = abs(arc[i] - arc[j])
-            along = min(along, arc[k] - along)
-            gap = np.hypot(ring[i, 0] - ring[j, 0], ring[i, 1] - ring[j, 1])
-            if gap < size and along > 1.5 * gap and along > 0.0:
-                size = min(size, gap)
+            du, dv = ring[i, 0] - ring[j, 0], ring[i, 1] - ring[j, 1]
+            gap = du * du + dv * dv
+            if gap < square:
+                along = abs(arc[i] - arc[j])
+                along = min(along, arc[k] - along)
+                if along * along > 2.25 * gap and along > 0.0:
+                    square = gap
+        size = min(size, np.sqrt(square))
         out[i] = max(size, floor)

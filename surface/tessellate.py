@@ -227,8 +227,8 @@ def _off_line(a: Floats, middle: Floats, b: Floats) -> Floats:
 def _finish(surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool) -> Mesh:
     """Split vertices on slits, evaluate, drop uncovered triangles, order by cell, make the lists."""
     flat, side = _open_slits(flat, domain)
-    points, su, sv = surface.derivatives(flat.uv, side=side)
-    side = surface.resolve_sides(flat.uv, side)
+    side, out = surface.sample_derivatives(flat.uv, side)
+    points, su, sv = out[:, 0], out[:, 1], out[:, 2]
     keep = (side >= 0)[flat.triangles].all(axis=1)
     order, code = _order(Flat(flat.uv, flat.triangles[keep], flat.owner[keep]), lattice, leaves)
     rank = np.zeros(len(flat.uv), dtype=np.int32)
