@@ -1,0 +1,174 @@
+"""What every bus must do, whatever the driver: one class of tests that runs over each of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from drivers.bus import Bus, BusState, ServoSpec
+from drivers.errors import BusError, DriverError, PortLost
+
+SERVOS = (
+    ServoSpec(1, "jaw", "xl330-m288", -0.6, 0.4, 8.0, 200.0),
+    ServoSpec(2, "brow", "xl330-m288", -0.5, 0.5, 8.0, 200.0, reverse=True),
+    ServoSpec(7, "neck", "xl330-m288", -0.3, 0.9, 8.0, 200.0, zero_rad=0.2),
+)
+STEP_RAD = 2 * np.pi / 4096
+PERIOD_S = 0.005
+
+
+def settle(bus: Bus, target: np.ndarray | list[float], tolerance: float = 2 * STEP_RAD) -> BusState:
+    """Drive towards a target until it is measured there."""
+    end = time.monotonic() + 10.0
+    while True:
+        bus.write(target)
+        state = bus.read()
+        if state.fresh.all() and np.abs(state.position_rad - target).max() < tolerance:
+            return state
+        if time.monotonic() > end:
+            raise AssertionError(f"still at {state.position_rad}, wanted {target}")
+        time.sleep(PERIOD_S)
+
+
+def read_until(bus: Bus, done: Callable[[BusState], bool], timeout_s: float = 10.0) -> BusState:
+    """Read until something is known."""
+    end = time.monotonic() + timeout_s
+    while not done(state := bus.read()):
+        assert time.monotonic() < end, state
+        time.sleep(PERIOD_S)
+    return state
+
+
+class BusContract:
+    """Subclasses give a fixture ``bus``: a closed bus of ``SERVOS``."""
+
+    def test_a_bus_opens_and_closes_any_number_of_times(self, bus: Bus) -> None:
+        assert not bus.is_open
+        for _ in range(2):
+            bus.open()
+            assert bus.is_open
+            assert not bus.running
+            bus.close()
+            bus.close()
+            assert not bus.is_open
+
+    def test_discover_names_who_is_there_without_moving_anything(self, bus: Bus) -> None:
+        with bus:
+            found = bus.discover([0, 1, 2, 3, 7])
+            assert [(info.id, info.model, info.torque) for info in found] == [
+                (servo.id, "xl330-m288", False) for servo in SERVOS
+            ]
+            assert all(info.voltage_v == pytest.approx(5.0, abs=0.3) for info in found)
+
+    def test_start_switches_on_without_a_movement(self, bus: Bus) -> None:
+        with bus:
+            before = bus.read()
+            assert before.fresh.all()
+            bus.start()
+            assert bus.running
+            after = bus.read()
+            assert after.torque.all()
+            np.testing.assert_allclose(after.position_rad, before.position_rad, atol=STEP_RAD * 1.5)
+
+    def test_targets_are_reached_and_measured(self, bus: Bus) -> None:
+        with bus:
+            bus.start()
+            state = settle(bus, [0.2, -0.3, 0.5])
+            assert state.fresh.all()
+            assert (state.age_s >= 0).all()
+            assert (state.age_s < 1).all()
+            assert not state.error.any()
+            assert not state.silent.any()
+
+    def test_what_was_sent_is_returned_after_limits(self, bus: Bus) -> None:
+        low = np.array([servo.min_rad for servo in SERVOS])
+        high = np.array([servo.max_rad for servo in SERVOS])
+        with bus:
+            bus.start()
+            for target, wall in ((np.full(3, 9.0), high), (np.full(3, -9.0), low)):
+                end = time.monotonic() + 10
+                while np.abs((sent := bus.write(target)) - wall).max() > STEP_RAD:
+                    assert time.monotonic() < end
+                    time.sleep(PERIOD_S)
+                assert (sent <= high).all()
+                assert (sent >= low).all()
+            assert bus.report().limits_hit > 0
+
+    def test_first_targets_are_a_ramp_from_where_the_servos_are(self, bus: Bus) -> None:
+        with bus:
+            bus.start()
+            here = bus.read().position_rad
+            start = time.monotonic()
+            sent = bus.write([0.4, 0.5, 0.9])
+            reach = 8.0 * (time.monotonic() - start + 0.05) + STEP_RAD
+            assert np.abs(sent - here).max() <= reach
+
+    def test_a_target_that_is_no_number_keeps_the_last_one(self, bus: Bus) -> None:
+        with bus:
+            bus.start()
+            settle(bus, [0.1, 0.1, 0.1])
+            sent = bus.write([np.nan, 0.1, np.inf])
+            np.testing.assert_allclose(sent, 0.1, atol=STEP_RAD)
+            assert bus.report().refused_targets == 2
+
+    def test_arrays_that_leave_the_bus_are_read_only(self, bus: Bus) -> None:
+        with bus:
+            bus.start()
+            arrays = [bus.write(np.zeros(3))]
+            state = bus.read()
+            arrays += [getattr(state, name) for name in BusState.__slots__ if name != "time_s"]
+            for array in arrays:
+                assert array.shape == (3,)
+                assert not array.flags.writeable
+
+    def test_slow_values_arrive_in_turn(self, bus: Bus) -> None:
+        with bus:
+            bus.start()
+            state = read_until(bus, lambda s: not np.isnan(s.voltage_v + s.temperature_c).any())
+            np.testing.assert_allclose(state.voltage_v, 5.0, atol=0.5)
+            assert (state.temperature_c > 10).all()
+
+    def test_wrong_use_is_told(self, bus: Bus) -> None:
+        with pytest.raises(PortLost, match="not open"):
+            bus.read()
+        with bus:
+            with pytest.raises(BusError, match="not started"):
+                bus.write(np.zeros(3))
+            bus.start()
+            with pytest.raises(ValueError, match="angle_rad"):
+                bus.write(np.zeros(4))
+
+    def test_stop_switches_everything_off_and_may_be_repeated(self, bus: Bus) -> None:
+        with bus:
+            bus.start()
+            bus.stop()
+            assert not bus.running
+            assert not any(info.torque for info in bus.discover(bus.ids))
+            bus.stop()
+            bus.start()
+            assert all(info.torque for info in bus.discover(bus.ids))
+
+    def test_an_error_in_the_loop_leaves_nothing_on(self, bus: Bus) -> None:
+        with pytest.raises(ZeroDivisionError), bus:
+            bus.start()
+            raise ZeroDivisionError
+        assert not bus.running
+        assert not bus.is_open
+
+    def test_counters_are_a_copy(self, bus: Bus) -> None:
+        with bus:
+            bus.start()
+            bus.write(np.zeros(3))
+            bus.read()
+            report = bus.report()
+            assert (report.cycles, report.writes, report.errors) == (1, 1, {})
+            report.count("no_reply", 1)
+            assert bus.report().errors == {}
+            assert bus.report().as_dict()["cycles"] == 1
+
+    def test_errors_of_the_room_are_one_tree(self) -> None:
+        assert issubclass(PortLost, DriverError)
+        assert issubclass(BusError, DriverError)
