@@ -13,7 +13,7 @@ from drivers.dynamixel.packet import (
     encode_instruction,
 )
 from drivers.dynamixel.packet import ErrorNumber as E
-from drivers.dynamixel.packet import Instruction as I  # noqa: E741
+from drivers.dynamixel.packet import Instruction as I
 from drivers.sim.bus import SimulatedChain
 from drivers.sim.device import SimulatedServo
 

@@ -1,0 +1,77 @@
+"""drivers.sim.wire: the time formulas of a half-duplex bus."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.dynamixel.packet import BROADCAST_ID, InstructionPacket, encode_instruction
+from drivers.dynamixel.packet import Instruction as I
+from drivers.sim.bus import Reply, SimulatedChain
+from drivers.sim.device import SimulatedServo
+from drivers.sim.wire import WireTiming, instruction_size, without_timing
+
+IDS = bytes(range(1, 25))
+POSITION = b"\x84\0\4\0"
+
+
+def transaction(
+    params: bytes, instruction: int, baud: int, delay: int = 0, latency_s: float = 0.0
+) -> list[tuple[float, bytes]]:
+    """Deliveries of one read from 24 servos that begins at 1 s."""
+    servos = [SimulatedServo(i) for i in IDS]
+    for servo in servos:
+        servo.registers.put("Return Delay Time", delay)
+    bus, timing = SimulatedChain(servos), WireTiming(latency_s)
+    packet = InstructionPacket(BROADCAST_ID, instruction, params)
+    at_s = timing.arrival(1.0, instruction_size(packet), baud)
+    return timing.deliveries(bus.handle(packet, at_s), baud)
+
+
+@pytest.mark.parametrize("params", [b"", POSITION + IDS, b"\x74\0\xff\xff\xfd\0"])
+def test_size_of_an_instruction(params: bytes):
+    packet = InstructionPacket(1, I.WRITE, params)
+    assert instruction_size(packet) == len(encode_instruction(*packet))
+
+
+@pytest.mark.parametrize(("baud", "expected_ms"), [(57_600, 69.1), (1_000_000, 3.98), (4_000_000, 0.995)])
+def test_sync_read_takes_the_formula(baud: int, expected_ms: float):
+    out = transaction(POSITION + IDS, I.SYNC_READ, baud)
+    assert len(out) == 24
+    assert (out[-1][0] - 1.0) * 1e3 == pytest.approx(expected_ms, rel=2e-3)
+    assert out[-1][0] - 1.0 == pytest.approx((14 + 24 + 24 * 15) * 10 / baud)
+
+
+def test_every_status_pays_the_return_delay_but_a_fast_reply_only_once():
+    bits = 10 / 1_000_000
+    slow = transaction(POSITION + IDS, I.SYNC_READ, 1_000_000, delay=250)
+    assert slow[-1][0] - 1.0 == pytest.approx((38 + 360) * bits + 24 * 500e-6)
+    fast = transaction(POSITION + IDS, I.FAST_SYNC_READ, 1_000_000, delay=250)
+    assert fast[-1][0] - 1.0 == pytest.approx((38 + 200) * bits + 500e-6)
+
+
+def test_the_wire_is_busy_while_a_write_goes_out():
+    timing = WireTiming()
+    assert timing.arrival(1.0, 134, 1_000_000) == pytest.approx(1.00134)
+    assert timing.arrival(1.0001, 38, 1_000_000) == pytest.approx(1.00172)
+    assert timing.arrival(2.0, 10, 1_000_000) == pytest.approx(2.0001)
+
+
+def test_replies_arrive_one_after_the_other_and_late_ones_hold_up_the_rest():
+    timing = WireTiming()
+    timing.arrival(0.0, 100, 1_000_000)
+    out = timing.deliveries([Reply(b"a" * 10, None), Reply(b"b" * 10, None, 0.5), Reply(b"c", None)], 1_000_000)
+    assert [time for time, _ in out] == pytest.approx([0.0011, 0.5012, 0.50121])
+
+
+def test_latency_timer_holds_the_last_short_packet():
+    out = transaction(POSITION + IDS, I.SYNC_READ, 1_000_000, latency_s=0.016)
+    assert [len(data) for _, data in out] == [62] * 5 + [50]
+    assert b"".join(data for _, data in out).count(b"\xff\xff\xfd\0") == 24
+    assert out[-1][0] == pytest.approx(1.00398 + 0.016)
+    assert out[-2][0] < 1.004
+
+
+def test_without_timing_only_lateness_counts():
+    replies = [Reply(b"a", None), Reply(b"b", None), Reply(b"c", None, 0.5), Reply(b"d", None)]
+    assert without_timing(replies, 1.0) == [(1.0, b"ab"), (1.5, b"cd")]
+    assert without_timing([], 1.0) == []
