@@ -60,5 +60,4 @@ def fit(
     """
     from controller.fitting import fit_with_progress
 
-    for line in fit_with_progress(mesh, out, name or out.name, console):
-        console.print(line)
+    fit_with_progress(mesh, out, name or out.name, console)

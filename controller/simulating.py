@@ -14,6 +14,7 @@ from controller.errors import ConfigError
 from controller.parameters import PARAMETERS
 from controller.paths import find_config
 from controller.robot import load_robot
+from controller.signals import stop_flag
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,25 @@ def robot_servos(name: str, bus: str | None) -> tuple[list[SimulatedId], int]:
         raise ConfigError(f"robot {robot.name} has no bus called {bus!r}", hint=f"its buses: {', '.join(names)}")
     chosen = robot.buses[names.index(bus) if bus else 0]
     return [SimulatedId(channel.id, channel.model) for channel in robot.on_bus(chosen.name)], chosen.baud
+
+
+def serve_host(script: str, link: Path | None, console: Console) -> None:
+    """Serve a simulated robot host; prints ``ready PATH``, returns when interrupted and says what it counted.
+
+    Raises
+    ------
+    ConfigError
+        when the script is unknown or wrong.
+    """
+    from controller.host import HostPort, RobotHost, load_script
+
+    loaded = load_script(script, PARAMETERS)
+    with HostPort(link) as port, stop_flag() as flag:
+        console.print(f"ready {link or port.path}", soft_wrap=True)
+        host = RobotHost(port, loaded, PARAMETERS)
+        host.run(lambda: not flag.is_set())
+        counts = host.report()
+    console.print(f"{counts['sent']} lines sent, {counts['accepted']} accepted, {counts['refused']} refused")
 
 
 def _until_stopped(serve: Callable[[int], None]) -> None:

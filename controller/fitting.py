@@ -1,0 +1,46 @@
+"""``omote fit`` around the fitter: a progress bar before it, a table of errors after it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from surface.fit.report import FitReport
+
+
+def fit_with_progress(mesh: Path, out: Path, name: str, console: Console) -> None:
+    """Fit a head to ``mesh`` and write it to the folder ``out``; shows progress, then the errors of every part.
+
+    Raises
+    ------
+    FitError
+        when the mesh cannot be turned into a head; nothing is written then.
+    """
+    from surface.fit.api import fit_head
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("reading", total=1.0)
+
+        def tell(part: str, done: float) -> None:
+            bar.update(task, description=f"fitting {part}", completed=done)
+
+        report = fit_head(mesh, out, name=name, progress=tell)
+    console.print(report_table(report))
+    console.print(f"wrote {out}", soft_wrap=True)
+
+
+def report_table(report: FitReport) -> Table:
+    """Control points and errors (mm) of every fitted part."""
+    title = f"{report.name}: {report.points} control points, {len(report.parameters)} shapes"
+    table = Table("part", "control points", "RMS", "99 %", "max", "mean RMS of shapes", title=title)
+    for part in report.parts:
+        neutral = part.neutral
+        errors = [f"{value:.3f}" for value in (neutral.rms, neutral.p99, neutral.max, part.mean_shape_rms)]
+        table.add_row(part.name, str(part.points), *errors)
+    return table
