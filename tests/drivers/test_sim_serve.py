@@ -1,0 +1,111 @@
+"""drivers.sim.serve: serving until told to stop."""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from drivers.dynamixel.packet import Instruction as I
+from drivers.dynamixel.packet import StatusReader, encode_instruction
+from drivers.errors import DriverError
+from drivers.sim.bus import SimulatedChain
+from drivers.sim.serve import PAUSE_S, Commands, PtyServer, make_servos, serve_dynamixel
+
+
+def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
+    link, ready = tmp_path / "bus", threading.Event()
+    paths: list[str] = []
+    reading, writing = os.pipe()
+
+    def on_ready(path: str) -> None:
+        paths.append(path)
+        ready.set()
+
+    thread = threading.Thread(
+        target=serve_dynamixel,
+        args=([3, 4], "xm430-w350", 57_600, link, False, ["alert:4"], on_ready),
+        kwargs={"stop": reading},
+    )
+    thread.start()
+    try:
+        assert ready.wait(5)
+        client = os.open(paths[0], os.O_RDWR | os.O_NOCTTY)
+        os.write(client, encode_instruction(0xFE, I.PING))
+        received = b""
+        while len(received) < 28:
+            assert select.select([client], [], [], 5)[0]
+            received += os.read(client, 99)
+        os.close(client)
+    finally:
+        os.close(writing)
+        thread.join(5)
+        os.close(reading)
+    assert [(r.id, r.error, r.params[:2]) for r in StatusReader().feed(received)] == [
+        (3, 0, b"\xfc\x03"),
+        (4, 0x80, b"\xfc\x03"),
+    ]
+    assert paths == [str(link)]
+    assert not link.is_symlink()
+    assert capsys.readouterr() == ("", "")
+
+
+def test_an_interrupt_ends_it_and_takes_the_link_away(tmp_path: Path):
+    def interrupt(path: str) -> None:
+        assert Path(path).is_symlink()
+        raise KeyboardInterrupt
+
+    before = len(os.listdir("/proc/self/fd"))
+    with pytest.raises(KeyboardInterrupt):
+        serve_dynamixel([1], link=tmp_path / "bus", on_ready=interrupt)
+    assert os.listdir(tmp_path) == []
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
+@pytest.mark.parametrize("options", [{"model": "nonsense"}, {"faults": ["nonsense"]}])
+def test_bad_settings_are_refused_before_anybody_is_told(tmp_path: Path, options: dict):
+    with pytest.raises(DriverError, match="nonsense"):
+        serve_dynamixel([1], link=tmp_path / "bus", on_ready=lambda path: pytest.fail("too early"), **options)
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_loop_sleeps_until_something_is_due():
+    chain = SimulatedChain(make_servos([1], "xl330-m288", 1_000_000, 0.0))
+    server = PtyServer(chain)
+    try:
+        assert server._timeout() is None  # at rest nothing wakes it but its descriptors
+        chain.faults.add(["mute:1:at=60s"], time.monotonic())
+        assert 59 < server._timeout() <= 60
+        chain.faults.clear(None, 0.0)
+        chain.reader.feed_frames(b"\xff\xff\xfd\x00")
+        server._read_s = time.monotonic()
+        assert 0 < server._timeout() <= PAUSE_S
+    finally:
+        server.port.close()
+
+
+def test_servos_from_ids_and_from_specs():
+    class Spec:
+        id, model = 7, "xl320"
+
+    servos = make_servos([2, Spec()], "xm430-w210", 57_600, 0.0)
+    assert [(s.id, s.table.model, s.baud) for s in servos] == [
+        (2, "xm430-w210", 57_600),
+        (7, "xl320", 57_600),
+    ]
+
+
+def test_commands_in_pieces():
+    chain = SimulatedChain(make_servos([1], "xl330-m288", 1_000_000, 0.0))
+    done: list[int] = []
+    commands = Commands(chain, lambda: done.append(1))
+    commands(b'{"fault": ["mu')
+    assert done == []
+    commands(b'te:1", "echo"]}\n{"clear": "echo"}\n')
+    assert (len(done), [fault.kind for fault in chain.faults.active]) == (2, ["mute"])
+    commands(b'{"clear": null}\n')
+    assert chain.faults.active == []
