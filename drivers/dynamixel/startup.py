@@ -11,13 +11,14 @@ import logging
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from drivers.bus import ServoSpec
 from drivers.dynamixel.layout import NAMES
 from drivers.dynamixel.registers import Registers, together
 from drivers.dynamixel.tables import load_table, model_name, model_number
-from drivers.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel
+from drivers.errors import BusError, CorruptReply, NoReply, PortLost, ServoFault, ServoRefused, WrongModel
 
 log = logging.getLogger(__name__)
 
@@ -324,7 +325,7 @@ def switch_off(registers: Registers, ids: Sequence[int]) -> None:
             if not open_ids:
                 break
         off = [servo for servo in registers.having(known, "watchdog") if servo not in open_ids]
-        registers.put_all(dict.fromkeys(off, 0), "watchdog")
+        _disarm(registers, off)
     except PortLost as error:
         lost = error
     if not open_ids:
@@ -337,6 +338,12 @@ def switch_off(registers: Registers, ids: Sequence[int]) -> None:
         port=registers.port.port_name,
         servo_ids=tuple(open_ids),
     ) from lost
+
+
+def _disarm(registers: Registers, ids: Sequence[int]) -> None:
+    """Switch the watchdogs of servos that are off to off; not worth an error."""
+    with suppress(NoReply, CorruptReply, ServoRefused):
+        registers.set_all(dict.fromkeys(ids, 0), "watchdog")
 
 
 def _confirmed_off(registers: Registers, servo: int) -> bool:
