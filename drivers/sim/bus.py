@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
 
 from drivers.dynamixel.packet import (
     BROADCAST_ID,
@@ -23,24 +22,19 @@ from drivers.dynamixel.packet import (
 )
 from drivers.sim.device import WATCHDOG_STEP_S, Heard, SimulatedServo
 from drivers.sim.faults import Fault, FaultSet
+from drivers.sim.replies import Reply, collide
+from drivers.sim.requests import (
+    ReadRequest,
+    WriteRequest,
+    bulk_reads,
+    bulk_writes,
+    sync_reads,
+    sync_writes,
+    words,
+)
 
 FACTORY_BROADCAST_FIRMWARE = 42
 """From here on a broadcast factory reset of everything is ignored."""
-
-
-class Reply(NamedTuple):
-    """Bytes one servo puts on the wire.
-
-    Attributes
-    ----------
-    data : the bytes.
-    servo : whose Return Delay Time comes before them; None = they follow the bytes before at once.
-    late_s : further delay, by a fault.
-    """
-
-    data: bytes
-    servo: SimulatedServo | None
-    late_s: float = 0.0
 
 
 class SimulatedChain:
@@ -185,14 +179,11 @@ class SimulatedChain:
     # ------------------------------------------------------------ answers
     def _status(self, servo: SimulatedServo, device_id: int, error: int, data: bytes) -> Reply | None:
         """One status packet as it arrives at the host; None where nothing does."""
-        frame: bytes | None = encode_status(device_id, error, data)
-        late_s = 0.0
-        for spoiler in self.faults.spoilers:
-            if frame is None or not spoiler.strikes(device_id):
-                continue
-            late_s += spoiler.fault.value if spoiler.fault.kind == "late" else 0.0
-            frame = spoiler.status(frame, device_id, error, data)
-        return None if frame is None else Reply(frame, servo, late_s)
+        frame = encode_status(device_id, error, data)
+        if not self.faults.spoilers:
+            return Reply(frame, servo)
+        spoilt, late_s = self.faults.spoil_status(frame, device_id, error, data)
+        return None if spoilt is None else Reply(spoilt, servo, late_s)
 
     def _answer(
         self, device_id: int, level: int, now_s: float, act: Callable[[SimulatedServo], tuple[int, bytes]]
@@ -219,12 +210,12 @@ class SimulatedChain:
             Instruction.FACTORY_RESET: self._factory_reset,
             Instruction.REBOOT: self._reboot,
             Instruction.CLEAR: self._clear,
-            Instruction.SYNC_READ: self._sync_read,
-            Instruction.SYNC_WRITE: self._sync_write,
-            Instruction.FAST_SYNC_READ: self._fast_sync_read,
-            Instruction.BULK_READ: self._bulk_read,
-            Instruction.BULK_WRITE: self._bulk_write,
-            Instruction.FAST_BULK_READ: self._fast_bulk_read,
+            Instruction.SYNC_READ: lambda packet, now_s: self._read_many(sync_reads(packet), now_s),
+            Instruction.SYNC_WRITE: lambda packet, now_s: self._write_many(sync_writes(packet), now_s),
+            Instruction.FAST_SYNC_READ: lambda packet, now_s: self._read_fast(sync_reads(packet), now_s),
+            Instruction.BULK_READ: lambda packet, now_s: self._read_many(bulk_reads(packet), now_s),
+            Instruction.BULK_WRITE: lambda packet, now_s: self._write_many(bulk_writes(packet), now_s),
+            Instruction.FAST_BULK_READ: lambda packet, now_s: self._read_fast(bulk_reads(packet), now_s),
         }
 
     # ------------------------------------------------------------ instructions to one servo
@@ -247,7 +238,7 @@ class SimulatedChain:
         params = packet.params
         if len(params) != 4:
             return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s, 1)
-        address, length = _words(params)
+        address, length = words(params)
         if packet.id == BROADCAST_ID:
             return []
         return self._answer(packet.id, 1, now_s, lambda servo: servo.read(address, length, now_s))
@@ -309,18 +300,7 @@ class SimulatedChain:
         return self._answer(packet.id, 2, now_s, lambda servo: (act(servo), b""))
 
     # ------------------------------------------------------------ instructions to many
-    def _sync_read(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
-        params = packet.params
-        if packet.id != BROADCAST_ID or len(params) < 4:
-            return []
-        address, length = _words(params)
-        return self._read_many([(device_id, address, length) for device_id in params[4:]], now_s)
-
-    def _bulk_read(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
-        requests = _bulk_requests(packet)
-        return self._read_many(requests, now_s)
-
-    def _read_many(self, requests: list[tuple[int, int, int]], now_s: float) -> list[Reply]:
+    def _read_many(self, requests: list[ReadRequest], now_s: float) -> list[Reply]:
         """One status each, in the order asked for; a silent one may silence those behind it."""
         replies = []
         for device_id, address, length in requests:
@@ -344,17 +324,7 @@ class SimulatedChain:
             others.append(self._status(twin, device_id, error, data))
         return collide([reply, *(other for other in others if other)])[0]
 
-    def _fast_sync_read(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
-        params = packet.params
-        if packet.id != BROADCAST_ID or len(params) < 4:
-            return []
-        address, length = _words(params)
-        return self._read_fast([(device_id, address, length) for device_id in params[4:]], now_s)
-
-    def _fast_bulk_read(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
-        return self._read_fast(_bulk_requests(packet), now_s)
-
-    def _read_fast(self, requests: list[tuple[int, int, int]], now_s: float) -> list[Reply]:
+    def _read_fast(self, requests: list[ReadRequest], now_s: float) -> list[Reply]:
         """One joint reply, cut off at the first servo that is silent or knows no fast reads."""
         head = encode_fast_head([length for _, _, length in requests])
         crc = crc16(head)
@@ -365,48 +335,19 @@ class SimulatedChain:
                 break
             error, data = servo.read(address, length, now_s)
             part, crc = encode_fast_part(device_id, error, data.ljust(length, b"\0"), crc)
-            spoilt, late_s = self._spoil_part(part, device_id)
+            spoilt, late_s = self.faults.spoil_part(part, device_id)
             if spoilt is None:
                 break
             first = not replies
             replies.append(Reply(head + spoilt if first else spoilt, servo if first else None, late_s))
         return replies
 
-    def _spoil_part(self, part: bytes, device_id: int) -> tuple[bytes | None, float]:
-        late_s, spoilt = 0.0, part
-        for spoiler in self.faults.spoilers:
-            if not spoiler.strikes(device_id):
-                continue
-            late_s += spoiler.fault.value if spoiler.fault.kind == "late" else 0.0
-            result = spoiler.part(spoilt)
-            if result is None:
-                return None, late_s
-            spoilt = result
-        return spoilt, late_s
-
-    def _sync_write(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
-        params = packet.params
-        if packet.id != BROADCAST_ID or len(params) < 4:
-            return []
-        address, length = _words(params)
-        for at in range(4, len(params) - length, length + 1):
-            self._write_quietly(params[at], address, params[at + 1 : at + 1 + length], now_s)
+    def _write_many(self, requests: list[WriteRequest], now_s: float) -> list[Reply]:
+        """Carried out by everybody it names, answered by nobody."""
+        for device_id, address, data in requests:
+            for servo in self._group(device_id, now_s):
+                self._put(servo, device_id, address, data, now_s)
         return []
-
-    def _bulk_write(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
-        params, at = packet.params, 0
-        while packet.id == BROADCAST_ID and at + 5 <= len(params):
-            address, length = _words(params[at + 1 : at + 5])
-            data = params[at + 5 : at + 5 + length]
-            if len(data) < length:
-                break
-            self._write_quietly(params[at], address, data, now_s)
-            at += 5 + length
-        return []
-
-    def _write_quietly(self, device_id: int, address: int, data: bytes, now_s: float) -> None:
-        for servo in self._group(device_id, now_s):
-            self._put(servo, device_id, address, data, now_s)
 
     @staticmethod
     def _put(servo: SimulatedServo, device_id: int, address: int, data: bytes, now_s: float) -> int:
@@ -432,30 +373,10 @@ class SimulatedChain:
             for servo in self.servos:
                 if fault.concerns(servo.id):
                     self._change_servo(servo, fault, begins, now_s)
+            self._stale = True
 
     def _change_servo(self, servo: SimulatedServo, fault: Fault, begins: bool, now_s: float) -> None:
-        kind, plant = fault.kind, servo.plant
-        if kind == "alert":
-            servo.forced_alert = begins
-        elif kind == "watchdog-ignored":
-            servo.watchdog_ignored = begins
-        elif kind == "hw" and begins:
-            servo.latch(fault.value, now_s)
-        elif kind == "stall":
-            plant.jam(now_s, begins)
-        elif kind == "volts":
-            plant.supply_v = fault.value if begins else servo.table.voltage / 10
-            servo.check_health(now_s)
-        elif kind == "temp":
-            plant.forced_c = fault.value if begins else None
-            servo.check_health(now_s)
-        else:
-            self._change_wiring(servo, fault, begins, now_s)
-
-    def _change_wiring(self, servo: SimulatedServo, fault: Fault, begins: bool, now_s: float) -> None:
-        if fault.kind == "eeprom-busy":
-            servo.eeprom_busy_s = fault.value if begins else 0.0
-        elif fault.kind == "baud":
+        if fault.kind == "baud":
             servo.force_baud(fault.value if begins else self.line_baud or 1_000_000)
         elif fault.kind == "dup" and begins:
             twin = SimulatedServo(
@@ -465,29 +386,5 @@ class SimulatedChain:
             self._extra.setdefault(fault, []).append(twin)
         elif fault.kind == "dup":
             self._extra.pop(fault, None)
-        self._stale = True
-
-
-def collide(replies: list[Reply]) -> list[Reply]:
-    """What the host sees of replies sent at the same moment: a wire that idles high carries their bitwise and."""
-    if len(replies) < 2:
-        return replies
-    size = max(len(reply.data) for reply in replies)
-    mixed = bytearray(b"\xff" * size)
-    for reply in replies:
-        for at, byte in enumerate(reply.data):
-            mixed[at] &= byte
-    return [replies[0]._replace(data=bytes(mixed))]
-
-
-def _words(params: bytes) -> tuple[int, int]:
-    """(address, length) in the first four bytes."""
-    return params[0] | params[1] << 8, params[2] | params[3] << 8
-
-
-def _bulk_requests(packet: InstructionPacket) -> list[tuple[int, int, int]]:
-    """(id, address, length) of each; a packet that is not made of whole fives, or not broadcast, asks nothing."""
-    params = packet.params
-    if packet.id != BROADCAST_ID or len(params) % 5:
-        return []
-    return [(params[at], *_words(params[at + 1 : at + 5])) for at in range(0, len(params), 5)]
+        else:
+            servo.suffer(fault.kind, fault.value, begins, now_s)

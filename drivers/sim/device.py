@@ -20,7 +20,6 @@ TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""
 WATCHDOG_STEP_S = 0.02
 HEALTH_PERIOD_S = 0.05
-OVERLOAD_AFTER_S = 1.0
 
 
 class Heard:
@@ -205,6 +204,26 @@ class SimulatedServo:
         small = self.table.model.startswith(("xl330", "xc330"))
         return self.watchdog_ignored or (small and self.registers.get("Operating Mode") == CURRENT)
 
+    def suffer(self, kind: str, value: float, begins: bool, now_s: float) -> None:
+        """A fault of this servo begins or ends; kinds as in ``drivers.sim.faults``."""
+        plant = self.plant
+        if kind == "alert":
+            self.forced_alert = begins
+        elif kind == "watchdog-ignored":
+            self.watchdog_ignored = begins
+        elif kind == "eeprom-busy":
+            self.eeprom_busy_s = value if begins else 0.0
+        elif kind == "stall":
+            plant.jam(now_s, begins)
+        elif kind == "hw" and begins:
+            self.latch(int(value), now_s)
+        elif kind == "volts":
+            plant.supply_v = value if begins else self.table.voltage / 10
+            self.check_health(now_s)
+        elif kind == "temp":
+            plant.forced_c = value if begins else None
+            self.check_health(now_s)
+
     def force_baud(self, baud: int) -> None:
         """Set the bit rate it listens at, whatever the wire says; an unknown rate counts as the lowest.
 
@@ -215,17 +234,9 @@ class SimulatedServo:
 
     def check_health(self, now_s: float) -> None:
         """Latch the hardware errors whose causes are there now."""
-        bits, registers = 0, self.registers
         load = self._sense(now_s)
-        cause = self.table.hardware_error
         self.plant.warm(now_s, load)
-        volts = 10.0 * self.plant.voltage(load)
-        if not registers.get("Min Voltage Limit") <= round(volts) <= registers.get("Max Voltage Limit"):
-            bits |= cause["voltage"]
-        if self.plant.temperature_c > registers.get("Temperature Limit"):
-            bits |= cause["temperature"]
-        if abs(load) >= 1.0 and self.plant.jammed_since is not None:
-            bits |= cause["overload"] if now_s - self.plant.jammed_since > OVERLOAD_AFTER_S else 0
+        bits = self.drive.hardware_errors(now_s, load)
         if bits:
             self.latch(bits, now_s)
 

@@ -21,6 +21,9 @@ MAX_POSITION_OFFSET = 1024
 FOLLOWING_TICKS = 10
 """Distance between wanted and real position from which on it is a following error."""
 
+OVERLOAD_AFTER_S = 1.0
+"""How long a jammed motor gives its full torque before it counts as overloaded."""
+
 _PROFILE = struct.Struct("<IIi")
 """Profile Acceleration, Profile Velocity and Goal Position, which lie side by side in every X-series table."""
 
@@ -202,6 +205,20 @@ class Drive:
             for layout, start, _, _ in self._groups:
                 layout.pack_into(memory, start, *values)
         return load
+
+    def hardware_errors(self, now_s: float, load: float) -> int:
+        """Bits of Hardware Error Status whose causes are there now."""
+        registers, plant = self.registers, self.plant
+        cause, bits = registers.table.hardware_error, 0
+        voltage = round(10.0 * plant.voltage(load))
+        if not registers.get("Min Voltage Limit") <= voltage <= registers.get("Max Voltage Limit"):
+            bits |= cause["voltage"]
+        if plant.temperature_c > registers.get("Temperature Limit"):
+            bits |= cause["temperature"]
+        since = plant.jammed_since
+        if abs(load) >= 1.0 and since is not None and now_s - since > OVERLOAD_AFTER_S:
+            bits |= cause["overload"]
+        return bits
 
     def _values(self, now_s: float, motion: Motion, wanted: Motion, load: float) -> tuple[int, ...]:
         """X-series registers 120-146, in order of address."""

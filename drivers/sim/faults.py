@@ -190,12 +190,18 @@ class Spoiler:
     ----------
     fault : a fault of scope ``"reply"``.
     rng : source of chance, shared by the bus so that a run can be repeated.
+
+    Attributes
+    ----------
+    struck : replies it has hit.
+    late_s : by how much it delays a reply it hits.
     """
 
     def __init__(self, fault: Fault, rng: random.Random) -> None:
         self.fault, self._rng = fault, rng
         self._seen: dict[int, int] = {}
         self.struck = 0
+        self.late_s: float = fault.value if fault.kind == "late" else 0.0
 
     def strikes(self, device_id: int) -> bool:
         """Whether it hits this reply of this servo; counts it."""
@@ -247,7 +253,6 @@ class FaultSet:
 
     Parameters
     ----------
-    faults : specs or faults that begin at `now_s` (plus their ``at``).
     on_change : called with (fault, begins, time) when one begins or ends.
     seed : of the chance.
     """
@@ -287,6 +292,32 @@ class FaultSet:
             time_s, _, begins, fault = self._due.pop(0)
             (self._begin if begins else self._end)(fault, time_s)
         self._set_next()
+
+    def spoil_status(self, frame: bytes, device_id: int, error: int, data: bytes) -> tuple[bytes | None, float]:
+        """A status packet as it arrives (None: it does not) and how late it is."""
+        late_s, spoilt = 0.0, frame
+        for spoiler in self.spoilers:
+            if not spoiler.strikes(device_id):
+                continue
+            late_s += spoiler.late_s
+            result = spoiler.status(spoilt, device_id, error, data)
+            if result is None:
+                return None, late_s
+            spoilt = result
+        return spoilt, late_s
+
+    def spoil_part(self, part: bytes, device_id: int) -> tuple[bytes | None, float]:
+        """A device's part of a joint reply as it arrives (None: it does not) and how late it is."""
+        late_s, spoilt = 0.0, part
+        for spoiler in self.spoilers:
+            if not spoiler.strikes(device_id):
+                continue
+            late_s += spoiler.late_s
+            result = spoiler.part(spoilt)
+            if result is None:
+                return None, late_s
+            spoilt = result
+        return spoilt, late_s
 
     def _schedule(self, time_s: float, begins: bool, fault: Fault) -> None:
         self._order += 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivers.dynamixel.packet import InstructionPacket, stuff
-from drivers.sim.bus import Reply
+from drivers.sim.replies import Reply
 
 BITS_PER_BYTE = 10
 USB_PACKET = 62

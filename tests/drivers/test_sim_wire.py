@@ -6,8 +6,9 @@ import pytest
 
 from drivers.dynamixel.packet import BROADCAST_ID, InstructionPacket, encode_instruction
 from drivers.dynamixel.packet import Instruction as I
-from drivers.sim.bus import Reply, SimulatedChain
+from drivers.sim.bus import SimulatedChain
 from drivers.sim.device import SimulatedServo
+from drivers.sim.replies import Reply
 from drivers.sim.wire import WireTiming, instruction_size, without_timing
 
 IDS = bytes(range(1, 25))
