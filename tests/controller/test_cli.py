@@ -1,0 +1,129 @@
+"""The command line as a user meets it: help with examples, one message for what goes wrong, never a traceback."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+COMMANDS = [
+    ("demo",),
+    ("run",),
+    ("play",),
+    ("render",),
+    ("fit",),
+    ("ports",),
+    ("scan",),
+    ("check",),
+    ("bench",),
+    ("simulate", "dynamixel"),
+    ("simulate", "robot"),
+    ("simulate", "host"),
+]
+
+
+def omote(*words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run ``omote WORDS`` as a process of its own."""
+    command = [sys.executable, "-c", "from controller.cli import main; main()", *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=cwd, check=False)
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_every_command_has_help_with_an_example(command: tuple[str, ...]) -> None:
+    from typer.testing import CliRunner
+
+    from controller.cli import app
+
+    result = CliRunner().invoke(app, [*command, "--help"])
+    assert result.exit_code == 0
+    assert f"Example: omote {' '.join(command)}" in " ".join(result.output.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "message", "hint"),
+    [
+        (("run", "nope"), "no stage 'nope'", "demo"),
+        (("check", "nope"), "nope: no such file", "omote check demo"),
+        (("play", "nope.csv"), "nope.csv: cannot be read", "ls -l"),
+        (("render", "-o", "x.png", "--set", "jawOpn=1"), "did you mean 'jawOpen'", "arkit.toml"),
+        (("render", "-o", "x.png", "--set", "jawOpen=nan"), "'nan' is not a number", ""),
+        (("render", "-o", "x.png", "-e", "hapiness"), "did you mean 'happiness'", ""),
+        (("render", "-o", "x.png", "--size", "big"), "expected WIDTHxHEIGHT", "800x800"),
+        (("render", "-o", "x.png", "--head", "nobody"), "no head 'nobody'", "ict"),
+        (("render", "-o", "no/such/x.png", "--size", "32x32"), "x.png", ""),
+        (("fit", "nope.npz", "-o", "out"), "nope.npz", ""),
+        (("scan", "/dev/not-there"), "/dev/not-there", "omote ports"),
+        (("simulate", "dynamixel", "--ids", "1-300"), "ids go from 0 to 252", "--ids 1-24"),
+        (("simulate", "dynamixel", "--model", "x"), "no control table for model 'x'", ""),
+        (("simulate", "dynamixel", "--fault", "x:1"), "fault 'x:1'", "mute"),
+        (("simulate", "robot", "nope"), "no robot 'nope'", "head24"),
+        (("simulate", "host", "nope"), "no script 'nope'", "tour"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_wrong_input_is_one_message_with_the_next_step(
+    tmp_path: Path, words: tuple[str, ...], message: str, hint: str
+) -> None:
+    result = omote(*words, cwd=tmp_path)
+    said = " ".join(result.stderr.split())
+    assert result.returncode == 1
+    assert said.startswith("error: ")
+    assert message in said
+    assert hint in said
+    assert "Traceback" not in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_or_busy_port_ends_a_run_with_one_message(tmp_path: Path) -> None:
+    stage = tmp_path / "stage.toml"
+    stage.write_text('name = "mine"\n[[links]]\nport = "/dev/not-there"\n')
+    result = omote("run", str(stage), "--headless", "--seconds", "2")
+    said = " ".join(result.stderr.split())
+    assert result.returncode == 1
+    assert said.startswith("error: ")
+    assert "/dev/not-there" in said
+    assert "omote ports" in said
+    assert "Traceback" not in said
+
+
+def test_a_damaged_head_is_one_message(tmp_path: Path, root: Path) -> None:
+    head = tmp_path / "head"
+    head.mkdir()
+    shipped = root / "configs/heads/ict"
+    (head / "head.toml").write_bytes((shipped / "head.toml").read_bytes())
+    (head / "head.npz").write_bytes((shipped / "head.npz").read_bytes()[:50_000])
+    result = omote("check", str(head))
+    assert result.returncode == 1
+    assert "head.npz" in " ".join(result.stderr.split())
+    assert "Traceback" not in result.stderr
+
+
+def test_render_draws_what_it_is_told(tmp_path: Path) -> None:
+    pictures = []
+    for name, words in (("rest", ()), ("open", ("--set", "jawOpen=0.8"))):
+        out = tmp_path / f"{name}.png"
+        result = omote("render", "-o", str(out), "--size", "160x200", *words)
+        assert result.returncode == 0, result.stderr
+        assert result.stderr == ""
+        pictures.append(np.asarray(Image.open(out).convert("RGB")).astype(int))
+    assert pictures[0].shape == (200, 160, 3)
+    assert (np.abs(pictures[1] - pictures[0]).max(axis=2) > 24).mean() > 0.01
+
+
+def test_check_names_what_is_good() -> None:
+    for name, said in (("demo", "stage demo"), ("head24", "24 channels"), ("ict", "59 parameters")):
+        result = omote("check", name)
+        assert result.returncode == 0, result.stderr
+        assert said in result.stdout
+        assert "good" in result.stdout
+
+
+def test_dry_run_opens_nothing_and_lists_every_channel() -> None:
+    result = omote("run", "demo", "--dry-run")
+    assert result.returncode == 0, result.stderr
+    assert "no port was opened" in result.stdout
+    assert result.stdout.count("xl330") == 24
