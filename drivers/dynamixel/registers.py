@@ -15,7 +15,7 @@ from drivers.dynamixel.sdk import Exchange, Packets
 from drivers.dynamixel.tables import ControlTable, Item
 from drivers.errors import BusError, CorruptReply, NoReply, ServoRefused
 
-TRIES = 3
+TRIES = 4
 T = TypeVar("T")
 
 

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import itertools
 import struct
-import threading
 import time
 from collections.abc import Callable, Iterator
 
 import dynamixel_sdk as bare
 import pytest
-import serial
 
 from drivers.dynamixel.packet import (
     ALERT,
@@ -31,7 +29,6 @@ from drivers.dynamixel.packet import (
 )
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.sdk import Packets
-from drivers.errors import DriverError, PortLost
 from tests.drivers.wire import Wire
 
 GOAL, POSITION, CURRENT = 116, 132, 126
@@ -218,95 +215,6 @@ def test_s4_a_silent_servo_is_asked_for_data_only_after_a_ping(wire: Wire, ours:
     assert port.suspects == set()
 
 
-# ---------------------------------------------------------------------------- S5, S6, S8, S9 the port
-
-
-def test_s5_an_interrupt_in_a_transaction_leaves_the_port_usable(
-    wire: Wire, ours: tuple, theirs: Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    wire.answer = table({1: four(7)})
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    port, packets = theirs
-    with monkeypatch.context() as patch:
-        patch.setattr(port, "readPort", interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            packets.read4ByteTxRx(port, 1, POSITION)
-    assert packets.read4ByteTxRx(port, 1, POSITION)[1] == bare.COMM_PORT_BUSY
-    port.ser.close()
-
-    port, packets = ours
-    for broken in ("read", "write", "drain"):
-        with monkeypatch.context() as patch:
-            patch.setattr(port.link, broken, interrupt)
-            with pytest.raises(KeyboardInterrupt):
-                packets.read4ByteTxRx(port, 1, POSITION)
-        assert not port.is_using
-        assert packets.read4ByteTxRx(port, 1, POSITION)[:2] == (7, bare.COMM_SUCCESS)
-
-
-def test_s6_an_unplugged_port_is_one_error(wire: Wire, ours: tuple, theirs: Client) -> None:
-    (their_port, their_packets), (port, packets) = theirs, ours
-    wire.unplug()
-    with pytest.raises(Exception) as caught:
-        their_packets.read4ByteTxRx(their_port, 1, POSITION)
-    assert not isinstance(caught.value, (OSError, serial.SerialException)), "termios.error"
-    for use in (packets.read4ByteTxRx, packets.hello):
-        with pytest.raises(PortLost):
-            use(port, 1, POSITION) if use == packets.read4ByteTxRx else use(port, 1)
-        assert not port.is_using
-
-
-def test_s7_a_silent_servo_costs_the_margin_and_not_34_ms(wire: Wire) -> None:
-    theirs, port = bare.PortHandler("unused"), Port(wire.path)
-    theirs.tx_time_per_byte = 0.01
-    theirs.setPacketTimeout(15)
-    assert theirs.packet_timeout > 34.0
-    port.setPacketTimeout(15)
-    assert port.packet_timeout == pytest.approx(0.15 + port.margin_s * 1000)
-    assert port.margin_s < 0.02
-
-
-def test_s7_the_latency_timer_sets_the_margin(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.dynamixel.port.latency_s", lambda path: 0.016)
-    slow = Port("/dev/ttyUSB0").margin_s
-    monkeypatch.setattr("drivers.dynamixel.port.latency_s", lambda path: 0.001)
-    assert slow - Port("/dev/ttyUSB0").margin_s == pytest.approx(0.030)
-
-
-def test_s8_a_step_of_the_wall_clock_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    theirs, port = bare.PortHandler("unused"), Port("unused")
-    theirs.setPacketTimeoutMillis(1000)
-    port.setPacketTimeoutMillis(1000)
-    future = time.time() + 3600
-    monkeypatch.setattr(time, "time", lambda: future)
-    assert theirs.isPacketTimeout()
-    assert not port.isPacketTimeout()
-    assert port.getTimeSinceStart() < 900
-
-
-def test_s9_a_second_thread_is_told(wire: Wire, ours: tuple, theirs: Client) -> None:
-    wire.answer = lambda packet: [(0.3, encode_status(packet.id, 0, four(1)))]
-    results: list[object] = []
-
-    def use(port: bare.PortHandler, packets: bare.Protocol2PacketHandler) -> None:
-        results.append(packets.read4ByteTxRx(port, 1, POSITION)[1])
-
-    port, packets = ours
-    port.margin_s = 2.0
-    thread = threading.Thread(target=use, args=(port, packets))
-    thread.start()
-    while not port.is_using:
-        time.sleep(0.001)
-    with pytest.raises(DriverError, match="two threads"):
-        packets.hello(port, 1)
-    thread.join()
-    assert results == [bare.COMM_SUCCESS]
-    assert not port.is_using
-
-
 # ---------------------------------------------------------------------------- S10, S11, S13 group transactions
 
 
@@ -341,24 +249,6 @@ def test_s11_group_writes_check_their_data_before_sending(wire: Wire, ours: tupl
         packets.syncWriteTxOnly(port, GOAL, 4, [1, 0, 0], 5)
     assert not port.is_using
     assert wire.heard == b""
-
-
-def cpu_of(read: Callable[[], object]) -> tuple[float, float]:
-    cpu, start = time.thread_time(), time.monotonic()
-    read()
-    return time.thread_time() - cpu, time.monotonic() - start
-
-
-def test_s12_waiting_costs_no_processor_time(wire: Wire, ours: tuple, theirs: Client) -> None:
-    port, packets = theirs
-    busy, waited = cpu_of(lambda: [packets.read4ByteTxRx(port, 1, POSITION) for _ in range(6)])
-    assert busy > 0.4 * waited, "the bare SDK waits without spinning by now"
-    port.ser.close()
-    port, packets = ours
-    port.margin_s = 0.2
-    busy, waited = cpu_of(lambda: packets.read4ByteTxRx(port, 1, POSITION))
-    assert waited >= 0.2
-    assert busy < 0.02
 
 
 def test_s13_goals_are_sent_without_waiting(wire: Wire, ours: tuple) -> None:
@@ -494,13 +384,3 @@ def test_broadcast_ping_finds_everybody(wire: Wire, ours: tuple) -> None:
     assert result == bare.COMM_SUCCESS
     assert found == {i: [0x400 + i, 38] for i in (3, 9, 200)}
     assert wire.packets == [InstructionPacket(BROADCAST_ID, Instruction.PING, b"")]
-
-
-@pytest.mark.parametrize("baud", [123_456, 250_000, 4_500_000])
-def test_any_baud_rate_opens(wire: Wire, baud: int) -> None:
-    assert not bare.PortHandler(wire.path).setBaudRate(baud)
-    port = Port(wire.path)
-    assert port.setBaudRate(baud)
-    assert port.getBaudRate() == baud
-    assert port.tx_time_per_byte == pytest.approx(10_000 / baud)
-    port.closePort()
