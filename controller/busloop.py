@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from controller.channels import build_table, limiter_of, servo_specs
 from controller.clock import Clock, Samples
 from controller.parameters import Parameters
+from controller.priority import take_priority
 from controller.robot import BusSettings, ChannelSettings
 from drivers import open_bus
 from drivers.bus import Bus, BusState
@@ -63,6 +64,7 @@ class BusLoop:
         self.clock = Clock(settings.rate_hz)
         self.latency_ms = Samples()
         self.held = 0
+        self.realtime = False
         self.error: Exception | None = None
         self._newest = newest
         self._limiter = limiter_of(self.table, 1.0 / settings.rate_hz)
@@ -114,6 +116,7 @@ class BusLoop:
         self._limiter.reset(self._sent)
 
     def _run(self) -> None:
+        self.realtime = take_priority()
         try:
             for now in self.clock.run(lambda: not self._stopping.is_set()):
                 if self._retry_ns is None:
@@ -157,6 +160,7 @@ class BusLoop:
         return {
             "name": self.settings.name,
             "servos": len(self.table.names),
+            "realtime": self.realtime,
             **self.clock.report(),
             "command_to_wire_ms": self.latency_ms.summary(),
             "channels_held_at_limit": self.held,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -72,6 +71,14 @@ class BodyProcess:
         """Pass on what the panel wants."""
         with suppress(OSError):  # a body that is gone is told by alive()
             self._pipe.send(wish)
+
+    def terminate(self) -> None:
+        """Send the body SIGTERM: it stops its servos by itself and ends."""
+        self._process.terminate()
+
+    def kill(self) -> None:
+        """Send the body SIGKILL: the servos are left to their bus watchdog."""
+        self._process.kill()
 
     def stop(self) -> None:
         """Ask the body to stop, wait for its servos to be safe, and keep its report."""
@@ -147,9 +154,3 @@ class Deadline:
         if self._end is None:
             self._end = time.monotonic() + self.seconds
         return time.monotonic() < self._end
-
-
-def yield_to_servos() -> None:
-    """Let this process give way to the body's: a late frame is seen less than a late servo target."""
-    if hasattr(os, "nice"):
-        os.nice(5)

@@ -13,7 +13,8 @@ from controller.files import replacing
 from controller.parameters import PARAMETERS
 from controller.pictures import write_pictures
 from controller.plan import plan_rows
-from controller.run import BodyProcess, Deadline, yield_to_servos
+from controller.priority import yield_to_servos
+from controller.run import BodyProcess, Deadline
 from controller.signals import stop_flag
 from controller.stage import Stage, load_stage
 
