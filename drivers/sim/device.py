@@ -19,7 +19,7 @@ CLEAR_MULTI_TURN = b"\x01\x44\x58\x4c\x22"
 TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""
 WATCHDOG_STEP_S = 0.02
-HEALTH_PERIOD_S = 0.05
+HEALTH_PERIOD_S = 0.1
 
 
 class Heard:
@@ -251,8 +251,12 @@ class SimulatedServo:
         if not registers.readable(address, length):
             return self.alert | ErrorNumber.ACCESS, b""
         first, end = registers.span(address, length)
-        if end > self.drive.first_sensed and first < self.drive.last_sensed and now_s != self._sensed_at:
-            self._sense(now_s)
+        drive = self.drive
+        if end > drive.first_sensed and first < drive.last_sensed and now_s != self._sensed_at:
+            if drive.motion_at <= first and end <= drive.motion_end:
+                drive.sense_motion(now_s)
+            else:
+                self._sense(now_s)
         return self.alert, registers.read(address, length)
 
     def write(self, address: int, data: bytes, now_s: float) -> int:

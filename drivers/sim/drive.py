@@ -21,6 +21,9 @@ MAX_POSITION_OFFSET = 1024
 FOLLOWING_TICKS = 10
 """Distance between wanted and real position from which on it is a following error."""
 
+_MOTION = struct.Struct("<hii")
+"""Present Current (or Load), Present Velocity and Present Position, side by side as well."""
+
 OVERLOAD_AFTER_S = 1.0
 """How long a jammed motor gives its full torque before it counts as overloaded."""
 
@@ -73,6 +76,8 @@ class Drive:
         self.top_speed = plant.top_speed
         self.timed, self.reach = False, math.inf
         self._profile_at = 0 if self.is_xl320 else table["Profile Acceleration"].address
+        self.motion_at = table.size if self.is_xl320 else table["Present Velocity"].address - 2
+        self.motion_end = self.motion_at + _MOTION.size
         self.configure()
 
     def configure(self) -> None:
@@ -205,6 +210,19 @@ class Drive:
             for layout, start, _, _ in self._groups:
                 layout.pack_into(memory, start, *values)
         return load
+
+    def sense_motion(self, now_s: float) -> None:
+        """Only current, velocity and position, which is what control loops read."""
+        plant, side = self.plant, self.side
+        wanted = plant.wanted(now_s)
+        motion = wanted if plant.jammed_at is None else plant.motion(now_s)
+        _MOTION.pack_into(
+            self.registers.memory,
+            self.motion_at,
+            side * round(plant.load(motion, wanted) * self.full_current),
+            side * round(motion.velocity / self.ticks_s),
+            round(self.mirror + side * motion.position) + self.offset,
+        )
 
     def hardware_errors(self, now_s: float, load: float) -> int:
         """Bits of Hardware Error Status whose causes are there now."""
