@@ -14,6 +14,9 @@ BITS_PER_BYTE = 10
 USB_PACKET = 62
 """Data bytes in a full USB packet of a common bridge; a shorter one waits for the latency timer."""
 
+USB_FRAME_S = 0.25e-3
+"""Bytes that arrive within this time reach the host together, when the last of them has arrived."""
+
 Timed = tuple[float, bytes]
 
 
@@ -46,7 +49,7 @@ class WireTiming:
             delay = reply.servo.return_delay_s if reply.servo else 0.0
             self._free_s += delay + reply.late_s + len(reply.data) * BITS_PER_BYTE / baud
             timed.append((self._free_s, reply.data))
-        return _through_bridge(timed, self.latency_s) if self.latency_s > 0.0 else timed
+        return _through_bridge(timed, self.latency_s) if self.latency_s > 0.0 else _by_frames(timed)
 
 
 def without_timing(replies: Sequence[Reply], now_s: float) -> list[Timed]:
@@ -59,6 +62,19 @@ def without_timing(replies: Sequence[Reply], now_s: float) -> list[Timed]:
         else:
             timed.append((now_s, reply.data))
     return timed
+
+
+def _by_frames(timed: list[Timed]) -> list[Timed]:
+    """Neighbours in time put together; the last byte of all keeps its time."""
+    out: list[Timed] = []
+    begun_s = 0.0
+    for time_s, data in timed:
+        if out and time_s - begun_s < USB_FRAME_S:
+            out[-1] = (time_s, out[-1][1] + data)
+        else:
+            begun_s = time_s
+            out.append((time_s, data))
+    return out
 
 
 def _through_bridge(timed: list[Timed], latency_s: float) -> list[Timed]:

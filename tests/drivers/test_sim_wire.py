@@ -9,7 +9,7 @@ from drivers.dynamixel.packet import Instruction as I
 from drivers.sim.bus import SimulatedChain
 from drivers.sim.device import SimulatedServo
 from drivers.sim.replies import Reply
-from drivers.sim.wire import WireTiming, instruction_size, without_timing
+from drivers.sim.wire import USB_FRAME_S, WireTiming, instruction_size, without_timing
 
 IDS = bytes(range(1, 25))
 POSITION = b"\x84\0\4\0"
@@ -37,7 +37,7 @@ def test_size_of_an_instruction(params: bytes):
 @pytest.mark.parametrize(("baud", "expected_ms"), [(57_600, 69.1), (1_000_000, 3.98), (4_000_000, 0.995)])
 def test_sync_read_takes_the_formula(baud: int, expected_ms: float):
     out = transaction(POSITION + IDS, I.SYNC_READ, baud)
-    assert len(out) == 24
+    assert b"".join(data for _, data in out).count(b"\xff\xff\xfd\0") == 24
     assert (out[-1][0] - 1.0) * 1e3 == pytest.approx(expected_ms, rel=2e-3)
     assert out[-1][0] - 1.0 == pytest.approx((14 + 24 + 24 * 15) * 10 / baud)
 
@@ -61,7 +61,18 @@ def test_replies_arrive_one_after_the_other_and_late_ones_hold_up_the_rest():
     timing = WireTiming()
     timing.arrival(0.0, 100, 1_000_000)
     out = timing.deliveries([Reply(b"a" * 10, None), Reply(b"b" * 10, None, 0.5), Reply(b"c", None)], 1_000_000)
-    assert [time for time, _ in out] == pytest.approx([0.0011, 0.5012, 0.50121])
+    assert [time for time, _ in out] == pytest.approx([0.0011, 0.50121])
+    assert [data for _, data in out] == [b"a" * 10, b"b" * 10 + b"c"]
+
+
+@pytest.mark.parametrize("baud", [57_600, 1_000_000, 4_000_000])
+def test_no_byte_comes_early_and_none_waits_longer_than_a_usb_frame(baud: int):
+    out = transaction(POSITION + IDS, I.SYNC_READ, baud)
+    sent = 0
+    for time_s, data in out:
+        first, sent = sent, sent + len(data)
+        assert time_s == pytest.approx(1.0 + (38 + sent) * 10 / baud)
+        assert len(data) == 15 or time_s - (1.0 + (38 + first + 15) * 10 / baud) < USB_FRAME_S
 
 
 def test_latency_timer_holds_the_last_short_packet():
