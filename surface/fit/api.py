@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.fit.chart import Chart, make_chart
-from surface.fit.crowns import crown_chart, split_teeth
-from surface.fit.eyeball import BACK, eyeball_surface
+from surface.fit.chart import make_chart
 from surface.fit.islands import Island, find_islands
 from surface.fit.joins import find_seams
 from surface.fit.mesh import FitMesh, load_mesh
 from surface.fit.names import sources_of
+from surface.fit.pieces import Body, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.recipe import PartRecipe, Recipe, recipe_for
-from surface.fit.refine import Fitted, fit_chart
+from surface.fit.refine import fit_chart
 from surface.fit.relax import open_flat_holes
-from surface.fit.report import FitReport, PartReport, measure
-from surface.fit.rigging import find_jaw, lid_share, make_groups, neck_share
+from surface.fit.report import FitReport, measure
+from surface.fit.rigging import find_jaw
 from surface.fit.seat import close_lips, seat_lids
-from surface.head.data import HeadData, Jaw, PartData
+from surface.fit.strokes import make_paint
+from surface.head.data import HeadData, PartData
 from surface.head.file import save_data
 from surface.head.meshes import pack, tessellate
 from surface.head.part import make_surface
@@ -55,29 +55,39 @@ def fit_head(mesh_path: str | Path, out_dir: str | Path, *, name: str, progress:
 def fit_mesh(mesh: FitMesh, recipe: Recipe, name: str, progress: Progress) -> tuple[HeadData, FitReport]:
     """Fit all parts of a mesh in memory."""
     mesh = _prepare(mesh, recipe)
-    sources = sources_of(mesh.names)
-    eyes, radius = _eyes(recipe)
-    jaw = find_jaw(mesh, sources, np.arange(*recipe.jaw_teeth), np.array(recipe.hinge or (0.0, 0.0, 0.0)))
+    body = _body(mesh, recipe)
     steps = _Steps(recipe, progress)
     parts, reports, charts = [], [], {}
     for part, islands in _islands_of(mesh, recipe):
         chart = make_chart(mesh, islands, normalise=len(islands) > 1 or not _unit_square(islands[0]))
-        fitted = fit_chart(mesh if part.follows == "skin" else replace(mesh, names=(), deltas=mesh.deltas[:0]),
-                           chart, part.wish, steps.of(part))  # fmt: skip
-        parts.append(_part_data(part, chart, fitted, sources, jaw, eyes, radius))
+        fitted = fit_chart(mesh if part.follows == "skin" else _still(mesh), chart, part.wish, steps.of(part))
+        parts.append(skin_part(part, chart, fitted, body))
         reports.append(measure(part.name, chart, fitted, mesh.names))
         charts[part.name] = chart
+        if recipe.hair and recipe.hair["face"] == part.name:
+            parts += hair_parts(mesh, chart, fitted, recipe.hair["brow"], body)
     for part in recipe.teeth:
-        data, report = _teeth(mesh, part, steps)
+        data, report = teeth_part(mesh, part, body)
         parts.append(data)
         reports.append(report)
-    if recipe.eyes is not None:
-        parts += [_eyeball(side, eye, radius) for side, eye in zip(("left", "right"), eyes, strict=True)]
-    parts = [_with_mesh(p) for p in parts]
+    if body.radius > 0:
+        parts += [eyeball_part(side, e, body.radius) for side, e in zip(("left", "right"), body.eyes, strict=True)]
     head = HeadData(
-        name, _provenance(recipe), recipe.neck or _low_middle(mesh), eyes, radius, jaw, parts, find_seams(charts), []
-    )
-    return head, FitReport(name, reports, sorted(set(sources)))
+        name, _provenance(recipe), recipe.neck or _low_middle(mesh), body.eyes, body.radius, body.jaw,
+        [_with_mesh(p) for p in parts], find_seams(charts), make_paint(recipe.paint, charts, mesh),
+    )  # fmt: skip
+    return head, FitReport(name, reports, sorted(body.sources))
+
+
+def _body(mesh: FitMesh, recipe: Recipe) -> Body:
+    sources = sources_of(mesh.names)
+    jaw = find_jaw(mesh, sources, np.arange(*recipe.jaw_teeth), np.array(recipe.hinge or (0.0, 0.0, 0.0)))
+    return Body(sources, jaw, *_eyes(recipe))
+
+
+def _still(mesh: FitMesh) -> FitMesh:
+    """The mesh without its shapes, for parts that move as a whole."""
+    return replace(mesh, names=(), deltas=mesh.deltas[:0])
 
 
 def _prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
@@ -117,45 +127,9 @@ class _Steps:
         return lambda done: self._progress(part.name, min(1.0, start + done * part.wish.points / self._total))
 
 
-def _part_data(part: PartRecipe, chart: Chart, fitted: Fitted, sources: dict[str, list[int]], jaw: Jaw,
-               eyes: Floats, radius: float) -> PartData:  # fmt: skip
-    n, skin = len(fitted.net), part.follows == "skin"
-    groups, share = make_groups(fitted.points, fitted.moves, sources, jaw) if skin else ([], np.zeros(n))
-    slits = np.array([[c.v, c.start, c.end] for c in chart.cuts]).reshape(-1, 3)
-    return PartData(
-        part.name, part.material, part.follows, fitted.points, np.ones(n),
-        fitted.net.knots_u, fitted.net.knots_v, np.full((n, 2), 3), chart.loops, slits, part.budget, groups, share,
-        neck_share(fitted.points) if skin else np.ones(n),
-        lid_share(fitted.points, eyes, radius) if skin and radius > 0 else np.zeros(n),
-    )  # fmt: skip
-
-
-def _teeth(mesh: FitMesh, part: PartRecipe, steps: _Steps) -> tuple[PartData, PartReport]:
-    """One patch per tooth, all in one part."""
-    first = mesh.faces[:, 0]
-    teeth = split_teeth(mesh, np.flatnonzero((first >= part.vertices[0][0]) & (first < part.vertices[0][1])))
-    chart, crowns = crown_chart(mesh, teeth, part.follows != "jaw")
-    wish = replace(part.wish, points=part.wish.points * len(teeth), coarse=0.4, deepest=1, neutral_mm=0.08)
-    fitted = fit_chart(crowns, chart, wish)
-    data = _part_data(part, chart, fitted, {}, Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0)), np.zeros((0, 3)), 0.0)
-    return data, measure(part.name, chart, fitted, ())
-
-
 def _with_mesh(part: PartData) -> PartData:
     """The part with its tessellation, so that a face starts at once."""
     return replace(part, mesh=pack(tessellate(part, make_surface(part)), part.budget))
-
-
-def _eyeball(side: str, centre: Floats, radius: float) -> PartData:
-    """An exact sphere with a cornea; the pole is left out by a hair so that normals are defined everywhere."""
-    s = eyeball_surface(centre, radius)
-    none = np.zeros(s.n)
-    loop = np.array([[0.0, 1e-3], [1.0, 1e-3], [1.0, 1.0], [0.0, 1.0]])
-    return PartData(
-        f"eye_{side}", "eye", f"{side}_eye", s.points.copy(), s.weights.copy(), *(k.copy() for k in s.padded),
-        np.stack(s.degrees, axis=1), [loop], np.zeros((0, 3)), (0, 0.02 * radius / 12.0 * BACK, 6), [],
-        none, none, none,
-    )  # fmt: skip
 
 
 def _eyes(recipe: Recipe) -> tuple[Floats, float]:

@@ -47,6 +47,8 @@ class Recipe:
     seat: list[tuple[int, int]] = field(default_factory=list)
     lips_close: float = 0.0
     source: dict[str, str] = field(default_factory=dict)
+    paint: list[dict[str, Any]] = field(default_factory=list)
+    hair: dict[str, Any] = field(default_factory=dict)
 
     @property
     def seated(self) -> NDArray[np.int64]:
@@ -77,6 +79,8 @@ def _read(table: dict[str, Any]) -> Recipe:
         seat=[tuple(r) for r in eyes["seat"]],
         lips_close=table["lips"]["close"],
         source=table["source"],
+        paint=table["paint"],
+        hair=table["hair"],
     )
 
 

@@ -110,7 +110,7 @@ def _make_part(part: PartData, head: HeadData, where: str) -> HeadPart:
         )
     try:
         surface = make_surface(part)
-        mesh = unpack(part.mesh, surface, part.budget) or tessellate(part, surface)
+        mesh = unpack(part.mesh, surface, part.budget, rough=part.follows == "skin") or tessellate(part, surface)
     except ValueError as e:
         raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e
     attributes = paint_part(head.paint, part.name, mesh.uv, where)

@@ -50,8 +50,14 @@ def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, NDArray]:
     }
 
 
-def unpack(arrays: dict[str, NDArray], surface: DCPSurface, budget: tuple[int, float, int]) -> Mesh | None:
-    """The kept mesh, or None if it is absent, made with another budget, or does not fit the surface."""
+def unpack(
+    arrays: dict[str, NDArray], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool
+) -> Mesh | None:
+    """The kept mesh, or None if it is absent, made with another budget, or does not fit the surface.
+
+    ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex then stands
+    in the middle of its cell's control points.
+    """
     if any(key not in arrays for key in KEYS):
         return None
     made = arrays["mesh_made"]
@@ -62,11 +68,15 @@ def unpack(arrays: dict[str, NDArray], surface: DCPSurface, budget: tuple[int, f
     if not _sound(uv, triangles, start, list_start, ids, surface.n):
         return None
     side = arrays["mesh_side"].astype(np.int64)
-    points, su, sv = surface.derivatives(uv, side=side)
-    normals = unit_normals(points, su, sv, triangles)
     cell = np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start))
+    if rough:
+        sums = np.add.reduceat(surface.points[ids], list_start[:-1]) / np.diff(list_start)[:, None]
+        points, normals = sums[cell], np.zeros((len(uv), 3))
+    else:
+        points, su, sv = surface.derivatives(uv, side=side)
+        normals = unit_normals(points, su, sv, triangles) * (-1.0 if made[4] else 1.0)
     return Mesh(
-        points, -normals if made[4] else normals, triangles, uv, side, cell, start.astype(np.int64),
+        points, normals, triangles, uv, side, cell, start.astype(np.int64),
         list_start.astype(np.int64), ids.astype(np.int32), int(made[3]), bool(made[4]),
     )  # fmt: skip
 
@@ -76,6 +86,6 @@ def _sound(uv: NDArray, triangles: NDArray, start: NDArray, list_start: NDArray,
     if uv.ndim != 2 or triangles.ndim != 2 or not len(triangles) or len(start) != len(list_start):
         return False
     whole = start[0] == 0 and start[-1] == len(uv) and list_start[0] == 0 and list_start[-1] == len(ids)
-    rising = bool((np.diff(start) > 0).all() and (np.diff(list_start) >= 0).all())
-    inside = 0 <= triangles.min() and triangles.max() < len(uv) and ids.min(initial=0) >= 0
+    rising = bool((np.diff(start) > 0).all() and (np.diff(list_start) > 0).all())
+    inside = triangles.min() >= 0 and triangles.max() < len(uv) and ids.min(initial=0) >= 0
     return bool(whole and rising and inside and ids.max(initial=-1) < n)

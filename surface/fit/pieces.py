@@ -1,0 +1,122 @@
+"""The kinds of parts a head is put together from: fitted skin, crowns, eyeballs, hair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.chart import Chart
+from surface.fit.crowns import crown_chart, split_teeth
+from surface.fit.eyeball import eyeball_surface
+from surface.fit.hair import Skin, Strip, brow_strip, lash_strip
+from surface.fit.mesh import FitMesh
+from surface.fit.recipe import PartRecipe
+from surface.fit.refine import Fitted, fit_chart
+from surface.fit.report import PartReport, measure
+from surface.fit.rigging import lid_share, make_groups, neck_share
+from surface.fit.strokes import mirrored, vertex_line
+from surface.head.data import Jaw, PartData
+
+Floats = NDArray[np.float64]
+STILL = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
+LASH_ROOT = 0.0125  # how far outside the hole in the skin the lashes stand, in v
+LASH_MM, LOWER_LASH_MM = 8.0, 4.0
+
+
+@dataclass(frozen=True)
+class Body:
+    """What all parts of one head share: shapes by parameter, the jaw's path, the eyes."""
+
+    sources: dict[str, list[int]]
+    jaw: Jaw
+    eyes: Floats
+    radius: float
+
+
+def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, body: Body) -> PartData:
+    """A fitted chart as a part; one that follows skull or jaw as a whole has no groups."""
+    n, skin = len(fitted.net), part.follows == "skin"
+    groups, share = make_groups(fitted.points, fitted.moves, body.sources, body.jaw) if skin else ([], np.zeros(n))
+    slits = np.array([[c.v, c.start, c.end] for c in chart.cuts]).reshape(-1, 3)
+    return PartData(
+        part.name, part.material, part.follows, fitted.points, np.ones(n),
+        fitted.net.knots_u, fitted.net.knots_v, np.full((n, 2), 3), chart.loops, slits, part.budget, groups, share,
+        neck_share(fitted.points) if skin else np.ones(n),
+        lid_share(fitted.points, body.eyes, body.radius) if skin and body.radius > 0 else np.zeros(n),
+    )  # fmt: skip
+
+
+def teeth_part(mesh: FitMesh, part: PartRecipe, body: Body) -> tuple[PartData, PartReport]:
+    """One patch per tooth, all in one part."""
+    first = mesh.faces[:, 0]
+    low, high = part.vertices[0]
+    teeth = split_teeth(mesh, np.flatnonzero((first >= low) & (first < high)))
+    chart, crowns = crown_chart(mesh, teeth, part.follows != "jaw")
+    wish = replace(part.wish, points=part.wish.points * len(teeth), coarse=0.4, deepest=1, neutral_mm=0.08)
+    fitted = fit_chart(crowns, chart, wish)
+    return skin_part(part, chart, fitted, body), measure(part.name, chart, fitted, ())
+
+
+def eyeball_part(side: str, centre: Floats, radius: float) -> PartData:
+    """An exact sphere with a cornea; the pole is left out by a hair so that normals are defined everywhere."""
+    s = eyeball_surface(centre, radius)
+    none = np.zeros(s.n)
+    loop = np.array([[0.0, 1e-3], [1.0, 1e-3], [1.0, 1.0], [0.0, 1.0]])
+    return PartData(
+        f"eye_{side}", "eye", f"{side}_eye", s.points.copy(), s.weights.copy(), *(k.copy() for k in s.padded),
+        np.stack(s.degrees, axis=1), [loop], np.zeros((0, 3)), (0, 0.01 * radius, 6), [], none, none, none,
+    )  # fmt: skip
+
+
+def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], body: Body) -> list[PartData]:
+    """Brows and lashes of both sides, rooted in the fitted face."""
+    skin = Skin(fitted)
+    left = np.array(brow)
+    parts = []
+    for side, ids, eye in zip(("left", "right"), (left, mirrored(mesh, left)), body.eyes, strict=True):
+        line = vertex_line(chart, mesh, ids, closed=False)
+        parts.append(_strip_part(f"brow_{side}", "brow", brow_strip(skin, line, (0.0105, 0.0125), hairs=40), body))
+        rim = _rim_near(chart, mesh, eye)
+        for upper in (True, False):
+            root, along = _lid_line(rim, upper=upper, inner_first=side == "left")
+            length = (LASH_MM if upper else LOWER_LASH_MM) * _length_profile(along)
+            strip = lash_strip(skin, root, eye, length, upper=upper, hairs=28 if upper else 18)
+            name = f"lash_{'upper' if upper else 'lower'}_{side}"
+            parts.append(_strip_part(name, "lash", strip, body))
+    return parts
+
+
+def _length_profile(along: Floats) -> Floats:
+    """Lashes are longest beyond the middle, short at the inner corner."""
+    return 0.45 + 0.55 * np.sin(np.pi * np.clip(0.12 + 0.62 * along, 0, 1))
+
+
+def _rim_near(chart: Chart, mesh: FitMesh, eye: Floats) -> Floats:
+    """(k, 2) the hole of the face whose rim lies nearest to an eyeball."""
+    middles = [mesh.vertices[ids].mean(axis=0) for ids in chart.loop_vertices]
+    nearest = int(np.argmin([np.linalg.norm(m - eye) for m in middles]))
+    return chart.loops[nearest]
+
+
+def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, Floats]:
+    """(m, 2) the lashes' roots, just outside a lid's rim, inner corner first; (m,) 0..1 along the lid."""
+    u0, u1 = rim[:, 0].min(), rim[:, 0].max()
+    along = np.linspace(0.10, 0.95, 24) if upper else np.linspace(0.22, 0.94, 20)
+    u = u0 + (u1 - u0) * (along if inner_first else 1.0 - along)
+    middle = 0.5 * (rim[:, 1].min() + rim[:, 1].max())
+    half = rim[(rim[:, 1] > middle) == upper]
+    order = np.argsort(half[:, 0])
+    v = np.interp(u, half[order, 0], half[order, 1])
+    return np.column_stack([u, v + (LASH_ROOT if upper else -LASH_ROOT)]), along
+
+
+def _strip_part(name: str, material: str, strip: Strip, body: Body) -> PartData:
+    n = len(strip.points)
+    groups, share = make_groups(strip.points, strip.moves, body.sources, body.jaw)
+    return PartData(
+        name, material, "skin", strip.points, np.ones(n), *(k.copy() for k in strip.surface.padded),
+        np.stack(strip.surface.degrees, axis=1), strip.loops, np.zeros((0, 3)), (0, 0.5, 4), groups, share,
+        neck_share(strip.points), lid_share(strip.points, body.eyes, body.radius),
+    )  # fmt: skip

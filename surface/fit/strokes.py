@@ -1,0 +1,65 @@
+"""Paint of a recipe, given by mesh vertices, as lines in (u, v) of the fitted part."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.chart import Chart
+from surface.fit.mesh import FitMesh
+
+Floats = NDArray[np.float64]
+PIECES = 6  # points per vertex of a smooth line
+
+
+def make_paint(layers: list[dict[str, Any]], charts: dict[str, Chart], mesh: FitMesh) -> list[dict[str, Any]]:
+    """Layers for head.toml; those of parts that were not fitted are left out."""
+    return [_layer(layer, charts[layer["part"]], mesh) for layer in layers if layer["part"] in charts]
+
+
+def _layer(layer: dict[str, Any], chart: Chart, mesh: FitMesh) -> dict[str, Any]:
+    out = {k: v for k, v in layer.items() if k not in ("lines", "mirror", "hole")}
+    if layer["kind"] == "hole":
+        out["kind"] = "region"
+        lines = [chart.loops[1 + layer["hole"]]]
+    elif layer["kind"] == "all":
+        return out
+    else:
+        ids = [np.array(line) for line in layer["lines"]]
+        if layer.get("mirror"):
+            ids += [mirrored(mesh, line) for line in ids]
+        lines = [vertex_line(chart, mesh, line, closed=layer["kind"] == "region") for line in ids]
+    return out | {"lines": [np.round(line, 5).tolist() for line in lines]}
+
+
+def mirrored(mesh: FitMesh, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The vertices on the other side of the face."""
+    flipped = mesh.vertices[ids] * [-1.0, 1.0, 1.0]
+    return np.array([int(np.argmin(((mesh.vertices - p) ** 2).sum(axis=1))) for p in flipped])
+
+
+def vertex_line(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64], *, closed: bool) -> Floats:
+    """A smooth line through vertices, in (u, v)."""
+    uv = np.array([chart.uv[vertex_row(chart, int(v))] for v in ids])
+    return uv if len(uv) < 3 else smooth_line(uv, closed=closed)
+
+
+def vertex_row(chart: Chart, vertex: int) -> int:
+    """The chart's sample that is a mesh vertex."""
+    column = chart.mix.getcol(vertex).tocoo()
+    return int(column.row[np.argmax(column.data)])
+
+
+def smooth_line(points: Floats, *, closed: bool) -> Floats:
+    """Catmull-Rom spline through points (n, k), PIECES points per step."""
+    n = len(points)
+    steps = n if closed else n - 1
+    padded = points if closed else np.vstack([2 * points[0] - points[1], points, 2 * points[-1] - points[-2]])
+    t = np.linspace(0.0, 1.0, PIECES, endpoint=False)[:, None]
+    out = []
+    for i in range(steps):
+        a, b, c, d = (padded[(i + k - closed) % len(padded)] for k in range(4))
+        out.append(0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * (b - c) + d - a) * t**3))
+    return np.vstack(out if closed else [*out, points[-1:]])
