@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from controller.acting import Actor
 from controller.expression import Vocabulary
 from controller.gaze import Gaze
+from controller.life import Life, LifeSettings
 from controller.mixer import DEFAULT_LAYERS, LayerSettings, Mixer
 from controller.motion import MotionLimiter
 from controller.parameters import Floats, Parameters
@@ -55,6 +56,9 @@ class CommandSink(Protocol):
     def neutral(self, seconds: float, stamp_ns: int) -> None:
         """Release everything that was commanded and return to neutral."""
 
+    def live(self, amount: float, stamp_ns: int) -> None:
+        """Set how lively the face is when nobody tells it anything, 0..1."""
+
     def snapshot(self, out: Floats) -> None:
         """Copy the present parameters to ``out`` : (P,)."""
 
@@ -75,11 +79,12 @@ class CommandState:
     ----------
     parameters : the registry.
     vocabulary : the named expressions; the shipped ones without.
-    layers : the layers; must include ``expression``, ``gaze``, ``capture`` and ``manual``.
+    layers : the layers; must include ``expression``, ``idle``, ``gaze``, ``capture`` and ``manual``.
+    life : the figures of idle life; the natural ones without. seed : the same seed lives the same life.
 
     Raises
     ------
-    ConfigError : the shipped expressions cannot be read.
+    ConfigError : the shipped expressions or figures cannot be read.
     """
 
     def __init__(
@@ -87,6 +92,9 @@ class CommandState:
         parameters: Parameters,
         vocabulary: Vocabulary | None = None,
         layers: Sequence[LayerSettings] = DEFAULT_LAYERS,
+        *,
+        life: LifeSettings | None = None,
+        seed: int = 0,
     ) -> None:
         self.parameters = parameters
         self.vocabulary = vocabulary or Vocabulary.load(parameters)
@@ -94,9 +102,10 @@ class CommandState:
         self.limiter = MotionLimiter.of(parameters)
         self._actor = Actor(self.vocabulary["neutral"])
         self._gaze = Gaze(parameters)
+        self._life = Life(parameters, life or LifeSettings.named("natural", parameters), seed)
         self._mixed, self._present = parameters.neutral(), parameters.neutral()
         self._expression, self._looking = self.mixer["expression"], self.mixer["gaze"]
-        self._manual = self.mixer["manual"]
+        self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
         self._everything = np.ones(len(parameters), dtype=bool)
         self._lock = threading.Lock()
         self._stamp_ns = 0
@@ -120,8 +129,18 @@ class CommandState:
 
     def _write_layers(self, now_s: float) -> None:
         self._expression.write_masked(self._actor.update(now_s), self._everything, now_s)
+        self._live(now_s)
         if self._gaze.active:
-            self._looking.write(self._gaze.indices, self._gaze.update(self._present), now_s)
+            self._looking.write(self._gaze.indices, self._gaze.update(self._present, self._life), now_s)
+
+    def _live(self, now_s: float) -> None:
+        life, actor = self._life, self._actor
+        if life.liveliness > 0.0:
+            life.update(now_s, looking=self._gaze.active, blink_block=actor.blink_block, gaze_block=actor.gaze_block)
+            self._idle.write_masked(life.values, self._everything, now_s)
+        elif self._idle.holding:
+            life.update(now_s, looking=False)
+            self._idle.release()
 
     # What links call
 
@@ -148,12 +167,14 @@ class CommandState:
         """See :class:`CommandSink`."""
         with self._lock:
             self._gaze.look(yaw_rad, pitch_rad)
+            self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
             self._note(stamp_ns)
 
     def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
         """See :class:`CommandSink`."""
         with self._lock:
             self._gaze.look_at(x_mm, y_mm, z_mm)
+            self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
             self._note(stamp_ns)
 
     def gaze_off(self, stamp_ns: int) -> None:
@@ -168,6 +189,12 @@ class CommandState:
             self._manual.release(fade_s=seconds)
             self._stop_looking(seconds)
             self._actor.rest(seconds, self._time(stamp_ns))
+            self._note(stamp_ns)
+
+    def live(self, amount: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._life.liveliness = min(max(amount, 0.0), 1.0)
             self._note(stamp_ns)
 
     def capture(self, values: Floats, mask: NDArray[np.bool_], now_ns: int, stamp_ns: int = 0) -> None:
@@ -198,6 +225,7 @@ class CommandState:
                 "expression": self._actor.name,
                 "intensity": round(self._actor.intensity, 3),
                 "gaze": f"{yaw:.1f},{pitch:.1f}" if self._gaze.active else "off",
+                "life": self._life.liveliness,
                 "manual": self._manual.holding,
                 "capture": self.mixer["capture"].holding,
                 "limited": int(np.count_nonzero(self.limiter.limited)),

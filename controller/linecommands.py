@@ -93,6 +93,13 @@ class Neutral:
 
 
 @dataclass(frozen=True)
+class Live:
+    """Set how lively the face is by itself, 0 to 1. ``LIFE amount``."""
+
+    amount: float
+
+
+@dataclass(frozen=True)
 class Get:
     """Tell parameters. ``GET name ...``, ``GET ALL``."""
 
@@ -132,7 +139,7 @@ class List:
 
 
 Command = (
-    Hello | Ping | Set | Release | Expr | Gaze | GazeAt | GazeOff | Neutral
+    Hello | Ping | Set | Release | Expr | Gaze | GazeAt | GazeOff | Neutral | Live
     | Get | Info | Status | Subscribe | Unsubscribe | List
 )  # fmt: skip
 
@@ -293,6 +300,8 @@ def _plain_words(command: Command) -> list[str]:
             return ["GAZE", "OFF"]
         case Neutral(seconds):
             return ["NEUTRAL", repr(seconds)]
+        case Live(amount):
+            return ["LIFE", repr(amount)]
         case Ping(text):
             return ["PING", text] if text else ["PING"]
         case List(what):
@@ -345,6 +354,7 @@ _RULES: dict[str, Rule] = {
     "EXPR": (1, 3, Grammar.read_expr),
     "GAZE": (1, 4, Grammar.read_gaze),
     "NEUTRAL": (0, 1, _neutral),
+    "LIFE": (1, 1, lambda _, given: Live(in_range("amount", given[0], 0.0, 1.0))),
     "GET": (1, None, lambda g, given: Get(g.names_or_all(given))),
     "INFO": (1, 1, lambda g, given: Info(g.name(given[0]))),
     "STATUS": (0, 0, lambda _, given: Status()),
@@ -366,6 +376,7 @@ USAGE = {
     "EXPR": "EXPR name [intensity [duration_s]]",
     "GAZE": "GAZE yaw_deg pitch_deg, GAZE AT x_mm y_mm z_mm, or GAZE OFF",
     "NEUTRAL": "NEUTRAL [seconds]",
+    "LIFE": "LIFE amount",
     "GET": "GET name ... or GET ALL",
     "INFO": "INFO name",
     "STATUS": "STATUS",

@@ -25,6 +25,7 @@ from controller.linecommands import (
     Hello,
     Info,
     List,
+    Live,
     Neutral,
     Ping,
     Release,
@@ -145,6 +146,8 @@ class LineSession:
                 sink.gaze_off(now_ns)
             case Neutral(seconds):
                 sink.neutral(seconds, now_ns)
+            case Live(amount):
+                sink.live(amount, now_ns)
             case _:
                 return False
         return True
@@ -206,6 +209,8 @@ def _receipt(command: Command) -> str:
             return "UNSUB"
         case Gaze() | GazeAt() | GazeOff():
             return "GAZE"
+        case Live(amount):
+            return f"LIFE {number(amount)}"
     return "NEUTRAL"
 
 

@@ -26,7 +26,7 @@ _TINY = 1e-12
 def minimum_jerk(t: float) -> float:
     """10 t^3 - 15 t^4 + 6 t^5 with ``t`` held in 0..1 (Flash and Hogan 1985)."""
     t = min(max(t, 0.0), 1.0)
-    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
+    return min(t * t * t * (10.0 + t * (6.0 * t - 15.0)), 1.0)  # rounding must not pass the end
 
 
 @dataclass(frozen=True)

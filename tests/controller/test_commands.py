@@ -93,7 +93,8 @@ def test_neutral_releases_everything(face: Face) -> None:
     face.state.neutral(0.3, face.now)
     assert np.abs(face.run(3.0)).max() < 1e-3
     assert face.state.status() | {"ticks": 0} == {
-        "expression": "neutral", "intensity": 1.0, "gaze": "off", "manual": 0, "capture": 0, "limited": 0, "ticks": 0,
+        "expression": "neutral", "intensity": 1.0, "gaze": "off", "life": 0.0, "manual": 0, "capture": 0,
+        "limited": 0, "ticks": 0,
     }  # fmt: skip
 
 
@@ -153,3 +154,37 @@ def test_hostile_sources_in_many_threads_keep_every_limit() -> None:
     assert np.all(path >= P.low) and np.all(path <= P.high)
     assert np.all(np.abs(speed) <= P.max_speed * (1 + 1e-9))
     assert np.all(np.abs(np.diff(speed, axis=0)) / 0.01 <= P.max_acceleration * (1 + 1e-9) + 1e-9)
+
+
+def test_life_blinks_by_itself_and_stops(face: Face) -> None:
+    face.state.live(1.0, face.now)
+    lid = P.index("eyeBlinkLeft")
+    closed = [face.run(0.01)[lid] for _ in range(3000)]
+    assert 4 <= np.count_nonzero(np.diff(np.array(closed) > 0.5)) / 2 <= 16  # blinks in 30 s
+    assert face.state.holder(P.index("headRoll")) == "expression"
+    face.state.live(0.0, face.now)
+    assert np.abs(face.run(3.0)).max() < 1e-6
+
+
+def test_life_gives_way_to_set(face: Face) -> None:
+    face.state.live(1.0, face.now)
+    face.state.set_parameters([0, 7], [0.0, 0.0], face.now)
+    assert max(face.run(0.01)[0] for _ in range(1500)) == 0.0
+
+
+def test_life_stirs_around_a_gaze_without_leaving_it(face: Face) -> None:
+    face.state.live(1.0, face.now)
+    face.state.gaze(math.radians(30), 0.0, face.now)
+    face.run(2.0)
+    yaw = [face.run(0.01)[P.index("headYaw")] * 60 + face.values[P.index("leftEyeYaw")] * 35 for _ in range(1500)]
+    assert abs(np.mean(yaw) - 30) < 0.3 and 0.05 < np.std(yaw) < 0.8
+
+
+def test_the_same_seed_lives_the_same_life() -> None:
+    def lived(seed: int) -> np.ndarray:
+        state, out = CommandState(P, seed=seed), P.neutral()
+        state.live(1.0, 0)
+        return np.array([[*map(float, out)] for i in range(300) if state.tick(i * STEP_NS, 0.01, out) == 0])
+
+    np.testing.assert_array_equal(lived(3), lived(3))
+    assert np.abs(lived(3) - lived(4)).max() > 0.01
