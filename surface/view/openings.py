@@ -17,6 +17,12 @@ _SAMPLES = 48
 _LID_REACH = 2.0
 #: How far, millimetres, the lips' mean may lie from the front of the teeth.
 _LIP_REACH = 45.0
+#: The skin ends inside the lips; the light comes in this far in front of its edge, mm.
+_LIP_DEPTH = 14.0
+#: Share of the edge's area at rest that is still hidden behind closed lips.
+_SHUT = 0.75
+#: Half the mouth's width, a little less: how far the opening counts to either side.
+_SLIDE = 0.38
 _FALLBACK_AREA = (0.0, 0.0, 250.0)
 
 
@@ -51,6 +57,8 @@ class Openings:
         loops = boundary_loops(self._skin.triangles) if self._skin is not None else []
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
+        area = np.array(_FALLBACK_AREA) if self._lips is None else self._edge_area()
+        self._shut_area, self._outward = _SHUT * float(np.linalg.norm(area)), 1.0 if area[2] > 0 else -1.0
 
     def _eye(self, part: ViewPart, loops: list[np.ndarray]) -> EyeFrame:
         """Frame and lids of one eyeball."""
@@ -98,9 +106,26 @@ class Openings:
     def mouth(self) -> dict[str, object]:
         """Uniforms of the opening between the lips now: centre and vector area, mm and mm^2."""
         if self._lips is None or self._skin is None:
-            return {"opening_centre": (0.0, -35.0, 110.0), "opening_area": _FALLBACK_AREA}
-        ring = self._skin.vertices[self._lips.loop]
-        return {"opening_centre": ring.mean(axis=0), "opening_area": vector_area(ring)}
+            return {
+                "opening_centre": (0.0, -35.0, 110.0),
+                "opening_area": _FALLBACK_AREA,
+                "opening_side": (18.0, 0.0, 0.0),
+            }
+        area = self._edge_area() * self._outward
+        size = max(float(np.linalg.norm(area)), 1e-6)
+        centre = self._skin.vertices[self._lips.loop].mean(axis=0) + area * (_LIP_DEPTH / size)
+        corners = self._skin.vertices[self._lips.upper[[0, -1]]]
+        return {
+            "opening_centre": centre,
+            "opening_area": area * (max(size - self._shut_area, 20.0) / size),
+            "opening_side": (corners[1] - corners[0]) * _SLIDE,
+        }
+
+    def _edge_area(self) -> np.ndarray:
+        """Vector area (3,) inside the edge of the lips now, mm^2."""
+        if self._skin is None or self._lips is None:
+            return np.zeros(3)
+        return vector_area(self._skin.vertices[self._lips.loop])
 
 
 def fit_sphere(points: np.ndarray) -> tuple[np.ndarray, float]:

@@ -45,9 +45,9 @@ void main() {
     // The cornea bulges: its normal leans out less than the eyeball's, its highlight is small and sharp.
     vec3 axis = eye_rotation[2];
     vec3 cornea = normalize(n + 0.45 * (n - axis * dot(n, axis)) * smoothstep(1.3, 0.7, r / iris_radius));
-    float upper = smoothstep(0.0, 4.5, v_lid.x);
-    float lower = smoothstep(0.0, 2.2, v_lid.y);
-    float shade = (0.22 + 0.78 * upper) * (0.55 + 0.45 * lower);
+    float upper = smoothstep(-0.5, 5.0, v_lid.x);
+    float lower = smoothstep(-0.8, 2.4, v_lid.y);
+    float shade = (0.15 + 0.85 * upper) * (0.45 + 0.55 * lower);
 
     vec3 light = key_colour * wrapped(dot(n, key_direction), vec3(0.35, 0.25, 0.22))
         + fill_colour * wrapped(dot(n, fill_direction), vec3(0.3)) + ambient(n);

@@ -2,6 +2,7 @@
 uniform mat4 view_projection;
 uniform vec3 camera;
 uniform vec3 opening_centre;
+uniform vec3 opening_side;   // from its centre towards a corner of the mouth
 uniform vec3 opening_area;   // vector area of the lips' opening, mm^2
 uniform vec3 albedo;
 uniform vec3 wrap;
@@ -13,15 +14,16 @@ in float occlusion;
 
 out vec3 v_colour;
 
-// Form factor of the opening seen from here, the opening taken as a disc of its area.
+// Form factor of the opening seen from here: a disc of its area, slid along the mouth to the nearest place.
 float daylight(vec3 n) {
     float area = length(opening_area) + 1e-3;
-    vec3 towards = opening_centre - position;
+    vec3 off = position - opening_centre;
+    vec3 towards = opening_side * clamp(dot(off, opening_side) / dot(opening_side, opening_side), -1.0, 1.0) - off;
     float square = dot(towards, towards) + 1e-3;
     vec3 direction = towards * inversesqrt(square);
     float facing = abs(dot(opening_area / area, direction));
-    float cosine = clamp(0.30 + 0.70 * dot(n, direction), 0.0, 1.0);
-    return area * cosine * (0.15 + 0.85 * facing) / (2.2 * square + area);
+    float cosine = clamp(0.35 + 0.65 * dot(n, direction), 0.0, 1.0);
+    return area * cosine * (0.3 + 0.7 * facing) / (2.0 * square + area);
 }
 
 void main() {
@@ -29,10 +31,11 @@ void main() {
     vec3 v = normalize(camera - position);
     vec3 n = dot(normal, v) < 0.0 ? -normal : normal;
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
-        + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.4 * ambient(n);
-    float reach = daylight(n) * occlusion;
+        + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
+    float reach = clamp(daylight(n) * occlusion, 0.0, 1.0);
+    // What light has bounced about the mouth is red.
+    vec3 tint = mix(vec3(1.0, 0.55, 0.45), vec3(1.0), reach);
     float nh = dot(n, normalize(key_direction + v));
-    float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0));
-    vec3 lit = (albedo * light + shine * key_colour) * reach;
-    v_colour = encode(lit);
+    float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach;
+    v_colour = encode(albedo * light * tint * reach + shine * key_colour);
 }

@@ -1,0 +1,84 @@
+"""surface.view.occlusion"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ball_head import BallHead, BallPart, ball, grid, values
+
+from surface.view.occlusion import bake, bake_head, lit, orthographic, spread
+
+
+def plate(name: str, y: float, half: float, material: str = "skin") -> BallPart:
+    uv, triangles = grid(15, 15)
+    points = np.column_stack([(uv[:, 0] - 0.5) * 2 * half, np.full(len(uv), y), (0.5 - uv[:, 1]) * 2 * half])
+    return BallPart(name, material, triangles, points, np.tile([0.0, 1.0, 0.0], (len(points), 1)))
+
+
+def test_a_ball_alone_sees_the_whole_sky(gl: None) -> None:
+    points, normals, triangles = ball(50.0, 41, 61)
+    share = bake([BallPart("ball", "skin", triangles, points, normals)], directions=24, resolution=320)["ball"]
+    assert share.shape == (len(points), 1)
+    assert share.min() > 0.97
+
+
+def test_under_a_lid_it_is_dark(gl: None) -> None:
+    share = bake([plate("floor", 0.0, 100.0), plate("lid", 8.0, 100.0)], directions=60, resolution=320)
+    middle = share["floor"].reshape(15, 15)[5:10, 5:10]
+    assert middle.max() < 0.05
+    assert share["lid"].min() > 0.95
+
+
+def test_a_disc_above_hides_its_form_factor(gl: None) -> None:
+    radius, height = 40.0, 30.0
+    points, _, triangles = ball(np.array([radius, 0.01, radius]), 41, 61)
+    disc = BallPart(
+        "disc", "skin", triangles, points + np.array([0.0, height, 0.0]), np.tile([0.0, 1.0, 0.0], (len(points), 1))
+    )
+    share = bake([plate("floor", 0.0, 100.0), disc], directions=300, resolution=192)["floor"]
+    wanted = 1.0 - radius**2 / (radius**2 + height**2)
+    assert share.reshape(15, 15)[7, 7] == pytest.approx(wanted, abs=0.03)
+
+
+def test_the_mouths_inside_is_shaded_by_itself_alone(gl: None) -> None:
+    share = bake(
+        [plate("teeth", 0.0, 20.0, "teeth"), plate("skin", 8.0, 100.0), plate("mouth", -5.0, 9.0, "mouth")],
+        directions=24,
+        resolution=96,
+    )
+    assert share["teeth"].min() > 0.95
+    assert (share["mouth"] == 1.0).all()
+
+
+def test_what_opens_does_not_stay_black(gl: None) -> None:
+    head = BallHead()
+    opened = bake_head(head, values(jawOpen=1.0), directions=12, resolution=96)
+    rest = bake(head.parts, directions=12, resolution=96)
+    assert all((opened[name] >= rest[name]).all() for name in rest)
+    assert (head.parts[0].vertices == BallHead().parts[0].vertices).all()
+
+
+def test_directions_are_even() -> None:
+    directions = spread(200)
+    assert np.linalg.norm(directions, axis=1) == pytest.approx(np.ones(200))
+    assert np.abs(directions.mean(axis=0)).max() < 0.01
+    assert np.cov(directions.T) == pytest.approx(np.eye(3) / 3, abs=0.01)
+
+
+def test_orthographic_depth_grows_away_from_the_viewer() -> None:
+    points = np.random.default_rng(2).uniform(-50, 90, (200, 3))
+    direction = np.array([0.6, 0.0, 0.8])
+    box, matrix, span = orthographic(points, direction)
+    assert box.min() > 0
+    assert box.max() < 1
+    assert np.diff(box[np.argsort(points @ direction), 2]).max() <= 1e-12
+    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    assert (clip[:, :3] + 1) / 2 == pytest.approx(box)
+    assert np.ptp(box[:, 2]) * span == pytest.approx(np.ptp(points @ direction))
+
+
+def test_lit_blends_over_neighbours() -> None:
+    picture = np.zeros((8, 8), np.float32)
+    picture[:, 4:] = 1.0
+    box = np.array([[0.5, 0.5, 0.5], [0.9, 0.5, 0.5], [0.1, 0.5, 0.5], [0.1, 0.5, 0.01]])
+    assert lit(box, picture, 0.02) == pytest.approx([0.5, 1.0, 0.0, 1.0])
