@@ -71,9 +71,7 @@ class ServoSpec:
         if self.min_rad >= self.max_rad:
             raise ValueError(f"servo {self.name!r} (id {self.id}): min_rad must be below max_rad")
         if min(self.max_speed_rad_s, self.max_accel_rad_s2) <= 0:
-            raise ValueError(
-                f"servo {self.name!r} (id {self.id}): max speed and acceleration must be above zero"
-            )
+            raise ValueError(f"servo {self.name!r} (id {self.id}): max speed and acceleration must be above zero")
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +260,7 @@ class Bus(ABC):
 
         Raises
         ------
-        PortMissing : still unplugged; call again later.
+        PortMissing, BusError : still unplugged, or not all servos are back; call again later.
         """
 
     @abstractmethod

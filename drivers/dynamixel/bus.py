@@ -112,12 +112,20 @@ class DynamixelBus(Bus):
         self._lost = False
 
     def reconnect(self) -> None:
-        """Take the port again and, if the bus was running, start from where the servos are now."""
+        """Take the port again and, if the bus was running, start from where the servos are now.
+
+        When that fails the bus counts as lost still, so that no goal goes out; call again later.
+        """
         self._port.closePort()
         self.open()
-        if self._running:
-            self._running = False
-            self.start()
+        if not self._running:
+            return
+        try:
+            self._start()
+        except BaseException:
+            self._lost = True
+            self._port.closePort()
+            raise
 
     def _release(self) -> None:
         self._port.closePort()
@@ -169,8 +177,10 @@ class DynamixelBus(Bus):
 
     def start(self) -> None:
         """Check every servo and switch it on where it stands; see :meth:`drivers.bus.Bus.start`."""
-        if self._running:
-            return
+        if not self._running:
+            self._start()
+
+    def _start(self) -> None:
         with self._losing():
             self._port.suspects.clear()
             startup.identify(self._registers, self.servos)
@@ -206,8 +216,8 @@ class DynamixelBus(Bus):
         if not self._running:
             return
         self._running = False
-        if self._lost:
-            self.reconnect()  # the adapter may be back; if it is not, this says so
+        if self._lost:  # the adapter may be back; if it is not, this says so
+            self.reconnect()
         with self._losing():
             startup.switch_off(self._registers, self.ids)
 

@@ -236,31 +236,18 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
 
     def _collect(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange:
         """The replies in ``data`` and in what still comes, whatever lies between them."""
-        reader, replies, late = StatusReader(), dict[int, StatusPacket](), 0
-        self._sort(port, reader.feed(data), wanted, replies)
-        while len(replies) < len(wanted) and late < _LATE_CHUNKS:
+        reader, box, late = StatusReader(), _Sorter(wanted), 0
+        box.take(reader.feed(data))
+        while len(box.replies) < len(wanted) and late < _LATE_CHUNKS:
             data = port.link.read(port.deadline_s)
             if not data:
-                self._sort(port, reader.flush(), wanted, replies)
+                box.take(reader.flush())
                 break
             late += time.monotonic() > port.deadline_s
-            self._sort(port, reader.feed(data), wanted, replies)
-        return _settle(port, wanted, replies, bool(reader.broken_frames or reader.noise_bytes))
-
-    def _sort(
-        self,
-        port: Port,
-        arrived: list[StatusPacket],
-        wanted: Mapping[int, int],
-        replies: dict[int, StatusPacket],
-    ) -> None:
-        for reply in arrived:
-            length = wanted.get(reply.id)
-            refused = bool(reply.error & 0x7F) and not reply.params
-            if reply.id in replies or length is None or (len(reply.params) != length and not refused):
-                port.stray += 1
-            else:
-                replies[reply.id] = reply
+            box.take(reader.feed(data))
+        port.stray += box.stray
+        corrupt = bool(reader.broken_frames or reader.noise_bytes or box.twice)
+        return _settle(port, wanted, box.unique(), corrupt)
 
     def _exchange_fast(self, port: Port, frame: bytes, devices: list[tuple[int, int]]) -> Exchange:
         size = packet.fast_reply_size(length for _, length in devices)
@@ -278,6 +265,36 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         finally:
             port.is_using = False
         return _settle(port, dict(devices), {reply.id: reply for reply in replies}, len(raw) >= size)
+
+
+class _Sorter:
+    """Sorts replies into those asked for and strays; two under one id are both worth nothing.
+
+    Parameters
+    ----------
+    wanted : data bytes expected, by servo id.
+    """
+
+    def __init__(self, wanted: Mapping[int, int]) -> None:
+        self._wanted = wanted
+        self.replies: dict[int, StatusPacket] = {}
+        self.twice: set[int] = set()
+        self.stray = 0
+
+    def take(self, arrived: list[StatusPacket]) -> None:
+        """Sort some more."""
+        for reply in arrived:
+            length = self._wanted.get(reply.id)
+            refused = bool(reply.error & 0x7F) and not reply.params
+            if length is None or (len(reply.params) != length and not refused):
+                self.stray += 1
+            elif self.replies.setdefault(reply.id, reply) is not reply:
+                self.twice.add(reply.id)
+                self.stray += 2
+
+    def unique(self) -> dict[int, StatusPacket]:
+        """Replies that came once."""
+        return {servo: reply for servo, reply in self.replies.items() if servo not in self.twice}
 
 
 def _settle(port: Port, wanted: Mapping[int, int], replies: dict[int, StatusPacket], corrupt: bool) -> Exchange:

@@ -350,6 +350,14 @@ def test_corrupt_replies_are_told_from_silence(wire: Wire, ours: tuple) -> None:
     assert packets.read4ByteTxRx(port, 1, POSITION)[:2] == (1, bare.COMM_SUCCESS)
 
 
+def test_two_answers_under_one_id_are_both_worth_nothing(wire: Wire, ours: tuple) -> None:
+    wire.answer = lambda packet: [encode_status(2, 0, four(1)), encode_status(2, 0, four(2))]
+    port, packets = ours
+    port.margin_s = 0.05
+    got = packets.read_group(port, [1, 2], POSITION, 4)
+    assert (got.replies, got.missing, got.corrupt) == ({}, (1, 2), True)
+
+
 def test_an_echo_is_stripped_and_no_reply_is_lost_with_it(wire: Wire, ours: tuple) -> None:
     answer = table({1: four(10), 2: four(20)})
 

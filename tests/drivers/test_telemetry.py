@@ -147,7 +147,7 @@ def test_torque_that_goes_without_a_word_is_noticed(wire: SimulatedBus, bus: Bus
 
 
 @pytest.mark.parametrize(
-    "fault", ["crc:2:every=3", "flip:2:every=3", "short:2:every=3", "noise:2:every=2", "wrongid:2:1:every=4"]
+    "fault", ["crc:2:every=3", "flip:2:every=3", "short:2:every=3", "noise:2:every=2", "wrongid:2:9:every=4"]
 )
 def test_damaged_answers_cost_a_cycle_and_give_no_wrong_value(wire: SimulatedBus, bus: Bus, fault: str) -> None:
     bus._port.margin_s = 0.05
@@ -161,6 +161,15 @@ def test_damaged_answers_cost_a_cycle_and_give_no_wrong_value(wire: SimulatedBus
         np.testing.assert_allclose(state.position_rad, 0.3, atol=0.01)
         assert state.fresh[FIRST]
         assert state.fresh[THIRD]
+    wire.clear()
+
+
+def test_a_servo_that_answers_under_anothers_id_gives_nobody_a_wrong_value(wire: SimulatedBus, bus: Bus) -> None:
+    bus._port.margin_s = 0.05
+    settle(bus, [0.3, -0.3, 0.1])
+    wire.fault("wrongid:1:7:every=3")
+    for _ in range(20):
+        np.testing.assert_allclose(bus.read().position_rad, [0.3, -0.3, 0.1], atol=0.01)
     wire.clear()
 
 
