@@ -1,4 +1,4 @@
-"""The child process of ``SimulatedBus(process=True)``: settings and commands come as JSON lines on standard input.
+"""The child process of ``SimulatedBus(process=True)``: settings (a JSON line), then commands, on standard input.
 
 It answers ``ready PATH`` (or ``error WHY``) on standard output and ends when standard input does, so it cannot
 outlive its parent however that one ends.
@@ -14,9 +14,11 @@ import time
 from typing import Any
 
 from drivers.errors import DriverError
+from drivers.priority import take_priority
 from drivers.sim.bus import SimulatedChain
+from drivers.sim.control import Commands
 from drivers.sim.device import SimulatedServo
-from drivers.sim.serve import Commands, PtyServer
+from drivers.sim.serve import PtyServer
 
 
 def build(settings: dict[str, Any]) -> PtyServer:
@@ -32,12 +34,12 @@ def build(settings: dict[str, Any]) -> PtyServer:
         baud=settings["baud"],
         wire=settings["wire"],
         latency_s=settings["latency_s"],
-        on_lines=Commands(chain),
+        on_line=Commands(chain).obey,
     )
     try:
         chain.faults.add(settings["faults"], now_s)
     except DriverError:
-        server.port.close()
+        server.close()
         raise
     return server
 
@@ -45,6 +47,7 @@ def build(settings: dict[str, Any]) -> PtyServer:
 def main() -> int:
     """Serve until standard input ends. An interrupt of the terminal is the parent's business."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    take_priority()  # a real servo is not kept waiting by a program that draws
     first = _first_line(sys.stdin.fileno())
     if not first:
         return 0

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
 import select
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import Any
 
 from drivers.sim.bus import SimulatedChain
+from drivers.sim.control import Commands, ControlSocket, Lines
 from drivers.sim.device import SimulatedServo
 from drivers.sim.faults import Fault
 from drivers.sim.ptyport import PtyPort
@@ -18,35 +17,6 @@ from drivers.sim.wire import Timed, WireTiming, instruction_size, without_timing
 
 PAUSE_S = 0.1
 """A packet that is not complete after this pause is given up."""
-
-
-class Commands:
-    """Carries out command lines (JSON): ``{"fault": [SPEC, ...]}`` and ``{"clear": KIND or null}``.
-
-    They run in the server's own loop, so a port is never pulled away while somebody waits on it.
-
-    Parameters
-    ----------
-    chain : the servos.
-    done : called after each line.
-    """
-
-    def __init__(self, chain: SimulatedChain, done: Callable[[], None] = lambda: None) -> None:
-        self._chain, self._done, self._rest = chain, done, b""
-
-    def __call__(self, data: bytes) -> None:
-        *lines, self._rest = (self._rest + data).split(b"\n")
-        for line in lines:
-            self._obey(json.loads(line))
-            self._done()
-
-    def _obey(self, message: dict[str, Any]) -> None:
-        now_s = time.monotonic()
-        with self._chain.lock:
-            if "fault" in message:
-                self._chain.faults.add(message["fault"], now_s)
-            if "clear" in message:
-                self._chain.faults.clear(message["clear"], now_s)
 
 
 class PtyServer:
@@ -59,7 +29,9 @@ class PtyServer:
     baud : bit rate while no client has set one.
     wire : bytes take their time.
     latency_s : USB latency timer, with `wire`.
-    on_lines : called with what arrives at the descriptor of `run`, to take commands; it ends the loop at EOF.
+    commands : where other programs may send commands (``drivers.sim.control``), or None.
+    on_line : called with each command line that arrives at the descriptor of `run`; None = anything there ends
+        the loop, as its end always does.
 
     Attributes
     ----------
@@ -74,13 +46,19 @@ class PtyServer:
         baud: int = 1_000_000,
         wire: bool = False,
         latency_s: float = 0.0,
-        on_lines: Callable[[bytes], None] | None = None,
+        commands: str | os.PathLike[str] | None = None,
+        on_line: Callable[[str], object] | None = None,
     ) -> None:
         self.chain, self.baud = chain, baud
-        self.port = PtyPort(link)
+        self._socket = ControlSocket(commands, Commands(chain).obey) if commands else None
+        try:
+            self.port = PtyPort(link)
+        except BaseException:
+            self._close_socket()
+            raise
         self._link = link
         self._timing = WireTiming(latency_s) if wire else None
-        self._on_lines = on_lines
+        self._on_line, self._lines = on_line, Lines()
         self._queue: deque[Timed] = deque()
         self._read_s = 0.0
         chain.on_unplug = self._unplug
@@ -89,22 +67,35 @@ class PtyServer:
         """Serve until the descriptor `control` reaches its end (or says anything, without `on_lines`)."""
         try:
             while True:
-                watched = [control, self.port.fileno()] if self.port.is_open else [control]
+                watched = [control, *(self._socket.descriptors if self._socket else ())]
+                watched += [self.port.fileno()] if self.port.is_open else []
                 ready, _, _ = select.select(watched, [], [], self._timeout())
                 if control in ready and not self._command(control):
                     return
+                if self._socket:
+                    self._socket.serve(ready)
                 if self.port.is_open and self.port.fileno() in ready:
                     self._receive()
                 self._work_off()
         finally:
-            self.port.close()
+            self.close()
+
+    def close(self) -> None:
+        """Take port, link and socket away; harmless when done."""
+        self.port.close()
+        self._close_socket()
+
+    def _close_socket(self) -> None:
+        if self._socket:
+            self._socket.close()
 
     def _command(self, control: int) -> bool:
         """Take commands; False when it is time to go."""
         data = os.read(control, 65536)
-        if not data or self._on_lines is None:
+        if not data or self._on_line is None:
             return False
-        self._on_lines(data)
+        for line in self._lines.feed(data):
+            self._on_line(line)
         return True
 
     def _timeout(self) -> float | None:
@@ -188,6 +179,7 @@ def serve_dynamixel(
     on_ready: Callable[[str], None] = lambda path: None,
     *,
     latency_s: float = 0.0,
+    commands: str | os.PathLike[str] | None = None,
     stop: int | None = None,
     seed: int = 0,
 ) -> None:
@@ -202,6 +194,7 @@ def serve_dynamixel(
     wire : bytes take their time at the bit rate, with return delay and `latency_s`.
     faults : specs, see ``drivers.sim.faults``.
     on_ready : called with the path to open as soon as clients may come.
+    commands : path of a socket that takes commands while it runs, see ``drivers.sim.control``.
     stop : descriptor; the end of it (or any byte) ends the service. None = until KeyboardInterrupt.
     seed : of random faults.
 
@@ -211,13 +204,13 @@ def serve_dynamixel(
     """
     now_s = time.monotonic()
     chain = SimulatedChain(make_servos(ids, model, baud, now_s), now_s, seed=seed)
-    server = PtyServer(chain, link, baud=baud, wire=wire, latency_s=latency_s)
+    server = PtyServer(chain, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
     reading, writing = os.pipe()
     try:
         chain.faults.add(faults, now_s)
         on_ready(server.port.path)
         server.run(reading if stop is None else stop)
     finally:
-        server.port.close()
+        server.close()
         os.close(reading)
         os.close(writing)

@@ -15,8 +15,9 @@ from typing import Any, Self
 
 from drivers.errors import PortError
 from drivers.sim.bus import SimulatedChain
+from drivers.sim.control import Commands
 from drivers.sim.faults import parse_fault
-from drivers.sim.serve import Commands, PtyServer, make_servos
+from drivers.sim.serve import PtyServer, make_servos
 
 START_S = 20.0
 """A child process that is not ready after this time is given up."""
@@ -148,11 +149,11 @@ class SimulatedBus:
         """
         for spec in specs:
             parse_fault(spec)
-        self._tell({"fault": specs})
+        self._tell(" ".join(("fault", *specs)))
 
     def clear(self, kind: str | None = None) -> None:
         """End the faults of a kind; None: all."""
-        self._tell({"clear": kind})
+        self._tell(f"clear {kind or ''}")
 
     def __enter__(self) -> Self:
         if self._process:
@@ -187,17 +188,22 @@ class SimulatedBus:
             baud=self.baud,
             wire=self._wire,
             latency_s=self._latency_s,
-            on_lines=Commands(chain, self._obeyed.set),
+            on_line=self._obey,
         )
         try:
             chain.faults.add(self._faults, now_s)
         except BaseException:
-            server.port.close()
+            server.close()
             raise
+        self._commands = Commands(chain)
         self._server, self._path = server, server.port.path
         reading, self._stop = os.pipe()
         self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
         self._thread.start()
+
+    def _obey(self, line: str) -> None:
+        self._commands.obey(line)
+        self._obeyed.set()
 
     # ------------------------------------------------------------ in a child process
     def _start_child(self) -> None:
@@ -210,17 +216,16 @@ class SimulatedBus:
             stdout=subprocess.PIPE,
             env=environment,
         )
-        self._tell(
-            {
-                "servos": self._servos,
-                "link": None if self._link is None else os.fspath(self._link),
-                "baud": self.baud,
-                "faults": self._faults,
-                "seed": self._seed,
-                "wire": self._wire,
-                "latency_s": self._latency_s,
-            }
-        )
+        settings = {
+            "servos": self._servos,
+            "link": None if self._link is None else os.fspath(self._link),
+            "baud": self.baud,
+            "faults": self._faults,
+            "seed": self._seed,
+            "wire": self._wire,
+            "latency_s": self._latency_s,
+        }
+        self._tell(json.dumps(settings))
         self._path = self._first_line(self._child)
 
     def _first_line(self, child: subprocess.Popen[bytes]) -> str:
@@ -237,9 +242,9 @@ class SimulatedBus:
         self._child = None
         raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
 
-    def _tell(self, message: dict[str, Any]) -> None:
+    def _tell(self, command: str) -> None:
         """Send a command; a bus in a thread has carried it out when this returns."""
-        line = json.dumps(message).encode() + b"\n"
+        line = command.encode() + b"\n"
         if self._child and self._child.stdin:
             self._child.stdin.write(line)
             self._child.stdin.flush()

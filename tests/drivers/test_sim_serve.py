@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import os
 import select
+import socket
 import threading
 import time
 from pathlib import Path
 
 import pytest
+import serial
 
 from drivers.dynamixel.packet import Instruction as I
 from drivers.dynamixel.packet import StatusReader, encode_instruction
 from drivers.errors import DriverError
 from drivers.sim.bus import SimulatedChain
-from drivers.sim.serve import PAUSE_S, Commands, PtyServer, make_servos, serve_dynamixel
+from drivers.sim.serve import PAUSE_S, PtyServer, make_servos, serve_dynamixel
 
 
 def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
@@ -99,13 +101,33 @@ def test_servos_from_ids_and_from_specs():
     ]
 
 
-def test_commands_in_pieces():
-    chain = SimulatedChain(make_servos([1], "xl330-m288", 1_000_000, 0.0))
-    done: list[int] = []
-    commands = Commands(chain, lambda: done.append(1))
-    commands(b'{"fault": ["mu')
-    assert done == []
-    commands(b'te:1", "echo"]}\n{"clear": "echo"}\n')
-    assert (len(done), [fault.kind for fault in chain.faults.active]) == (2, ["mute"])
-    commands(b'{"clear": null}\n')
-    assert chain.faults.active == []
+def test_another_program_sets_faults_through_the_socket(tmp_path: Path):
+    path, paths, ready = tmp_path / "control", [], threading.Event()
+    reading, writing = os.pipe()
+    thread = threading.Thread(
+        target=serve_dynamixel,
+        args=([1],),
+        kwargs={"commands": path, "stop": reading, "on_ready": lambda p: (paths.append(p), ready.set())},
+    )
+    thread.start()
+    try:
+        assert ready.wait(5)
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+            client.connect(str(path))
+            client.settimeout(5)
+            client.sendall(b"fault alert:1\n")
+            assert client.recv(99) == b"ok\n"
+            with serial.Serial(paths[0], 1_000_000, timeout=5) as port:
+                port.write(encode_instruction(1, I.PING))
+                assert StatusReader().feed(port.read(14))[0].alert
+    finally:
+        os.close(writing)
+        thread.join(5)
+        os.close(reading)
+    assert not path.exists()
+
+
+def test_a_port_that_cannot_be_made_leaves_no_socket(tmp_path: Path):
+    with pytest.raises(DriverError, match="cannot make the link"):
+        serve_dynamixel([1], link=tmp_path / "none" / "port", commands=tmp_path / "control")
+    assert os.listdir(tmp_path) == []
