@@ -1,8 +1,9 @@
 """Kernels that turn weights and control points into vertices and normals: Eq. (1) and Eq. (2) by cell.
 
-``state`` is (tiles * 12 * 8,) float32. Per tile of eight vertices: the denominator and its derivatives in u and v,
-then the x, y and z numerators of the position, of the derivative in u and of that in v. Numerators are those of
-positions relative to the cell's origin, which keeps float32 sums exact to a small part of the cell's size.
+Per tile of eight vertices, ``below`` (8 numbers) holds one over the denominator, ``bend`` (16) the derivatives of
+the denominator in u and in v, ``state`` (72) the x, y and z numerators of the position, of the derivative in u
+and of that in v. Numerators are those of positions relative to the cell's origin, which keeps float32 sums exact to a small part of
+the cell's size. Without normals ``bend`` is empty and ``state`` has 24 numbers per tile.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="call-arg, var-annotated, has-type"
@@ -10,13 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import kernel
+from .jit import inlined, kernel
 from .lanes import add, div, fma, load, mul, root, splat, store, store3, sub, zero
 
-STATE = 96  # numbers per tile in ``state``
 
-
-@kernel
+@inlined
 def gather(points, ids, first, rows, origin, c, local):
     """Copy a cell's control points, relative to its origin, into ``local (>= rows, 3)`` float32."""
     for k in range(rows):
@@ -26,7 +25,7 @@ def gather(points, ids, first, rows, origin, c, local):
         local[k, 2] = points[i, 2] - origin[c, 2]
 
 
-@kernel
+@inlined
 def sum_values(value, at, rows, local):
     """Three sums of one tile; four rows at a time so that additions do not wait for each other."""
     x0, y0, z0 = zero(), zero(), zero()
@@ -49,29 +48,29 @@ def sum_values(value, at, rows, local):
     return add(add(x0, x1), add(x2, x3)), add(add(y0, y1), add(y2, y3)), add(add(z0, z1), add(z2, z3))
 
 
-@kernel
-def sum_slopes(slope, at, rows, local):
-    """Six sums of one tile: numerators of the derivatives in u and in v."""
+@inlined
+def sum_all(value, slope, at, rows, local):
+    """Nine sums of one tile: the numerators of the position and of its derivatives in u and in v."""
+    x, y, z = zero(), zero(), zero()
     ax, ay, az, bx, by, bz = zero(), zero(), zero(), zero(), zero(), zero()
     for k in range(rows):
-        u, v = load(slope, at + 16 * k), load(slope, at + 16 * k + 8)
+        w = load(value, at + 8 * k)
+        u, v = load(slope, 2 * at + 16 * k), load(slope, 2 * at + 16 * k + 8)
+        x, y, z = fma(w, local[k, 0], x), fma(w, local[k, 1], y), fma(w, local[k, 2], z)
         ax, ay, az = fma(u, local[k, 0], ax), fma(u, local[k, 1], ay), fma(u, local[k, 2], az)
         bx, by, bz = fma(v, local[k, 0], bx), fma(v, local[k, 1], by), fma(v, local[k, 2], bz)
-    return ax, ay, az, bx, by, bz
+    return x, y, z, ax, ay, az, bx, by, bz
 
 
-@kernel
+@inlined
 def put(out, vertex, left, x, y, z, spare):
-    """Write eight vertices of ``out (m * 3,)``, or only ``left`` where the cell ends before."""
-    if left >= 8:
-        store3(out, 3 * vertex, x, y, z)
-        return
+    """Write the ``left`` last vertices of a cell, fewer than a tile has, to ``out (m * 3,)``."""
     store3(spare, 0, x, y, z)
     for j in range(3 * left):
         out[3 * vertex + j] = spare[j]
 
 
-@kernel
+@inlined
 def cross(ax, ay, az, bx, by, bz, sign):
     """Unit vectors along a x b, times ``sign``; zero where the product vanishes."""
     nx, ny = sub(mul(ay, bz), mul(az, by)), sub(mul(az, bx), mul(ax, bz))
@@ -81,105 +80,164 @@ def cross(ax, ay, az, bx, by, bz, sign):
     return mul(nx, scale), mul(ny, scale), mul(nz, scale)
 
 
-@kernel
-def finish(state, tile, vertex, left, origin, c, sums, sign, vertices, normals, spare):
-    """Vertices and normals of one tile from its sums; a normal is the direction of S_u x S_v (quotient rule)."""
-    base = tile * STATE
-    w = load(state, base)
-    x, y, z = div(sums[0], w), div(sums[1], w), div(sums[2], w)
-    ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
-    put(vertices, vertex, left, add(x, splat(ox)), add(y, splat(oy)), add(z, splat(oz)), spare)
-    if normals.shape[0] == 0:
-        return
-    wu, wv = load(state, base + 8), load(state, base + 16)
-    ax, ay, az = sub(sums[3], mul(x, wu)), sub(sums[4], mul(y, wu)), sub(sums[5], mul(z, wu))
-    bx, by, bz = sub(sums[6], mul(x, wv)), sub(sums[7], mul(y, wv)), sub(sums[8], mul(z, wv))
-    nx, ny, nz = cross(ax, ay, az, bx, by, bz, sign)
-    put(normals, vertex, left, nx, ny, nz, spare)
+@inlined
+def scaled(tile, x, y, z, below):
+    """Positions of one tile relative to the cell's origin, from their numerators."""
+    w = load(below, 8 * tile)
+    return mul(x, w), mul(y, w), mul(z, w)
+
+
+@inlined
+def directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend):
+    """Normals of one tile: the direction of S_u x S_v by the quotient rule, without its common factor."""
+    wu, wv = load(bend, 16 * tile), load(bend, 16 * tile + 8)
+    ax, ay, az = sub(ax, mul(x, wu)), sub(ay, mul(y, wu)), sub(az, mul(z, wu))
+    bx, by, bz = sub(bx, mul(x, wv)), sub(by, mul(y, wv)), sub(bz, mul(z, wv))
+    return cross(ax, ay, az, bx, by, bz, sign)
 
 
 @kernel
-def apply_cell(c, points, origin, lists, state, keep, sign, vertices, normals, local, spare):
-    """Compute one cell from its control points; ``keep`` also stores the numerators for later differences."""
-    cell_start, tile_start, rows, room, at, ids_at, ids, value, slope = lists
-    k = rows[c]
-    gather(points, ids, ids_at[c], k, origin, c, local)
-    vertex, end = cell_start[c], cell_start[c + 1]
-    place = at[c]
-    for tile in range(tile_start[c], tile_start[c + 1]):
-        x, y, z = sum_values(value, place, k, local)
-        sums = (x, y, z, x, y, z, x, y, z)
-        if slope.shape[0] > 0:
-            sums = (x, y, z) + sum_slopes(slope, 2 * place, k, local)  # noqa: RUF005 - numba
-        if keep:
-            for j in range(9):
-                store(state, tile * STATE + 24 + 8 * j, sums[j])
-        finish(state, tile, vertex, end - vertex, origin, c, sums, sign, vertices, normals, spare)
-        place += room[c] * 8
-        vertex += 8
+def positions(first, last, rows, room, at, tile, value, below, local, ox, oy, oz, vertices, spare):
+    """Compute one cell's positions from its gathered points."""
+    px, py, pz = splat(ox), splat(oy), splat(oz)
+    full = last - (last - first) % 8
+    for vertex in range(first, full, 8):
+        x, y, z = sum_values(value, at, rows, local)
+        x, y, z = scaled(tile, x, y, z, below)
+        store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
+        at += room * 8
+        tile += 1
+    if full < last:
+        x, y, z = sum_values(value, at, rows, local)
+        x, y, z = scaled(tile, x, y, z, below)
+        put(vertices, full, last - full, add(x, px), add(y, py), add(z, pz), spare)
+
+
+@inlined
+def both(rows, at, tile, sign, value, slope, below, bend, local):
+    """Positions relative to the origin and normals of one tile."""
+    x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, at, rows, local)
+    x, y, z = scaled(tile, x, y, z, below)
+    nx, ny, nz = directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend)
+    return x, y, z, nx, ny, nz
 
 
 @kernel
-def apply_cells(first, last, points, origin, lists, state, kept, sign, vertices, normals, local, spare):
-    """Compute cells first..last from their control points; their numerators are no longer kept."""
-    for c in range(first, last):
-        kept[c] = -1
-        apply_cell(c, points, origin, lists, state, False, sign, vertices, normals, local, spare)
+def shaded(
+    first, last, rows, room, at, tile, sign, value, slope, below, bend, local, ox, oy, oz, vertices, normals, spare
+):
+    """Compute one cell's positions and normals from its gathered points."""
+    px, py, pz = splat(ox), splat(oy), splat(oz)
+    full = last - (last - first) % 8
+    for vertex in range(first, full, 8):
+        x, y, z, nx, ny, nz = both(rows, at, tile, sign, value, slope, below, bend, local)
+        store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
+        store3(normals, 3 * vertex, nx, ny, nz)
+        at += room * 8
+        tile += 1
+    if full < last:
+        x, y, z, nx, ny, nz = both(rows, at, tile, sign, value, slope, below, bend, local)
+        put(vertices, full, last - full, add(x, px), add(y, py), add(z, pz), spare)
+        put(normals, full, last - full, nx, ny, nz, spare)
 
 
 @kernel
-def finish_cell(c, origin, lists, state, sign, vertices, normals, spare):
+def keep_sums(tiles, tile, rows, room, at, value, slope, local, state):
+    """Store the numerators of one cell for later differences."""
+    size = 72 if slope.shape[0] > 0 else 24
+    for t in range(tile, tile + tiles):
+        if slope.shape[0] == 0:
+            x, y, z = sum_values(value, at, rows, local)
+        else:
+            x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, at, rows, local)
+            store(state, t * size + 24, ax)
+            store(state, t * size + 32, ay)
+            store(state, t * size + 40, az)
+            store(state, t * size + 48, bx)
+            store(state, t * size + 56, by)
+            store(state, t * size + 64, bz)
+        store(state, t * size, x)
+        store(state, t * size + 8, y)
+        store(state, t * size + 16, z)
+        at += room * 8
+
+
+@kernel
+def finish_cell(first, last, tile, ox, oy, oz, sign, below, bend, state, vertices, normals, spare):
     """Vertices and normals of one cell from its kept numerators."""
-    cell_start, tile_start = lists[0], lists[1]
-    vertex, end = cell_start[c], cell_start[c + 1]
-    for tile in range(tile_start[c], tile_start[c + 1]):
-        base = tile * STATE + 24
-        sums = (
-            load(state, base),
-            load(state, base + 8),
-            load(state, base + 16),
-            load(state, base + 24),
-            load(state, base + 32),
-            load(state, base + 40),
-            load(state, base + 48),
-            load(state, base + 56),
-            load(state, base + 64),
-        )
-        finish(state, tile, vertex, end - vertex, origin, c, sums, sign, vertices, normals, spare)
-        vertex += 8
+    px, py, pz = splat(ox), splat(oy), splat(oz)
+    size = 72 if normals.shape[0] > 0 else 24
+    for vertex in range(first, last, 8):
+        base, left = tile * size, min(last - vertex, 8)
+        x, y, z = scaled(tile, load(state, base), load(state, base + 8), load(state, base + 16), below)
+        put(vertices, vertex, left, add(x, px), add(y, py), add(z, pz), spare)
+        if normals.shape[0] > 0:
+            ax, ay, az = load(state, base + 24), load(state, base + 32), load(state, base + 40)
+            bx, by, bz = load(state, base + 48), load(state, base + 56), load(state, base + 64)
+            nx, ny, nz = directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend)
+            put(normals, vertex, left, nx, ny, nz, spare)
+        tile += 1
 
 
 @kernel
-def add_row(c, row, dx, dy, dz, lists, state):
-    """Eq. (2): add b w dP of one control point to the numerators of one cell."""
-    tile_start, room, at, value, slope = lists[1], lists[3], lists[4], lists[7], lists[8]
-    place = at[c] + 8 * row
-    for tile in range(tile_start[c], tile_start[c + 1]):
-        base = tile * STATE + 24
+def apply_cells(
+    begin, end, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids, value, slope, below, bend, state,
+    kept, sign, vertices, normals, local, spare,
+):  # fmt: skip
+    """Compute cells begin..end from their control points; their numerators are no longer kept."""
+    for c in range(begin, end):
+        kept[c] = -1
+        gather(points, ids, ids_at[c], rows[c], origin, c, local)
+        ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
+        first, last = cell_start[c], cell_start[c + 1]
+        if slope.shape[0] == 0:
+            positions(
+                first, last, rows[c], room[c], at[c], tile_start[c], value, below, local, ox, oy, oz, vertices,
+                spare,
+            )  # fmt: skip
+        else:
+            shaded(
+                first, last, rows[c], room[c], at[c], tile_start[c], sign, value, slope, below, bend, local,
+                ox, oy, oz, vertices, normals, spare,
+            )  # fmt: skip
+
+
+@inlined
+def nudge(state, place, weights, number):
+    """``state[place : place + 8] += weights * number``."""
+    store(state, place, fma(weights, number, load(state, place)))
+
+
+@kernel
+def add_row(tiles, first_tile, place, step, dx, dy, dz, value, slope, state):
+    """Eq. (2): add b w dP of one control point to the numerators of one cell's tiles."""
+    size = 72 if slope.shape[0] > 0 else 24
+    base = first_tile * size
+    for _ in range(tiles):
         a = load(value, place)
-        store(state, base, fma(a, dx, load(state, base)))
-        store(state, base + 8, fma(a, dy, load(state, base + 8)))
-        store(state, base + 16, fma(a, dz, load(state, base + 16)))
+        nudge(state, base, a, dx)
+        nudge(state, base + 8, a, dy)
+        nudge(state, base + 16, a, dz)
         if slope.shape[0] > 0:
             u, v = load(slope, 2 * place), load(slope, 2 * place + 8)
-            store(state, base + 24, fma(u, dx, load(state, base + 24)))
-            store(state, base + 32, fma(u, dy, load(state, base + 32)))
-            store(state, base + 40, fma(u, dz, load(state, base + 40)))
-            store(state, base + 48, fma(v, dx, load(state, base + 48)))
-            store(state, base + 56, fma(v, dy, load(state, base + 56)))
-            store(state, base + 64, fma(v, dz, load(state, base + 64)))
-        place += room[c] * 8
+            nudge(state, base + 24, u, dx)
+            nudge(state, base + 32, u, dy)
+            nudge(state, base + 40, u, dz)
+            nudge(state, base + 48, v, dx)
+            nudge(state, base + 56, v, dy)
+            nudge(state, base + 64, v, dz)
+        place += step
+        base += size
 
 
 @kernel
-def mark(ids, count, back, hits, touched):
+def mark(ids, count, back_start, back_count, back_cell, hits, touched):
     """Cells reached by the first ``count`` of ``ids``: returns their number, fills ``touched``, counts ``hits``."""
-    start, number, cell, _ = back
     total = 0
     for q in range(count):
         i = ids[q]
-        for e in range(start[i], start[i] + number[i]):
-            c = cell[e]
+        for e in range(back_start[i], back_start[i] + back_count[i]):
+            c = back_cell[e]
             if hits[c] == 0:
                 touched[total] = c
                 total += 1
@@ -189,37 +247,53 @@ def mark(ids, count, back, hits, touched):
 
 
 @kernel
+def choose(total, touched, hits, kept, rows, limit, bias):
+    """Per touched cell, take differences (``kept`` >= 0 counts them) or compute it anew (-1)."""
+    for q in range(total):
+        c = touched[q]
+        if kept[c] >= 0 and kept[c] + hits[c] <= limit and bias * hits[c] < rows[c]:
+            kept[c] += hits[c]
+        else:
+            kept[c] = -1
+
+
+@kernel
 def update(
-    ids, count, delta, points, origin, lists, back, state, kept, sign, vertices, normals, local, spare, hits,
-    touched, limit, bias,
+    ids, count, delta, hits, touched, limit, bias, back_start, back_count, back_cell, back_row, points, origin,
+    cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope, below, bend, state, kept, sign, vertices,
+    normals, local, spare,
 ):  # fmt: skip
     """Bring all cells that the moved points reach up to date; returns how many there are.
 
     Per cell the cheaper way is taken: differences cost one row each, computing anew costs all rows. A cell is
     also computed anew when it has not kept its numerators, or has taken more than ``limit`` differences.
     """
-    total = mark(ids, count, back, hits, touched)
-    for q in range(total):
-        c = touched[q]
-        fits = kept[c] >= 0 and kept[c] + hits[c] <= limit and bias * hits[c] < lists[2][c]
-        if fits:
-            kept[c] += hits[c]
-        else:
-            kept[c] = -1
+    total = mark(ids, count, back_start, back_count, back_cell, hits, touched)
+    choose(total, touched, hits, kept, rows, limit, bias)
     for q in range(count):
         i = ids[q]
         dx, dy, dz = np.float32(delta[q, 0]), np.float32(delta[q, 1]), np.float32(delta[q, 2])
-        for e in range(back[0][i], back[0][i] + back[1][i]):
-            if kept[back[2][e]] >= 0:
-                add_row(back[2][e], back[3][e], dx, dy, dz, lists, state)
+        for e in range(back_start[i], back_start[i] + back_count[i]):
+            c = back_cell[e]
+            if kept[c] >= 0:
+                tiles, place = tile_start[c + 1] - tile_start[c], at[c] + 8 * back_row[e]
+                add_row(tiles, tile_start[c], place, room[c] * 8, dx, dy, dz, value, slope, state)
     for q in range(total):
         c = touched[q]
+        if kept[c] < 0 and bias * hits[c] < rows[c]:  # few points, perhaps again next time: keep numerators
+            gather(points, ids_of, ids_at[c], rows[c], origin, c, local)
+            tiles = tile_start[c + 1] - tile_start[c]
+            keep_sums(tiles, tile_start[c], rows[c], room[c], at[c], value, slope, local, state)
+            kept[c] = 0
         if kept[c] >= 0:
-            finish_cell(c, origin, lists, state, sign, vertices, normals, spare)
+            ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
+            first, last = cell_start[c], cell_start[c + 1]
+            finish_cell(first, last, tile_start[c], ox, oy, oz, sign, below, bend, state, vertices, normals, spare)
         else:
-            few = bias * hits[c] < lists[2][c]  # a few points again next time: keep numerators for it
-            kept[c] = 0 if few else -1
-            apply_cell(c, points, origin, lists, state, few, sign, vertices, normals, local, spare)
+            apply_cells(
+                c, c + 1, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope,
+                below, bend, state, kept, sign, vertices, normals, local, spare,
+            )  # fmt: skip
         hits[c] = 0
     return total
 
@@ -241,9 +315,8 @@ def difference(ids, xyz, points, changed, delta):
 
 
 @kernel
-def denominators(cells, lists, state):
-    """Sum the weights of the given cells; returns the first vertex that nothing covers, or -1."""
-    cell_start, tile_start, rows, room, at, _, _, value, slope = lists
+def denominators(cells, cell_start, tile_start, rows, room, at, value, slope, below, bend):
+    """Sum the weights of the given cells."""
     for q in range(cells.shape[0]):
         c = cells[q]
         for tile in range(tile_start[c], tile_start[c + 1]):
@@ -256,14 +329,11 @@ def denominators(cells, lists, state):
                     if slope.shape[0] > 0:
                         wu += slope[2 * place + j]
                         wv += slope[2 * place + 8 + j]
-                vertex = cell_start[c] + 8 * t + j
-                if vertex >= cell_start[c + 1]:
-                    w = 1.0
-                if w <= 0.0:
-                    return vertex
-                base = tile * STATE + j
-                state[base], state[base + 8], state[base + 16] = w, wu, wv
-    return -1
+                if cell_start[c] + 8 * t + j >= cell_start[c + 1]:
+                    w = 1.0  # lanes that fill up the last tile
+                below[8 * tile + j] = 1.0 / w
+                if slope.shape[0] > 0:
+                    bend[16 * tile + j], bend[16 * tile + 8 + j] = wu, wv
 
 
 @kernel

@@ -59,7 +59,10 @@ class Deformation:
         self._origin = np.zeros((cells, 3))
         if m:
             self._origin[:] = np.add.reduceat(self.mesh.vertices, starts) / np.diff(self.mesh.cell_start)[:, None]
-        self._state = np.zeros(int(self._lists.tile_start[-1]) * 96, dtype=np.float32)
+        tiles = int(self._lists.tile_start[-1])
+        self._below = np.zeros(tiles * 8, dtype=np.float32)
+        self._bend = np.zeros(tiles * 16 if normals else 0, dtype=np.float32)
+        self._state = np.zeros(tiles * (72 if normals else 24), dtype=np.float32)
         self._kept = np.full(cells, -1, dtype=np.int64)
         self._vertices = np.zeros(3 * m, dtype=np.float32)
         self._normals = np.zeros(3 * m if normals else 0, dtype=np.float32)
@@ -192,8 +195,8 @@ class Deformation:
             self.refresh()
             return
         total = apply.update(
-            self._changed_ids, moved, self._delta, self._points, self._origin, self._tables(), self._back(),
-            *self._inputs()[3:], self._hits, self._touched, LIMIT, BIAS,
+            self._changed_ids, moved, self._delta, self._hits, self._touched, LIMIT, BIAS, *self._back(),
+            *self._inputs(),
         )  # fmt: skip
         self._count = apply.ranges(self._touched, total, self._lists.cell_start, GAP, self._ranges)
 
@@ -212,10 +215,13 @@ class Deformation:
         )  # fmt: skip
         return cells
 
-    def _sum_weights(self, cells: np.ndarray) -> int:
+    def _sum_weights(self, cells: np.ndarray) -> None:
         from . import apply
 
-        return apply.denominators(cells, self._tables(), self._state)
+        x = self._lists
+        apply.denominators(
+            cells, x.cell_start, x.tile_start, x.rows, x.room, x.at, x.value, x.slope, self._below, self._bend
+        )
 
     def _recompute(self, cells: np.ndarray) -> None:
         """Denominators and vertices of the given rising cells."""
@@ -240,7 +246,7 @@ class Deformation:
 
     def _inputs(self) -> tuple:
         return (
-            self._points, self._origin, self._tables(), self._state, self._kept, self._sign,
+            self._points, self._origin, *self._tables(), self._below, self._bend, self._state, self._kept, self._sign,
             self._vertices, self._normals, self._local, self._spare,
         )  # fmt: skip
 
