@@ -47,7 +47,8 @@ class DynamixelBus(Bus):
     feedback : ``"full"`` reads velocity and current with every position, ``"position"`` only the position.
     fast : use fast sync read where every servo's firmware has it.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
-    slow_group : servos asked for one slow value each cycle.
+    slow_group : servos asked for one slow value (torque, error, watchdog, supply) each cycle; 0 asks only about
+        servos that raise an alert.
     faults : only a simulated bus takes any.
     clock : monotonic seconds.
     policy : fields of :class:`~drivers.dynamixel.startup.Policy`, such as ``watchdog_ms``.

@@ -80,7 +80,7 @@ class Telemetry:
         self._registers, self._packets, self._port = registers, registers.packets, registers.port
         self.ids = tuple(ids)
         self.report = report
-        self._options = (feedback, fast, max(slow_group, 1))
+        self._options = (feedback, fast, max(slow_group, 0))
         n = len(self.ids)
         self._ticks, self._speed, self._current = (np.full(n, np.nan) for _ in range(3))
         self._volts, self._celsius = np.full(n, np.nan), np.full(n, np.nan)
@@ -142,8 +142,9 @@ class Telemetry:
             self._revive(clock())
         for group in self._groups:
             self._read(group, clock)
-        group, block, ids = self._urgent.popleft() if self._urgent else next(self._turns)
-        self._slow(group, block, ids, running)
+        turn = self._urgent.popleft() if self._urgent else next(self._turns, None)
+        if turn is not None:
+            self._slow(*turn, running)
 
     def ask_watchdogs(self) -> None:
         """Look at every servo's watchdog now."""
@@ -263,15 +264,19 @@ class Telemetry:
                 self._look_at(servo)
 
     def _rota(self) -> Iterator[tuple[Group, Block, tuple[int, ...]]]:
-        """Slow values in turn, some servos at a time, for ever."""
+        """Slow values in turn, some servos at a time, for ever; none where the size is 0."""
         size = self._options[2]
-        turns = [
-            (group, block, group.ids[at : at + size])
-            for group in self._groups
-            for block in group.layout.slow
-            for at in range(0, len(group.ids), size)
-        ]
-        while True:
+        turns = (
+            []
+            if not size
+            else [
+                (group, block, group.ids[at : at + size])
+                for group in self._groups
+                for block in group.layout.slow
+                for at in range(0, len(group.ids), size)
+            ]
+        )
+        while turns:
             yield from turns
 
     def _slow(self, group: Group, block: Block, ids: Sequence[int], running: bool) -> None:
