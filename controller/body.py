@@ -28,7 +28,7 @@ from controller.livelink import Take, TakePlayer
 from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS, Parameters
 from controller.stage import Stage, load_stage
-from controller.wire import BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
+from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
 
 Floats = NDArray[np.float64]
 
@@ -60,6 +60,7 @@ class Body:
         self._mailbox = mailbox
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping = threading.Event()
+        self._begun = threading.Event()
         self._error: Exception | None = None
         self._closers = ExitStack()
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
@@ -74,23 +75,33 @@ class Body:
         return self.player is not None and self.player.finished
 
     def start(self) -> None:
-        """Bring up buses first, then links: no command is taken before the servos stand.
+        """Bring the servos up where they stand, and keep them there.
 
         Raises
         ------
-        ControllerError, DriverError
-            when a port, servo or link does not come up; what was up is shut down again.
+        DriverError
+            when a port or servo does not come up; what was up is shut down again.
         """
         try:
             for bus in self.buses:
                 bus.start()
                 self._closers.callback(bus.stop)
-            if self.player is None:
-                self.links = open_links(self.stage.settings.links, self.state, self._closers)
             self._thread.start()
         except BaseException:
             self._closers.close()
             raise
+
+    def begin(self) -> None:
+        """Open the links, or start the take.
+
+        Raises
+        ------
+        LinkError, PortError
+            when a link does not come up.
+        """
+        if self.player is None:
+            self.links = open_links(self.stage.settings.links, self.state, self._closers)
+        self._begun.set()
 
     def check(self) -> None:
         """Raise what ended one of the loops, if any did."""
@@ -115,7 +126,7 @@ class Body:
         values = self._newest[0].copy()
         last = time.monotonic_ns()
         for now in self.clock.run(lambda: not self._stopping.is_set()):
-            if self.player is not None:
+            if self.player is not None and self._begun.is_set():
                 self.player.tick(now)
             stamp = self.state.tick(now, (now - last) / 1e9, values)
             last = now
@@ -172,7 +183,7 @@ def _wait(body: Body, pipe: Connection, stop: threading.Event) -> None:
     """Serve main until it says stop or is gone, a signal comes, or a bus gave up."""
     told = False
     while not stop.is_set():
-        if pipe.poll(_POLL_S) and not _obey(body.state, pipe):
+        if pipe.poll(_POLL_S) and not _obey(body, pipe):
             return
         if body.finished and not told:
             _tell(pipe, Finished())
@@ -180,14 +191,16 @@ def _wait(body: Body, pipe: Connection, stop: threading.Event) -> None:
         body.check()
 
 
-def _obey(state: CommandState, pipe: Connection) -> bool:
-    """Do what main's panel wants; False when it said stop or is gone."""
+def _obey(body: Body, pipe: Connection) -> bool:
+    """Do what main or its panel wants; False when it said stop or is gone."""
     try:
         wish = pipe.recv()
     except (EOFError, OSError):
         return False
-    now = time.monotonic_ns()
+    state, now = body.state, time.monotonic_ns()
     match wish:
+        case Begin():
+            body.begin()
         case Hold(index, None):
             state.release([index], now)
         case Hold(index, float(value)):

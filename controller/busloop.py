@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from controller.channels import build_table, limiter_of, servo_specs
 from controller.clock import Clock, Samples
 from controller.parameters import Parameters
-from controller.priority import take_priority
 from controller.robot import BusSettings, ChannelSettings
 from drivers import open_bus
 from drivers.bus import Bus, BusState
 from drivers.errors import DriverError, PortLost
+from drivers.priority import take_priority
 
 log = logging.getLogger(__name__)
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-
-if TYPE_CHECKING:
-    from controller.session import Session
 
 console = Console(highlight=False)
 
@@ -19,6 +16,7 @@ Headless = Annotated[bool, typer.Option("--headless", help="Open no window even 
 Pictures = Annotated[
     Path | None, typer.Option("--pictures", help="Folder for a contact sheet and a clip (headless only).")
 ]
+NoFace = Annotated[bool, typer.Option("--no-face", help="Draw nothing: links and servos only, needs no OpenGL.")]
 StageName = Annotated[str, typer.Option("--stage", help="Stage: a name from configs/stages or a file.")]
 
 
@@ -41,17 +39,11 @@ def demo(
 
     Example: omote demo --seconds 5 --headless
     """
-    from controller.session import Session, has_display, write_report
+    from controller.session import has_display
 
     windowed = has_display() and not headless
-    session = Session.load("demo")
-    if windowed:
-        session.run_window(seconds)
-        return
-    report = session.run_headless(seconds or 15.0, pictures=out)
-    report["written"].append(str(out / "report.json"))
-    write_report(report, out / "report.json")
-    show_report(report)
+    pictures, report = (None, None) if windowed else (out, out / "report.json")
+    _run("demo", None, seconds if windowed else seconds or 15.0, headless, False, pictures, report)
 
 
 def run(
@@ -60,6 +52,7 @@ def run(
     headless: Headless = False,
     report: ReportFile = None,
     pictures: Pictures = None,
+    no_face: NoFace = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Open no port and move nothing; show what would be sent.")
     ] = False,
@@ -68,13 +61,12 @@ def run(
 
     Example: omote run everything --headless --seconds 20 --report r.json
     """
-    from controller.session import Session
-
-    session = Session.load(stage)
     if dry_run:
-        show_plan(session.plan())
-        return
-    _run_and_report(session, seconds, headless, pictures, report)
+        from controller.session import Session
+
+        show_plan(Session.load(stage).plan())
+    else:
+        _run(stage, None, seconds, headless, no_face, pictures, report)
 
 
 def play(
@@ -84,29 +76,37 @@ def play(
     headless: Headless = False,
     report: ReportFile = None,
     pictures: Pictures = None,
+    no_face: NoFace = False,
 ) -> None:
     """Play a recorded take on the face and the servo head, at the take's own rate.
 
     Example: omote play alex_rom_3.csv --headless --report r.json
     """
-    from controller.session import Session
-
-    session = Session.load(stage, take=take)
-    _run_and_report(session, seconds, headless, pictures, report)
+    _run(stage, take, seconds, headless, no_face, pictures, report)
 
 
-def _run_and_report(
-    session: Session, seconds: float | None, headless: bool, pictures: Path | None, report: Path | None
+def _run(
+    stage: str,
+    take: Path | None,
+    seconds: float | None,
+    headless: bool,
+    no_face: bool,
+    pictures: Path | None,
+    report: Path | None,
 ) -> None:
-    from controller.session import has_display, write_report
+    from controller.session import Session, has_display, write_report
 
-    if headless or not has_display():
-        measured = session.run_headless(seconds, pictures=pictures)
-    else:
-        measured = session.run_window(seconds)
-    if report is not None:
-        write_report(measured, report)
-        measured["written"].append(str(report))
+    with console.status("starting") as status:
+        session = Session.load(stage, take, status.update)
+        if no_face:
+            measured = session.run_without_face(seconds)
+        elif headless or not has_display():
+            measured = session.run_headless(seconds, pictures)
+        else:
+            measured = session.run_window(seconds)
+        if report is not None:
+            write_report(measured, report)
+            measured["written"].append(str(report))
     show_report(measured)
 
 

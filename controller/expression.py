@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,10 +15,14 @@ from controller.errors import ParameterError
 from controller.parameters import Floats, Parameters, did_you_mean, file_error, fold, read_toml
 from controller.paths import config_dir
 
+if TYPE_CHECKING:
+    from controller.facs import Facs
+
 KINDS = ("emotion", "gesture", "user")
 OVERRIDES = ("keep", "block", "blend")
 _KEYS = {"kind", "aliases", "source", "onset_s", "offset_s", "blink", "gaze", "weights"}
 _RISE_S = 0.4
+_FORMULA = re.compile(r"(AU|AD)[LR]?\d", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +54,17 @@ class Vocabulary:
     ----------
     expressions : the expressions, in file order.
     aliases : folded other names to canonical ones.
+    facs : gives the action units; without, formulas of them are unknown names.
     """
 
-    def __init__(self, expressions: dict[str, Expression], aliases: dict[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        expressions: dict[str, Expression],
+        aliases: dict[str, str] | None = None,
+        facs: Callable[[], Facs] | None = None,
+    ) -> None:
         self._expressions = expressions
+        self._facs = facs
         self._lookup = {fold(name): name for name in expressions} | (aliases or {})
 
     @classmethod
@@ -67,7 +81,7 @@ class Vocabulary:
         aliases = reader.aliases(expressions)
         if reader.faults:
             raise file_error(path, reader.faults)
-        return cls(expressions, aliases)
+        return cls(expressions, aliases, cache(lambda: _facs(parameters)))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -75,7 +89,14 @@ class Vocabulary:
         return tuple(self._expressions)
 
     def __getitem__(self, name: str) -> Expression:
-        """The expression called ``name``, any case. Raises ParameterError with the nearest names."""
+        """The expression called ``name``, any case, or of a formula of action units such as ``AU1+2+5B``.
+
+        Raises
+        ------
+        ParameterError : unknown name, with the nearest ones, or a wrong formula.
+        """
+        if self._facs is not None and _FORMULA.match(name):
+            return Expression(name.upper(), self._facs().expand(name), source="FACS")
         found = self._lookup.get(name) or self._lookup.get(fold(name))
         if found is None:
             raise ParameterError(
@@ -164,6 +185,12 @@ class _Reader:
             self.faults.append(f"{name}.{key}: must be one of {', '.join(known)} (is {value!r})")
             return default
         return str(value)
+
+
+def _facs(parameters: Parameters) -> Facs:
+    from controller.facs import Facs  # it needs this module
+
+    return Facs.load(parameters)
 
 
 def sides(parameters: Parameters, name: str) -> list[int]:

@@ -7,7 +7,8 @@ from typing import Any
 
 def rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and value of everything worth showing of a run's report."""
-    return [*_face(report["face"]), *_control(report), *_buses(report.get("buses", []))]
+    face = report.get("face")
+    return [*(_face(face) if face else []), *_control(report), *_buses(report.get("buses", []))]
 
 
 def _face(face: dict[str, Any]) -> list[tuple[str, str]]:

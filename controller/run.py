@@ -13,7 +13,7 @@ from controller.errors import ControllerError
 from controller.mailbox import Mailbox
 from controller.parameters import Parameters
 from controller.stage import Stage
-from controller.wire import BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show, Stop
+from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show, Stop
 
 _START_TIMEOUT_S = 60.0
 _STOP_TIMEOUT_S = 30.0
@@ -43,7 +43,7 @@ class BodyProcess:
         theirs.close()
 
     def wait_ready(self) -> Ready:
-        """Wait until servos and links are up.
+        """Wait until the servos stand.
 
         Raises
         ------
@@ -54,6 +54,10 @@ class BodyProcess:
         if not isinstance(message, Ready):
             raise ControllerError(f"the body said {message!r} before it was ready")
         return message
+
+    def begin(self) -> None:
+        """Let commands in: open the links, or start the take."""
+        self.tell(Begin())
 
     def alive(self) -> bool:
         """Whether the body still runs and has something to play; takes in what it said.
@@ -67,8 +71,8 @@ class BodyProcess:
             self._take_in(self._receive(0.0))
         return not self.finished
 
-    def tell(self, wish: Hold | Show | Calm) -> None:
-        """Pass on what the panel wants."""
+    def tell(self, wish: Begin | Hold | Show | Calm) -> None:
+        """Pass on what main or its panel wants."""
         with suppress(OSError):  # a body that is gone is told by alive()
             self._pipe.send(wish)
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +16,18 @@ from controller.files import replacing
 from controller.parameters import PARAMETERS
 from controller.pictures import write_pictures
 from controller.plan import plan_rows
-from controller.priority import yield_to_servos
 from controller.run import BodyProcess, Deadline
 from controller.signals import stop_flag
 from controller.stage import Stage, load_stage
+from drivers.priority import yield_to_servos
 
 if TYPE_CHECKING:
     from surface.head import Head
+
+
+Tell = Callable[[str], None]
+
+_IDLE_S = 0.05
 
 
 def has_display() -> bool:
@@ -36,20 +44,22 @@ class Session:
     ----------
     stage : what to run.
     take : a recorded take to play instead of the stage's links.
+    tell : hears in a few words what is being done.
     """
 
-    def __init__(self, stage: Stage, take: Path | None = None) -> None:
+    def __init__(self, stage: Stage, take: Path | None = None, tell: Tell = lambda _: None) -> None:
         self.stage = stage
         self.take = take
+        self.tell = tell
 
     @classmethod
-    def load(cls, stage: str, take: Path | None = None) -> Session:
+    def load(cls, stage: str, take: Path | None = None, tell: Tell = lambda _: None) -> Session:
         """Find and check a stage and, where given, a take; raises before anything is opened."""
         if take is not None:
             from controller.livelink import Take
 
             Take.load(take, PARAMETERS)
-        return cls(load_stage(stage, PARAMETERS), take)
+        return cls(load_stage(stage, PARAMETERS), take, tell)
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display; returns the report.
@@ -61,16 +71,15 @@ class Session:
         """
         recorder = Recorder() if pictures else None
         with stop_flag() as flag, self._body() as body:
-            face = self._headless_face(body, recorder)
-            body.wait_ready()
-            deadline = Deadline(seconds)
+            values, head = self._head(body)
+            face = HeadlessFace(head, self.stage.settings.face, values, recorder)
             try:
-                face.run(lambda: not flag.is_set() and deadline() and body.alive())
+                face.run(self._begin(body, flag, seconds))
             finally:
                 face.close()
-            body.stop()
-            report = self._report(face.report(), body)
+            report = self._end(body, face.report())
         if recorder is not None and pictures is not None:
+            self.tell("writing the pictures")
             report["written"] = write_pictures(recorder, pictures)
         return report
 
@@ -79,38 +88,47 @@ class Session:
         from controller.window import WindowFace
 
         with stop_flag() as flag, self._body() as body:
-            yield_to_servos()
-            head = load_head(self.stage)
-            values = HeadValues(body.mailbox, PARAMETERS, head.parameters)
+            values, head = self._head(body)
             face = WindowFace(head, self.stage.settings.face, values, body)
-            body.wait_ready()
-            deadline = Deadline(seconds)
-            face.run(lambda: not flag.is_set() and deadline() and body.alive())
-            body.stop()
-            return self._report(face.report(), body)
+            face.run(self._begin(body, flag, seconds))
+            return self._end(body, face.report())
+
+    def run_without_face(self, seconds: float | None) -> dict[str, Any]:
+        """Run links and servos only, as on a robot without OpenGL; returns the report."""
+        with stop_flag() as flag, self._body() as body:
+            keep_going = self._begin(body, flag, seconds)
+            while keep_going():
+                time.sleep(_IDLE_S)
+            return self._end(body, None)
 
     def _body(self) -> BodyProcess:
+        self.tell("starting")
         return BodyProcess(self.stage, PARAMETERS, self.take)
 
-    def _headless_face(self, body: BodyProcess, recorder: Recorder | None) -> HeadlessFace:
-        yield_to_servos()
-        head = load_head(self.stage)
-        values = HeadValues(body.mailbox, PARAMETERS, head.parameters)
-        return HeadlessFace(head, self.stage.settings.face, values, recorder)
+    def _head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
+        """The head and its values; the servos come up meanwhile in the body's process."""
+        from surface.head import Head
 
-    def _report(self, face: dict[str, object], body: BodyProcess) -> dict[str, Any]:
+        yield_to_servos()
+        head = Head.load(self.stage.head)
+        return HeadValues(body.mailbox, PARAMETERS, head.parameters), head
+
+    def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:
+        """Wait for the servos, let commands in; gives the question whether to go on."""
+        body.wait_ready()
+        body.begin()
+        self.tell("running" + (f" for {seconds:g} s" if seconds else ""))
+        deadline = Deadline(seconds)
+        return lambda: not flag.is_set() and deadline() and body.alive()
+
+    def _end(self, body: BodyProcess, face: dict[str, object] | None) -> dict[str, Any]:
+        self.tell("bringing the servos to rest")
+        body.stop()
         return {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}
 
     def plan(self) -> list[dict[str, str]]:
         """What each channel would be sent: its chain in words and its angle for a neutral face."""
         return [row for robot in self.stage.robots for row in plan_rows(robot, PARAMETERS)]
-
-
-def load_head(stage: Stage) -> Head:
-    """The stage's head, ready to pose."""
-    from surface.head import Head
-
-    return Head.load(stage.head)
 
 
 def write_report(report: dict[str, Any], path: Path) -> None:

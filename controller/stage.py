@@ -91,7 +91,7 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
         _collect(
             faults,
             f"robots[{i}]",
-            lambda robot=robot: load_robot(find_config("robots", robot, beside=path), parameters),  # type: ignore[misc]
+            lambda robot=robot: load_robot(find_config("robots", robot, beside=path), parameters),
         )
         for i, robot in enumerate(settings.robots)
     ]

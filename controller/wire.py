@@ -22,6 +22,11 @@ class BodyOrders:
 
 
 @dataclass(frozen=True)
+class Begin:
+    """Main to body: the face is there; open the links, or start the take."""
+
+
+@dataclass(frozen=True)
 class Stop:
     """Main to body: stop the servos and end."""
 
@@ -57,7 +62,7 @@ class Calm:
 
 @dataclass(frozen=True)
 class Ready:
-    """The body is up.
+    """The servos stand; the body waits for :class:`Begin`.
 
     Attributes
     ----------

@@ -92,6 +92,7 @@ def test_one_line_moves_the_servo_and_the_picture(
         values = HeadValues(mailbox, PARAMETERS, head.parameters)
         body = Body(stage, PARAMETERS, mailbox)
         body.start()
+        body.begin()
         try:
             closed = screen.render(values(), Camera.front()).astype(int)
             rest = servos.servo(JAW_ID).position_ticks
@@ -121,6 +122,7 @@ def test_a_refused_line_changes_nothing(tmp_path: Path, root: Path, host: Host, 
     with Mailbox.create(len(PARAMETERS.names)) as mailbox:
         body = Body(stage, PARAMETERS, mailbox)
         body.start()
+        body.begin()
         try:
             assert host.say("SET jawOpen 0.5").startswith("OK")
             jaw = PARAMETERS.index("jawOpen")
