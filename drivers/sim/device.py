@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 
 from drivers.dynamixel.packet import ALERT, ErrorNumber
 from drivers.dynamixel.tables import Item, load_table
@@ -322,7 +323,8 @@ class SimulatedServo:
             "Operating Mode": self._write_mode,
             "Hardware Error Status": lambda value, now_s: None,
         }
-        effects.update(dict.fromkeys(GOALS | {"Moving Speed"}, self._write_goal))
+        for name in GOALS | {"Moving Speed"}:
+            effects[name] = partial(self._write_goal, name)
         effects.update(dict.fromkeys(("ID", "Secondary(Shadow) ID", "Baud Rate"), self._write_address))
         for name in self.table:
             if name.startswith("Indirect Address"):
@@ -350,10 +352,11 @@ class SimulatedServo:
         if bool(value) != self.plant.powered:
             self._set_power(bool(value), now_s)
 
-    def _write_goal(self, value: int, now_s: float) -> None:
-        """A goal moves a powered motor. Drive Mode bit 3: it also switches the motor on."""
+    def _write_goal(self, name: str, value: int, now_s: float) -> None:
+        """The goal of the present mode moves a powered motor; with Drive Mode bit 3 any goal powers it."""
         if self.plant.powered:
-            self.drive.plan(now_s)
+            if name in self.drive.goals:
+                self.drive.plan(now_s)
         elif self.table.goal_torque and self.registers.get("Drive Mode") & GOAL_TORQUE and not self.shut_down:
             self.registers.put("Torque Enable", 1)
             self._set_power(True, now_s)

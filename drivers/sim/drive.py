@@ -30,6 +30,16 @@ OVERLOAD_AFTER_S = 1.0
 _PROFILE = struct.Struct("<IIi")
 """Profile Acceleration, Profile Velocity and Goal Position, which lie side by side in every X-series table."""
 
+_GOALS = {
+    CURRENT: ("Goal Current",),
+    VELOCITY: ("Goal Velocity",),
+    POSITION: ("Goal Position",),
+    EXTENDED: ("Goal Position",),
+    CURRENT_POSITION: ("Goal Position", "Goal Current"),
+    PWM: ("Goal PWM",),
+}
+"""Goal registers that move the motor, by Operating Mode."""
+
 _CODES = {(1, False): "B", (1, True): "b", (2, False): "H", (2, True): "h", (4, False): "I", (4, True): "i"}
 _SENSED = (
     "Realtime Tick",
@@ -57,6 +67,10 @@ class Drive:
     registers : its memory.
     plant : its shaft.
     now_s : when it is switched on.
+
+    Attributes
+    ----------
+    goals : names of the registers that move the motor in the present mode.
     """
 
     def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
@@ -75,6 +89,7 @@ class Drive:
         self.side, self.mirror, self.offset, self.mode = 1, 0.0, 0, POSITION
         self.top_speed = plant.top_speed
         self.timed, self.reach = False, math.inf
+        self.goals: tuple[str, ...] = ("Goal Position", "Moving Speed")
         self._profile_at = 0 if self.is_xl320 else table["Profile Acceleration"].address
         self.motion_at = table.size if self.is_xl320 else table["Present Velocity"].address - 2
         self.motion_end = self.motion_at + _MOTION.size
@@ -86,6 +101,7 @@ class Drive:
             return
         registers = self.registers
         self.mode = registers.get("Operating Mode")
+        self.goals = _GOALS[self.mode]
         reverse = registers.get("Drive Mode") & REVERSE
         self.side, self.mirror = (-1, registers.table.ticks_per_turn - 1.0) if reverse else (1, 0.0)
         offset = registers.get("Homing Offset")

@@ -98,6 +98,17 @@ def test_time_based_profile_takes_its_time():
     assert (read(device, "Moving", 1.01), read(device, "Present Position", 1.01)) == (0, 3048)
 
 
+def test_goals_of_other_modes_do_not_start_the_motion_anew():
+    device = servo()
+    write(device, "Drive Mode", 4)
+    write(device, "Torque Enable", 1)
+    write(device, "Profile Velocity", 1000)
+    write(device, "Goal Position", 3048)
+    for name in ("Goal Velocity", "Goal PWM", "Goal Current"):
+        write(device, name, 5, 0.9)
+    assert read(device, "Present Position", 1.01) == 3048
+
+
 def test_velocity_pwm_and_current_modes():
     device = servo()
     write(device, "Operating Mode", 1)
