@@ -15,9 +15,9 @@ from surface.fit.mesh import FitMesh, triangles
 
 Floats = NDArray[np.float64]
 GRID = (15, 21)  # rays along u and v
-U_RANGE = np.radians([14.0, 166.0])
-V_RANGE = np.radians([125.0, -125.0])
-TALL_MM = 9.0  # of a tooth, only this much below its tip is a crown
+U_RANGE = np.radians([7.0, 173.0])
+V_RANGE = np.radians([150.0, -150.0])
+TALL_MM = 10.0  # of a tooth, only this much below its tip is a crown
 
 
 def crown_chart(mesh: FitMesh, teeth: list[NDArray[np.int64]], upper: bool) -> tuple[Chart, FitMesh]:
@@ -35,11 +35,11 @@ def crown_chart(mesh: FitMesh, teeth: list[NDArray[np.int64]], upper: bool) -> t
     s, t = (np.linspace(0.0, 1.0, k) for k in GRID)
     square = np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1).reshape(-1, 2)
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    uv = np.concatenate([square + [TILE * k, 0] for k in range(len(teeth))])
+    uv = np.concatenate([square + np.array([TILE * k, 0.0]) for k in range(len(teeth))])
     n = len(uv)
     chart = Chart(
         uv, identity(n, format="csr"), np.ones(n), np.tile([1 / (k - 1) for k in GRID], (n, 1)), np.zeros(n, bool),
-        [corners + [TILE * k, 0] for k in range(len(teeth))], [], [],
+        [corners + np.array([TILE * k, 0.0]) for k in range(len(teeth))], [], [],
     )  # fmt: skip
     points = np.concatenate(grids)
     empty = np.zeros((0, 4), np.int64)

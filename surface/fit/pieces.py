@@ -21,7 +21,7 @@ from surface.head.data import Jaw, PartData
 
 Floats = NDArray[np.float64]
 STILL = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
-LASH_ROOT = 0.0125  # how far outside the hole in the skin the lashes stand, in v
+LASH_ROOT = 0.0145  # how far outside the hole in the skin the lashes stand, in v
 LASH_MM, LOWER_LASH_MM = 8.0, 4.0
 
 

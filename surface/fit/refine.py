@@ -13,7 +13,7 @@ from surface.fit.mesh import FitMesh
 from surface.fit.net import Net, coarse_places, level_caps, net_at, wanted_places
 from surface.fit.solve import basis, solve
 
-FINEST = 1.4  # a net may be this fine, in spacings of the mesh's vertices
+FINEST = 1.2  # a net may be this fine, in spacings of the mesh's vertices
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,12 @@
 """Open up holes that a chart squeezes flat, so that (u, v) is about as long across a lid as along it.
 
-v is replaced by an increasing function of v that is steep near every flat hole; straight lines of constant v,
-and with them slits, stay straight.
+Around every flat hole v is stretched about the hole's centre line. Within the hole's width lines of constant v, and
+with them slits, stay straight; further away the stretching fades. u is unchanged.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,33 +15,40 @@ from surface.fit.islands import Island, boundary_loops
 
 OPEN = 0.4  # height over width that a flat hole gets
 BAND = 2.0  # half the height of the steep band, in heights of the hole
-SAME = 0.01  # holes at the same height (two eyes) are opened once
+REACH_V = 2.0  # how far the stretching is felt up and down, in widths of the hole
+REACH_U = 1.2  # and to the sides
+
+
+@dataclass(frozen=True)
+class _Band:
+    """What is stretched: about v = ``centre``, whole between u = ``start`` and ``end``."""
+
+    centre: float
+    start: float
+    end: float
+    half: float
+    extra: float
+
+    def shift(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m,) what is added to v."""
+        x, width = uv[:, 1] - self.centre, self.end - self.start
+        beside = np.maximum(self.start - uv[:, 0], uv[:, 0] - self.end) / (REACH_U * width)
+        t = np.clip(beside, 0.0, 1.0)
+        fade = (1.0 - t * t * (3.0 - 2.0 * t)) * np.exp(-((x / (REACH_V * width)) ** 2))
+        return self.extra * self.half * np.arctan(x / self.half) * fade
 
 
 def open_flat_holes(island: Island) -> Island:
-    """The island with v stretched around its flat holes; u is unchanged, v keeps its range."""
-    bands = _bands(island)
-    if not bands:
-        return island
-    low, high = island.uv[:, 1].min(), island.uv[:, 1].max()
-    ends = _stretch(np.array([low, high]), bands)
-    v = low + (_stretch(island.uv[:, 1], bands) - ends[0]) * (high - low) / (ends[1] - ends[0])
+    """The island with v stretched around its flat holes."""
+    v = island.uv[:, 1] + sum((band.shift(island.uv) for band in _bands(island)), np.zeros(len(island.uv)))
     return Island(island.vertex, np.column_stack([island.uv[:, 0], v]), island.faces)
 
 
-def _bands(island: Island) -> list[tuple[float, float, float]]:
-    """Centre, half height and extra steepness of every band."""
-    bands: list[tuple[float, float, float]] = []
+def _bands(island: Island) -> list[_Band]:
+    bands = []
     for loop in boundary_loops(island)[1:]:
-        rim = island.uv[loop]
-        width, height = np.ptp(rim, axis=0)
-        centre = 0.5 * (rim[:, 1].min() + rim[:, 1].max())
-        known = any(abs(centre - c) < SAME for c, _, _ in bands)
-        if height < OPEN * width and not known:
-            bands.append((centre, BAND * height, OPEN * width / max(height, 1e-6) - 1.0))
+        (u0, v0), (u1, v1) = island.uv[loop].min(axis=0), island.uv[loop].max(axis=0)
+        width, height = u1 - u0, max(v1 - v0, 1e-6)
+        if height < OPEN * width:
+            bands.append(_Band(0.5 * (v0 + v1), u0, u1, BAND * height, OPEN * width / height - 1.0))
     return bands
-
-
-def _stretch(v: NDArray[np.float64], bands: list[tuple[float, float, float]]) -> NDArray[np.float64]:
-    """Integral of 1 + sum a / (1 + ((v - c) / s)^2) over the bands (c, s, a)."""
-    return v + sum(a * s * np.arctan((v - c) / s) for c, s, a in bands)

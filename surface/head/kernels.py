@@ -70,3 +70,23 @@ def bend_neck(share: Floats, turn: Floats, pivot: Floats, points: Floats) -> Non
         points[i, 0] = pivot[0] + x * cosine + (b * z - c * y) * sine + a * along
         points[i, 1] = pivot[1] + y * cosine + (c * x - a * z) * sine + b * along
         points[i, 2] = pivot[2] + z * cosine + (a * y - b * x) * sine + c * along
+
+
+@kernel
+def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at: Floats) -> None:
+    """For every point of ``uv (m, 2)``: its distance from the polyline ``line (k, 2)``, and how far along it the
+    nearest place lies, in the line's points; written to ``distance (m,)`` and ``at (m,)``."""
+    steps = line.shape[0] if closed else max(line.shape[0] - 1, 1)
+    for i in range(uv.shape[0]):
+        best = np.inf
+        for k in range(steps):
+            n = (k + 1) % line.shape[0]
+            du, dv = line[n, 0] - line[k, 0], line[n, 1] - line[k, 1]
+            pu, pv = uv[i, 0] - line[k, 0], uv[i, 1] - line[k, 1]
+            t = min(max((pu * du + pv * dv) / max(du * du + dv * dv, 1e-18), 0.0), 1.0)
+            pu, pv = pu - t * du, pv - t * dv
+            d = pu * pu + pv * pv
+            if d < best:
+                best = d
+                at[i] = k + t
+        distance[i] = np.sqrt(best)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.errors import HeadFileError
+from surface.head.kernels import nearest_on_line
 
 Floats = NDArray[np.float64]
 BASE: dict[str, tuple[float, ...]] = {"albedo": (0.60, 0.37, 0.28), "occlusion": (1.0,), "gloss": (0.3,)}
@@ -69,13 +70,9 @@ def _field(layer: dict[str, Any], uv: Floats) -> Floats:
 
 def _distance(uv: Floats, line: Floats, closed: bool) -> Floats:
     """Distance (m,) of points from a polyline; a single point counts as one."""
-    ends = np.roll(line, -1, axis=0) if closed else np.vstack([line[1:], line[-1:]])
-    best = np.full(len(uv), np.inf)
-    for a, b in zip(line, ends, strict=True):
-        step = b - a
-        t = np.clip((uv - a) @ step / max(step @ step, 1e-18), 0.0, 1.0)
-        np.minimum(best, np.hypot(*(uv - a - t[:, None] * step).T), out=best)
-    return best
+    distance, at = np.empty(len(uv)), np.empty(len(uv))
+    nearest_on_line(np.ascontiguousarray(uv), np.ascontiguousarray(line), closed, distance, at)
+    return distance
 
 
 def _inside(uv: Floats, ring: Floats) -> NDArray[np.bool_]:

@@ -26,6 +26,7 @@ class HeadPart:
     triangles : (t, 3) int32; uv : (m, 2) float32.
     vertices, normals : (m, 3) float32, current, in head space including the head's rotation.
     changed : vertex ranges [start, stop) that the last pose touched.
+    borders : (k, 2) directed edges that only one triangle of the tessellation has.
     attributes : static per-vertex arrays (m, k) float32 by name.
     surface : the DCP surface at rest.
     """
@@ -38,6 +39,7 @@ class HeadPart:
         self.vertices = np.array(mesh.vertices, np.float32)
         self.normals = np.array(mesh.normals, np.float32)
         self.attributes = dict(attributes)
+        self.borders = border_edges(self.triangles)
         self.changed: list[tuple[int, int]] = [(0, len(self.vertices))]
 
     def pose(self, pose: Pose, turn: NDArray[np.float64]) -> None:
@@ -48,6 +50,17 @@ class HeadPart:
     def control_points(self) -> NDArray[np.float64]:
         """(n, 3) float64, where the control points stand now."""
         raise NotImplementedError
+
+    def append(self, like: NDArray[np.int64], triangles: NDArray[np.int32]) -> None:
+        """Add vertices that look like others, ids ``like (k,)``, and triangles that may use them.
+
+        The new vertices stand behind the part's own; whoever adds them moves them.
+        """
+        for name in ("vertices", "normals", "uv"):
+            array = getattr(self, name)
+            setattr(self, name, np.concatenate([array, array[like]]))
+        self.attributes = {k: np.concatenate([a, a[like]]) for k, a in self.attributes.items()}
+        self.triangles = np.concatenate([self.triangles, triangles.astype(np.int32)])
 
     def touch(self) -> None:
         """Report every vertex as changed: a seam has written into the part."""
@@ -91,6 +104,7 @@ class RigidPart(HeadPart):
         super().__init__(data, mesh, surface, attributes)
         self._head = head
         self._rest, self._rest_normals = self.vertices.copy(), self.normals.copy()
+        self._own = len(self._rest)
         self._linear, self._shift = np.eye(3), np.zeros(3)
 
     def pose(self, pose: Pose, turn: NDArray[np.float64]) -> None:
@@ -100,9 +114,10 @@ class RigidPart(HeadPart):
             return
         self._linear, self._shift = linear, shift
         matrix = np.ascontiguousarray(linear.T, np.float32)
-        np.dot(self._rest, matrix, out=self.vertices)
-        self.vertices += shift.astype(np.float32)
-        np.dot(self._rest_normals, matrix, out=self.normals)
+        own = slice(self._own)
+        np.dot(self._rest, matrix, out=self.vertices[own])
+        self.vertices[own] += shift.astype(np.float32)
+        np.dot(self._rest_normals, matrix, out=self.normals[own])
         self.changed = [(0, len(self.vertices))]
 
     @property
@@ -115,3 +130,10 @@ def make_surface(data: PartData) -> DCPSurface:
     return DCPSurface.from_padded(
         data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1]
     )
+
+
+def border_edges(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
+    """(k, 2) edges that only one triangle has, in the direction of that triangle."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    key, back = edges[:, 0] << 32 | edges[:, 1], edges[:, 1] << 32 | edges[:, 0]
+    return edges[~np.isin(key, back)]

@@ -10,6 +10,7 @@ from surface.head.kernels import bend_neck, keep_on_eyeball, swing_jaw
 from surface.head.parameters import SHAPES, Pose, rotation, rotation_vector
 
 Floats = NDArray[np.float64]
+LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
 
 
 class SkinRig:
@@ -34,6 +35,7 @@ class SkinRig:
         self._lid_hold = np.abs(part.lids[self._lid])
         self._lid_eye = head.eyes[(part.lids[self._lid] < 0).astype(int)]
         self._radius, self._radius_moves = self._radii()
+        self._least = np.minimum(self._radius, head.eye_radius + LID_MM)
         self._amounts = np.zeros(len(self.used), np.float32)
         self._linear = np.zeros(3 * n, np.float32)
         self.points = np.zeros((n, 3))
@@ -61,6 +63,7 @@ class SkinRig:
                       pose.jaw, undo, self.points)  # fmt: skip
         if len(self._lid):
             radius = self._radius + self._amounts.astype(np.float64) @ self._radius_moves
+            np.maximum(radius, self._least, out=radius)
             keep_on_eyeball(self._lid, self._lid_eye, self._lid_hold, radius, self.points)
         if pose.head.any():
             bend_neck(self._neck, rotation_vector(head), self._pivot, self.points)

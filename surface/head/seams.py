@@ -1,7 +1,8 @@
 """Seams: two islands of the mesh meet in one border; drawn from two surfaces it must not show a crack.
 
-The first part is the master. Vertices of the second part on the seam are put onto the first part's border edges,
-with its normals, after every pose.
+The first part is the master. After every pose the second part's border vertices are put onto the first part's
+border edges, with its normals; slivers fill what is left between vertices that only the first part has and the
+edges of the second.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.head.data import Seam
+from surface.head.kernels import nearest_on_line
 from surface.head.part import HeadPart
 
 NEAR = 2e-3  # in (u, v): a vertex nearer than this to the seam's polyline is on it
+SAME = 1e-4  # in points of the seam: vertices nearer than this are one
 
 
 class Zipper:
@@ -20,19 +23,45 @@ class Zipper:
 
     Parameters
     ----------
-    seam : polylines of both sides; first, second : the parts they belong to.
+    seam : polylines of both sides; first, second : the parts they belong to. The second part gets slivers.
     """
 
     def __init__(self, seam: Seam, first: HeadPart, second: HeadPart) -> None:
         self.first, self.second = first, second
         a_ids, a_at = _along(first, seam.uv_a)
         b_ids, b_at = _along(second, seam.uv_b)
-        inside = (b_at >= a_at.min(initial=np.inf)) & (b_at <= a_at.max(initial=-np.inf))
+        inside = (b_at >= a_at.min(initial=np.inf) - SAME) & (b_at <= a_at.max(initial=-np.inf) + SAME)
         self.ids, at = b_ids[inside], b_at[inside]
+        if not len(self.ids):
+            return
         after = np.clip(np.searchsorted(a_at, at), 1, max(len(a_at) - 1, 1))
         self.low, self.high = a_ids[after - 1], a_ids[after]
         gap = np.maximum(a_at[after] - a_at[after - 1], 1e-12)
-        self.share = ((at - a_at[after - 1]) / gap).astype(np.float32)[:, None]
+        self.share = np.clip((at - a_at[after - 1]) / gap, 0.0, 1.0).astype(np.float32)[:, None]
+        self._fill(a_ids, a_at, at)
+
+    def _fill(self, a_ids: NDArray[np.int64], a_at: NDArray[np.float64], at: NDArray[np.float64]) -> None:
+        """Slivers over the first part's vertices that stand between two neighbours of the second part's."""
+        directed = {(int(p), int(q)) for p, q in self.second.borders}
+        triangles, copies, like = [], [], []
+        for p, q, start, end in zip(self.ids, self.ids[1:], at, at[1:], strict=False):
+            between = a_ids[(a_at > start + SAME) & (a_at < end - SAME)]
+            forward = (int(p), int(q)) in directed
+            if not len(between) or not (forward or (int(q), int(p)) in directed):
+                continue
+            new = len(self.second.vertices) + len(copies) + np.arange(len(between))
+            fan = np.concatenate([new, [q]])
+            pairs = np.column_stack([np.full(len(between), p), fan[:-1], fan[1:]])
+            triangles.append(pairs if forward else pairs[:, [0, 2, 1]])
+            copies += between.tolist()
+            like += [int(p)] * len(between)
+        if copies:
+            new = len(self.second.vertices) + np.arange(len(copies))
+            self.second.append(np.array(like), np.concatenate(triangles))
+            self.ids = np.concatenate([self.ids, new])
+            self.low = np.concatenate([self.low, copies])
+            self.high = np.concatenate([self.high, copies])
+            self.share = np.vstack([self.share, np.zeros((len(copies), 1), np.float32)])
 
     def close(self) -> None:
         """Put the second part's border onto the first one's."""
@@ -47,23 +76,10 @@ class Zipper:
 
 def _along(part: HeadPart, line: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Border vertices of a part on a polyline, and how far along it they lie, in its points; in order."""
-    ids = border_vertices(part.triangles)
-    uv = part.mesh.uv[ids]
-    start, step = line[:-1], np.diff(line, axis=0)
-    length = np.maximum((step * step).sum(axis=1), 1e-18)
-    t = np.clip(((uv[:, None] - start) * step).sum(axis=2) / length, 0.0, 1.0)
-    distance = np.linalg.norm(uv[:, None] - (start + t[..., None] * step), axis=2)
-    nearest = distance.argmin(axis=1)
-    rows = np.arange(len(ids))
-    on = distance[rows, nearest] < NEAR
-    at = nearest[on] + t[rows, nearest][on]
+    ids = np.unique(part.borders)
+    distance, at = np.empty(len(ids)), np.empty(len(ids))
+    nearest_on_line(part.mesh.uv[ids], np.ascontiguousarray(line, np.float64), False, distance, at)
+    on = distance < NEAR
+    ids, at = ids[on], at[on]
     order = np.argsort(at, kind="stable")
-    return ids[on][order], at[order]
-
-
-def border_vertices(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Vertices of edges that only one triangle has."""
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
-    key, count = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)
-    lone = key[count == 1]
-    return np.unique(np.concatenate([lone >> 32, lone & 0xFFFFFFFF]))
+    return ids[order], at[order]
