@@ -2,8 +2,8 @@
 
 Per tile of eight vertices, ``below`` (8 numbers) holds one over the denominator, ``bend`` (16) the derivatives of
 the denominator in u and in v, ``state`` (72) the x, y and z numerators of the position, of the derivative in u
-and of that in v. Numerators are those of positions relative to the cell's origin, which keeps float32 sums exact to a small part of
-the cell's size. Without normals ``bend`` is empty and ``state`` has 24 numbers per tile.
+and of that in v. Numerators are those of positions relative to the cell's origin, which keeps float32 sums exact
+to a small part of the cell's size. Without normals ``bend`` is empty and ``state`` has 24 numbers per tile.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="call-arg, var-annotated, has-type"
@@ -13,6 +13,8 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .lanes import add, div, fma, load, mul, root, splat, store, store3, sub, zero
+
+KEEP = -2  # in ``kept``: compute this cell anew and keep its numerators
 
 
 @inlined
@@ -96,7 +98,7 @@ def directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend):
     return cross(ax, ay, az, bx, by, bz, sign)
 
 
-@kernel
+@inlined
 def positions(first, last, rows, room, at, tile, value, below, local, ox, oy, oz, vertices, spare):
     """Compute one cell's positions from its gathered points."""
     px, py, pz = splat(ox), splat(oy), splat(oz)
@@ -122,7 +124,7 @@ def both(rows, at, tile, sign, value, slope, below, bend, local):
     return x, y, z, nx, ny, nz
 
 
-@kernel
+@inlined
 def shaded(
     first, last, rows, room, at, tile, sign, value, slope, below, bend, local, ox, oy, oz, vertices, normals, spare
 ):
@@ -141,7 +143,7 @@ def shaded(
         put(normals, full, last - full, nx, ny, nz, spare)
 
 
-@kernel
+@inlined
 def keep_sums(tiles, tile, rows, room, at, value, slope, local, state):
     """Store the numerators of one cell for later differences."""
     size = 72 if slope.shape[0] > 0 else 24
@@ -162,30 +164,46 @@ def keep_sums(tiles, tile, rows, room, at, value, slope, local, state):
         at += room * 8
 
 
-@kernel
+@inlined
+def kept_tile(tile, size, sign, below, bend, state):
+    """Positions relative to the origin, and normals where they are kept, of one tile from its numerators."""
+    base = tile * size
+    x, y, z = scaled(tile, load(state, base), load(state, base + 8), load(state, base + 16), below)
+    nx, ny, nz = x, y, z
+    if size == 72:
+        ax, ay, az = load(state, base + 24), load(state, base + 32), load(state, base + 40)
+        bx, by, bz = load(state, base + 48), load(state, base + 56), load(state, base + 64)
+        nx, ny, nz = directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend)
+    return x, y, z, nx, ny, nz
+
+
+@inlined
 def finish_cell(first, last, tile, ox, oy, oz, sign, below, bend, state, vertices, normals, spare):
     """Vertices and normals of one cell from its kept numerators."""
     px, py, pz = splat(ox), splat(oy), splat(oz)
     size = 72 if normals.shape[0] > 0 else 24
-    for vertex in range(first, last, 8):
-        base, left = tile * size, min(last - vertex, 8)
-        x, y, z = scaled(tile, load(state, base), load(state, base + 8), load(state, base + 16), below)
-        put(vertices, vertex, left, add(x, px), add(y, py), add(z, pz), spare)
-        if normals.shape[0] > 0:
-            ax, ay, az = load(state, base + 24), load(state, base + 32), load(state, base + 40)
-            bx, by, bz = load(state, base + 48), load(state, base + 56), load(state, base + 64)
-            nx, ny, nz = directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend)
-            put(normals, vertex, left, nx, ny, nz, spare)
+    full = last - (last - first) % 8
+    for vertex in range(first, full, 8):
+        x, y, z, nx, ny, nz = kept_tile(tile, size, sign, below, bend, state)
+        store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
+        if size == 72:
+            store3(normals, 3 * vertex, nx, ny, nz)
         tile += 1
+    if full < last:
+        x, y, z, nx, ny, nz = kept_tile(tile, size, sign, below, bend, state)
+        put(vertices, full, last - full, add(x, px), add(y, py), add(z, pz), spare)
+        if size == 72:
+            put(normals, full, last - full, nx, ny, nz, spare)
 
 
 @kernel
 def apply_cells(
-    begin, end, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids, value, slope, below, bend, state,
-    kept, sign, vertices, normals, local, spare,
+    cells, begin, end, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids, value, slope, below,
+    bend, state, kept, sign, vertices, normals, local, spare,
 ):  # fmt: skip
-    """Compute cells begin..end from their control points; their numerators are no longer kept."""
-    for c in range(begin, end):
+    """Compute ``cells[begin:end]`` from their control points; their numerators are no longer kept."""
+    for q in range(begin, end):
+        c = cells[q]
         kept[c] = -1
         gather(points, ids, ids_at[c], rows[c], origin, c, local)
         ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
@@ -208,7 +226,7 @@ def nudge(state, place, weights, number):
     store(state, place, fma(weights, number, load(state, place)))
 
 
-@kernel
+@inlined
 def add_row(tiles, first_tile, place, step, dx, dy, dz, value, slope, state):
     """Eq. (2): add b w dP of one control point to the numerators of one cell's tiles."""
     size = 72 if slope.shape[0] > 0 else 24
@@ -247,19 +265,27 @@ def mark(ids, count, back_start, back_count, back_cell, hits, touched):
 
 
 @kernel
-def choose(total, touched, hits, kept, rows, limit, bias):
-    """Per touched cell, take differences (``kept`` >= 0 counts them) or compute it anew (-1)."""
+def choose(total, touched, hits, kept, rows, limit, bias, anew):
+    """Per touched cell, take differences (``kept`` >= 0 counts them) or compute it anew (into ``anew``)."""
+    count = 0
     for q in range(total):
         c = touched[q]
-        if kept[c] >= 0 and kept[c] + hits[c] <= limit and bias * hits[c] < rows[c]:
+        few = bias * hits[c] < rows[c]
+        if kept[c] >= 0 and kept[c] + hits[c] <= limit and few:
             kept[c] += hits[c]
+        elif few:
+            kept[c] = KEEP  # few points, perhaps again next time: compute anew and keep the numerators
         else:
             kept[c] = -1
+            anew[count] = c
+            count += 1
+        hits[c] = 0
+    return count
 
 
 @kernel
 def update(
-    ids, count, delta, hits, touched, limit, bias, back_start, back_count, back_cell, back_row, points, origin,
+    ids, count, delta, hits, touched, anew, limit, bias, back_start, back_count, back_cell, back_row, points, origin,
     cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope, below, bend, state, kept, sign, vertices,
     normals, local, spare,
 ):  # fmt: skip
@@ -269,7 +295,7 @@ def update(
     also computed anew when it has not kept its numerators, or has taken more than ``limit`` differences.
     """
     total = mark(ids, count, back_start, back_count, back_cell, hits, touched)
-    choose(total, touched, hits, kept, rows, limit, bias)
+    fresh = choose(total, touched, hits, kept, rows, limit, bias, anew)
     for q in range(count):
         i = ids[q]
         dx, dy, dz = np.float32(delta[q, 0]), np.float32(delta[q, 1]), np.float32(delta[q, 2])
@@ -280,38 +306,82 @@ def update(
                 add_row(tiles, tile_start[c], place, room[c] * 8, dx, dy, dz, value, slope, state)
     for q in range(total):
         c = touched[q]
-        if kept[c] < 0 and bias * hits[c] < rows[c]:  # few points, perhaps again next time: keep numerators
+        if kept[c] == -1:
+            continue
+        if kept[c] == KEEP:
             gather(points, ids_of, ids_at[c], rows[c], origin, c, local)
             tiles = tile_start[c + 1] - tile_start[c]
             keep_sums(tiles, tile_start[c], rows[c], room[c], at[c], value, slope, local, state)
             kept[c] = 0
-        if kept[c] >= 0:
-            ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
-            first, last = cell_start[c], cell_start[c + 1]
-            finish_cell(first, last, tile_start[c], ox, oy, oz, sign, below, bend, state, vertices, normals, spare)
-        else:
-            apply_cells(
-                c, c + 1, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope,
-                below, bend, state, kept, sign, vertices, normals, local, spare,
-            )  # fmt: skip
-        hits[c] = 0
+        ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
+        first, last = cell_start[c], cell_start[c + 1]
+        finish_cell(first, last, tile_start[c], ox, oy, oz, sign, below, bend, state, vertices, normals, spare)
+    apply_cells(
+        anew, 0, fresh, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope, below,
+        bend, state, kept, sign, vertices, normals, local, spare,
+    )  # fmt: skip
     return total
 
 
 @kernel
-def difference(ids, xyz, points, changed, delta):
+def reject(ids, rows, n):
+    """The first row with an id out of range (as ``-1 - row``) or a number that is not finite (``row``); else 2**62."""
+    for q in range(ids.shape[0]):
+        if ids[q] < 0 or ids[q] >= n:
+            return -1 - q
+    for q in range(ids.shape[0]):
+        if not np.isfinite(rows[q, 0] + rows[q, 1] + rows[q, 2]):
+            return q
+    return 1 << 62
+
+
+@kernel
+def difference(ids, rows, relative, points, changed, delta):
     """Store new positions; ``changed`` and ``delta`` get the points that really moved; returns their number."""
     count = 0
     for q in range(ids.shape[0]):
         i = ids[q]
-        dx, dy, dz = xyz[q, 0] - points[i, 0], xyz[q, 1] - points[i, 1], xyz[q, 2] - points[i, 2]
+        dx, dy, dz = rows[q, 0], rows[q, 1], rows[q, 2]
+        if not relative:
+            dx, dy, dz = dx - points[i, 0], dy - points[i, 1], dz - points[i, 2]
         if dx == 0.0 and dy == 0.0 and dz == 0.0:
             continue
         changed[count] = i
         delta[count, 0], delta[count, 1], delta[count, 2] = dx, dy, dz
-        points[i, 0], points[i, 1], points[i, 2] = xyz[q, 0], xyz[q, 1], xyz[q, 2]
+        if relative:
+            points[i, 0] += dx
+            points[i, 1] += dy
+            points[i, 2] += dz
+        else:
+            points[i, 0], points[i, 1], points[i, 2] = rows[q, 0], rows[q, 1], rows[q, 2]
         count += 1
     return count
+
+
+@kernel
+def place(
+    ids, rows, relative, changed, delta, hits, touched, anew, found, most, limit, bias, gap, back_start, back_count,
+    back_cell, back_row, points, origin, cell_start, tile_start, in_cell, room, at, ids_at, ids_of, value, slope,
+    below, bend, state, kept, sign, vertices, normals, local, spare,
+):  # fmt: skip
+    """Move points and bring the mesh up to date: the whole of an update in one call.
+
+    ``rows (k, 3)`` are new positions, or moves if ``relative``. Returns the number of vertex ranges in ``found``; -1
+    if more than ``most`` points moved and everything is to be computed anew; or what :func:`reject` found, less
+    2**61, and then nothing has been changed.
+    """
+    bad = reject(ids, rows, points.shape[0])
+    if bad != 1 << 62:
+        return bad - (1 << 61)
+    count = difference(ids, rows, relative, points, changed, delta)
+    if count > most:
+        return -1
+    total = update(
+        changed, count, delta, hits, touched, anew, limit, bias, back_start, back_count, back_cell, back_row,
+        points, origin, cell_start, tile_start, in_cell, room, at, ids_at, ids_of, value, slope, below, bend,
+        state, kept, sign, vertices, normals, local, spare,
+    )  # fmt: skip
+    return ranges(touched, total, cell_start, gap, found)
 
 
 @kernel

@@ -289,17 +289,18 @@ class DCPSurface:
             flip=flip,
         )
 
-    def deformation(self, mesh: Mesh, *, normals: bool = True) -> Deformation:
+    def deformation(self, mesh: Mesh, *, normals: bool = True, threads: int = 1) -> Deformation:
         """A mesh that follows moves of control points, changes of weights and of knots (Eq. 2).
 
         Parameters
         ----------
         mesh : from :meth:`tessellate`
         normals : also keep exact normals
+        threads : how many threads compute everything anew
         """
         from .deformation import Deformation
 
-        return Deformation(self, mesh, normals=normals)
+        return Deformation(self, mesh, normals=normals, threads=threads)
 
     def sample_derivatives(
         self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False

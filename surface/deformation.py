@@ -7,6 +7,7 @@ error is 6e-8 of the cell's size, not of the head's.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,8 +22,9 @@ if TYPE_CHECKING:
     from .dcp import DCPSurface
 
 LIMIT = 256  # differences a cell takes before it is computed anew
-BIAS = 2.0  # cost of adding one row's difference, in rows computed anew (measured)
+BIAS = 6.0  # cost of one row's difference, in rows computed anew (measured)
 GAP = 256  # unchanged vertices between two changed ranges that are uploaded rather than left out
+SMALL = 500_000  # weights below which one thread is as fast as two
 MOST_MOVED = 0.75  # from this part of the points on, everything is computed anew
 
 
@@ -34,6 +36,7 @@ class Deformation:
     surface : the surface the mesh was made from
     mesh : from :meth:`surface.DCPSurface.tessellate`
     normals : also keep normals; without them an update costs a third
+    threads : how many threads compute everything anew; updates of parts use one
 
     Notes
     -----
@@ -41,8 +44,12 @@ class Deformation:
     but the copy of arguments that are not already int64 and float64 arrays.
     """
 
-    def __init__(self, surface: DCPSurface, mesh: Mesh, *, normals: bool = True) -> None:
+    def __init__(self, surface: DCPSurface, mesh: Mesh, *, normals: bool = True, threads: int = 1) -> None:
+        if threads < 1:
+            raise ValueError(f"threads: must be at least 1, not {threads}")
         self.mesh = mesh
+        self._threads = threads
+        self._pool: ThreadPoolExecutor | None = None
         self._lists = build_lists(surface, mesh, normals)
         self._points = surface.points.copy()
         self._weights = surface.weights.copy()
@@ -67,7 +74,8 @@ class Deformation:
         self._vertices = np.zeros(3 * m, dtype=np.float32)
         self._normals = np.zeros(3 * m if normals else 0, dtype=np.float32)
         self._hits = np.zeros(cells, dtype=np.int64)
-        self._touched = np.zeros(cells, dtype=np.int32)
+        self._touched, self._anew = np.zeros(cells, dtype=np.int32), np.zeros(cells, dtype=np.int32)
+        self._cells = np.arange(cells, dtype=np.int32)
         self._ranges = np.zeros((cells, 2), dtype=np.int64)
         self._changed_ids, self._delta = np.zeros(n, dtype=np.int64), np.zeros((n, 3))
         self._all = np.arange(n)
@@ -113,17 +121,10 @@ class Deformation:
         ValueError
             For ids out of range, wrong shapes or numbers that are not finite; nothing is changed then.
         """
-        which = self._check_ids(ids)
         step = np.asarray(delta, dtype=np.float64)
         if step.shape == (3,):
-            step = np.broadcast_to(step, (len(which), 3))
-        _check_rows(step, len(which), "delta")
-        if len(np.unique(which)) < len(which):
-            which, back = np.unique(which, return_inverse=True)
-            total = np.zeros((len(which), 3))
-            np.add.at(total, back, step)
-            step = total
-        self._place(which, self._points[which] + step)
+            step = np.broadcast_to(step, (np.size(ids), 3))
+        self._place(ids, step, "delta", True)
 
     def set_positions(self, ids: ArrayLike, xyz: ArrayLike) -> None:
         """Put points ``ids (k,)`` at ``xyz (k, 3)``; points that stand there already cost next to nothing.
@@ -133,16 +134,11 @@ class Deformation:
         ValueError
             As :meth:`move`.
         """
-        which = self._check_ids(ids)
-        target = np.ascontiguousarray(xyz, dtype=np.float64)
-        _check_rows(target, len(which), "xyz")
-        self._place(which, target)
+        self._place(ids, xyz, "xyz", False)
 
     def set_points(self, xyz: np.ndarray) -> None:
         """Put all points at ``xyz (n, 3)``: :meth:`set_positions` without a list of ids."""
-        target = np.ascontiguousarray(xyz, dtype=np.float64)
-        _check_rows(target, len(self._points), "xyz")
-        self._place(self._all, target)
+        self._place(self._all, xyz, "xyz", False)
 
     def set_weights(self, ids: ArrayLike, weights: ArrayLike) -> None:
         """Give points ``ids (k,)`` the weights ``(k,)``, positive.
@@ -183,22 +179,56 @@ class Deformation:
         from . import apply
 
         cells = len(self._kept)
-        apply.apply_cells(0, cells, *self._inputs())
+        if self._threads == 1 or len(self._lists.value) < SMALL:
+            apply.apply_cells(self._cells, 0, cells, *self._inputs())
+        else:
+            self._refresh_in_parts()
         self._ranges[0] = 0, len(self.vertices)
         self._count = 1
 
-    def _place(self, which: np.ndarray, target: np.ndarray) -> None:
+    def _refresh_in_parts(self) -> None:
+        """Every thread takes cells with an equal share of the weights, and scratch of its own."""
         from . import apply
 
-        moved = apply.difference(which, target, self._points, self._changed_ids, self._delta)
-        if moved > MOST_MOVED * len(self._points):
-            self.refresh()
-            return
-        total = apply.update(
-            self._changed_ids, moved, self._delta, self._hits, self._touched, LIMIT, BIAS, *self._back(),
-            *self._inputs(),
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="surface")
+        work = np.cumsum(self._lists.rows * np.diff(self._lists.tile_start))
+        cuts = np.searchsorted(work, work[-1] * np.arange(self._threads + 1) / self._threads)
+        cuts[-1] = len(work)
+        inputs = self._inputs()[:-2]
+        scratch = [(np.zeros_like(self._local), np.zeros_like(self._spare)) for _ in cuts[1:]]
+        parts = [(self._cells, a, b, *inputs, *own) for a, b, own in zip(cuts[:-1], cuts[1:], scratch, strict=True)]
+        waiting = [self._pool.submit(apply.apply_cells, *part) for part in parts[1:]]
+        apply.apply_cells(*parts[0])
+        for done in waiting:
+            done.result()
+
+    def _place(self, ids: ArrayLike, rows: ArrayLike, name: str, relative: bool) -> None:
+        from . import apply
+
+        which, target = _integers(ids), np.ascontiguousarray(rows, dtype=np.float64)
+        n = len(self._points)
+        if target.shape != (len(which), 3):
+            raise ValueError(f"{name}: shape {target.shape}, expected {(len(which), 3)}")
+        if len(which) > n:  # ids that stand several times: the last position counts, moves add up
+            which, target = _gathered(which, target, relative, n)
+        count = apply.place(
+            which, target, relative, self._changed_ids, self._delta, self._hits, self._touched, self._anew,
+            self._ranges, int(MOST_MOVED * n), LIMIT, BIAS, GAP, *self._back(), *self._inputs(),
         )  # fmt: skip
-        self._count = apply.ranges(self._touched, total, self._lists.cell_start, GAP, self._ranges)
+        if count == -1:
+            self.refresh()
+        elif count < 0 or count >= 1 << 60:
+            self._complain(which, target, count + (1 << 61), name)
+        else:
+            self._count = count
+
+    def _complain(self, which: np.ndarray, target: np.ndarray, bad: int, name: str) -> None:
+        if bad < 0:
+            raise ValueError(
+                f"ids[{-1 - bad}]: {which[-1 - bad]} is not a control point (0 to {len(self._points) - 1})"
+            )
+        raise ValueError(f"{name}[{bad}]: must be finite, got {target[bad].tolist()}")
 
     def _rewrite(self, i: int) -> np.ndarray:
         """Compute the rows of point i anew; returns the cells it stands in."""
@@ -232,8 +262,7 @@ class Deformation:
         """Vertices of the given rising cells."""
         from . import apply
 
-        for c in cells:
-            apply.apply_cells(c, c + 1, *self._inputs())
+        apply.apply_cells(cells.astype(np.int32), 0, len(cells), *self._inputs())
         self._count = apply.ranges(cells, len(cells), self._lists.cell_start, GAP, self._ranges)
 
     def _tables(self) -> tuple[np.ndarray, ...]:
@@ -251,14 +280,33 @@ class Deformation:
         )  # fmt: skip
 
     def _check_ids(self, ids: ArrayLike) -> np.ndarray:
-        which = np.ascontiguousarray(ids)
-        if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
-            raise ValueError(f"ids: needs a flat sequence of integers, got shape {which.shape} of {which.dtype}")
-        which = which.astype(np.int64, copy=False)
-        if which.size and (which.min() < 0 or which.max() >= len(self._points)):
-            k = int(np.argmax((which < 0) | (which >= len(self._points))))
+        which = _integers(ids)
+        bad = (which < 0) | (which >= len(self._points))
+        if bad.any():
+            k = int(np.argmax(bad))
             raise ValueError(f"ids[{k}]: {which[k]} is not a control point (0 to {len(self._points) - 1})")
         return which
+
+
+def _integers(ids: ArrayLike) -> np.ndarray:
+    """(k,) int64."""
+    which = np.ascontiguousarray(ids)
+    if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
+        raise ValueError(f"ids: needs a flat sequence of integers, got shape {which.shape} of {which.dtype}")
+    return which.astype(np.int64, copy=False)
+
+
+def _gathered(which: np.ndarray, rows: np.ndarray, relative: bool, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Each id once."""
+    if (which < 0).any() or (which >= n).any():
+        return which[:n], rows[:n]  # refused later, and by then short enough for the work space
+    if not relative:
+        unique, last = np.unique(which[::-1], return_index=True)
+        return unique, np.ascontiguousarray(rows[::-1][last])
+    unique, back = np.unique(which, return_inverse=True)
+    total = np.zeros((len(unique), 3))
+    np.add.at(total, back, rows)
+    return unique, total
 
 
 def _view(flat: np.ndarray) -> np.ndarray:
@@ -266,11 +314,3 @@ def _view(flat: np.ndarray) -> np.ndarray:
     view = flat.reshape(-1, 3)
     view.flags.writeable = False
     return view
-
-
-def _check_rows(rows: np.ndarray, count: int, name: str) -> None:
-    if rows.shape != (count, 3):
-        raise ValueError(f"{name}: shape {rows.shape}, expected {(count, 3)}")
-    if not np.isfinite(rows).all():
-        k = int(np.argmin(np.isfinite(rows).all(axis=1)))
-        raise ValueError(f"{name}[{k}]: must be finite, got {rows[k].tolist()}")
