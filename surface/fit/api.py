@@ -20,15 +20,19 @@ from surface.fit.refine import fit_chart
 from surface.fit.relax import open_flat_holes
 from surface.fit.report import FitReport, measure
 from surface.fit.rigging import find_jaw
-from surface.fit.seat import close_lips, seat_lids
+from surface.fit.seat import close_lips, seat_lids, strengthen
 from surface.fit.strokes import make_paint
 from surface.head.data import HeadData, PartData
 from surface.head.file import save_data
 from surface.head.meshes import pack, tessellate
+from surface.head.parameters import NAMES, read_pose
 from surface.head.part import make_surface
+from surface.head.rig import SkinRig
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
+# the pose that decides how finely a part is cut into triangles
+LIVELY = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
 
 
 def fit_head(mesh_path: str | Path, out_dir: str | Path, *, name: str, progress: Progress | None = None) -> FitReport:
@@ -74,15 +78,16 @@ def fit_mesh(mesh: FitMesh, recipe: Recipe, name: str, progress: Progress) -> tu
         parts += [eyeball_part(side, e, body.radius) for side, e in zip(("left", "right"), body.eyes, strict=True)]
     head = HeadData(
         name, _provenance(recipe), recipe.neck or _low_middle(mesh), body.eyes, body.radius, body.jaw,
-        [_with_mesh(p) for p in parts], find_seams(charts), make_paint(recipe.paint, charts, mesh),
+        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
     )  # fmt: skip
+    head = replace(head, parts=[_with_mesh(p, head) for p in parts])
     return head, FitReport(name, reports, sorted(body.sources))
 
 
 def _body(mesh: FitMesh, recipe: Recipe) -> Body:
     sources = sources_of(mesh.names)
     jaw = find_jaw(mesh, sources, np.arange(*recipe.jaw_teeth), np.array(recipe.hinge or (0.0, 0.0, 0.0)))
-    return Body(sources, jaw, *_eyes(recipe))
+    return Body(sources, jaw, *_eyes(recipe), np.array(recipe.tongue))
 
 
 def _still(mesh: FitMesh) -> FitMesh:
@@ -91,7 +96,7 @@ def _still(mesh: FitMesh) -> FitMesh:
 
 
 def _prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
-    mesh = close_lips(mesh, recipe.lips_close)
+    mesh = strengthen(close_lips(mesh, recipe.lips_close), "eyeBlink", recipe.blink)
     if recipe.lids_on is not None and recipe.eyes is not None:
         mesh = seat_lids(mesh, recipe.lids_on, recipe.eyes, recipe.seated)
     return mesh
@@ -127,9 +132,13 @@ class _Steps:
         return lambda done: self._progress(part.name, min(1.0, start + done * part.wish.points / self._total))
 
 
-def _with_mesh(part: PartData) -> PartData:
-    """The part with its tessellation, so that a face starts at once."""
-    return replace(part, mesh=pack(tessellate(part, make_surface(part)), part.budget))
+def _with_mesh(part: PartData, head: HeadData) -> PartData:
+    """The part with its tessellation, so that a face starts at once; fine enough for a face that moves."""
+    surface = make_surface(part)
+    if part.follows == "skin":
+        lively = SkinRig(part, head).apply(read_pose(np.array([LIVELY.get(n, 0.0) for n in NAMES])), np.eye(3))
+        surface = surface.with_points(lively)
+    return replace(part, mesh=pack(tessellate(part, surface), part.budget))
 
 
 def _eyes(recipe: Recipe) -> tuple[Floats, float]:

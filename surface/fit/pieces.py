@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from surface.fit.mesh import FitMesh
 from surface.fit.recipe import PartRecipe
 from surface.fit.refine import Fitted, fit_chart
 from surface.fit.report import PartReport, measure
-from surface.fit.rigging import lid_share, make_groups, neck_share
+from surface.fit.rigging import lid_share, make_groups, neck_share, tongue_group
 from surface.fit.strokes import mirrored, vertex_line
 from surface.head.data import Jaw, PartData
 
@@ -27,18 +27,21 @@ LASH_MM, LOWER_LASH_MM = 8.0, 4.0
 
 @dataclass(frozen=True)
 class Body:
-    """What all parts of one head share: shapes by parameter, the jaw's path, the eyes."""
+    """What all parts of one head share: shapes by parameter, the jaw's path, the eyes, the tongue's path out."""
 
     sources: dict[str, list[int]]
     jaw: Jaw
     eyes: Floats
     radius: float
+    tongue: Floats = field(default_factory=lambda: np.zeros((0, 5)))
 
 
 def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, body: Body) -> PartData:
     """A fitted chart as a part; one that follows skull or jaw as a whole has no groups."""
     n, skin = len(fitted.net), part.follows == "skin"
     groups, share = make_groups(fitted.points, fitted.moves, body.sources, body.jaw) if skin else ([], np.zeros(n))
+    if part.material == "tongue" and skin and len(body.tongue):
+        groups.append(tongue_group(fitted.points, body.tongue, body.jaw))
     slits = np.array([[c.v, c.start, c.end] for c in chart.cuts]).reshape(-1, 3)
     return PartData(
         part.name, part.material, part.follows, fitted.points, np.ones(n),

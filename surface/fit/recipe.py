@@ -46,6 +46,8 @@ class Recipe:
     eyes: Eyeball | None = None
     seat: list[tuple[int, int]] = field(default_factory=list)
     lips_close: float = 0.0
+    blink: float = 1.0
+    tongue: list[list[float]] = field(default_factory=list)
     source: dict[str, str] = field(default_factory=dict)
     paint: list[dict[str, Any]] = field(default_factory=list)
     hair: dict[str, Any] = field(default_factory=dict)
@@ -78,6 +80,8 @@ def _read(table: dict[str, Any]) -> Recipe:
         eyes=Eyeball(tuple(eyes["centre"]), eyes["radius"]),
         seat=[tuple(r) for r in eyes["seat"]],
         lips_close=table["lips"]["close"],
+        blink=table["eyes"]["blink"],
+        tongue=table["tongue"]["path"],
         source=table["source"],
         paint=table["paint"],
         hair=table["hair"],

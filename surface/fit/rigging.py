@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from surface.fit.mesh import FitMesh
 from surface.head.data import Group, Jaw
+from surface.head.parameters import TONGUE_NEEDS
 from surface.head.rig import jaw_path
 
 Floats = NDArray[np.float64]
@@ -73,6 +74,28 @@ def make_groups(points: Floats, moves: Floats, sources: dict[str, list[int]], ja
         if len(ids):
             groups.append(Group(name, ids.astype(np.int32), np.round(field[ids], 4).astype(np.float32)))
     return groups, share
+
+
+def tongue_group(points: Floats, path: Floats, jaw: Jaw) -> Group:
+    """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_NEEDS`.
+
+    Parameters
+    ----------
+    points : (n, 3) control points of the tongue at rest.
+    path : (k, 5) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, and
+        how much of its thickness is left.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    z = np.clip(points[:, 2], path[0, 0], path[-1, 0])
+    middle, to_y, to_z, thickness = PchipInterpolator(path[:, 0], path[:, 1:])(z).T
+    target = points.copy()
+    target[:, 1] = to_y + thickness * (points[:, 1] - middle)
+    target[:, 2] = to_z + (points[:, 2] - z)
+    turn, shift = jaw_path(jaw, TONGUE_NEEDS)
+    move = target - (points @ turn.T + shift)
+    move *= np.clip((points[:, 2] - path[0, 0]) / 20.0, 0.0, 1.0)[:, None]
+    return Group("tongueOut", np.arange(len(points), dtype=np.int32), np.round(move, 4).astype(np.float32))
 
 
 def neck_share(points: Floats) -> Floats:

@@ -73,3 +73,9 @@ def close_lips(mesh: FitMesh, share: float, shape: str = "mouthClose") -> FitMes
     deltas = mesh.deltas.copy()
     deltas[k] *= 1.0 - share
     return mesh.moved(mesh.vertices + share * mesh.deltas[k], deltas)
+
+
+def strengthen(mesh: FitMesh, prefix: str, factor: float) -> FitMesh:
+    """Scale the shapes whose names begin with ``prefix``."""
+    scale = np.array([factor if n.startswith(prefix) else 1.0 for n in mesh.names])
+    return mesh.moved(mesh.vertices, mesh.deltas * scale[:, None, None])

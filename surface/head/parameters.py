@@ -32,7 +32,8 @@ _ANGLE = [_AT[n] for n in ANGLES]
 _LOOK = np.array([[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] for s in SIDES])
 _BLINK = np.array([_AT[f"eyeBlink{s}"] for s in SIDES])
 _OPENERS = np.array([[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES])
-_JAW, _CLOSE = _AT["jawOpen"], _AT["mouthClose"]
+_JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
+TONGUE_NEEDS = 0.25  # how far the jaw opens at least to let the whole tongue out
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
 
 
@@ -57,7 +58,8 @@ class Pose:
 def read_pose(values: NDArray[np.float64]) -> Pose:
     """Parameter values (59,) in the order of NAMES, clipped, as a pose.
 
-    mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen.
+    mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
+    opens the jaw as far as it needs.
 
     Raises
     ------
@@ -69,6 +71,7 @@ def read_pose(values: NDArray[np.float64]) -> Pose:
     if np.isnan(v).any():
         raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
     v = np.clip(v, _LOW, 1.0)
+    v[_JAW] = max(v[_JAW], TONGUE_NEEDS * v[_TONGUE])
     angle = v[_ANGLE]
     shapes = v[: len(SHAPES)].copy()
     gaze = np.array([_gaze(v, side, angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)])
