@@ -23,7 +23,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from drivers.errors import DriverError, PortBusy, PortError
-from drivers.sim.bus import SimulatedChain
+from drivers.sim.chain import Chain
 
 MAX_LINE = 4096
 
@@ -38,7 +38,7 @@ class Commands:
     chain : the servos.
     """
 
-    def __init__(self, chain: SimulatedChain) -> None:
+    def __init__(self, chain: Chain) -> None:
         self._chain = chain
         self._words: dict[str, Callable[[list[str], float], str]] = {
             "fault": self._fault,

@@ -24,6 +24,9 @@ from typing import Any
 from drivers.dynamixel.packet import encode_status
 from drivers.errors import DriverError
 
+Encoder = Callable[[int, int, bytes], bytes]
+"""Makes a status packet of (id, error byte, data)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Kind:
@@ -214,15 +217,17 @@ class Spoiler:
         self.struck += 1
         return True
 
-    def status(self, frame: bytes, device_id: int, error: int, data: bytes) -> bytes | None:
-        """A status packet spoilt; None = it never arrives."""
+    def status(
+        self, frame: bytes, device_id: int, error: int, data: bytes, encode: Encoder = encode_status
+    ) -> bytes | None:
+        """A status packet spoilt; None = it never arrives. `encode` makes one of the wire's protocol."""
         kind, value = self.fault.kind, self.fault.value
         if kind in ("silent", "drop"):
             return None
         if kind == "short":
-            return encode_status(device_id, error, data[:value])
+            return encode(device_id, error, data[:value])
         if kind == "wrongid":
-            return encode_status(value, error, data)
+            return encode(value, error, data)
         return self._bytes(frame, 4)
 
     def part(self, frame: bytes) -> bytes | None:
@@ -293,14 +298,16 @@ class FaultSet:
             (self._begin if begins else self._end)(fault, time_s)
         self._set_next()
 
-    def spoil_status(self, frame: bytes, device_id: int, error: int, data: bytes) -> tuple[bytes | None, float]:
+    def spoil_status(
+        self, frame: bytes, device_id: int, error: int, data: bytes, encode: Encoder
+    ) -> tuple[bytes | None, float]:
         """A status packet as it arrives (None: it does not) and how late it is."""
         late_s, spoilt = 0.0, frame
         for spoiler in self.spoilers:
             if not spoiler.strikes(device_id):
                 continue
             late_s += spoiler.late_s
-            result = spoiler.status(spoilt, device_id, error, data)
+            result = spoiler.status(spoilt, device_id, error, data, encode)
             if result is None:
                 return None, late_s
             spoilt = result

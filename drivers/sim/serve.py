@@ -9,11 +9,12 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from drivers.sim.bus import SimulatedChain
+from drivers.sim.chain import Chain
 from drivers.sim.control import Commands, ControlSocket, Lines
 from drivers.sim.device import SimulatedServo
 from drivers.sim.faults import Fault
 from drivers.sim.ptyport import PtyPort
-from drivers.sim.wire import Timed, WireTiming, instruction_size, without_timing
+from drivers.sim.wire import Timed, WireTiming, without_timing
 
 PAUSE_S = 0.1
 """A packet that is not complete after this pause is given up."""
@@ -40,7 +41,7 @@ class PtyServer:
 
     def __init__(
         self,
-        chain: SimulatedChain,
+        chain: Chain,
         link: str | os.PathLike[str] | None = None,
         *,
         baud: int = 1_000_000,
@@ -121,7 +122,7 @@ class PtyServer:
                 self._send(without_timing(chain.handle(packet, now_s), now_s))
                 continue
             baud = chain.line_baud or self.baud
-            at_s = self._timing.arrival(now_s, instruction_size(packet), baud)
+            at_s = self._timing.arrival(now_s, chain.size(packet), baud)
             self._send(self._timing.deliveries(chain.handle(packet, at_s), baud))
 
     def _send(self, timed: list[Timed]) -> None:

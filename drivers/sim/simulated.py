@@ -15,6 +15,7 @@ from typing import Any, Self
 
 from drivers.errors import PortError
 from drivers.sim.bus import SimulatedChain
+from drivers.sim.chain import Chain
 from drivers.sim.control import Commands
 from drivers.sim.faults import parse_fault
 from drivers.sim.serve import PtyServer, make_servos
@@ -26,7 +27,7 @@ START_S = 20.0
 class ServoView:
     """One servo of a running bus, seen from another thread: always up to date, never in the middle of a packet."""
 
-    def __init__(self, chain: SimulatedChain, device_id: int) -> None:
+    def __init__(self, chain: Chain, device_id: int) -> None:
         self._chain, self._servo = chain, chain.servo(device_id)
 
     @property
@@ -130,7 +131,7 @@ class SimulatedBus:
         return self._server.port.path if self._server and self._server.port.is_open else self._path
 
     @property
-    def chain(self) -> SimulatedChain:
+    def chain(self) -> Chain:
         """The servos themselves (thread mode only)."""
         if self._server is None:
             raise RuntimeError("the servos can be looked at only while the bus runs in a thread of this process")

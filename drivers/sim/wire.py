@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivers.dynamixel.packet import InstructionPacket, stuff
 from drivers.sim.replies import Reply
 
 BITS_PER_BYTE = 10
@@ -18,11 +17,6 @@ USB_FRAME_S = 0.25e-3
 """Bytes that arrive within this time reach the host together, when the last of them has arrived."""
 
 Timed = tuple[float, bytes]
-
-
-def instruction_size(packet: InstructionPacket) -> int:
-    """Bytes of an instruction on the wire."""
-    return 10 + len(stuff(packet.params))
 
 
 class WireTiming:

@@ -7,6 +7,7 @@ import pytest
 from drivers.dynamixel.packet import (
     ALERT,
     BROADCAST_ID,
+    InstructionPacket,
     StatusPacket,
     StatusReader,
     decode_fast,
@@ -417,3 +418,16 @@ def test_unplug_is_passed_on():
     bus.faults.advance(1.0)
     bus.faults.advance(3.0)
     assert seen == [("/tmp/other", True), ("/tmp/other", False)]
+
+
+@pytest.mark.parametrize("params", [b"", POSITION, b"\x74\0\xff\xff\xfd\0"])
+def test_size_on_the_wire_counts_the_stuffing(params: bytes):
+    packet = InstructionPacket(1, I.WRITE, params)
+    assert chain().size(packet) == len(encode_instruction(*packet))
+
+
+def test_everybody_mute_stays_mute_under_a_new_id():
+    bus = chain(1)
+    wire(bus, 1, I.WRITE, words(7) + b"\5")
+    bus.faults.add(["mute:*"], 0.0)
+    assert ask(bus, 5, I.PING) == []

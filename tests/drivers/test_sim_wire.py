@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.dynamixel.packet import BROADCAST_ID, InstructionPacket, encode_instruction
+from drivers.dynamixel.packet import BROADCAST_ID, InstructionPacket
 from drivers.dynamixel.packet import Instruction as I
 from drivers.sim.bus import SimulatedChain
 from drivers.sim.device import SimulatedServo
 from drivers.sim.replies import Reply
-from drivers.sim.wire import USB_FRAME_S, WireTiming, instruction_size, without_timing
+from drivers.sim.wire import USB_FRAME_S, WireTiming, without_timing
 
 IDS = bytes(range(1, 25))
 POSITION = b"\x84\0\4\0"
@@ -24,14 +24,8 @@ def transaction(
         servo.registers.put("Return Delay Time", delay)
     bus, timing = SimulatedChain(servos), WireTiming(latency_s)
     packet = InstructionPacket(BROADCAST_ID, instruction, params)
-    at_s = timing.arrival(1.0, instruction_size(packet), baud)
+    at_s = timing.arrival(1.0, bus.size(packet), baud)
     return timing.deliveries(bus.handle(packet, at_s), baud)
-
-
-@pytest.mark.parametrize("params", [b"", POSITION + IDS, b"\x74\0\xff\xff\xfd\0"])
-def test_size_of_an_instruction(params: bytes):
-    packet = InstructionPacket(1, I.WRITE, params)
-    assert instruction_size(packet) == len(encode_instruction(*packet))
 
 
 @pytest.mark.parametrize(("baud", "expected_ms"), [(57_600, 69.1), (1_000_000, 3.98), (4_000_000, 0.995)])
