@@ -7,13 +7,14 @@ Links call the methods of :class:`CommandSink` from their own threads; the contr
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.acting import Actor
+from controller.errors import ParameterError
 from controller.expression import Vocabulary
 from controller.gaze import Gaze
 from controller.life import Life, LifeSettings
@@ -199,9 +200,52 @@ class CommandState:
 
     def capture(self, values: Floats, mask: NDArray[np.bool_], now_ns: int, stamp_ns: int = 0) -> None:
         """Give the live-capture layer ``values`` : (P,) where ``mask`` : (P,) bool; released after 1 s of silence."""
+        self.write_layer("capture", values, mask, now_ns, stamp_ns)
+
+    def write_layer(
+        self,
+        name: str,
+        values: Floats,
+        mask: NDArray[np.bool_],
+        now_ns: int,
+        stamp_ns: int = 0,
+        *,
+        through: Floats | None = None,
+    ) -> None:
+        """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest.
+
+        Parameters
+        ----------
+        through : (P,) how much of the layers below shows through, 0..1; nothing without.
+
+        Raises
+        ------
+        KeyError : no layer of that name.
+        """
         with self._lock:
-            self.mixer["capture"].write_masked(values, mask, now_ns * 1e-9)
+            layer = self.mixer[name]
+            layer.write_masked(values, mask, now_ns * 1e-9)
+            if through is None:
+                layer.share.fill(1.0)
+            else:
+                np.subtract(1.0, through, out=layer.share)
             self._note(stamp_ns)
+
+    def set_gains(self, name: str, gains: Mapping[str, float]) -> None:
+        """Scale what a layer gives, by region: ``{"brows": 0.6}``; regions not named stay at 1.
+
+        Raises
+        ------
+        KeyError : no layer of that name. ParameterError : no such region, or a gain that is not 0 to 4.
+        """
+        layer = self.mixer[name]
+        gain = np.ones(len(self.parameters))
+        for region, factor in gains.items():
+            if not 0.0 <= factor <= 4.0:
+                raise ParameterError(f"gain of {region} must be 0 to 4, not {factor}", hint="1 leaves it as it is")
+            gain[self.parameters.region(region)] = factor
+        with self._lock:
+            layer.gain[:] = gain
 
     def snapshot(self, out: Floats) -> None:
         """See :class:`CommandSink`."""

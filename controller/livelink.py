@@ -40,6 +40,7 @@ class Take:
     ----------
     name : file name. times_s : (n,) float64, from 0, rising. values : (n, P) float64, normalised but not clipped.
     mask : (P,) bool, which parameters the take drives. low, high : (P,) range that :meth:`sample` keeps to.
+    through : (P,) how much of the layers below shows through, 0..1; None for nothing.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Take:
     mask: NDArray[np.bool_]
     low: Floats
     high: Floats
+    through: Floats | None = None
 
     @classmethod
     def load(
@@ -108,19 +110,20 @@ class Take:
 
 
 class TakePlayer:
-    """Plays a take into the live-capture layer at its own rate.
+    """Plays a take into a layer at its own rate.
 
     Parameters
     ----------
-    take : what to play. state : where.
+    take : what to play. state : where. layer : ``"capture"``, or ``"speech"`` for a mouth that leaves the rest alone.
 
     Attributes
     ----------
     finished : the last row has been given.
     """
 
-    def __init__(self, take: Take, state: CommandState) -> None:
+    def __init__(self, take: Take, state: CommandState, layer: str = "capture") -> None:
         self.take = take
+        self._layer = layer
         self.finished = False
         self._state = state
         self._values = np.zeros(take.values.shape[1])
@@ -141,7 +144,8 @@ class TakePlayer:
         if self.finished:
             return
         self.finished = self._position_s >= self.take.duration_s
-        self._state.capture(self.take.sample(self._position_s, self._values), self.take.mask, now_ns, now_ns)
+        values = self.take.sample(self._position_s, self._values)
+        self._state.write_layer(self._layer, values, self.take.mask, now_ns, now_ns, through=self.take.through)
 
 
 def _read(path: Path) -> tuple[list[str], Floats, Floats]:
