@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     import moderngl
 
 Arrays = dict[str, np.ndarray]
-#: Millimetres of skin that one tile of the detail texture covers, and the span of the skin's (u, v) square.
-_DETAIL_TILES = 9.0
+#: Tiles of the detail texture once round the head; whole, so that its seam at the back of the head does not show.
+_DETAIL_TILES = 18
+#: Middle of the ball that the detail is wrapped on, mm.
+_DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_SIZE = 128
 
 
@@ -33,6 +35,7 @@ class Material:
     static : part, theme, openings -> per-vertex data that never changes.
     uniforms : part, theme, openings -> uniforms of this frame.
     two_sided : whether back faces are drawn.
+    blended : whether the fragment's alpha mixes it with what is behind.
     order : lower is drawn earlier; what hides most comes first.
     """
 
@@ -40,6 +43,7 @@ class Material:
     static: Callable[[ViewPart, Theme, Openings], Arrays]
     uniforms: Callable[[ViewPart, Theme, Openings], Mapping[str, Any]]
     two_sided: bool = False
+    blended: bool = False
     order: int = 0
 
 
@@ -49,7 +53,7 @@ def programs(ctx: moderngl.Context, quality: str) -> dict[str, moderngl.Program]
     made = {
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), LID_POINTS=LID_POINTS),
         "inner": build(ctx, ("light.glsl", "inner.vert"), flat),
-        "hair": build(ctx, ("light.glsl", "hair.vert"), flat),
+        "hair": build(ctx, ("light.glsl", "hair.vert"), ("hair.frag",)),
         "background": build(ctx, ("background.vert",), ("background.frag",)),
     }
     if quality == "full":
@@ -84,11 +88,19 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     occlusion = attribute(part, "occlusion", (1.0,))[:, :1]
     packed = np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), np.clip(occlusion, 0.0, 1.0)])
     gloss = attribute(part, "gloss", (0.3,))[:, :1]
-    uv = np.asarray(part.uv, np.float32) * _DETAIL_TILES
     return {
         "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
-        "surface_uv_gloss": np.hstack([uv, gloss, np.zeros_like(gloss)]).astype(np.float32),
+        "surface_uv_gloss": np.hstack([detail_uv(part), gloss, np.zeros_like(gloss)]).astype(np.float32),
     }
+
+
+def detail_uv(part: ViewPart) -> np.ndarray:
+    """Where the detail texture lies on a part at rest, (m, 2), in tiles: longitude and latitude, since a head's
+    own (u, v) are stretched and differ from part to part."""
+    offset = np.asarray(part.vertices, np.float64) - _DETAIL_CENTRE
+    longitude = np.arctan2(offset[:, 0], offset[:, 2])
+    latitude = np.arctan2(offset[:, 1], np.hypot(offset[:, 0], offset[:, 2]))
+    return np.column_stack([longitude, latitude]) * (_DETAIL_TILES / (2.0 * np.pi))
 
 
 def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
@@ -121,16 +133,23 @@ def _inner(albedo: tuple[float, float, float], wrap: float, wetness: float, **op
     return Material("inner", static, uniforms, **options)
 
 
-def _hair(albedo: tuple[float, float, float]) -> Material:
-    """Lashes and brows."""
-    return Material("hair", lambda part, theme, openings: {}, lambda *_: {"albedo": albedo}, two_sided=True, order=2)
+def _hair(albedo: tuple[float, float, float], fade: tuple[float, float, float, float]) -> Material:
+    """Lashes and brows; `fade` as in hair.frag."""
+    return Material(
+        "hair",
+        lambda part, theme, openings: {"along": np.asarray(part.uv, np.float32)},
+        lambda *_: {"albedo": albedo, "fade": fade},
+        two_sided=True,
+        blended=True,
+        order=2,
+    )
 
 
 MATERIALS: dict[str, Material] = {
     "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
     "eye": Material("eye", _eye_static, _eye_uniforms, order=1),
-    "lash": _hair((0.020, 0.014, 0.011)),
-    "brow": _hair((0.070, 0.045, 0.030)),
+    "lash": _hair((0.022, 0.015, 0.012), (0.85, 0.15, 0.0, 0.0)),
+    "brow": _hair((0.085, 0.052, 0.034), (0.80, 0.55, 0.22, 1.6)),
     "teeth": _inner((0.72, 0.66, 0.54), 0.3, 0.30, order=3),
     "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.22, order=4),
     "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),

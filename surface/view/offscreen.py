@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from surface.errors import ViewError
 from surface.view.camera import Camera
+from surface.view.pace import Pace, is_software
 from surface.view.parts import ViewHead
 from surface.view.renderer import Renderer
 from surface.view.target import Target
@@ -17,8 +19,6 @@ from surface.view.theme import Theme
 if TYPE_CHECKING:
     import moderngl
 
-#: Samples per pixel of each quality.
-SAMPLES = {"full": 4, "fast": 1}
 NO_OPENGL_HINT = "apt-get install libegl1 libgl1-mesa-dri"
 
 
@@ -52,7 +52,8 @@ class Offscreen:
     ----------
     head : anything with the parts of `surface.view.parts.ViewHead`.
     size : (width, height), pixels.
-    samples : per pixel; None = 4 for quality "full", 1 and smoothed edges for "fast".
+    samples : per pixel; None = 4 for quality "full" and 1 with smoothed edges for "fast". Once :meth:`draw` is
+        used, the picture counts as live, and "full" too falls back to 1 where 4 cannot be kept up.
     quality, theme : see :class:`surface.view.renderer.Renderer`.
 
     Raises
@@ -75,7 +76,9 @@ class Offscreen:
             self.ctx.release()
             raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
         self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme)
-        self.target = Target(self.ctx, size, SAMPLES[quality] if samples is None else samples)
+        self._pace = Pace(quality, samples, software=is_software(self.ctx))
+        self._wanted = self._pace.samples
+        self.target = Target(self.ctx, size, self._wanted)
 
     def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
         """Pose the head with `values` (P,) and draw it, without reading the picture back.
@@ -83,16 +86,33 @@ class Offscreen:
         The frame before is waited for after the pose, so on a software renderer posing runs beside the
         filling of the last frame and never more than one frame is under way.
         """
-        self.head.pose(values)
-        self.ctx.__enter__()  # another context may have been current since
-        self.ctx.finish()
-        self.renderer.update()
-        self.target.paint(self.renderer, camera or Camera.front())
+        self._pace.begin_live()
+        self._frame(values, camera)
 
     def render(self, values: np.ndarray, camera: Camera | None = None) -> np.ndarray:
-        """As :meth:`draw`, and the picture as (height, width, 3) uint8, top row first."""
-        self.draw(values, camera)
+        """Pose the head, draw it and return the picture as (height, width, 3) uint8, top row first."""
+        self._frame(values, camera)
         return self.read()
+
+    def _frame(self, values: np.ndarray, camera: Camera | None) -> None:
+        """Pose and draw."""
+        self.head.pose(values)
+        started = time.perf_counter()
+        self.ctx.__enter__()  # another context may have been current since
+        self.ctx.finish()
+        self._fit_target()
+        self.renderer.update()
+        self.target.paint(self.renderer, camera or Camera.front())
+        if self._pace.live:
+            self._pace.note(time.perf_counter() - started)
+
+    def _fit_target(self) -> None:
+        """Make the target anew when the pace asks for other samples."""
+        if self._wanted != self._pace.samples:
+            self._wanted = self._pace.samples
+            size = self.target.size
+            self.target.release()
+            self.target = Target(self.ctx, size, self._wanted)
 
     def read(self) -> np.ndarray:
         """The picture last drawn, (height, width, 3) uint8, top row first."""

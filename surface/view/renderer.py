@@ -79,15 +79,15 @@ class Renderer:
         target.scissor = region or (0, 0, width, height)
         target.use()
         self.ctx.viewport = (0, 0, width, height)
-        self.ctx.enable_only(self.ctx.DEPTH_TEST)
         self.ctx.depth_func = "<="
+        self.ctx.blend_func = self.ctx.SRC_ALPHA, self.ctx.ONE_MINUS_SRC_ALPHA
         target.depth_mask = True
         target.clear(depth=1.0)
         self._aim(camera, width / max(height, 1))
         self._detail.use(0)
         for buffers in self._parts:
             self._draw_part(buffers)
-        self.ctx.disable(self.ctx.CULL_FACE)
+        self.ctx.enable_only(self.ctx.DEPTH_TEST)
         theme = self.theme
         put(self._programs["background"], {"top": theme.background_top, "bottom": theme.background_bottom})
         self._background.render(vertices=3)
@@ -112,10 +112,10 @@ class Renderer:
         part = buffers.part
         material = materials.of(part.material)
         put(self._programs[material.program], material.uniforms(part, self.theme, self.openings))
-        if material.two_sided:
-            self.ctx.disable(self.ctx.CULL_FACE)
-        else:
-            self.ctx.enable(self.ctx.CULL_FACE)
+        flags = self.ctx.DEPTH_TEST
+        flags |= 0 if material.two_sided else self.ctx.CULL_FACE
+        flags |= self.ctx.BLEND if material.blended else 0
+        self.ctx.enable_only(flags)
         buffers.draw()
 
     def _apply_theme(self) -> None:

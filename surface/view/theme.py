@@ -39,18 +39,18 @@ class Theme:
     lights_follow : 0 keeps the lights with the world, 1 turns them with the camera.
     """
 
-    albedo: Colour = (0.52, 0.31, 0.225)
+    albedo: Colour = (0.60, 0.37, 0.28)
     use_painted: bool = True
     wrap: Colour = (0.42, 0.20, 0.14)
     gloss: float = 1.0
     detail: float = 1.0
-    iris: Colour = (0.065, 0.105, 0.125)
-    sclera: Colour = (0.56, 0.52, 0.49)
-    key: Light = Light(-34.0, 32.0, (1.50, 1.36, 1.20))
-    fill: Light = Light(48.0, 6.0, (0.24, 0.28, 0.34))
-    rim: Light = Light(152.0, 28.0, (0.95, 1.00, 1.12))
-    sky: Colour = (0.26, 0.28, 0.32)
-    ground: Colour = (0.14, 0.105, 0.09)
+    iris: Colour = (0.080, 0.125, 0.150)
+    sclera: Colour = (0.68, 0.63, 0.59)
+    key: Light = Light(-34.0, 32.0, (1.18, 1.06, 0.92))
+    fill: Light = Light(48.0, 6.0, (0.16, 0.18, 0.215))
+    rim: Light = Light(152.0, 28.0, (0.80, 0.84, 0.94))
+    sky: Colour = (0.20, 0.21, 0.235)
+    ground: Colour = (0.115, 0.085, 0.072)
     background_top: Colour = (0.20, 0.23, 0.27)
     background_bottom: Colour = (0.42, 0.44, 0.46)
     lights_follow: float = 0.5

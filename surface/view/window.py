@@ -13,7 +13,7 @@ import numpy as np
 
 from surface.errors import ViewError
 from surface.view.camera import Camera
-from surface.view.offscreen import SAMPLES
+from surface.view.pace import Pace, is_software
 from surface.view.parts import ViewHead
 from surface.view.renderer import Renderer
 from surface.view.target import Target
@@ -136,6 +136,8 @@ class _Window:
         self._ctx: moderngl.Context | None = None
         self._renderer: Renderer | None = None
         self._target: Target | None = None
+        self._made_for = (0, 0, 0)
+        self._pace = Pace(quality)
 
     def guarded(self, action: Callable[[], None]) -> Callable[[], None]:
         """`action` as a callback: what it raises is kept and closes the window."""
@@ -169,6 +171,8 @@ class _Window:
                 f"the window has no OpenGL 3.1: {error}", hint="set LIBGL_ALWAYS_SOFTWARE=1 to draw in software"
             ) from error
         self._ctx.clear_errors()
+        self._pace = Pace(self.quality, software=is_software(self._ctx))
+        self._pace.begin_live()
         self._renderer = Renderer(self._ctx, self.head, quality=self.quality, theme=self.theme)
 
     def background(self) -> None:
@@ -180,8 +184,9 @@ class _Window:
         size = _pixels()
         if size[0] < 1 or size[1] < 1:
             return
-        target = self._fitting(self._ctx, size)
         self.head.pose(self.source())
+        started = time.perf_counter()
+        target = self._fitting(self._ctx, size)
         self._renderer.update()
         target.paint(self._renderer, self.viewpoint.camera)
         target.picture.scissor = (0, 0, *size)
@@ -189,6 +194,7 @@ class _Window:
         self._ctx.copy_framebuffer(screen, target.picture)
         screen.use()
         self._ctx.enable_only(self._ctx.NOTHING)
+        self._pace.note(time.perf_counter() - started)
         self._count()
 
     def panels(self) -> None:
@@ -206,11 +212,12 @@ class _Window:
         self._target = self._renderer = None
 
     def _fitting(self, ctx: moderngl.Context, size: tuple[int, int]) -> Target:
-        """The target, made anew when the window changed its size."""
-        if self._target is None or self._target.size != size:
+        """The target, made anew when the window changed its size or the pace its samples."""
+        wanted = (*size, self._pace.samples)
+        if self._target is None or self._made_for != wanted:
             if self._target is not None:
                 self._target.release()
-            self._target = Target(ctx, size, SAMPLES[self.quality])
+            self._target, self._made_for = Target(ctx, size, self._pace.samples), wanted
         return self._target
 
     def _count(self) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ball_head import skin
 
-from surface.view.materials import MATERIALS, attribute, of, order
+from surface.view.materials import MATERIALS, attribute, detail_uv, of, order
 from surface.view.openings import Openings
 from surface.view.theme import THEMES
 
@@ -34,3 +34,15 @@ def test_missing_attributes_have_defaults() -> None:
     part = skin()
     assert attribute(part, "gloss", (0.3,)) == pytest.approx(np.full((len(part.rest), 1), 0.3))
     assert (of("skin").static(part, THEMES["skin"], Openings([part]))["albedo_occlusion"][:, 3] == 255).all()
+
+
+def test_detail_is_even_in_millimetres_and_closes_behind_the_head() -> None:
+    part = skin()
+    uv = detail_uv(part)
+    front = np.argmin(np.linalg.norm(part.rest - [0, 10, 90], axis=1))
+    near = np.flatnonzero(np.linalg.norm(part.rest - part.rest[front], axis=1) < 12)
+    moved = np.linalg.norm(part.rest[near] - part.rest[front], axis=1)
+    scale = np.linalg.norm(uv[near] - uv[front], axis=1)[moved > 3] / moved[moved > 3]
+    assert scale.max() / scale.min() < 1.3
+    back = uv[part.rest[:, 2] < -0.9 * part.rest[:, 2].max()]
+    assert np.ptp(back[:, 0]) == pytest.approx(round(np.ptp(back[:, 0])), abs=1e-6)

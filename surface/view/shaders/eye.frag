@@ -56,8 +56,9 @@ void main() {
     vec3 lit = albedo * light * shade * caustic;
 
     vec3 mirrored = reflect(-v, cornea);
-    float key = lobe(dot(mirrored, key_direction), 220.0) * 1.6 + lobe(dot(mirrored, key_direction), 24.0) * 0.04;
-    float fill = lobe(dot(mirrored, fill_direction), 110.0) * 0.5;
+    // Lamps mirror as soft boxes: flat inside, soft at the rim.
+    float key = smoothstep(0.972, 0.988, dot(mirrored, key_direction)) * 1.1 + lobe(dot(mirrored, key_direction), 30.0) * 0.05;
+    float fill = smoothstep(0.970, 0.990, dot(mirrored, fill_direction)) * 0.6;
     float fresnel = 1.0 - clamp(dot(cornea, v), 0.0, 1.0);
     fresnel = 0.03 + 0.5 * fresnel * fresnel * fresnel;
     lit += (key * key_colour + fill * fill_colour) * smoothstep(0.0, 1.2, v_lid.x);

@@ -14,7 +14,7 @@ void main() {
     float wide = lobe(dot(n, v_half_narrow.xyz), WIDE_SHARPNESS);
     float narrow = wide * wide;
     narrow *= narrow;
-    vec3 lit = v_diffuse * (1.0 + grain.w * vec3(0.5, 0.9, 1.0));
+    vec3 lit = v_diffuse * (1.0 + grain.w * vec3(0.7, 1.3, 1.5));
     lit += key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w);
     colour = vec4(encode(lit), 1.0);
 }

@@ -1,7 +1,7 @@
 // How skin answers the lights, per vertex.
 #define WIDE_SHARPNESS 9.0      // the narrow lobe is the wide one to the fourth power
-#define WIDE 0.030
-#define NARROW 0.085
+#define WIDE 0.042
+#define NARROW 0.17
 
 uniform vec3 wrap;
 uniform float gloss_scale;
@@ -15,7 +15,7 @@ float grazing(vec3 n, vec3 v) {
 // Everything but the key light's highlights.
 vec3 diffuse(vec3 n, vec3 v, vec3 albedo, float occlusion) {
     // Blood colours what little light leaves a crevice: occlusion bites less in red.
-    vec3 open = occlusion + occlusion * (1.0 - occlusion) * vec3(0.60, 0.15, 0.05);
+    vec3 open = occlusion + (1.0 - occlusion) * (occlusion * vec3(0.60, 0.15, 0.05) + vec3(0.10, 0.035, 0.025));
     float direct = 0.25 + 0.75 * occlusion;
     float rim = dot(n, rim_direction);
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap) * direct;
