@@ -61,6 +61,8 @@ class Renderer:
         parts = sorted(head.parts, key=lambda part: materials.order(part.material))
         self._parts = [self._buffers(part) for part in parts]
         self._camera: tuple[Camera, float] | None = None
+        #: Grows with every upload: equal revisions, cameras and themes draw equal pictures.
+        self.revision = 0
         self._apply_theme()
 
     def _buffers(self, part: Any) -> PartBuffers:
@@ -71,7 +73,9 @@ class Renderer:
 
     def update(self) -> int:
         """Upload what the last `head.pose` changed; call once after every pose. Returns vertices sent."""
-        return sum(buffers.upload(buffers.part.changed) for buffers in self._parts)
+        sent = sum(buffers.upload(buffers.part.changed) for buffers in self._parts)
+        self.revision += sent > 0
+        return sent
 
     def draw(self, camera: Camera, target: moderngl.Framebuffer, region: Region | None = None) -> None:
         """Draw the head and the background into `target`: all of it, or only the pixels of `region`."""

@@ -9,6 +9,7 @@ import numpy as np
 from surface.view.camera import Camera
 from surface.view.programs import build, put
 from surface.view.renderer import Region, Renderer
+from surface.view.theme import Theme
 
 if TYPE_CHECKING:
     import moderngl
@@ -43,9 +44,17 @@ class Target:
         self._smoother = None if self._smooth is None else ctx.vertex_array(self._smooth, [])
         self._last: Region | None = None
         self._backdrop: tuple[object, object] | None = None
+        self._shown: tuple[Renderer, int, Theme, Camera] | None = None
 
     def paint(self, renderer: Renderer, camera: Camera) -> None:
-        """Draw the renderer's head as it was last uploaded; `picture` then holds it."""
+        """Draw the renderer's head as it was last uploaded; `picture` then holds it.
+
+        A picture that would come out as it is already is left alone: a face at rest costs nothing.
+        """
+        shown = (renderer, renderer.revision, renderer.theme, camera)
+        if shown == self._shown:
+            return
+        self._shown = shown
         whole = (0, 0, *self.size)
         region = renderer.region(camera, self.size)
         theme = renderer.theme

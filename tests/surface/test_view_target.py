@@ -54,3 +54,29 @@ def test_union() -> None:
     assert union((10, 10, 5, 5), (0, 12, 4, 10)) == (0, 10, 15, 12)
     assert union((0, 0, 0, 0), (3, 4, 5, 6)) == (3, 4, 5, 6)
     assert union((3, 4, 5, 6), (9, 9, 0, 3)) == (3, 4, 5, 6)
+
+
+def test_a_face_at_rest_is_not_drawn_again(gl: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    with Offscreen(BallHead(), (64, 64), samples=4) as screen:
+        drawn: list[Camera] = []
+        draw = screen.renderer.draw
+
+        def counted(camera: Camera, *rest: object) -> None:
+            drawn.append(camera)
+            draw(camera, *rest)
+
+        monkeypatch.setattr(screen.renderer, "draw", counted)
+        first = screen.render(values())
+        monkeypatch.setattr(screen.head, "pose", lambda values: _touch_nothing(screen))
+        assert (screen.render(values()) == first).all()
+        assert len(drawn) == 1
+        screen.render(values(), Camera.profile())
+        screen.renderer.set_background((0, 0, 0), (0, 0, 0))
+        screen.render(values(), Camera.profile())
+        assert len(drawn) == 3
+
+
+def _touch_nothing(screen: Offscreen) -> None:
+    """What a head does when the values are those it has."""
+    for part in screen.head.parts:
+        part.changed = []
