@@ -1,4 +1,4 @@
-"""Control tables of Dynamixel servos by model, as data.
+"""Control tables of Dynamixel and Feetech servos by model, as data.
 
 Addresses and sizes come from the table files that ship with dynamixel-sdk; `tables.toml` beside this module
 adds what they lack (initial values, access, ranges, signs, units) and corrects what is wrong in them. Nothing
@@ -10,10 +10,10 @@ from __future__ import annotations
 import importlib.util
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from drivers.errors import DriverError
 
@@ -34,6 +34,8 @@ class Item:
     lower, upper : names of the registers that bound it (a symmetric limit has ``lower`` None); outside them a
         write is refused with Data Limit (6).
     scale, unit : value of one step in SI units, and the unit's symbol ("" and 1.0 where it has none).
+    sign_bit : the value is a magnitude with its sign in this bit (Feetech, and speeds of AX and MX), or None.
+    big_endian : high byte first (Feetech SCS).
     """
 
     name: str
@@ -49,6 +51,8 @@ class Item:
     upper: str | None = None
     scale: float = 1.0
     unit: str = ""
+    sign_bit: int | None = None
+    big_endian: bool = False
 
     @property
     def end(self) -> int:
@@ -57,11 +61,29 @@ class Item:
 
     def encode(self, value: int) -> bytes:
         """`value` as the item's bytes; a value that does not fit is cut to the item's bits."""
-        return (value & ((1 << 8 * self.size) - 1)).to_bytes(self.size, "little")
+        raw = value if self.sign_bit is None else to_magnitude(value, self.sign_bit)
+        return (raw & ((1 << 8 * self.size) - 1)).to_bytes(self.size, self._order)
 
     def decode(self, data: bytes | bytearray | memoryview) -> int:
         """The item's value in its `size` bytes of `data`."""
-        return int.from_bytes(data[: self.size], "little", signed=self.signed)
+        raw = int.from_bytes(data[: self.size], self._order, signed=self.signed)
+        return raw if self.sign_bit is None else from_magnitude(raw, self.sign_bit)
+
+    @property
+    def _order(self) -> Literal["little", "big"]:
+        return "big" if self.big_endian else "little"
+
+
+def to_magnitude(value: int, sign_bit: int) -> int:
+    """Magnitude with the sign in a bit of its own; a magnitude that does not fit is cut to the largest."""
+    magnitude = min(abs(value), (1 << sign_bit) - 1)
+    return magnitude | 1 << sign_bit if value < 0 else magnitude
+
+
+def from_magnitude(raw: int, sign_bit: int) -> int:
+    """The inverse of `to_magnitude`."""
+    magnitude = raw & (1 << sign_bit) - 1
+    return -magnitude if raw >> sign_bit & 1 else magnitude
 
 
 class ControlTable(Mapping[str, Item]):
@@ -70,6 +92,9 @@ class ControlTable(Mapping[str, Item]):
     Attributes
     ----------
     model, number, firmware : ``"xl330-m288"``, 1200, 52.
+    protocol : 1 or 2: the framing it speaks.
+    lock : what closes the EEPROM to writes: ``"torque"``, or ``"Lock"`` for the register of that name.
+    top_speed : no-load speed in steps of its speed register; 0 = the initial Velocity Limit.
     items : by name, in order of address.
     eeprom_end : first RAM address; everything below keeps its value without power and is locked under torque.
     size : bytes of the whole table.
@@ -91,7 +116,10 @@ class ControlTable(Mapping[str, Item]):
         self.ticks_per_turn: int = spec["ticks_per_turn"]
         self.turn_rad: float = spec["turn_rad"]
         self.center: int = spec["center"]
-        self.baud: tuple[int, ...] = tuple(spec["baud"])
+        self.protocol: int = spec.get("protocol", 2)
+        self.lock: str = spec.get("lock", "torque")
+        self.top_speed: int = spec.get("top_speed", 0)
+        self.baud = _bit_rates(spec)
         self.voltage: int = spec["voltage"]
         self.indirect: tuple[tuple[int, int, int], ...] = tuple(tuple(area) for area in spec.get("indirect", ()))
         self.hardware_error: dict[str, int] = spec["hardware_error"]
@@ -122,9 +150,24 @@ class ControlTable(Mapping[str, Item]):
         return {item.address: item for item in self.items_by_name.values()}
 
 
+def _bit_rates(spec: dict[str, Any]) -> tuple[int, ...]:
+    """Bits per second by value of Baud Rate."""
+    divider = spec.get("baud_divider")
+    if divider is None:
+        return tuple(spec["baud"])
+    extra = spec.get("baud_extra", {})
+    return tuple(extra.get(str(value), round(divider / (value + 1))) for value in range(255))
+
+
 @lru_cache(maxsize=1)
 def _data() -> dict[str, Any]:
-    return tomllib.loads(Path(__file__).with_name("tables.toml").read_text(encoding="utf-8"))
+    """The data of both files; their families and numbers are kept apart by name."""
+    data: dict[str, Any] = {}
+    for name in ("tables.toml", "legacy.toml"):
+        part = tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+        for section, entries in part.items():
+            data.setdefault(section, {}).update(entries)
+    return data
 
 
 @lru_cache(maxsize=1)
@@ -200,8 +243,11 @@ def _load(number: int, firmware: int | None) -> ControlTable:
         if version >= int(since):
             suffix = changes.get("file", suffix)
             spec.update(changes)
-    path = _folder() / f"{model.replace('-', '_')}{suffix}.model"
-    items = _items(_layout(path, spec), spec["items"]) + _indirect_items(spec)
+    text = ""
+    if spec.get("protocol", 2) == 2:
+        path = _folder() / f"{model.replace('-', '_')}{suffix}.model"
+        text = path.read_text(encoding="utf-8")
+    items = _items(_layout(text, spec), spec) + _indirect_items(spec)
     items = [_with_identity(item, number, version) for item in items]
     return ControlTable(model, number, version, spec, items)
 
@@ -216,7 +262,8 @@ def _specification(model: str) -> dict[str, Any]:
     series = next((key for key in data["series"] if model.startswith(key)), "")
     spec: dict[str, Any] = {}
     items: dict[str, dict[str, Any]] = {}
-    for layer in (data["family"][family], data["series"].get(series, {}), data["model"].get(model, {})):
+    base = data["family"].get(data["family"][family].get("extends"), {})
+    for layer in (base, data["family"][family], data["series"].get(series, {}), data["model"].get(model, {})):
         spec.update(layer)
         for name, changes in layer.get("items", {}).items():
             items[name] = {**items.get(name, {}), **changes}
@@ -224,24 +271,25 @@ def _specification(model: str) -> dict[str, Any]:
     return spec
 
 
-def _layout(path: Path, spec: dict[str, Any]) -> dict[str, tuple[int, int]]:
-    """Name -> (address, size): the SDK's file less its aliases, plus the items it lacks."""
+def _layout(text: str, spec: dict[str, Any]) -> dict[str, tuple[int, int]]:
+    """Name -> (address, size): the SDK's file (`text`) less its aliases, plus the items it lacks."""
     drop, rename = spec.get("drop", ()), spec.get("rename", {})
     layout = {}
-    _, _, table = path.read_text(encoding="utf-8").partition("[control table]")
+    _, _, table = text.partition("[control table]")
     for line in table.splitlines()[2:]:
         address, size, name = [*line.strip().split("\t"), "", ""][:3]
         if name and name not in drop:
             layout[rename.get(name, name)] = (int(address), int(size))
     for name, entry in spec["items"].items():
-        if "address" in entry:
+        if "address" in entry and not entry.get("absent"):
             layout.setdefault(name, (entry["address"], entry["size"]))
     return layout
 
 
-def _items(layout: dict[str, tuple[int, int]], entries: dict[str, dict[str, Any]]) -> list[Item]:
+def _items(layout: dict[str, tuple[int, int]], spec: dict[str, Any]) -> list[Item]:
+    entries, big_endian = spec["items"], spec.get("order") == "big"
     return [
-        _item(name, address, size, entries.get(name, {}))
+        _item(name, address, size, {"big_endian": big_endian, **entries.get(name, {})})
         for name, (address, size) in layout.items()
         if not name.startswith("Indirect ")
     ]
@@ -252,7 +300,7 @@ def _item(name: str, address: int, size: int, entry: dict[str, Any]) -> Item:
     lower, upper = entry.get("between", (None, entry.get("limit")))
     values = entry.get("values")
     return Item(
-        name,
+        entry.get("name", name),
         address,
         size,
         signed=entry.get("signed", False),
@@ -265,6 +313,8 @@ def _item(name: str, address: int, size: int, entry: dict[str, Any]) -> Item:
         upper=upper,
         scale=entry.get("scale", 1.0),
         unit=entry.get("unit", ""),
+        sign_bit=entry.get("sign_bit"),
+        big_endian=entry["big_endian"],
     )
 
 
@@ -285,4 +335,4 @@ def _with_identity(item: Item, number: int, firmware: int) -> Item:
     known = {"Model Number": number, "Firmware Version": firmware}
     if item.name not in known:
         return item
-    return Item(item.name, item.address, item.size, writable=False, initial=known[item.name])
+    return replace(item, initial=known[item.name])

@@ -169,9 +169,7 @@ def test_modes_of_models_without_a_current_sensor():
     assert load_table("xm430-w350")["Operating Mode"].values == (0, 1, 3, 4, 5, 16)
 
 
-@pytest.mark.parametrize(
-    "name", ["xm430-w350", "XM430-W350", "xm430_w350", "XM430-W350-T", "XM430-W350-R", 1020]
-)
+@pytest.mark.parametrize("name", ["xm430-w350", "XM430-W350", "xm430_w350", "XM430-W350-T", "XM430-W350-R", 1020])
 def test_a_model_has_many_spellings(name):
     assert load_table(name) is load_table("xm430-w350")
 
@@ -186,6 +184,70 @@ def test_unknown_models_name_what_there_is(model):
     with pytest.raises(DriverError, match=str(model)) as error:
         load_table(model)
     assert "xl330-m288" in error.value.hint
+
+
+LEGACY = {
+    "ax-12a": (
+        12,
+        1,
+        {"ID": (3, 1), "CCW Angle Limit": (8, 1023), "Goal Position": (30, 0), "Present Temperature": (43, 0)},
+    ),
+    "mx1-28": (
+        29,
+        1,
+        {"Baud Rate": (4, 34), "CCW Angle Limit": (8, 4095), "P Gain": (28, 32), "Goal Acceleration": (73, 0)},
+    ),
+    "sts3215": (777, 1, {"ID": (5, 1), "Homing Offset": (31, 0), "Goal Position": (42, 0), "Lock": (55, 1)}),
+    "scs0009": (1284, 1, {"Lock": (48, 1), "Protective Torque": (37, 40), "Present Position": (56, 0)}),
+}
+
+
+@pytest.mark.parametrize("model", LEGACY)
+def test_tables_of_protocol_1_framing(model: str):
+    number, protocol, items = LEGACY[model]
+    table = load_table(model)
+    assert (table.number, table.protocol, table.eeprom_end) == (number, protocol, 24 if number < 100 else 40)
+    assert {name: (table[name].address, table[name].initial) for name in items} == items
+    assert load_table("xl330-m288").protocol == 2
+    at = 0
+    for item in table.values():
+        assert item.address >= at, item.name
+        at = item.end
+
+
+def test_mx_replaces_the_compliance_of_ax_by_gains():
+    assert "CCW Compliance Slope" not in load_table("mx1-28")
+    assert "CW Compliance Margin" not in load_table("mx1-28")
+    assert "P Gain" not in load_table("ax-12a")
+
+
+def test_bit_rates_by_divider_and_by_list():
+    assert [load_table("ax-12a").baud[code] for code in (1, 3, 34, 207)] == [1_000_000, 500_000, 57_143, 9_615]
+    assert [load_table("mx1-28").baud[code] for code in (1, 252)] == [1_000_000, 3_000_000]
+    assert load_table("sts3215").baud[4:] == (115_200, 76_800, 57_600, 38_400)
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "value", "data"),
+    [
+        ("sts3215", "Goal Position", -100, "6480"),
+        ("sts3215", "Homing Offset", -2047, "FF0F"),
+        ("sts3215", "Present Load", -5, "0504"),
+        ("sts3215", "Model Number", 777, "0903"),
+        ("scs0009", "Goal Position", 258, "0102"),
+        ("scs0009", "Present Velocity", -258, "8102"),
+        ("ax-12a", "Present Speed", -200, "C804"),
+        ("xl330-m288", "Goal Velocity", -2, "FEFFFFFF"),
+    ],
+)
+def test_signs_and_byte_orders(model: str, name: str, value: int, data: str):
+    item = load_table(model)[name]
+    assert item.encode(value).hex().upper() == data
+    assert item.decode(bytes.fromhex(data)) == value
+
+
+def test_a_magnitude_too_large_is_cut():
+    assert load_table("sts3215")["Homing Offset"].encode(-9999) == bytes.fromhex("FF0F")
 
 
 def test_missing_item_names_the_model():
