@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +13,10 @@ from controller.errors import ParameterError
 from controller.parameters import Floats, Parameters, did_you_mean, file_error, fold, read_toml
 from controller.paths import config_dir
 
-if TYPE_CHECKING:
-    from controller.facs import Facs
-
 KINDS = ("emotion", "gesture", "user")
 OVERRIDES = ("keep", "block", "blend")
 _KEYS = {"kind", "aliases", "source", "onset_s", "offset_s", "blink", "gaze", "weights"}
 _RISE_S = 0.4
-_FORMULA = re.compile(r"(AU|AD)[LR]?\d", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,17 +48,17 @@ class Vocabulary:
     ----------
     expressions : the expressions, in file order.
     aliases : folded other names to canonical ones.
-    facs : gives the action units; without, formulas of them are unknown names.
+    formulas : makes an expression of a formula, None of anything else; see :mod:`controller.formulas`.
     """
 
     def __init__(
         self,
         expressions: dict[str, Expression],
         aliases: dict[str, str] | None = None,
-        facs: Callable[[], Facs] | None = None,
+        formulas: Callable[[str], Expression | None] | None = None,
     ) -> None:
         self._expressions = expressions
-        self._facs = facs
+        self._formulas = formulas
         self._lookup = {fold(name): name for name in expressions} | (aliases or {})
 
     @classmethod
@@ -81,7 +75,11 @@ class Vocabulary:
         aliases = reader.aliases(expressions)
         if reader.faults:
             raise file_error(path, reader.faults)
-        return cls(expressions, aliases, cache(lambda: _facs(parameters)))
+        from controller.formulas import Formulas  # it needs this module
+
+        vocabulary = cls(expressions, aliases)
+        vocabulary._formulas = Formulas(parameters, vocabulary)
+        return vocabulary
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -89,14 +87,15 @@ class Vocabulary:
         return tuple(self._expressions)
 
     def __getitem__(self, name: str) -> Expression:
-        """The expression called ``name``, any case, or of a formula of action units such as ``AU1+2+5B``.
+        """The expression called ``name``, any case, or of a formula such as ``AU1+2+5B`` or ``VA:0.6,-0.2``.
 
         Raises
         ------
         ParameterError : unknown name, with the nearest ones, or a wrong formula.
         """
-        if self._facs is not None and _FORMULA.match(name):
-            return Expression(name.upper(), self._facs().expand(name), source="FACS")
+        made = self._formulas(name) if self._formulas is not None else None
+        if made is not None:
+            return made
         found = self._lookup.get(name) or self._lookup.get(fold(name))
         if found is None:
             raise ParameterError(
@@ -185,12 +184,6 @@ class _Reader:
             self.faults.append(f"{name}.{key}: must be one of {', '.join(known)} (is {value!r})")
             return default
         return str(value)
-
-
-def _facs(parameters: Parameters) -> Facs:
-    from controller.facs import Facs  # it needs this module
-
-    return Facs.load(parameters)
 
 
 def sides(parameters: Parameters, name: str) -> list[int]:

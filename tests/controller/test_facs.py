@@ -79,12 +79,6 @@ def test_read_out_as_a_formula() -> None:
     assert FACS.formula(np.zeros(len(FACS.names))) == ""
 
 
-def test_the_vocabulary_of_expressions_takes_formulas() -> None:
-    expression = Vocabulary.load(P)["au6+12"]
-    assert expression.name == "AU6+12"
-    np.testing.assert_array_equal(expression.weights, FACS.expand("6+12"))
-
-
 def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
     path = tmp_path / "own.toml"
     path.write_text(

@@ -88,6 +88,7 @@ def test_examples() -> None:
     assert parse("EXPR happy") == Expr("happiness", 1.0, None)
     assert parse("EXPR anger 0.5 2") == Expr("anger", 0.5, 2.0)
     assert parse("EXPR au1+2+5b 0.5") == Expr("AU1+2+5B", 0.5, None)
+    assert parse("EXPR va:0.5,-.25") == Expr("VA:0.5,-0.25", 1.0, None)
     assert parse("GAZE -20 5.5") == Gaze(-20.0, 5.5)
     assert parse("GAZE at 100 0 600") == GazeAt(100.0, 0.0, 600.0)
     assert parse("GAZE off") == GazeOff()
@@ -119,6 +120,8 @@ def test_examples() -> None:
         ("FRAME 1 2 3", Code.ARGUMENTS, "3 values; FRAME needs all 59"),
         ("EXPR hapiness", Code.NAME, "did you mean 'happiness'"),
         ("EXPR AU1+99", Code.NAME, "unknown action unit '99'"),
+        ("EXPR VA:0.5", Code.NAME, "VA: needs 2 numbers"),
+        ("EXPR VAD:0,0,2", Code.NAME, "from -1 to 1"),
         ("EXPR anger 1.5", Code.RANGE, "intensity must be 0 to 1"),
         ("EXPR anger 1 0", Code.RANGE, "duration_s must be 0.05 to 3600"),
         ("EXPR anger 1 2 3", Code.ARGUMENTS, "usage"),
