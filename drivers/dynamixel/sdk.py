@@ -215,6 +215,7 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         wanted : data bytes expected, by servo id, in the order of the replies.
         """
         size = len(wanted) * STATUS_SIZE + sum(wanted.values())
+        port.suspects.update(wanted)  # until they have answered, so also when this is interrupted
         self.send(port, frame)
         try:
             port.setPacketTimeout(len(frame) + size)
@@ -252,6 +253,7 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
     def _exchange_fast(self, port: Port, frame: bytes, devices: list[tuple[int, int]]) -> Exchange:
         size = packet.fast_reply_size(length for _, length in devices)
         raw, replies = bytearray(), list[StatusPacket]()
+        port.suspects.update(servo for servo, _ in devices)
         self.send(port, frame)
         try:
             port.setPacketTimeout(len(frame) + size)
@@ -298,11 +300,9 @@ class _Sorter:
 
 
 def _settle(port: Port, wanted: Mapping[int, int], replies: dict[int, StatusPacket], corrupt: bool) -> Exchange:
-    """Remember who missed its time; who answered is in step."""
+    """Who answered is in step; the others stay suspects."""
     missing = tuple(servo for servo in wanted if servo not in replies)
-    if port.suspects:
-        port.suspects.difference_update(replies)
-    port.suspects.update(missing)
+    port.suspects.difference_update(replies)
     return Exchange(replies, missing, corrupt and bool(missing))
 
 

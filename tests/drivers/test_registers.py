@@ -25,7 +25,7 @@ def wire() -> Iterator[SimulatedBus]:
 
 @pytest.fixture
 def registers(wire: SimulatedBus) -> Iterator[Registers]:
-    port = Port(wire.path, margin_s=0.15)
+    port = Port(wire.path, margin_s=0.1)
     port.openPort()
     named = Registers(Packets(), port, SERVOS)
     named.tables = dict.fromkeys(IDS, load_table("xl330-m288"))

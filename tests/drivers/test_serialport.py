@@ -84,7 +84,7 @@ def test_drain_waits_until_the_line_is_quiet(pty: Pty) -> None:
     os.write(pty.master, b"one")
     later = threading.Timer(0.05, os.write, (pty.master, b"more"))
     later.start()
-    assert port.drain(quiet_s=1.0, limit_s=1.2) == 7
+    assert port.drain(quiet_s=0.4, limit_s=0.6) == 7
     later.join()
     port.close()
 

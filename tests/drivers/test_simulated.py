@@ -39,7 +39,10 @@ def test_servos_keep_their_state_over_a_replug() -> None:
 
 
 def test_faults_reach_the_servos() -> None:
-    with open_bus("simulated", SERVOS, faults=["mute:2"], **CALM) as bus, pytest.raises(DriverError, match="id 2"):
+    with (
+        open_bus("simulated", SERVOS, faults=["mute:2"], margin_s=0.1) as bus,
+        pytest.raises(DriverError, match="id 2"),
+    ):
         bus.start()
 
 

@@ -18,7 +18,7 @@ from drivers.errors import BusError, CorruptReply, NoReply, ServoFault, ServoRef
 from drivers.sim import SimulatedBus
 from tests.drivers.contract import SERVOS, settle
 
-CALM = {"margin_s": 0.15, "watchdog_ms": 0}
+CALM = {"margin_s": 0.1, "watchdog_ms": 0}
 IDS = [servo.id for servo in SERVOS]
 
 
