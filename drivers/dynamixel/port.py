@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 import time
+from pathlib import Path
 
 from dynamixel_sdk import port_handler
 
@@ -16,6 +17,8 @@ from drivers.serialport import SerialPort, latency_s
 HOST_MARGIN_S = 0.010
 """Time a busy host may need to notice a reply, beyond the wire and the adapter."""
 UNKNOWN_LATENCY_S = 0.002
+PSEUDO_MARGIN_S = 0.05
+"""Behind a pseudo-terminal sits a program, which competes for the processor with everything else."""
 
 
 class Port(port_handler.PortHandler):
@@ -41,9 +44,7 @@ class Port(port_handler.PortHandler):
         self._tune()
 
     def _tune(self) -> None:
-        latency = latency_s(self.link.path)
-        latency = UNKNOWN_LATENCY_S if latency is None else latency
-        self.margin_s = 2 * latency + HOST_MARGIN_S if self._margin_s is None else self._margin_s
+        self.margin_s = _margin(self.link.path) if self._margin_s is None else self._margin_s
         self.tx_time_per_byte = 10_000.0 / self.baudrate  # milliseconds, the SDK's unit
 
     def openPort(self) -> bool:
@@ -137,3 +138,11 @@ class Port(port_handler.PortHandler):
                 hint="let one thread do all reads and writes of a bus",
                 port=self.port_name,
             )
+
+
+def _margin(path: str) -> float:
+    """Longest wait for a reply beyond its time on the wire, for what a path leads to."""
+    if str(Path(path).resolve()).startswith("/dev/pts/"):
+        return PSEUDO_MARGIN_S
+    latency = latency_s(path)
+    return 2 * (UNKNOWN_LATENCY_S if latency is None else latency) + HOST_MARGIN_S

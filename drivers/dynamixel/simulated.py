@@ -13,9 +13,6 @@ from drivers.dynamixel.bus import DynamixelBus
 if TYPE_CHECKING:
     from drivers.sim import SimulatedBus
 
-SIMULATED_MARGIN_S = 0.05
-"""A simulated servo competes for the processor with everything else, so it may take longer than a real one."""
-
 
 class SimulatedDynamixelBus(DynamixelBus):
     """A :class:`~drivers.dynamixel.bus.DynamixelBus` that brings its own simulated servos.
@@ -41,10 +38,9 @@ class SimulatedDynamixelBus(DynamixelBus):
         latency_s: float = 0.0,
         seed: int = 0,
         process: bool = True,
-        margin_s: float | None = SIMULATED_MARGIN_S,
         **options: Any,
     ) -> None:
-        super().__init__(servos, port=port, baud=baud, margin_s=margin_s, faults=faults, **options)
+        super().__init__(servos, port=port, baud=baud, faults=faults, **options)
         self.simulation: SimulatedBus | None = None
         self._link = port
         self._folder: tempfile.TemporaryDirectory[str] | None = None

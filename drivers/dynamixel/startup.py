@@ -51,6 +51,10 @@ class Policy:
     min_voltage_v: float | None = None
     voltage_wait_s: float = 30.0
 
+    def __post_init__(self) -> None:
+        if self.takeover not in ("adopt", "release", "refuse"):
+            raise ValueError(f'takeover: must be "adopt", "release" or "refuse", got {self.takeover!r}')
+
     @property
     def watchdog_steps(self) -> int:
         """The register's value, rounded up, at most 127."""
@@ -180,7 +184,8 @@ def _clear_faults(
     for servo in bad:
         registers.packets.reboot(registers.port, servo)
     sleep(BOOT_S / 4)
-    registers.each(bad, lambda servo: registers.hello(servo, tries=20))
+    patience = math.ceil(BOOT_S / registers.port.margin_s)
+    registers.each(bad, lambda servo: registers.hello(servo, tries=patience))
     registers.put_all(dict.fromkeys(bad, 2), "status_level")  # all RAM is at its default again
     still = {servo: bits for servo, bits in registers.get_all(list(bad), "hardware").items() if bits}
     if still:
@@ -207,7 +212,9 @@ def _settings(registers: Registers, servo: int, held: bool, started: Started) ->
     """Permanent registers this driver relies on: read, and written only where they differ."""
     table = registers.tables[servo]
     wanted: dict[str, int] = {"mode": 2 if table.model == "xl320" else 3}
-    keep = {"drive_mode": ~(REVERSE | TIME_PROFILE | TORQUE_BY_GOAL), "startup": ~1}
+    keep = {"drive_mode": ~(REVERSE | TIME_PROFILE | TORQUE_BY_GOAL)}
+    if table.goal_torque:  # older firmware has no Startup Configuration and refuses to be asked
+        keep["startup"] = ~1
     present = {name: registers.get(servo, name) for name in ("mode", *registers_of(registers, servo, keep))}
     wanted |= {name: present[name] & mask for name, mask in keep.items() if name in present}
     if not held:  # a delayed answer only costs time, so a servo that holds is left alone

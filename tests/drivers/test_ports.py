@@ -67,8 +67,7 @@ def test_a_port_that_is_no_usb_device_has_empty_fields(machine: Path) -> None:
 def test_ports_are_sorted_and_the_real_machine_can_be_listed(machine: Path) -> None:
     (machine / "dev/ttyACM0").touch()
     names = [
-        Path(p.device).name
-        for p in ports(machine, record(machine / "dev/ttyUSB0"), record(machine / "dev/ttyACM0"))
+        Path(p.device).name for p in ports(machine, record(machine / "dev/ttyUSB0"), record(machine / "dev/ttyACM0"))
     ]
     assert names == ["ttyACM0", "ttyUSB0"]
     assert isinstance(list_ports(), list)

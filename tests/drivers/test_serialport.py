@@ -121,9 +121,7 @@ def test_a_file_that_is_no_terminal_is_a_port_error(tmp_path: os.PathLike[str]) 
     ("code", "kind"),
     [(13, PortPermission), (1, PortPermission), (16, PortBusy), (2, PortMissing), (19, PortMissing)],
 )
-def test_the_systems_reason_picks_the_error(
-    monkeypatch: pytest.MonkeyPatch, code: int, kind: type[Exception]
-) -> None:
+def test_the_systems_reason_picks_the_error(monkeypatch: pytest.MonkeyPatch, code: int, kind: type[Exception]) -> None:
     def refuse(*args: object, **options: object) -> None:
         raise serial.SerialException(code, os.strerror(code))
 

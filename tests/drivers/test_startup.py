@@ -14,6 +14,7 @@ from drivers import open_bus
 from drivers.bus import Bus, ServoSpec
 from drivers.dynamixel import startup
 from drivers.dynamixel.startup import Policy
+from drivers.dynamixel.tables import load_table
 from drivers.errors import BusError, CorruptReply, NoReply, ServoFault, ServoRefused, WrongModel
 from drivers.sim import SimulatedBus
 from tests.drivers.contract import SERVOS, settle
@@ -330,3 +331,22 @@ def test_a_torque_that_does_not_come_on_leaves_nobody_on(wire: SimulatedBus, mon
     error = refuses(wire, ServoFault, r'did not switch their motor on: "neck" \(id 7\) \(hardware error 0x20\)')
     assert error.servo_ids == (7,)
     assert torques(wire) == [False] * 3
+
+
+def test_a_policy_nobody_knows_is_named() -> None:
+    with pytest.raises(ValueError, match="takeover"):
+        Policy(takeover="maybe")
+
+
+def test_old_firmware_is_not_asked_for_what_it_lacks(wire: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    original = startup.Registers.get
+    monkeypatch.setattr(
+        startup.Registers, "get", lambda self, servo, name, **o: asked.append(name) or original(self, servo, name, **o)
+    )
+    for firmware, expected in ((45, False), (52, True)):
+        del asked[:]
+        monkeypatch.setattr(startup, "load_table", lambda number, _, f=firmware: load_table(number, f))
+        with bus_on(wire) as bus:
+            bus.start()
+        assert ("startup" in asked) is expected
