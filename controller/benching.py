@@ -1,63 +1,79 @@
-"""What ``omote bench`` measures: the shipped head's own engine, part by part and as a whole."""
+"""What ``omote bench`` measures: a head's own engine, part by part and as a whole, beside its peers."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.paths import find_config
+from surface.bench import Measure, least, measure, speed_table
 
-
-def median_ms(work: Callable[[], object], seconds: float) -> float:
-    """Median time of ``work`` over ``seconds`` (at least five calls), after one call that is not counted."""
-    work()
-    times: list[float] = []
-    end = time.perf_counter() + seconds
-    while len(times) < 5 or time.perf_counter() < end:
-        started = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - started)
-    return 1e3 * float(np.median(times))
-
-
-def head_rows(name: str, seconds: float, tell: Callable[[str], None]) -> Iterator[tuple[str, ...]]:
-    """Rows of the head table: posing with everything, one region and nothing changing."""
+if TYPE_CHECKING:
     from surface.head import Head
 
+Tell = Callable[[str], None]
+Tables = list[tuple[str, list[Measure]]]
+
+_MOVING = ("jawOpen", "eyeBlinkLeft", "browInnerUp")
+_POSES = 8
+
+
+def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
+    """Tables of a head: posing it, and the engine on its largest surface."""
+    from surface.head import Head
+
+    tell("loading")
     started = time.perf_counter()
     head = Head.load(find_config("heads", name))
     loading = 1e3 * (time.perf_counter() - started)
+    largest = max(head.parts, key=lambda part: part.surface.n)
     vertices = sum(len(part.vertices) for part in head.parts)
-    yield ("load and tessellate", f"{loading:.0f}", "", f"{len(head.parts)} parts, {vertices} vertices")
-    rng = np.random.default_rng(1)
+    title = f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, loaded in {loading:.0f} ms"
+    about = f"{largest.name}: {largest.surface.n} control points, {len(largest.mesh.vertices)} vertices"
+    return [
+        (title, pose_rows(head, seconds, tell)),
+        (about, measure(largest.surface, largest.mesh, seconds=seconds, tell=tell)),
+    ]
+
+
+def bench_surface(seconds: float, tell: Tell) -> Tables:
+    """The engine at its memory limit, on a plain sheet."""
+    return [("about 100,000 vertices, 16 influences, one thread", speed_table(seconds=seconds, tell=tell))]
+
+
+def pose_rows(head: Head, seconds: float, tell: Tell) -> list[Measure]:
+    """Posing with everything, one parameter and nothing changing."""
     count = len(head.parameters)
-    full = _poser(head, [rng.uniform(0, 0.5, count) for _ in range(16)])
-    tell("the whole head")
-    whole = median_ms(full, seconds)
-    yield ("pose, every parameter changed", f"{whole:.2f}", "1", "numerators anew, positions and exact normals")
-    for parameter in ("jawOpen", "eyeBlinkLeft", "browInnerUp"):
+    rng = np.random.default_rng(1)
+    tell("every parameter")
+    whole = least(poser(head, [rng.uniform(0, 0.5, count) for _ in range(_POSES)]), seconds)
+    rows = [Measure("pose, every parameter changed", whole)]
+    for parameter in _MOVING:
         tell(parameter)
-        took = median_ms(_poser(head, _one_moving(head.parameters.index(parameter), count)), seconds)
-        yield (f"pose, only {parameter} changed", f"{took:.2f}", f"{took / whole:.2f}", "only what it reaches")
-    still = median_ms(_poser(head, [np.zeros(count)]), seconds)
-    yield ("pose, nothing changed", f"{still:.3f}", f"{still / whole:.3f}", "")
+        took = least(poser(head, _one_moving(head.parameters.index(parameter), count)), seconds)
+        rows.append(Measure(f"pose, only {parameter} changed", took, took / whole, "every parameter"))
+    still = least(poser(head, [np.zeros(count)]), seconds)
+    return [*rows, Measure("pose, nothing changed", still, still / whole, "every parameter")]
+
+
+def poser(head: Head, poses: list[NDArray[np.float64]]) -> Callable[[], object]:
+    """A call that poses ``head`` with the next of ``poses``, each (h,) float64."""
+    turn = 0
+
+    def step() -> None:
+        nonlocal turn
+        head.pose(poses[turn % len(poses)])
+        turn += 1
+
+    return step
 
 
 def _one_moving(index: int, count: int) -> list[NDArray[np.float64]]:
-    poses = [np.zeros(count) for _ in range(8)]
+    poses = [np.zeros(count) for _ in range(_POSES)]
     for k, pose in enumerate(poses):
-        pose[index] = k / len(poses)
+        pose[index] = k / _POSES
     return poses
-
-
-def _poser(head: object, poses: list[NDArray[np.float64]]) -> Callable[[], object]:
-    state = {"next": 0}
-
-    def step() -> None:
-        head.pose(poses[state["next"] % len(poses)])  # type: ignore[attr-defined]
-        state["next"] += 1
-
-    return step

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
+if TYPE_CHECKING:
+    from surface.bench import Measure
+
 console = Console(highlight=False)
+
+
+class Subject(StrEnum):
+    """What can be measured."""
+
+    head = "head"
+    surface = "surface"
 
 
 def register(app: typer.Typer) -> None:
@@ -17,17 +28,32 @@ def register(app: typer.Typer) -> None:
 
 
 def bench(
+    what: Annotated[Subject, typer.Argument(help="A head's own engine, or the engine at its limit.")] = Subject.head,
     head: Annotated[str, typer.Option(help="Head: a name from configs/heads or a folder.")] = "ict",
-    seconds: Annotated[float, typer.Option(help="Time for each measurement.", min=0.05)] = 0.5,
+    seconds: Annotated[float, typer.Option(help="Time for each measurement.", min=0.01)] = 0.3,
 ) -> None:
-    """Measure the surface engine on a head: full evaluation, incremental updates, and peers in the same run.
+    """Measure full evaluation and incremental updates on this machine, and peers in the same run.
 
-    Example: omote bench
+    Example: omote bench surface
     """
-    from controller.benching import bench_head
+    from controller.benching import bench_head, bench_surface
 
-    table = Table("measurement", "median (ms)", "ratio", "what it says", title="surface", title_justify="left")
     with console.status("measuring") as status:
-        for row in bench_head(head, seconds, lambda text: status.update(f"measuring {text}")):
-            table.add_row(*row)
-    console.print(table)
+
+        def tell(text: str) -> None:
+            status.update(f"measuring {text}")
+
+        tables = bench_head(head, seconds, tell) if what is Subject.head else bench_surface(seconds, tell)
+    for title, rows in tables:
+        console.print(measure_table(title, rows))
+
+
+def measure_table(title: str, rows: list[Measure]) -> Table:
+    """A table of measures with their ratios and bounds."""
+    table = Table("measure", "ms", "ratio", "to", "reach", "", title=title, title_justify="left")
+    for row in rows:
+        mark = {None: "", True: "kept", False: "missed"}[row.kept]
+        took = f"{row.milliseconds:.3f}" if row.milliseconds else ""
+        ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
+        table.add_row(row.name, took, ratio, row.against, row.reach, mark)
+    return table
