@@ -133,23 +133,30 @@ def _inner(albedo: tuple[float, float, float], wrap: float, wetness: float, **op
     return Material("inner", static, uniforms, **options)
 
 
-def _hair(albedo: tuple[float, float, float], fade: tuple[float, float, float, float]) -> Material:
-    """Lashes and brows; `fade` as in hair.frag."""
+def _hair(colour: str, fade: tuple[float, float, float, float]) -> Material:
+    """Lashes and brows; `colour` names the theme's, `fade` as in hair.frag."""
     return Material(
         "hair",
-        lambda part, theme, openings: {"along": np.asarray(part.uv, np.float32)},
-        lambda *_: {"albedo": albedo, "fade": fade},
+        lambda part, theme, openings: {"along": strip_uv(part)},
+        lambda part, theme, openings: {"albedo": getattr(theme, colour), "fade": fade},
         two_sided=True,
         blended=True,
         order=2,
     )
 
 
+def strip_uv(part: ViewPart) -> np.ndarray:
+    """Along and across a strip of hair, 0..1 (m, 2): several strips of one part lie two units of u apart."""
+    uv = np.array(part.uv, np.float32)
+    uv[:, 0] -= 2.0 * np.floor(uv[:, 0] / 2.0)
+    return np.clip(uv, 0.0, 1.0)
+
+
 MATERIALS: dict[str, Material] = {
     "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
     "eye": Material("eye", _eye_static, _eye_uniforms, order=1),
-    "lash": _hair((0.022, 0.015, 0.012), (0.85, 0.15, 0.0, 0.0)),
-    "brow": _hair((0.085, 0.052, 0.034), (0.80, 0.55, 0.22, 1.6)),
+    "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
+    "brow": _hair("brow", (0.80, 0.55, 0.22, 1.6)),
     "teeth": _inner((0.72, 0.66, 0.54), 0.3, 0.30, order=3),
     "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.22, order=4),
     "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),

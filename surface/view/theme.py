@@ -32,7 +32,7 @@ class Theme:
     use_painted : whether the head's own albedo is used.
     wrap : how far light bends round the terminator per channel, 0..1; red far, blue little, for skin.
     gloss : scale of the skin's highlights.
-    iris, sclera : eye colours.
+    iris, sclera, brow, lash : colours.
     key, fill, rim : the three lights.
     sky, ground : the ambient light's upper and lower colour.
     background_top, background_bottom : sRGB colours of the gradient behind the head.
@@ -46,6 +46,8 @@ class Theme:
     detail: float = 1.0
     iris: Colour = (0.080, 0.125, 0.150)
     sclera: Colour = (0.68, 0.63, 0.59)
+    brow: Colour = (0.085, 0.052, 0.034)
+    lash: Colour = (0.022, 0.015, 0.012)
     key: Light = Light(-34.0, 32.0, (1.18, 1.06, 0.92))
     fill: Light = Light(48.0, 6.0, (0.16, 0.18, 0.215))
     rim: Light = Light(152.0, 28.0, (0.80, 0.84, 0.94))
@@ -59,13 +61,15 @@ class Theme:
 THEMES: dict[str, Theme] = {
     "skin": Theme(),
     "mask": Theme(
-        albedo=(0.66, 0.67, 0.69),
+        albedo=(0.50, 0.51, 0.53),
         use_painted=False,
         wrap=(0.12, 0.12, 0.12),
-        gloss=2.2,
+        gloss=1.8,
         detail=0.0,
-        iris=(0.03, 0.30, 0.42),
-        sclera=(0.55, 0.57, 0.60),
+        iris=(0.025, 0.16, 0.22),
+        sclera=(0.50, 0.52, 0.55),
+        brow=(0.050, 0.055, 0.065),
+        lash=(0.030, 0.032, 0.038),
         background_top=(0.10, 0.12, 0.15),
         background_bottom=(0.27, 0.30, 0.34),
     ),
