@@ -13,11 +13,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.commands import CommandState
 from controller.errors import ParameterError, TakeError
 from controller.parameters import Floats, Parameters, fold
 
@@ -109,6 +109,22 @@ class Take:
         return np.clip(out, self.low, self.high, out=out)
 
 
+class LayerSink(Protocol):
+    """Whatever a take can be played into: a command state, or a recorder of one."""
+
+    def write_layer(
+        self,
+        name: str,
+        values: Floats,
+        mask: NDArray[np.bool_],
+        now_ns: int,
+        stamp_ns: int = 0,
+        *,
+        through: Floats | None = None,
+    ) -> None:
+        """Give a layer the values of the mask and release the rest."""
+
+
 class TakePlayer:
     """Plays a take into a layer at its own rate.
 
@@ -121,7 +137,7 @@ class TakePlayer:
     finished : the last row has been given.
     """
 
-    def __init__(self, take: Take, state: CommandState, layer: str = "capture") -> None:
+    def __init__(self, take: Take, state: LayerSink, layer: str = "capture") -> None:
         self.take = take
         self._layer = layer
         self.finished = False
