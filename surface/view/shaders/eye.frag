@@ -23,7 +23,7 @@ vec3 sclera(vec3 d, float r) {
 vec3 iris(vec2 p, float t) {
     float angle = atan(p.y, p.x) * 0.31831;
     float fibre = texture(detail, vec2(angle * 3.0, t * 0.22)).w + texture(detail, vec2(angle * 7.0, t * 0.10)).x;
-    float collarette = smoothstep(0.42, 0.18, abs(t - 0.26));
+    float collarette = (1.0 - smoothstep(0.18, 0.42, abs(t - 0.26)));
     vec3 tint = iris_colour * (0.35 + 1.1 * fibre) + vec3(0.10, 0.065, 0.03) * collarette * fibre;
     return tint * (1.0 - 0.8 * smoothstep(0.72, 1.0, t)) * smoothstep(-0.06, 0.12, t);
 }
@@ -36,7 +36,7 @@ void main() {
 
     // The iris lies under the cornea: looked at from the side it slides away from the viewer.
     vec3 v_own = v * eye_rotation;
-    vec2 p = d.xy - v_own.xy / max(v_own.z, 0.35) * 0.09 * smoothstep(1.25, 0.55, r / iris_radius);
+    vec2 p = d.xy - v_own.xy / max(v_own.z, 0.35) * 0.09 * (1.0 - smoothstep(0.55, 1.25, r / iris_radius));
     float q = length(p) / iris_radius;
     float pupil = pupil_radius / iris_radius;
     float t = (q - pupil) / (1.0 - pupil);
@@ -44,7 +44,7 @@ void main() {
 
     // The cornea bulges: its normal leans out less than the eyeball's, its highlight is small and sharp.
     vec3 axis = eye_rotation[2];
-    vec3 cornea = normalize(n + 0.45 * (n - axis * dot(n, axis)) * smoothstep(1.3, 0.7, r / iris_radius));
+    vec3 cornea = normalize(n + 0.45 * (n - axis * dot(n, axis)) * (1.0 - smoothstep(0.7, 1.3, r / iris_radius)));
     float upper = smoothstep(-0.5, 5.0, v_lid.x);
     float lower = smoothstep(-0.8, 2.4, v_lid.y);
     float shade = (0.15 + 0.85 * upper) * (0.45 + 0.55 * lower);
@@ -52,12 +52,15 @@ void main() {
     vec3 light = key_colour * wrapped(dot(n, key_direction), vec3(0.35, 0.25, 0.22))
         + fill_colour * wrapped(dot(n, fill_direction), vec3(0.3)) + ambient(n);
     // Light through the cornea gathers on the iris' far side.
-    float caustic = 1.0 + 1.2 * smoothstep(1.0, 0.5, q) * clamp(-dot(normalize(vec3(p, 0.35)).xy, (key_direction * eye_rotation).xy), 0.0, 1.0);
+    vec2 lamp = (key_direction * eye_rotation).xy;
+    float across = clamp(-dot(normalize(vec3(p, 0.35)).xy, lamp), 0.0, 1.0);
+    float caustic = 1.0 + 1.2 * (1.0 - smoothstep(0.5, 1.0, q)) * across;
     vec3 lit = albedo * light * shade * caustic;
 
     vec3 mirrored = reflect(-v, cornea);
     // Lamps mirror as soft boxes: flat inside, soft at the rim.
-    float key = smoothstep(0.972, 0.988, dot(mirrored, key_direction)) * 1.1 + lobe(dot(mirrored, key_direction), 30.0) * 0.05;
+    float towards_key = dot(mirrored, key_direction);
+    float key = 1.1 * smoothstep(0.972, 0.988, towards_key) + 0.05 * lobe(towards_key, 30.0);
     float fill = smoothstep(0.970, 0.990, dot(mirrored, fill_direction)) * 0.6;
     float fresnel = 1.0 - clamp(dot(cornea, v), 0.0, 1.0);
     fresnel = 0.03 + 0.5 * fresnel * fresnel * fresnel;
