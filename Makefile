@@ -29,7 +29,7 @@ check: setup ## style and types
 bench: setup ## measure the engine on this machine
 	@$(BIN)/omote bench
 
-setup: $(VENV)/.installed $(VENV)/.opengl ## set up only
+setup: $(VENV)/.installed $(VENV)/.opengl $(VENV)/.compiled ## set up only
 
 $(VENV)/.installed: requirements.lock pyproject.toml
 	@test -n "$(UV)$(PYTHON)" || { echo "omote needs Python 3.11 or newer. Debian, Ubuntu: sudo apt-get install python3 python3-venv"; exit 1; }
@@ -61,6 +61,12 @@ $(VENV)/.opengl: $(VENV)/.installed
 		fi; \
 		$(OPENGL_PROBE) || { echo "OpenGL still does not start; see docs/troubleshooting.md"; exit 1; }; \
 	fi
+	@touch $@
+
+# The kernels are compiled for this processor and kept beside the code; checking the head uses all of them.
+$(VENV)/.compiled: $(VENV)/.installed
+	@echo "Compiling the surface engine (half a minute, once) ..."
+	@$(BIN)/omote check ict
 	@touch $@
 
 lock: ## renew requirements.lock (needs uv)

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from controller.errors import ConfigError
 from controller.parameters import PARAMETERS, Parameters
 from controller.paths import find_config
+
+if TYPE_CHECKING:
+    from surface.head import Head
 
 
 def check_anything(name: str) -> list[str]:
@@ -45,8 +51,20 @@ def _check_head(folder: Path) -> list[str]:
     from surface.head import Head
 
     head = Head.load(folder)
+    _check_poses(head, folder)
     vertices = sum(len(part.vertices) for part in head.parts)
     return [f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, {len(head.parameters)} parameters: good"]
+
+
+def _check_poses(head: Head, folder: Path) -> None:
+    """Every parameter alone at its end must leave every vertex where it can be drawn."""
+    for index, name in enumerate(head.parameters):
+        values = np.zeros(len(head.parameters))
+        values[index] = 1.0
+        head.pose(values)
+        bad = [part.name for part in head.parts if not np.isfinite(part.vertices).all()]
+        if bad:
+            raise ConfigError(f"{folder}: {name} = 1 throws vertices of {', '.join(bad)} out of space")
 
 
 def _check_take(path: Path) -> list[str]:
