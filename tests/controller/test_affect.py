@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.affect import Affect
@@ -25,6 +25,7 @@ def test_an_anchor_is_met_exactly() -> None:
         np.testing.assert_array_equal(AFFECT.expand(*point), VOCABULARY[name].weights)
 
 
+@settings(deadline=None)
 @given(UNIT, UNIT, st.none() | UNIT)
 def test_every_mood_is_a_blend_in_range(valence: float, arousal: float, dominance: float | None) -> None:
     weights = AFFECT.weights(valence, arousal, dominance)
@@ -33,6 +34,7 @@ def test_every_mood_is_a_blend_in_range(valence: float, arousal: float, dominanc
     assert np.all(face >= P.low) and np.all(face <= P.high)
 
 
+@settings(deadline=None)
 @given(UNIT, UNIT, UNIT)
 def test_neighbouring_moods_look_alike(valence: float, arousal: float, dominance: float) -> None:
     one, other = AFFECT.expand(valence, arousal, dominance), AFFECT.expand(valence + 1e-4, arousal, dominance)

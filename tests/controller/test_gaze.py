@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.gaze import EYE_OFFSET_MM, Gaze
@@ -25,6 +25,7 @@ def settled(gaze: Gaze) -> np.ndarray:
     return np.degrees(face[gaze.indices] * SCALE)
 
 
+@settings(deadline=None)
 @given(st.floats(-95, 95), st.floats(-70, 70))
 def test_head_and_eyes_together_reach_the_direction(yaw: float, pitch: float) -> None:
     gaze = Gaze(P)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.expression import Vocabulary
@@ -75,6 +75,7 @@ COMMAND = st.one_of(
 )
 
 
+@settings(deadline=None)
 @given(COMMAND, st.none() | st.integers(0, 10**9 - 1), st.booleans())
 def test_format_and_parse_round_trip(command: Command, tag: int | None, checked: bool) -> None:
     request = Request(command, tag, checked)
@@ -157,6 +158,7 @@ def test_a_checked_refusal_is_answered_checked() -> None:
 SOUP = [*COMMANDS, "jawOpen", "headYaw", "anger", "ALL", "AT", "OFF", "0.5", "-1", "1e9", "x"]
 
 
+@settings(deadline=None)
 @given(st.lists(st.sampled_from(SOUP), max_size=8))
 def test_any_words_are_a_command_or_a_refusal(words: list[str]) -> None:
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.lineprotocol import (
@@ -41,6 +41,7 @@ def test_checksum_is_crc8_smbus() -> None:
 ASCII = st.lists(st.integers(0x20, 0x7E), min_size=2, max_size=60).map(bytes)
 
 
+@settings(deadline=None)
 @given(ASCII, st.data())
 def test_checksum_sees_swapped_neighbours_and_short_bursts(data: bytes, draw: st.DataObject) -> None:
     i = draw.draw(st.integers(0, len(data) - 2))
@@ -50,6 +51,7 @@ def test_checksum_sees_swapped_neighbours_and_short_bursts(data: bytes, draw: st
     assert checksum(data[:i] + burst + data[i + 1 :]) != checksum(data)
 
 
+@settings(deadline=None)
 @given(st.lists(WORD, min_size=1, max_size=8), TAG, st.booleans())
 def test_words_round_trip(words: list[str], tag: int | None, checked: bool) -> None:
     line = format_words(words, tag=tag, checked=checked)
@@ -57,6 +59,7 @@ def test_words_round_trip(words: list[str], tag: int | None, checked: bool) -> N
     assert parse_words(line[:-1]) == Words(tuple(words), tag, checked)
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=1100))
 def test_any_bytes_are_words_or_a_refusal(data: bytes) -> None:
     try:
@@ -101,6 +104,7 @@ def test_a_bad_checksum_is_answered_with_one_and_without_the_tag() -> None:
     assert reply is not None and (reply.kind, reply.code, reply.tag, reply.checked) == ("ERR", 13, None, True)
 
 
+@settings(deadline=None)
 @given(st.text(st.characters(max_codepoint=0x2FF), max_size=40), TAG, st.booleans())
 def test_replies_round_trip_whatever_the_text(text: str, tag: int | None, checked: bool) -> None:
     line = format_ok(text, tag=tag, checked=checked)
@@ -155,6 +159,7 @@ def test_decoder_reports_an_overlong_line_once_and_recovers() -> None:
     assert decoder.feed(b"12345678\n") == [b"12345678"]
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=300), st.lists(st.integers(1, 40), max_size=30))
 def test_decoder_gives_the_same_lines_however_the_bytes_arrive(data: bytes, cuts: list[int]) -> None:
     whole = LineDecoder(64).feed(data + b"\n")
