@@ -83,14 +83,14 @@ def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, tell: Tell
     read = add("one read of the weights", weights.sum)
     full = add("all positions", bare.refresh, "one read of the weights", "<= 1.8", read)
     add("all positions and normals", shaded.refresh, "all positions", "<= 3.5", full)
-    everything = _shaker(shaded, np.arange(surface.n))
+    everything = shaker(shaded, np.arange(surface.n))
     add("every point moved, with normals", everything, "all positions", "", full)
-    middle = _near(surface, 1)
-    add("one point moved, with normals", _shaker(shaded, middle), "all positions", "", full)
+    middle = nearest(surface, 1)
+    add("one point moved, with normals", shaker(shaded, middle), "all positions", "", full)
     for share in (0.02, 0.1):
         ids, reached = _group(surface, bare, share)
         name = f"group that reaches {100 * reached:.1f} % moved"
-        add(name, _shaker(bare, ids), "its part of all positions", "<= 1.5", reached * full)
+        add(name, shaker(bare, ids), "its part of all positions", "<= 1.5", reached * full)
     rows += peers(surface, mesh, full, seconds, tell)
     return rows
 
@@ -155,7 +155,7 @@ def large_table(vertices: int = 1_000_000, seconds: float = 0.5, tell: Tell = la
     ]
 
 
-def _shaker(deformation: Deformation, ids: np.ndarray) -> Callable[[], object]:
+def shaker(deformation: Deformation, ids: np.ndarray) -> Callable[[], object]:
     """A call that moves the points there and back in turn."""
     here = deformation.points[ids].copy()
     places = (here + 0.01 * np.ptp(deformation.points, axis=0).max(), here)
@@ -168,7 +168,7 @@ def _shaker(deformation: Deformation, ids: np.ndarray) -> Callable[[], object]:
     return call
 
 
-def _near(surface: DCPSurface, count: int) -> np.ndarray:
+def nearest(surface: DCPSurface, count: int) -> np.ndarray:
     """The ``count`` points whose subdomains lie nearest to the middle of all."""
     supports: Floats = surface.supports
     centre = np.stack([supports[:, :2].mean(axis=1), supports[:, 2:].mean(axis=1)], axis=1)
@@ -187,12 +187,13 @@ def _group(surface: DCPSurface, deformation: Deformation, share: float) -> tuple
             low = count + 1
         else:
             high = count
-    return _near(surface, low), _reached(surface, deformation, low, size)
+    return nearest(surface, low), _reached(surface, deformation, low, size)
 
 
 def _reached(surface: DCPSurface, deformation: Deformation, count: int, size: np.ndarray) -> float:
     lists = deformation._lists
     cells = [
-        lists.back_cell[lists.back_start[i] : lists.back_start[i] + lists.back_count[i]] for i in _near(surface, count)
+        lists.back_cell[lists.back_start[i] : lists.back_start[i] + lists.back_count[i]]
+        for i in nearest(surface, count)
     ]
     return float(size[np.unique(np.concatenate(cells))].sum() / size.sum())

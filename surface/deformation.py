@@ -76,7 +76,7 @@ class Deformation:
         self._hits = np.zeros(cells, dtype=np.int64)
         self._touched, self._anew = np.zeros(cells, dtype=np.int32), np.zeros(cells, dtype=np.int32)
         self._cells = np.arange(cells, dtype=np.int32)
-        self._ranges = np.zeros((cells, 2), dtype=np.int64)
+        self._ranges = np.zeros((max(cells, 1), 2), dtype=np.int64)
         self._changed_ids, self._delta = np.zeros(n, dtype=np.int64), np.zeros((n, 3))
         self._all = np.arange(n)
         self._cell_boxes: tuple[np.ndarray, Bins] | None = None
@@ -87,6 +87,8 @@ class Deformation:
         self.normals = _view(self._normals)
 
     def _reserve_local(self) -> None:
+        """Room for the longest list; called whenever the lists' arrays may have been replaced."""
+        self._table: np.ndarray | None = None
         self._local = np.zeros((int(self._lists.rows.max(initial=0)), 3), dtype=np.float32)
 
     @property
@@ -204,7 +206,7 @@ class Deformation:
             done.result()
 
     def _place(self, ids: ArrayLike, rows: ArrayLike, name: str, relative: bool) -> None:
-        from . import apply
+        from . import binding
 
         which, target = _integers(ids), np.ascontiguousarray(rows, dtype=np.float64)
         n = len(self._points)
@@ -212,10 +214,11 @@ class Deformation:
             raise ValueError(f"{name}: shape {target.shape}, expected {(len(which), 3)}")
         if len(which) > n:  # ids that stand several times: the last position counts, moves add up
             which, target = _gathered(which, target, relative, n)
-        count = apply.place(
-            which, target, relative, self._changed_ids, self._delta, self._hits, self._touched, self._anew,
-            self._ranges, int(MOST_MOVED * n), LIMIT, BIAS, GAP, *self._back(), *self._inputs(),
-        )  # fmt: skip
+        if self._table is None:
+            self._table = binding.address_table(self._arrays())
+        count = binding.place_bound(
+            self._table, which, target, relative, int(MOST_MOVED * n), LIMIT, BIAS, GAP, self._sign
+        )
         if count == -1:
             self.refresh()
         elif count < 0 or count >= 1 << 60:
@@ -269,15 +272,17 @@ class Deformation:
         x = self._lists
         return x.cell_start, x.tile_start, x.rows, x.room, x.at, x.ids_at, x.ids, x.value, x.slope
 
-    def _back(self) -> tuple[np.ndarray, ...]:
-        x = self._lists
-        return x.back_start, x.back_count, x.back_cell, x.back_row
-
     def _inputs(self) -> tuple:
         return (
             self._points, self._origin, *self._tables(), self._below, self._bend, self._state, self._kept, self._sign,
             self._vertices, self._normals, self._local, self._spare,
         )  # fmt: skip
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        """All arrays an update works on; :mod:`surface.binding` keeps their addresses."""
+        own = ["changed_ids", "delta", "hits", "touched", "anew", "ranges", "points", "origin", "below", "bend"]
+        own += ["state", "kept", "vertices", "normals", "local", "spare"]
+        return vars(self._lists) | {name: getattr(self, f"_{name}") for name in own}
 
     def _check_ids(self, ids: ArrayLike) -> np.ndarray:
         which = _integers(ids)

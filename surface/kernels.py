@@ -336,26 +336,76 @@ def _put_row(value, slope, at, rows, row, tiles, numbers):
 
 
 @kernel
+def _distinct(uv, side, axis, first, last, values, index):
+    """Distinct coordinates (with the limit they take in ``values (k, 2)``) of vertices; returns how many."""
+    count = 0
+    for s in range(first, last):
+        x, left = uv[s, axis], float(side[s] >> axis & 1)
+        k = count - 1
+        while k >= 0 and not (values[k, 0] == x and values[k, 1] == left):
+            k -= 1
+        if k < 0:
+            k = count
+            values[k, 0], values[k, 1] = x, left
+            count += 1
+        index[s - first] = k
+    return count
+
+
+@kernel
+def _along(knots, i, p, values, count, work, out):
+    """Value and slope of one blending function at distinct coordinates into ``out (k, 2)``; any nonzero?"""
+    found = False
+    for k in range(count):
+        out[k, 0], out[k, 1] = blend1(knots, i, p, values[k, 0], values[k, 1] != 0.0, work)
+        found |= out[k, 0] != 0.0 or out[k, 1] != 0.0
+    return found
+
+
+@kernel
+def _combine(along_u, along_v, at_u, at_v, count, weight, out):
+    """b w and its derivatives of one point at a cell's vertices into ``out (3, count)``; any nonzero?"""
+    found = False
+    for j in range(count):
+        a0, a1 = along_u[at_u[j], 0] * weight, along_u[at_u[j], 1] * weight
+        b0, b1 = along_v[at_v[j], 0], along_v[at_v[j], 1]
+        out[0, j], out[1, j], out[2, j] = a0 * b0, a1 * b0, a0 * b1
+        found |= (a0 != 0.0 or a1 != 0.0) and (b0 != 0.0 or b1 != 0.0)
+    return found
+
+
+@kernel
 def fill_blocks(
     knots_u, knots_v, pu, pv, weights, uv, side, cell_start, list_start, list_ids, value, slope, at, rows, ids, ids_at
 ):
-    """Weights of all cells, block after block, without rows that are all zero; layout in :mod:`surface.lists`."""
+    """Weights of all cells, block after block, without rows that are all zero; layout in :mod:`surface.lists`.
+
+    The vertices of a cell share most of their coordinates, so blending functions are computed once for each.
+    """
     work, most, widest = np.zeros(12), 0, 0
     for c in range(cell_start.shape[0] - 1):
         most = max(most, list_start[c + 1] - list_start[c])
         widest = max(widest, (cell_start[c + 1] - cell_start[c] + 7) // 8 * 8)
     numbers = np.zeros((most, 3, widest))
+    at_u, at_v = np.zeros(widest, dtype=np.int64), np.zeros(widest, dtype=np.int64)
+    values_u, values_v = np.zeros((widest, 2)), np.zeros((widest, 2))
+    along_u, along_v = np.zeros((widest, 2)), np.zeros((widest, 2))
     for c in range(cell_start.shape[0] - 1):
-        first, last = cell_start[c], cell_start[c + 1]
-        tiles = (last - first + 7) // 8
-        count = 0
+        first, size = cell_start[c], cell_start[c + 1] - cell_start[c]
+        many_u = _distinct(uv, side, 0, first, first + size, values_u, at_u)
+        many_v = _distinct(uv, side, 1, first, first + size, values_v, at_v)
+        count, tiles = 0, (size + 7) // 8
         for q in range(list_start[c], list_start[c + 1]):
             i = list_ids[q]
-            if _weigh(knots_u, knots_v, pu, pv, weights, i, uv, side, first, last, work, numbers[count]):
+            if not _along(knots_u, i, pu[i], values_u, many_u, work, along_u):
+                continue
+            if not _along(knots_v, i, pv[i], values_v, many_v, work, along_v):
+                continue
+            if _combine(along_u, along_v, at_u, at_v, size, weights[i], numbers[count]):
                 ids[ids_at[c] + count] = i
                 count += 1
         for row in range(count):
-            numbers[row, :, last - first :] = 0.0
+            numbers[row, :, size:] = 0.0
             _put_row(value, slope, at[c], count, row, tiles, numbers[row])
         rows[c] = count
         at[c + 1] = at[c] + count * tiles * 8
