@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
-from drivers.sim.device import WATCHDOG_STEP_S, Heard, SimulatedServo
+from drivers.sim.device import WATCHDOG_STEP_S, Heard, SimulatedServo, same_rate
 from drivers.sim.faults import Fault, FaultSet
 from drivers.sim.replies import Reply, collide
 
@@ -148,7 +148,7 @@ class Chain(ABC):
         self.by_id, self.twins = {}, {}
         everyone = self.servos + [twin for twins in self._extra.values() for twin in twins]
         for servo in everyone:
-            if self.line_baud is not None and servo.baud != self.line_baud:
+            if self.line_baud is not None and not same_rate(servo.baud, self.line_baud):
                 continue
             if servo.id in self.by_id:
                 self.twins.setdefault(servo.id, []).append(servo)

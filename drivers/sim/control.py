@@ -82,7 +82,7 @@ class Commands:
                     "position": servo.position_ticks(now_s),
                     "goal": servo.goal,
                     "torque": servo.torque,
-                    "error": servo.register("Hardware Error Status", now_s),
+                    "error": servo.hardware_error,
                 }
                 for servo in self._chain.servos
             ]

@@ -12,7 +12,9 @@ from functools import partial
 
 from drivers.dynamixel.packet import ALERT, ErrorNumber
 from drivers.dynamixel.tables import Item, load_table
-from drivers.sim.drive import CURRENT, CURRENT_POSITION, EXTENDED, GOAL_TORQUE, PWM, Drive
+from drivers.sim.drive import Drive
+from drivers.sim.drive_word import FeetechDrive, WordDrive
+from drivers.sim.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, GOAL_TORQUE, PWM, XDrive
 from drivers.sim.plant import Plant, Skin
 from drivers.sim.registers import GOALS, Change, Registers
 
@@ -20,7 +22,14 @@ CLEAR_MULTI_TURN = b"\x01\x44\x58\x4c\x22"
 TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""
 WATCHDOG_STEP_S = 0.02
+CALIBRATE = 128
+"""Feetech: written to Torque Enable it sets the middle of the turn."""
 HEALTH_PERIOD_S = 0.1
+
+
+def same_rate(first: int, second: int) -> bool:
+    """Whether two ends of a wire understand each other: their clocks may differ by 3 %."""
+    return abs(first - second) <= 0.03 * second
 
 
 class Heard:
@@ -81,20 +90,31 @@ class SimulatedServo:
         self.next_health_s = now_s
         self._sensed_at = -1.0
         self._pending: list[Change] = []
+        self._errors = 0
+        self._has_error_register = "Hardware Error Status" in table
+        self.is_feetech = "Response Level" in table
         self.registers.put("ID", device_id)
-        if baud in table.baud:
-            self.registers.put("Baud Rate", table.baud.index(baud))
+        self.force_baud(baud, self.baud)
         start = float(table.center if position is None else position)
         self.plant = Plant(now_s, start, self._no_load_speed(), table.voltage / 10, skin or Skin())
-        self.drive = Drive(self.registers, self.plant, now_s)
+        self.drive = self._make_drive(now_s)
         self._effects = self._effects_by_name()
         self._boot(now_s)
 
     def _no_load_speed(self) -> float:
-        limit = self.table.get("Velocity Limit")
-        if limit is None:
-            return 1023 * self.table["Moving Speed"].scale / self.table.rad_per_tick
-        return limit.initial * limit.scale / self.table.rad_per_tick
+        table = self.table
+        if table.top_speed:
+            speed = table["Present Speed"] if "Present Speed" in table else table["Present Velocity"]
+            return table.top_speed * speed.scale / table.rad_per_tick
+        limit = table["Velocity Limit"]
+        return limit.initial * limit.scale / table.rad_per_tick
+
+    def _make_drive(self, now_s: float) -> Drive:
+        """The motor control that fits the control table."""
+        if "Profile Velocity" in self.table:
+            return XDrive(self.registers, self.plant, now_s)
+        kind = FeetechDrive if "Goal Velocity" in self.table else WordDrive
+        return kind(self.registers, self.plant, now_s)
 
     # ------------------------------------------------------------ what the bus needs to know
     @property
@@ -121,13 +141,26 @@ class SimulatedServo:
 
     @property
     def status_level(self) -> int:
-        """0 answers a ping only, 1 a read too, 2 everything."""
+        """0 answers a ping only, 1 a read too, 2 everything. (Feetech's Response Level has no 0.)"""
+        if self.is_feetech:
+            return 1 + self.registers.get("Response Level")
         return self.registers.get("Status Return Level")
 
     @property
     def alert(self) -> int:
         """`ALERT` while a hardware error is latched, else 0."""
-        return ALERT if self.forced_alert or self.registers.get("Hardware Error Status") else 0
+        return ALERT if self.forced_alert or self.hardware_error else 0
+
+    @property
+    def hardware_error(self) -> int:
+        """Latched hardware errors, as bits of the model's own order."""
+        return self.registers.get("Hardware Error Status") if self._has_error_register else self._errors
+
+    @hardware_error.setter
+    def hardware_error(self, bits: int) -> None:
+        self._errors = bits
+        if self._has_error_register:
+            self.registers.put("Hardware Error Status", bits)
 
     # ------------------------------------------------------------ what tests and tools look at
     @property
@@ -171,7 +204,7 @@ class SimulatedServo:
     def latch(self, bits: int, now_s: float) -> None:
         """Latch hardware errors; those in the Shutdown mask switch the motor off until a reboot."""
         registers = self.registers
-        registers.put("Hardware Error Status", registers.get("Hardware Error Status") | bits)
+        self.hardware_error |= bits
         if bits & registers.get("Shutdown") and not self.shut_down:
             self.shut_down = True
             if "Torque Limit" in self.table:
@@ -225,13 +258,17 @@ class SimulatedServo:
             plant.forced_c = value if begins else None
             self.check_health(now_s)
 
-    def force_baud(self, baud: int) -> None:
-        """Set the bit rate it listens at, whatever the wire says; an unknown rate counts as the lowest.
+    def force_baud(self, baud: int, otherwise: int = 0) -> None:
+        """Set the bit rate it listens at, whatever the wire says.
 
-        This is how a bus comes to have a servo at the wrong rate.
+        This is how a bus comes to have a servo at the wrong rate. A rate the model lacks counts as `otherwise`,
+        or as its lowest.
         """
         rates = self.table.baud
-        self.registers.put("Baud Rate", rates.index(baud) if baud in rates else 0)
+        near = min(rates, key=lambda rate: abs(rate - baud))
+        if not same_rate(near, baud):
+            near = otherwise or min(rates)
+        self.registers.put("Baud Rate", rates.index(near))
 
     def check_health(self, now_s: float) -> None:
         """Latch the hardware errors whose causes are there now."""
@@ -323,8 +360,10 @@ class SimulatedServo:
             "Operating Mode": self._write_mode,
             "Hardware Error Status": lambda value, now_s: None,
         }
-        for name in GOALS | {"Moving Speed"}:
+        for name in GOALS | {"Moving Speed", "Goal Time"}:
             effects[name] = partial(self._write_goal, name)
+        if self.table.lock == "Lock":
+            effects["Lock"] = self._write_lock
         effects.update(dict.fromkeys(("ID", "Secondary(Shadow) ID", "Baud Rate"), self._write_address))
         for name in self.table:
             if name.startswith("Indirect Address"):
@@ -337,8 +376,8 @@ class SimulatedServo:
         self._sensed_at = -1.0
 
     def _store(self, item: Item, value: int, now_s: float) -> None:
-        if item.name == "Torque Enable" and value and self.shut_down:
-            return  # only a reboot lets a servo that shut down have torque again
+        if item.name == "Torque Enable" and value and self.shut_down and not self._recover():
+            return
         self.registers.store(item, value)
         if item.address < self.table.eeprom_end:
             self.eeprom_writes[item.name] += 1
@@ -348,9 +387,34 @@ class SimulatedServo:
         if effect is not None:
             effect(value, now_s)
 
+    def _recover(self) -> bool:
+        """Torque again after a shutdown: with Protocol 2.0 only a reboot gives it, older servos are just told to."""
+        if self.table.protocol == 2:
+            return False
+        self.shut_down, self.hardware_error = False, 0
+        if "Torque Limit" in self.table:
+            self.registers.put("Torque Limit", self.table["Torque Limit"].initial)
+        return True
+
+    def _write_lock(self, value: int, now_s: float) -> None:
+        """Closes the permanent registers. AX and MX open it again only without power."""
+        closed = bool(value) or (self.registers.locked and not self.is_feetech)
+        self.registers.locked = closed
+        self.registers.put("Lock", int(closed))
+
     def _write_torque(self, value: int, now_s: float) -> None:
-        if bool(value) != self.plant.powered:
+        if value == CALIBRATE:
+            self._calibrate(now_s)
+        elif bool(value) != self.plant.powered:
             self._set_power(bool(value), now_s)
+
+    def _calibrate(self, now_s: float) -> None:
+        """Feetech: the shaft's present position becomes the middle of the turn; torque stays as it was."""
+        registers = self.registers
+        shaft = round(self.plant.motion(now_s).position)
+        registers.put("Homing Offset", shaft - self.table.center)
+        registers.put("Torque Enable", int(self.plant.powered))
+        self.drive.configure()
 
     def _write_goal(self, name: str, value: int, now_s: float) -> None:
         """The goal of the present mode moves a powered motor; with Drive Mode bit 3 any goal powers it."""
@@ -367,7 +431,7 @@ class SimulatedServo:
 
     def _write_mode(self, value: int, now_s: float) -> None:
         """Goals go back to those of a servo that stands still; Present Position back into one turn."""
-        self.registers.extended = value in (EXTENDED, CURRENT_POSITION)
+        self.registers.extended = self.table.protocol == 2 and value in (EXTENDED, CURRENT_POSITION)
         self._one_turn(now_s)
         self._reset_goals(now_s)
 
@@ -377,7 +441,8 @@ class SimulatedServo:
     # ------------------------------------------------------------ states
     def _set_power(self, on: bool, now_s: float) -> None:
         self.plant.powered = on
-        self.registers.locked = on
+        if self.table.lock == "torque":
+            self.registers.locked = on
         if on:
             self.drive.plan(now_s)
         else:
@@ -388,10 +453,12 @@ class SimulatedServo:
         registers = self.registers
         registers.reset(self.table.eeprom_end, self.table.size)
         registers.goals_locked = self.shut_down = False
+        registers.locked = self.table.lock == "Lock" and bool(registers.get("Lock"))
+        self.hardware_error = 0
         self._pending = []
         self.drive.born_s = now_s
         self._set_power(False, now_s)
-        if "Operating Mode" in self.table:
+        if self.table.protocol == 2 and "Operating Mode" in self.table:
             registers.extended = registers.get("Operating Mode") in (EXTENDED, CURRENT_POSITION)
         self._reset_goals(now_s)
         self._sensed_at = -1.0
@@ -404,7 +471,7 @@ class SimulatedServo:
         """Goal Position where the shaft is; current and PWM at their limits but where they are the goal."""
         registers = self.registers
         registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))
-        if "Operating Mode" not in self.table:
+        if "Goal PWM" not in self.table:
             return
         mode = registers.get("Operating Mode")
         registers.put("Goal Velocity", 0)

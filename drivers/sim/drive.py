@@ -1,66 +1,20 @@
-"""The motor control of a simulated servo: from goal registers to a trajectory, from the shaft to registers."""
+"""What the motor control of every simulated servo has in common; the kinds of servo are in ``drive_x`` and
+``drive_word``."""
 
 from __future__ import annotations
 
-import math
-import struct
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 
-from drivers.dynamixel.tables import ControlTable, Item
-from drivers.sim.motion import Motion, Profile, hold, plan_move, plan_speed, plan_stop, plan_timed
+from drivers.sim.motion import Motion, hold, plan_stop
 from drivers.sim.plant import Plant
 from drivers.sim.registers import Registers
-
-CURRENT, VELOCITY, POSITION, EXTENDED, CURRENT_POSITION, PWM = 0, 1, 3, 4, 5, 16
-"""Operating Mode (11)."""
-REVERSE, TIME_PROFILE, GOAL_TORQUE = 0x01, 0x04, 0x08
-"""Bits of Drive Mode (10)."""
-MAX_POSITION_OFFSET = 1024
-"""Homing Offset beyond this is ignored in position mode (e-Manual, Homing Offset)."""
-
-FOLLOWING_TICKS = 10
-"""Distance between wanted and real position from which on it is a following error."""
-
-_MOTION = struct.Struct("<hii")
-"""Present Current (or Load), Present Velocity and Present Position, side by side as well."""
 
 OVERLOAD_AFTER_S = 1.0
 """How long a jammed motor gives its full torque before it counts as overloaded."""
 
-_PROFILE = struct.Struct("<IIi")
-"""Profile Acceleration, Profile Velocity and Goal Position, which lie side by side in every X-series table."""
 
-_GOALS = {
-    CURRENT: ("Goal Current",),
-    VELOCITY: ("Goal Velocity",),
-    POSITION: ("Goal Position",),
-    EXTENDED: ("Goal Position",),
-    CURRENT_POSITION: ("Goal Position", "Goal Current"),
-    PWM: ("Goal PWM",),
-}
-"""Goal registers that move the motor, by Operating Mode."""
-
-_CODES = {(1, False): "B", (1, True): "b", (2, False): "H", (2, True): "h", (4, False): "I", (4, True): "i"}
-_SENSED = (
-    "Realtime Tick",
-    "Moving",
-    "Moving Status",
-    "Present PWM",
-    "Present Current",
-    "Present Load",
-    "Present Velocity",
-    "Present Speed",
-    "Present Position",
-    "Velocity Trajectory",
-    "Position Trajectory",
-    "Present Input Voltage",
-    "Present Voltage",
-    "Present Temperature",
-)
-
-
-class Drive:
-    """Plans and senses for one servo.
+class Drive(ABC):
+    """Turns goal registers into a trajectory and what the shaft does into registers, for one servo.
 
     Parameters
     ----------
@@ -71,53 +25,40 @@ class Drive:
     Attributes
     ----------
     goals : names of the registers that move the motor in the present mode.
+    offset : Present Position less the shaft's, ticks; `side` and `mirror` reverse the direction.
+    ticks_s : one step of the speed register, ticks/s.
+    first_sensed, last_sensed : addresses from and to which `sense` writes.
+    motion_at, motion_end : the part of them that `sense_motion` writes; empty where there is no such part.
     """
 
-    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
+    goals: tuple[str, ...]
+    first_sensed: int
+    last_sensed: int
+    motion_at: int
+    motion_end: int
+
+    def __init__(self, registers: Registers, plant: Plant, now_s: float, speed: str) -> None:
         table = registers.table
         self.registers, self.plant, self.born_s = registers, plant, now_s
-        self.is_xl320 = "Moving Speed" in table
-        speed = table["Present Speed" if self.is_xl320 else "Present Velocity"]
-        self.ticks_s = speed.scale / table.rad_per_tick
-        self.ticks_s2 = 1.0 if self.is_xl320 else table["Profile Acceleration"].scale / table.rad_per_tick
-        limit = table.get("Current Limit")
-        self.has_current = limit is not None
-        self.full_current = limit.initial if limit else 1000  # else Present Load, 0.1 %
-        self._groups = _sensed_groups(table)
-        self.first_sensed = min(start for _, start, _, _ in self._groups)
-        self.last_sensed = max(end for _, _, end, _ in self._groups)
-        self.side, self.mirror, self.offset, self.mode = 1, 0.0, 0, POSITION
-        self.top_speed = plant.top_speed
-        self.timed, self.reach = False, math.inf
-        self.goals: tuple[str, ...] = ("Goal Position", "Moving Speed")
-        self._profile_at = 0 if self.is_xl320 else table["Profile Acceleration"].address
-        self.motion_at = table.size if self.is_xl320 else table["Present Velocity"].address - 2
-        self.motion_end = self.motion_at + _MOTION.size
-        self.configure()
+        self.ticks_s = table[speed].scale / table.rad_per_tick
+        self.side, self.mirror, self.offset = 1, 0.0, 0
 
+    @abstractmethod
     def configure(self) -> None:
-        """Take over the EEPROM settings; to be called when one of them changed."""
-        if self.is_xl320:
-            return
-        registers = self.registers
-        self.mode = registers.get("Operating Mode")
-        self.goals = _GOALS[self.mode]
-        reverse = registers.get("Drive Mode") & REVERSE
-        self.side, self.mirror = (-1, registers.table.ticks_per_turn - 1.0) if reverse else (1, 0.0)
-        offset = registers.get("Homing Offset")
-        ignored = self.mode == POSITION and abs(offset) > MAX_POSITION_OFFSET
-        self.offset = 0 if ignored else offset
-        limit = registers.get("Velocity Limit") * self.ticks_s
-        self.top_speed = max(min(self.plant.top_speed, limit), 1e-3)
-        self.timed = registers.table.time_profile and bool(registers.get("Drive Mode") & TIME_PROFILE)
-        self.reach = self._reach(registers.get("Current Limit")) if self.has_current else math.inf
+        """Take over the permanent settings; to be called when one of them changed."""
 
-    def _reach(self, current: int) -> float:
-        """How far from its rest a current can pull the skin, ticks."""
-        spring = self.plant.skin.spring
-        return abs(current) / self.full_current / spring if spring > 0.0 else math.inf
+    @abstractmethod
+    def plan(self, now_s: float) -> None:
+        """Move as the goal registers and the operating mode say, from the present motion on."""
 
-    # ------------------------------------------------------------ angles
+    @abstractmethod
+    def sense(self, now_s: float) -> float:
+        """Write what the sensors see at `now_s` into memory; returns the load (-1 to 1)."""
+
+    @abstractmethod
+    def sense_motion(self, now_s: float) -> None:
+        """Only current, velocity and position, which is what control loops read."""
+
     def to_register(self, shaft: float) -> int:
         """Present Position for a shaft position: reversed about the middle of the turn, then offset."""
         return round(self.mirror + self.side * shaft) + self.offset
@@ -125,20 +66,6 @@ class Drive:
     def to_shaft(self, register: int) -> float:
         """Shaft position for a Goal Position; the inverse of `to_register`."""
         return self.mirror + self.side * float(register - self.offset)
-
-    # ------------------------------------------------------------ planning
-    def plan(self, now_s: float) -> None:
-        """Move as the goal registers and the operating mode say, from the present motion on."""
-        if self.is_xl320:
-            self._plan_xl320(now_s)
-            return
-        mode = self.mode
-        if mode in (POSITION, EXTENDED, CURRENT_POSITION):
-            self._plan_position(now_s, mode)
-        elif mode == CURRENT:
-            self._plan_current(now_s)
-        else:
-            self._plan_speed(now_s, mode)
 
     def stop(self, now_s: float) -> None:
         """Stand still at once (bus watchdog: profile acceleration and velocity count as 0)."""
@@ -149,96 +76,12 @@ class Drive:
         motion = self.plant.motion(now_s)
         self.plant.trajectory = plan_stop(now_s, motion.position, motion.velocity, 0.5 * self.plant.top_acceleration)
 
-    def _plan_position(self, now_s: float, mode: int) -> None:
-        """To Goal Position, as far as the current pulls the skin."""
-        plant = self.plant
-        acceleration, speed, register = _PROFILE.unpack_from(self.registers.memory, self._profile_at)
-        reach = self.reach
-        if mode == CURRENT_POSITION:
-            reach = min(reach, self._reach(self.registers.get("Goal Current")))
-        goal = min(max(self.to_shaft(register), plant.rest - reach), plant.rest + reach)
-        now = plant.motion(now_s)
-        if speed and self.timed:
-            plan = plan_timed(now_s, now.position, now.velocity, goal, speed * 1e-3, acceleration * 1e-3)
-            if abs(plan.at(now_s + 0.5 * plan.duration).velocity) <= self.top_speed:
-                plant.trajectory = plan
-                return
-            speed = 0
-        top, limit, profile = self.top_speed, plant.top_acceleration, Profile.STEP
-        if speed:
-            top, profile = min(speed * self.ticks_s, top), Profile.RECTANGULAR
-            if acceleration:
-                limit, profile = min(acceleration * self.ticks_s2, limit), Profile.TRAPEZOIDAL
-        plant.trajectory = plan_move(now_s, now.position, now.velocity, goal, top, limit, profile)
-
-    def _plan_current(self, now_s: float) -> None:
-        """The shaft goes where the skin's spring balances the current; without a spring it turns."""
-        share = self.side * self.registers.get("Goal Current") / self.full_current
-        now, plant, top = self.plant.motion(now_s), self.plant, self.top_speed
-        if plant.skin.spring > 0.0:
-            goal = plant.rest + share / plant.skin.spring
-            plant.trajectory = plan_move(now_s, now.position, now.velocity, goal, top, plant.top_acceleration)
-        else:
-            plant.trajectory = plan_speed(now_s, now.position, now.velocity, share * top, plant.top_acceleration)
-
-    def _plan_speed(self, now_s: float, mode: int) -> None:
-        registers, now, top = self.registers, self.plant.motion(now_s), self.top_speed
-        if mode == PWM:
-            speed = registers.get("Goal PWM") / registers.table["PWM Limit"].initial * top
-            acceleration = 0.0
-        else:
-            speed = registers.get("Goal Velocity") * self.ticks_s
-            acceleration = registers.get("Profile Acceleration") * self.ticks_s2
-        speed = self.side * min(max(speed, -top), top)
-        self.plant.trajectory = plan_speed(
-            now_s, now.position, now.velocity, speed, acceleration or self.plant.top_acceleration
-        )
-
-    def _plan_xl320(self, now_s: float) -> None:
-        registers, plant, now = self.registers, self.plant, self.plant.motion(now_s)
-        moving = registers.get("Moving Speed")
-        if registers.get("Control Mode") == 1:
-            share = (moving & 1023) / 1023 * (-1 if moving & 1024 else 1)
-            plant.trajectory = plan_speed(
-                now_s, now.position, now.velocity, share * plant.top_speed, plant.top_acceleration
-            )
-            return
-        top = min((moving & 1023) * self.ticks_s, plant.top_speed) if moving & 1023 else plant.top_speed
-        goal = float(registers.get("Goal Position"))
-        plant.trajectory = plan_move(
-            now_s, now.position, now.velocity, goal, top, plant.top_acceleration, Profile.RECTANGULAR
-        )
-
-    # ------------------------------------------------------------ sensing
-    def sense(self, now_s: float) -> float:
-        """Write what the sensors see at `now_s` into memory; returns the load (-1 to 1)."""
+    def look(self, now_s: float) -> tuple[Motion, Motion, float]:
+        """(motion of the shaft, motion the motor was told, load)."""
         plant = self.plant
         wanted = plant.wanted(now_s)
         motion = wanted if plant.jammed_at is None else plant.motion(now_s)
-        load = plant.load(motion, wanted)
-        values = self._values(now_s, motion, wanted, load)
-        memory = self.registers.memory
-        if self.is_xl320:
-            named = self._xl320_values(values)
-            for layout, start, _, names in self._groups:
-                layout.pack_into(memory, start, *[named[name] for name in names])
-        else:
-            for layout, start, _, _ in self._groups:
-                layout.pack_into(memory, start, *values)
-        return load
-
-    def sense_motion(self, now_s: float) -> None:
-        """Only current, velocity and position, which is what control loops read."""
-        plant, side = self.plant, self.side
-        wanted = plant.wanted(now_s)
-        motion = wanted if plant.jammed_at is None else plant.motion(now_s)
-        _MOTION.pack_into(
-            self.registers.memory,
-            self.motion_at,
-            side * round(plant.load(motion, wanted) * self.full_current),
-            side * round(motion.velocity / self.ticks_s),
-            round(self.mirror + side * motion.position) + self.offset,
-        )
+        return motion, wanted, plant.load(motion, wanted)
 
     def hardware_errors(self, now_s: float, load: float) -> int:
         """Bits of Hardware Error Status whose causes are there now."""
@@ -253,67 +96,3 @@ class Drive:
         if abs(load) >= 1.0 and since is not None and now_s - since > OVERLOAD_AFTER_S:
             bits |= cause["overload"]
         return bits
-
-    def _values(self, now_s: float, motion: Motion, wanted: Motion, load: float) -> tuple[int, ...]:
-        """X-series registers 120-146, in order of address."""
-        plant, side, ticks_s = self.plant, self.side, self.ticks_s
-        powered, speed = plant.powered, motion.velocity
-        running = powered and plant.trajectory.moving(now_s)
-        arrived = abs(wanted.position - motion.position) < FOLLOWING_TICKS
-        profile = plant.trajectory.profile << 4 if running else 0
-        push = 0.8 * speed / plant.top_speed + 0.2 * load if powered else 0.0
-        return (
-            int((now_s - self.born_s) * 1000.0) & 0x7FFF,
-            int(powered and speed != 0.0),
-            (arrived and not running) | running << 1 | (not arrived) << 3 | profile,
-            side * round(885.0 * push),
-            side * round(load * self.full_current),
-            side * round(speed / ticks_s),
-            round(self.mirror + side * motion.position) + self.offset,
-            side * round(wanted.velocity / ticks_s),
-            round(self.mirror + side * wanted.position) + self.offset,
-            round(10.0 * plant.voltage(load)),
-            min(max(round(plant.temperature_c), 0), 255),
-        )
-
-    def _xl320_values(self, values: tuple[int, ...]) -> dict[str, int]:
-        return {
-            "Present Position": min(max(values[6], 0), 1023),
-            "Present Speed": _sign_bit_10(values[5]),
-            "Present Load": _sign_bit_10(values[4]),
-            "Present Voltage": min(values[9], 255),
-            "Present Temperature": values[10],
-            "Moving": values[1],
-        }
-
-
-def _sign_bit_10(value: int) -> int:
-    """XL-320: magnitude in bits 0-9, direction in bit 10 (clear = counter-clockwise)."""
-    magnitude = min(abs(value), 1023)
-    return magnitude | 1024 if value < 0 else magnitude
-
-
-_Group = tuple[struct.Struct, int, int, tuple[str, ...]]
-
-
-def _sensed_groups(table: ControlTable) -> list[_Group]:
-    """Runs of sensed items, each packed by one call; a run ends where another item or a gap comes between."""
-    items = sorted((table[name] for name in _SENSED if name in table), key=_address)
-    groups: list[list[Item]] = []
-    for item in items:
-        if groups and groups[-1][-1].end == item.address:
-            groups[-1].append(item)
-        else:
-            groups.append([item])
-    return [
-        (
-            struct.Struct("<" + "".join(_CODES[item.size, item.signed] for item in run)),
-            run[0].address,
-            run[-1].end,
-            tuple(item.name for item in run),
-        )
-        for run in groups
-    ]
-
-
-_address: Callable[[Item], int] = lambda item: item.address  # noqa: E731

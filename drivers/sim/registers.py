@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 
 from drivers.dynamixel.packet import ErrorNumber
-from drivers.dynamixel.tables import ControlTable, Item
+from drivers.dynamixel.tables import ControlTable, Item, from_magnitude, to_magnitude
 
 EXTENDED_RANGE = 1_048_575
 """Goal Position in modes 4 and 5: 256 turns either way (e-Manual, Goal Position)."""
@@ -18,10 +18,15 @@ GOALS = frozenset({"Goal PWM", "Goal Current", "Goal Velocity", "Goal Position"}
 Change = tuple[Item, int]
 
 _CODES = {
-    (size, signed): struct.Struct("<" + (code.lower() if signed else code))
+    (size, signed, big_endian): struct.Struct("<>"[big_endian] + (code.lower() if signed else code))
     for size, code in ((1, "B"), (2, "H"), (4, "I"))
     for signed in (False, True)
+    for big_endian in (False, True)
 }
+
+
+def _cell(item: Item) -> struct.Struct:
+    return _CODES[item.size, item.signed, item.big_endian]
 
 
 class Registers:
@@ -34,7 +39,7 @@ class Registers:
     Attributes
     ----------
     memory : (table.size,) bytes as they would be read, but for the indirect area.
-    locked : torque is on, so nothing below ``table.eeprom_end`` may be written.
+    locked : nothing below ``table.eeprom_end`` may be written (torque is on, or Lock is set).
     goals_locked : the bus watchdog has tripped, so goals may not be written.
     extended : Goal Position may leave one turn (operating modes 4 and 5).
     """
@@ -43,7 +48,7 @@ class Registers:
         self.table = table
         self.memory = bytearray(table.size)
         self.locked = self.goals_locked = self.extended = False
-        self._cells = {name: (_CODES[item.size, item.signed], item.address) for name, item in table.items()}
+        self._cells = {name: (_cell(item), item.address, item.sign_bit) for name, item in table.items()}
         self._layouts: dict[tuple[int, int], tuple[Item, ...] | ErrorNumber] = {}
         self._pointers: dict[int, int] = {}
         self._slots = frozenset(address for _, data, count in table.indirect for address in range(data, data + count))
@@ -58,9 +63,9 @@ class Registers:
 
     def get(self, name: str) -> int:
         """Value of an item as it lies in memory; KeyError where the model has none of that name."""
-        cell, address = self._cells[name]
+        cell, address, sign_bit = self._cells[name]
         value: int = cell.unpack_from(self.memory, address)[0]
-        return value
+        return value if sign_bit is None else from_magnitude(value, sign_bit)
 
     def put(self, name: str, value: int) -> None:
         """Set an item whatever its access."""
@@ -103,7 +108,9 @@ class Registers:
             return layout
         changes = []
         for item in layout:
-            value = _CODES[item.size, item.signed].unpack_from(data, item.address - address)[0]
+            value = _cell(item).unpack_from(data, item.address - address)[0]
+            if item.sign_bit is not None:
+                value = from_magnitude(value, item.sign_bit)
             error = self._refusal(item, value)
             if error:
                 return error
@@ -112,7 +119,8 @@ class Registers:
 
     def store(self, item: Item, value: int) -> None:
         """Put a value that `parse` allowed."""
-        _CODES[item.size, item.signed].pack_into(self.memory, item.address, value)
+        raw = value if item.sign_bit is None else to_magnitude(value, item.sign_bit)
+        _cell(item).pack_into(self.memory, item.address, raw)
 
     def _layout(self, address: int, length: int) -> tuple[Item, ...] | ErrorNumber:
         """The items that a write of this size at this address covers; cached, as hosts repeat themselves."""

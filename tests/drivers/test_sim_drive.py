@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from drivers.dynamixel.tables import load_table
 from drivers.sim.drive import Drive
+from drivers.sim.drive_word import WordDrive
+from drivers.sim.drive_x import XDrive
 from drivers.sim.plant import Plant, Skin
 from drivers.sim.registers import Registers
 
@@ -18,7 +20,8 @@ def drive(model: str = "xl330-m288", **registers: int) -> Drive:
     memory.reset(0, table.size)
     for name, value in registers.items():
         memory.put(name.replace("_", " "), value)
-    return Drive(memory, Plant(0.0, 2000.0, 7000.0, 5.0, Skin()), 0.0)
+    kind = XDrive if "Profile Velocity" in table else WordDrive
+    return kind(memory, Plant(0.0, 2000.0, 7000.0, 5.0, Skin()), 0.0)
 
 
 @given(st.integers(-100_000, 100_000), st.sampled_from([0, 1]), st.integers(-1024, 1024))

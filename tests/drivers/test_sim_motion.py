@@ -19,9 +19,7 @@ def samples(plan: Trajectory, count: int = 400) -> list[float]:
 
 
 @given(TICKS, SPEEDS, TICKS, TOP, ACCELERATION)
-def test_a_move_is_smooth_keeps_its_limits_and_ends_at_rest_on_the_goal(
-    start, velocity, goal, top, acceleration
-):
+def test_a_move_is_smooth_keeps_its_limits_and_ends_at_rest_on_the_goal(start, velocity, goal, top, acceleration):
     plan = plan_move(3.0, start, velocity, goal, top, acceleration)
     assert plan.at(3.0)[:2] == pytest.approx((start, velocity))
     assert tuple(plan.at(3.0 + plan.duration + 1e-9)) == (goal, 0.0, 0.0)

@@ -160,3 +160,22 @@ def test_an_indirect_write_of_scattered_targets_takes_them_one_by_one(registers:
 @pytest.mark.parametrize("target", [63, 228])
 def test_pointers_stay_in_their_range(registers: Registers, target: int):
     assert registers.parse(168, le(target, 2)) == E.DATA_RANGE
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "data", "value"),
+    [
+        ("sts3215", "Homing Offset", "0A08", -10),
+        ("sts3215", "Goal Velocity", "64 80", -100),
+        ("scs0009", "Goal Position", "0102", 258),
+    ],
+)
+def test_magnitudes_and_high_bytes_first(model: str, name: str, data: str, value: int):
+    made = Registers(load_table(model))
+    made.reset(0, made.table.size)
+    item = made.table[name]
+    ((parsed, number),) = made.parse(item.address, bytes.fromhex(data))
+    assert (parsed.name, number) == (name, value)
+    made.store(parsed, number)
+    assert made.get(name) == value
+    assert made.read(item.address, 2) == bytes.fromhex(data)
