@@ -7,9 +7,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
-from drivers.sim.device import WATCHDOG_STEP_S, Heard, SimulatedServo, same_rate
+from drivers.sim.device import SimulatedServo
 from drivers.sim.faults import Fault, FaultSet
 from drivers.sim.replies import Reply, collide
+from drivers.sim.state import WATCHDOG_STEP_S, Heard, same_rate
 
 
 class Reader(Protocol):
