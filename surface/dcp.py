@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from .basis import Floats, Ints, check_knots, pad_knots
 from .bins import Bins, build_bins
+from .checks import check_points, check_sides, check_uv, check_weights
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from .deformation import Deformation
     from .domain import Domain
     from .mesh import Mesh
+    from .refine import Refinement
 
 CHUNK = 8192  # samples per pass of basis_matrix: bounds its scratch memory
 
@@ -216,6 +218,38 @@ class DCPSurface:
         out = self.sample_derivatives(uv, side, second=True)[1]
         return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
 
+    def curvatures(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats]:
+        """Gaussian and mean curvature, each (m,) float64; see :func:`surface.curvature.curvatures`."""
+        from .curvature import curvatures
+
+        return curvatures(self, uv, side)
+
+    def insert_knot(self, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement:
+        """The same surface with one more knot, exactly.
+
+        Parameters
+        ----------
+        axis : "u" or "v"
+        value : where; points whose subdomain does not hold it inside stay as they are
+        ids : split only these points; all if left out
+
+        Returns
+        -------
+        Refinement : the new surface, and how data of the old points is carried over
+        """
+        from .refine import insert_knot
+
+        return insert_knot(self, axis, value, ids)
+
+    def refine(self, region: tuple[float, float, float, float]) -> Refinement:
+        """The same surface with half as wide control points where ``region`` (u0, u1, v0, v1) is, exactly.
+
+        Points whose subdomain does not reach the region stay as they are.
+        """
+        from .refine import refine
+
+        return refine(self, region)
+
     def basis_matrix(
         self, uv: ArrayLike, derivative: tuple[int, int] = (0, 0), side: ArrayLike | None = None
     ) -> csr_matrix:
@@ -315,7 +349,7 @@ class DCPSurface:
         from . import kernels
 
         samples = check_uv(uv)
-        sides = _sides(samples, side)
+        sides = check_sides(samples, side)
         out = np.zeros((len(samples), 6 if second else 3, 3))
         kernels.sample_derivatives(*self._arrays(), *self._bin_arrays(), samples, sides, out)
         return sides, out
@@ -325,7 +359,7 @@ class DCPSurface:
         from . import kernels
 
         samples = check_uv(uv)
-        sides = _sides(samples, side)
+        sides = check_sides(samples, side)
         out = np.zeros((len(samples), 3))
         kernels.sample(*self._arrays(), *self._bin_arrays(), samples, sides, out)
         return samples, sides, out
@@ -354,51 +388,3 @@ class DCPSurface:
 
     def _bin_arrays(self) -> tuple[np.ndarray, ...]:
         return self.bins.grid, self.bins.shape, self.bins.start, self.bins.ids
-
-
-def _sides(samples: Floats, side: ArrayLike | None) -> Ints:
-    """(m,) int64 copy of the wanted limits."""
-    sides = np.zeros(len(samples), dtype=np.int64)
-    if side is not None:
-        sides[:] = side
-        if ((sides < 0) | (sides > 3)).any():
-            raise ValueError("side: must be 0, 1, 2 or 3")
-    return sides
-
-
-def check_points(points: ArrayLike, name: str = "points") -> Floats:
-    """(n, 3) float64 copy; ``ValueError`` for another shape, no points, or numbers that are not finite."""
-    xyz = np.array(points, dtype=np.float64, order="C")
-    if xyz.ndim != 2 or xyz.shape[1] != 3:
-        raise ValueError(f"{name}: shape {xyz.shape}, expected (n, 3)")
-    if len(xyz) == 0:
-        raise ValueError(f"{name}: empty; a surface needs at least one control point")
-    finite = np.isfinite(xyz).all(axis=1)
-    if not finite.all():
-        i = int(np.argmin(finite))
-        raise ValueError(f"{name}[{i}]: must be finite, got {xyz[i].tolist()}")
-    return xyz
-
-
-def check_weights(weights: ArrayLike, name: str = "weights") -> Floats:
-    """(n,) float64 copy; ``ValueError`` for another shape or weights that are not positive and finite."""
-    w = np.array(weights, dtype=np.float64, order="C")
-    if w.ndim != 1:
-        raise ValueError(f"{name}: shape {w.shape}, expected (n,)")
-    good = np.isfinite(w) & (w > 0)
-    if not good.all():
-        i = int(np.argmin(good))
-        raise ValueError(f"{name}[{i}]: must be positive and finite, got {w[i]}")
-    return w
-
-
-def check_uv(uv: ArrayLike, name: str = "uv") -> Floats:
-    """(m, 2) float64; ``ValueError`` for another shape or NaN."""
-    samples = np.ascontiguousarray(np.asarray(uv, dtype=np.float64))
-    if samples.ndim != 2 or samples.shape[1] != 2:
-        raise ValueError(f"{name}: shape {samples.shape}, expected (m, 2)")
-    good = np.isfinite(samples).all(axis=1)
-    if not good.all():
-        i = int(np.argmin(good))
-        raise ValueError(f"{name}[{i}]: must be finite, got {samples[i].tolist()}")
-    return samples

@@ -1,0 +1,59 @@
+"""Curvatures of surfaces whose curvature is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from surface import DCPSurface
+from surface.curvature import curvatures
+
+H = np.sqrt(0.5)
+ARC = np.array([[1, 0], [1, 1], [0, 1]], dtype=float)
+ARC_WEIGHTS = np.array([1, H, 1])
+CLAMPED = [0, 0, 0, 1, 1, 1]
+
+
+def turned(profile: np.ndarray, weights: np.ndarray, degree: int, knots: list) -> DCPSurface:
+    """A quarter turn about z of a profile (k, 2) of radius and height, exactly."""
+    net = np.zeros((3, len(profile), 3))
+    net[:, :, :2] = ARC[:, None] * profile[None, :, :1]
+    net[:, :, 2] = profile[:, 1]
+    return DCPSurface.from_nurbs(2, degree, CLAMPED, knots, net, np.outer(ARC_WEIGHTS, weights))
+
+
+def test_sphere() -> None:
+    radius = 3.0
+    sphere = turned(radius * np.array([[1, 0], [1, 1], [0, 1]]), ARC_WEIGHTS, 2, CLAMPED)
+    uv = np.random.default_rng(0).uniform(0.05, 0.95, (40, 2))
+    assert np.allclose(np.linalg.norm(sphere.evaluate(uv), axis=1), radius, rtol=1e-13)
+    gaussian, mean = sphere.curvatures(uv)
+    assert np.allclose(gaussian, 1 / radius**2, rtol=1e-10)
+    assert np.allclose(np.abs(mean), 1 / radius, rtol=1e-10)
+
+
+def test_cylinder_and_plane() -> None:
+    uv = np.random.default_rng(1).uniform(0, 1, (40, 2))
+    cylinder = turned(np.array([[2.0, 0], [2.0, 5]]), np.ones(2), 1, [0, 0, 1, 1])
+    gaussian, mean = cylinder.curvatures(uv)
+    assert np.allclose(gaussian, 0, atol=1e-12)
+    assert np.allclose(np.abs(mean), 0.25, rtol=1e-10)
+    plane = DCPSurface.from_nurbs(1, 1, [0, 0, 1, 1], [0, 0, 1, 1], [[[0, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0]]])
+    assert np.allclose(plane.curvatures(uv), 0, atol=1e-14)
+
+
+def test_saddle_point_and_sides() -> None:
+    x, y = np.meshgrid([0.0, 0.5, 1.0], [0.0, 0.5, 1.0], indexing="ij")
+    # z = (x - 1/2)^2 - (y - 1/2)^2 as a Bezier patch: blossoms of the two squares
+    square = np.array([0.25, -0.25, 0.25])
+    z = square[:, None] - square[None, :]
+    saddle = DCPSurface.from_nurbs(2, 2, CLAMPED, CLAMPED, np.stack([x, y, z], axis=-1))
+    gaussian, mean = saddle.curvatures([[0.5, 0.5]])
+    assert np.isclose(gaussian[0], -4, rtol=1e-12)
+    assert np.isclose(mean[0], 0, atol=1e-12)
+
+
+def test_uncovered_is_nan() -> None:
+    single = DCPSurface([[0, 0, 0]], [1], [[0, 0, 1, 1]], [[0, 0, 1, 1]])
+    gaussian, mean = curvatures(single, [[2.0, 0.5], [0.5, 0.5]])
+    assert np.isnan(gaussian).all()
+    assert np.isnan(mean).all()
