@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 Newest = Callable[[], tuple[Floats, int]]
 
 _RETRY_NS = 1_000_000_000
+_REST_LIMIT_NS = 2_000_000_000
+_AT_REST_RAD = 0.02
 
 
 class BusLoop:
@@ -123,6 +125,7 @@ class BusLoop:
                     self._cycle()
                 elif now >= self._retry_ns:
                     self._reconnect(now)
+            self._come_to_rest()
         except Exception as error:  # noqa: BLE001  the body has to hear of it and stop the servos
             self.error = error
 
@@ -130,14 +133,29 @@ class BusLoop:
         values, stamp = self._newest()
         angles, held = self.table.angles(values)
         self.held += held
-        self._limiter.step(self.clock.period_ns / 1e9, angles, self._sent)
         try:
-            self.bus.write(self._sent)
+            self._send(angles)
             self._note_latency(stamp)
             self._state = self.bus.read()
         except PortLost as error:
             log.warning("%s; trying again every %g s", error, _RETRY_NS / 1e9)
             self._retry_ns = 0
+
+    def _send(self, angles: Floats) -> None:
+        """One step towards ``angles`` (n,) rad within the limits of motion."""
+        self._limiter.step(self.clock.period_ns / 1e9, angles, self._sent)
+        self.bus.write(self._sent)
+
+    def _come_to_rest(self) -> None:
+        """Lead the servos to the neutral face before they go limp, so that no part of the head drops."""
+        rest, _ = self.table.angles(np.zeros(self.table.mix.shape[1]))
+        end_ns = time.monotonic_ns() + _REST_LIMIT_NS
+        with suppress(DriverError):  # a bus that does not work is stopped as it is
+            for now in Clock(self.settings.rate_hz).run(lambda: self._retry_ns is None):
+                self._send(rest)
+                away = np.abs(self.bus.read().position_rad - rest)
+                if now > end_ns or np.nanmax(away, initial=0.0) < _AT_REST_RAD:
+                    return
 
     def _reconnect(self, now: int) -> None:
         """One attempt to get a lost port back; motion goes on from where the servos are found."""

@@ -72,9 +72,12 @@ def test_the_panel_moves_servos_and_they_are_limp_afterwards(stage: Stage, servo
         assert until(lambda: newest(body, "mouthSmileLeft") > 0.3)
         body.tell(Calm(0.1))
         assert until(lambda: newest(body, "mouthSmileLeft") < 0.01)
+        body.tell(Hold(jaw, 1.0))
+        assert until(lambda: servos.servo(JAW_ID).position_ticks - rest > 300)
         body.stop()
         report = body.report
     assert powered(servos) == []
+    assert abs(servos.servo(JAW_ID).position_ticks - 2048) < 20  # led to rest before it went limp
     bus = report["buses"][0]  # type: ignore[index]
     assert bus["servos"] == 24
     assert bus["bus"]["errors"] == {}
