@@ -22,7 +22,7 @@ MAX_DISTANCE_MM = 1e6
 MIN_DURATION_S = 0.05
 MAX_DURATION_S = 3600.0
 MAX_FADE_S = 60.0
-LISTS = ("COMMANDS", "EXPRESSIONS", "LAYERS", "PARAMETERS")
+LISTS = ("COMMANDS", "EXPRESSIONS", "HOLDERS", "LAYERS", "PARAMETERS")
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 
@@ -133,7 +133,7 @@ class Unsubscribe:
 
 @dataclass(frozen=True)
 class List:
-    """Tell names. ``LIST COMMANDS|EXPRESSIONS|LAYERS|PARAMETERS``."""
+    """Tell names. ``LIST COMMANDS|EXPRESSIONS|HOLDERS|LAYERS|PARAMETERS``."""
 
     what: str
 
@@ -382,6 +382,6 @@ USAGE = {
     "STATUS": "STATUS",
     "SUB": "SUB rate_hz [ALL] or SUB rate_hz name ...",
     "UNSUB": "UNSUB",
-    "LIST": "LIST COMMANDS, EXPRESSIONS, LAYERS or PARAMETERS",
+    "LIST": "LIST COMMANDS, EXPRESSIONS, HOLDERS, LAYERS or PARAMETERS",
 }
 """How each command is written, for messages."""

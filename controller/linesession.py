@@ -188,6 +188,8 @@ class LineSession:
         return {**self._sink.status(), "accepted": self.accepted, "refused": self.refused.total()}
 
     def _list(self, what: str) -> tuple[str, ...]:
+        if what == "HOLDERS":
+            return tuple(self._sink.holder(i) or "none" for i in range(len(self._parameters)))
         return {
             "PARAMETERS": self._parameters.names,
             "EXPRESSIONS": self._sink.vocabulary.names,

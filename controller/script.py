@@ -1,9 +1,9 @@
-"""Scripts of the simulated robot host: lines of the line protocol and when to send them."""
+"""Scripts: lines of the line protocol and when they are said, by a simulated robot host or in a show."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,25 +14,27 @@ from controller.linecommands import Grammar
 from controller.lineprotocol import LineError
 from controller.parameters import Floats, Parameters, did_you_mean, file_error, read_toml
 
-_KEYS = ("name", "description", "loop_s", "frames_hz", "steps")
+_KEYS = ("name", "description", "loop_s", "frames_hz", "marks", "steps")
 _MAX_FRAMES_HZ = 200.0
 
 
 @dataclass(frozen=True)
 class Script:
-    """What a robot host sends.
+    """What a robot host sends, or a show plays.
 
     Attributes
     ----------
     steps : (time s, line) in rising time.
     loop_s : after how long it begins again; 0 plays it once.
     frames_hz : how often every parameter is sent besides, 0 for never.
+    marks : names of moments (s).
     """
 
     steps: tuple[tuple[float, str], ...]
     loop_s: float = 0.0
     frames_hz: float = 0.0
     name: str = ""
+    marks: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def load(cls, path: Path, parameters: Parameters, vocabulary: Vocabulary) -> Script:
@@ -48,11 +50,12 @@ class Script:
         steps = _steps(table.get("steps", []), grammar, faults)
         loop_s = _number(table, "loop_s", 86_400.0, faults)
         frames_hz = _number(table, "frames_hz", _MAX_FRAMES_HZ, faults)
+        marks = _marks(table.get("marks", {}), faults)
         if loop_s and steps and steps[-1][0] > loop_s:
             faults.append(f"loop_s: {loop_s:g} is before the last step at {steps[-1][0]:g}")
         if faults:
             raise file_error(path, faults)
-        return cls(tuple(steps), loop_s, frames_hz, str(table.get("name", path.stem)))
+        return cls(tuple(steps), loop_s, frames_hz, str(table.get("name", path.stem)), marks)
 
 
 def _steps(given: Any, grammar: Grammar, faults: list[str]) -> list[tuple[float, str]]:
@@ -79,6 +82,18 @@ def _step(text: Any, grammar: Grammar, earliest_s: float) -> tuple[float, str]:
     if grammar.parse(line.encode("utf-8")) is None:
         raise ValueError("no command after the time")
     return at_s, line.strip()
+
+
+def _marks(given: Any, faults: list[str]) -> dict[str, float]:
+    if not isinstance(given, dict):
+        faults.append("marks: must be a table of times, like { chorus = 12.5 }")
+        return {}
+    marks = {}
+    for name in given:
+        inner: list[str] = []
+        marks[name] = _number(given, name, 86_400.0, inner)
+        faults += [f"marks.{fault}" for fault in inner]
+    return marks
 
 
 def _number(table: dict[str, Any], key: str, most: float, faults: list[str]) -> float:

@@ -63,7 +63,8 @@ def test_every_command_is_acknowledged(talk: Talk) -> None:
         "LIFE .5": "LIFE 0.5", "LIFE 0": "LIFE 0",
         "GET ALL": "GET ALL 0", "STATUS": "STATUS expression=neutral", "SUB 20": "SUB 20 59", "UNSUB": "UNSUB",
         "LIST PARAMETERS": "LIST PARAMETERS eyeBlinkLeft", "LIST EXPRESSIONS": "LIST EXPRESSIONS neutral",
-        "LIST LAYERS": "LIST LAYERS expression", "LIST COMMANDS": "LIST COMMANDS HELLO",
+        "LIST LAYERS": "LIST LAYERS expression", "LIST HOLDERS": "LIST HOLDERS expression",
+        "LIST COMMANDS": "LIST COMMANDS HELLO",
     }  # fmt: skip
     for line, text in answers.items():
         reply = talk.say(line)

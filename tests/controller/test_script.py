@@ -31,13 +31,14 @@ def test_a_wrong_script_lists_every_fault(tmp_path: Path) -> None:
     path = tmp_path / "own.toml"
     path.write_text(
         "loop = 3\nloop_s = 1.0\nframes_hz = -1\n"
+        "marks = { a = 1.0, b = -1 }\n"
         'steps = ["0 PING", "x PING", "2 SET jawOpn 1", "2.5", "3 GAZE 0 0", "1 PING"]\n'
     )
     with pytest.raises(ConfigError) as caught:
         Script.load(path, P, VOCABULARY)
     text = str(caught.value)
     for part in (
-        "7 faults", "loop: unknown key, did you mean 'loop_s'", "steps[1]: begins with a time",
+        "8 faults", "marks.b: must be", "loop: unknown key, did you mean 'loop_s'", "steps[1]: begins with a time",
         "steps[2]: unknown parameter 'jawOpn', did you mean 'jawOpen'", "steps[3]: no command",
         "steps[5]: times must rise", "frames_hz: must be", "loop_s: 1 is before the last step at 3",
     ):  # fmt: skip
