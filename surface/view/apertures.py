@@ -13,6 +13,9 @@ import numpy as np
 
 #: Points of one lid handed to the eye's shader.
 LID_POINTS = 10
+#: How far from the skin's edge a lid's margin may lie, and how wide a column it is looked for in, mm.
+_MARGIN_MM = 7.0
+_COLUMN_MM = 1.6
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,44 @@ def _spread(path: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     along = np.concatenate([[0.0], np.cumsum(steps)])
     wanted = np.linspace(0.0, along[-1], LID_POINTS)
     return path[np.clip(np.searchsorted(along, wanted), 0, len(path) - 1)]
+
+
+def leading_edge(
+    path: np.ndarray, other: np.ndarray, vertices: np.ndarray, centre: np.ndarray, side: float
+) -> np.ndarray:
+    """The vertices of a lid that reach furthest over the eyeball, next to the skin's own edge.
+
+    The skin ends behind the lid's margin, out of sight; the margin is what stands lowest (upper lid) or
+    highest (lower lid) seen from the eyeball's centre.
+
+    Parameters
+    ----------
+    path, other : (k,) vertex ids along the skin's edge, on this lid and on the other one.
+    vertices : (m, 3) positions at rest.
+    centre : (3,) the eyeball's.
+    side : +1 for an upper, -1 for a lower lid.
+
+    Returns
+    -------
+    (k,) vertex ids.
+    """
+    offset = vertices - centre
+    slope = side * offset[:, 1] / np.maximum(offset[:, 2], 1e-6)
+    middle = 0.5 * (_height(path, vertices) + _height(other, vertices))
+    chosen = path.copy()
+    for index, vertex in enumerate(path):
+        near = np.linalg.norm(vertices - vertices[vertex], axis=1) < _MARGIN_MM
+        near &= np.abs(vertices[:, 0] - vertices[vertex, 0]) < _COLUMN_MM
+        near &= (offset[:, 2] > 0.0) & (side * (vertices[:, 1] - middle) > 0.0)
+        ids = np.flatnonzero(near)
+        if len(ids):
+            chosen[index] = ids[np.argmin(slope[ids])]
+    return chosen
+
+
+def _height(path: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """Height (m,) of the line along `path`, which runs towards greater x, at every vertex's x."""
+    return np.interp(vertices[:, 0], vertices[path, 0], vertices[path, 1])
 
 
 def nearest_loop(loops: list[np.ndarray], vertices: np.ndarray, point: np.ndarray, reach: float) -> np.ndarray | None:

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surface.view.apertures import LID_POINTS, Aperture, aperture, boundary_loops, nearest_loop, vector_area
+from surface.view.apertures import (
+    LID_POINTS,
+    Aperture,
+    aperture,
+    boundary_loops,
+    leading_edge,
+    nearest_loop,
+    vector_area,
+)
 from surface.view.parts import ViewPart
 
 _INNER = ("teeth", "tongue", "gums", "mouth")
@@ -73,8 +81,15 @@ class Openings:
         lids = None
         if self._skin is not None:
             loop = nearest_loop(loops, self._skin.vertices, centre, _LID_REACH * radius)
-            lids = None if loop is None else aperture(loop, self._skin.vertices)
+            lids = None if loop is None else self._lids(loop, centre)
         return EyeFrame(local, ids, solve, lids)
+
+    def _lids(self, loop: np.ndarray, centre: np.ndarray) -> Aperture:
+        """The margins of both lids over an eyeball."""
+        vertices = np.asarray(self._skin.vertices if self._skin is not None else (), float)
+        edge = aperture(loop, vertices)
+        upper = leading_edge(edge.upper, edge.lower, vertices, centre, 1.0)
+        return replace(edge, upper=upper, lower=leading_edge(edge.lower, edge.upper, vertices, centre, -1.0))
 
     def _find_lips(self, parts: Sequence[ViewPart], loops: list[np.ndarray]) -> Aperture | None:
         """The skin's opening nearest to the front of the mouth's inner parts."""

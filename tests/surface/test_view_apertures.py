@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ball_head import EYES, grid, skin
 
-from surface.view.apertures import LID_POINTS, aperture, boundary_loops, nearest_loop, vector_area
+from surface.view.apertures import LID_POINTS, aperture, boundary_loops, leading_edge, nearest_loop, vector_area
 
 
 def sheet_with_hole() -> tuple[np.ndarray, np.ndarray]:
@@ -55,3 +55,13 @@ def test_vector_area_of_a_circle() -> None:
     angle = np.linspace(0, 2 * np.pi, 721)[:-1]
     ring = np.column_stack([3 * np.cos(angle) + 100, 3 * np.sin(angle) - 20, np.full(720, 50.0)])
     assert vector_area(ring) == pytest.approx([0, 0, np.pi * 9], rel=1e-4, abs=1e-9)
+
+
+def test_leading_edge_is_what_reaches_furthest_over_the_eyeball() -> None:
+    x = np.linspace(-10, 10, LID_POINTS)
+    rows = {"edge": (5.0, 12.0), "margin": (4.0, 13.5), "lid": (8.0, 13.0), "lower": (-5.0, 12.0)}
+    vertices = np.concatenate([np.column_stack([x, np.full_like(x, y), np.full_like(x, z)]) for y, z in rows.values()])
+    ids = dict(zip(rows, np.arange(4 * LID_POINTS).reshape(4, -1), strict=True))
+    centre = np.zeros(3)
+    assert (leading_edge(ids["edge"], ids["lower"], vertices, centre, 1.0) == ids["margin"]).all()
+    assert (leading_edge(ids["lower"], ids["edge"], vertices, centre, -1.0) == ids["lower"]).all()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from ball_head import EYES, BallHead, BallPart, rotation, skin, values
 
+from surface.head import Head
 from surface.view.openings import Openings, fit_sphere
 
 
@@ -72,3 +75,42 @@ def test_fit_sphere_is_exact_on_a_cap() -> None:
     centre, radius = fit_sphere(points)
     assert centre == pytest.approx([30.9, 36.1, 79.9])
     assert radius == pytest.approx(12.0)
+
+
+@pytest.fixture(scope="module")
+def shipped(root: Path) -> Head:
+    return Head.load(root / "configs" / "heads" / "ict")
+
+
+def posed(head: Head, **given: float) -> Head:
+    head.pose(head.values(given))
+    return head
+
+
+def test_the_shipped_heads_lids_are_found_and_close(shipped: Head) -> None:
+    openings = Openings(posed(shipped).parts)
+    for part in (p for p in shipped.parts if p.material == "eye"):
+        posed(shipped)
+        opened = openings.eye(part)
+        assert opened["lids"] == 1.0
+        posed(shipped, eyeBlinkLeft=1.0, eyeBlinkRight=1.0)
+        shut = openings.eye(part)
+        heights = [np.max(lids["lid_upper"][:, 1] - lids["lid_lower"][:, 1]) for lids in (opened, shut)]
+        assert heights[0] > 7.0
+        assert heights[1] < 0.35 * heights[0]
+
+
+def test_the_shipped_heads_mouth_lets_in_more_light_when_open(shipped: Head) -> None:
+    openings = Openings(posed(shipped).parts)
+    areas = []
+    for amount in (0.0, 0.25, 0.5, 1.0):
+        posed(shipped, jawOpen=amount)
+        areas.append(np.linalg.norm(openings.mouth()["opening_area"]))
+    assert (np.diff(areas) > 60).all()
+
+
+def test_the_shipped_heads_eyes_turn_by_their_parameters(shipped: Head) -> None:
+    openings = Openings(posed(shipped).parts)
+    for part in (p for p in shipped.parts if p.material == "eye"):
+        posed(shipped, leftEyeYaw=0.5, rightEyeYaw=0.5)
+        assert openings.eye(part)["eye_rotation"] == pytest.approx(rotation(np.radians(17.5)), abs=1e-3)
