@@ -6,7 +6,6 @@ uniform float iris_radius;            // sine of the iris' half angle
 uniform float pupil_radius;
 
 in vec3 v_local;
-in vec3 v_normal;
 in vec3 v_view;
 in vec2 v_lid;
 
@@ -31,7 +30,7 @@ vec3 iris(vec2 p, float t) {
 void main() {
     vec3 d = normalize(v_local);
     vec3 v = normalize(v_view);
-    vec3 n = normalize(v_normal);
+    vec3 n = eye_rotation * d;
     float r = length(d.xy);
 
     // The iris lies under the cornea: looked at from the side it slides away from the viewer.
@@ -42,9 +41,10 @@ void main() {
     float t = (q - pupil) / (1.0 - pupil);
     vec3 albedo = mix(iris(p, t), sclera(d, r), smoothstep(0.90, 1.06, q));
 
-    // The cornea bulges: its normal leans out less than the eyeball's, its highlight is small and sharp.
+    // The cornea is rounder than the eyeball: its normals lean out faster, which draws highlights to its middle.
+    // They are made from directions alone, since the rim of a modelled cornea would split each lamp's image.
     vec3 axis = eye_rotation[2];
-    vec3 cornea = normalize(n + 0.45 * (n - axis * dot(n, axis)) * (1.0 - smoothstep(0.7, 1.3, r / iris_radius)));
+    vec3 cornea = normalize(n + 0.9 * (n - axis * dot(n, axis)) * (1.0 - smoothstep(0.5, 2.2, r / iris_radius)));
     float upper = smoothstep(-0.5, 5.0, v_lid.x);
     float lower = smoothstep(-0.8, 2.4, v_lid.y);
     float shade = (0.15 + 0.85 * upper) * (0.45 + 0.55 * lower);
@@ -60,8 +60,8 @@ void main() {
     vec3 mirrored = reflect(-v, cornea);
     // Lamps mirror as soft boxes: flat inside, soft at the rim.
     float towards_key = dot(mirrored, key_direction);
-    float key = 1.1 * smoothstep(0.972, 0.988, towards_key) + 0.05 * lobe(towards_key, 30.0);
-    float fill = smoothstep(0.970, 0.990, dot(mirrored, fill_direction)) * 0.6;
+    float key = 1.1 * smoothstep(0.955, 0.980, towards_key) + 0.05 * lobe(towards_key, 30.0);
+    float fill = smoothstep(0.965, 0.990, dot(mirrored, fill_direction)) * 0.5;
     float fresnel = 1.0 - clamp(dot(cornea, v), 0.0, 1.0);
     fresnel = 0.03 + 0.5 * fresnel * fresnel * fresnel;
     lit += (key * key_colour + fill * fill_colour) * smoothstep(0.0, 1.2, v_lid.x);

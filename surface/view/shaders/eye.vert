@@ -6,11 +6,9 @@ uniform vec3 lid_lower[LID_POINTS];
 uniform float lids;                   // 1 where the head has lid margins
 
 in vec3 position;
-in vec3 normal;
 in vec3 local;                        // direction in the eye's own frame, +z = pupil
 
 out vec3 v_local;
-out vec3 v_normal;
 out vec3 v_view;
 out vec2 v_lid;                       // mm to the upper and the lower lid
 
@@ -24,7 +22,6 @@ float to_segment(vec3 a, vec3 b) {
 void main() {
     gl_Position = view_projection * vec4(position, 1.0);
     v_local = local;
-    v_normal = normal;
     v_view = camera - position;
     vec2 near = vec2(1e4);
     for (int i = 0; i + 1 < LID_POINTS; ++i) {
