@@ -6,6 +6,7 @@ Done once when a head is made and kept in its file; the picture then shades crev
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 #: What hides the sky from what: skin and eyes are shaded by each other, the mouth's inside by itself alone,
 #: since the light that comes in between the lips is worked out each frame.
 _COMPANIES = (("skin", "eye"), ("teeth", "gums", "tongue"))
+
+#: Pose in which mouth and lids show what they hide at rest.
+_OPEN = {"jawOpen": 0.45, "eyeBlinkLeft": 0.8, "eyeBlinkRight": 0.8}
 
 
 def bake(
@@ -148,3 +152,20 @@ def _draw_depth(ctx: moderngl.Context, target: moderngl.Framebuffer, arrays: lis
     target.clear(depth=1.0)
     for array in arrays:
         array.render()
+
+
+def shade_head(folder: str | Path) -> Path:
+    """Bake the head in `folder` and keep the result beside it; returns the file written.
+
+    Raises
+    ------
+    HeadFileError : the head cannot be read.
+    ViewError : no OpenGL on this machine.
+    """
+    from surface.head import Head
+    from surface.head.shade import shade_path, write_shade
+
+    shade_path(folder).unlink(missing_ok=True)
+    head = Head.load(folder)
+    open_pose = np.array([_OPEN.get(name, 0.0) for name in head.parameters])
+    return write_shade(folder, bake_head(head, open_pose))

@@ -1,0 +1,68 @@
+"""Baked shade: how much sky each vertex of a head sees, kept beside the head in ``occlusion.npz``.
+
+The file belongs to one tessellation. Parts that it does not fit, or a head without it, are drawn unshaded.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.errors import HeadFileError
+from surface.head.part import HeadPart
+
+FILE = "occlusion.npz"
+Shares = Mapping[str, NDArray[np.floating]]
+
+
+def read_shade(head: str | Path) -> dict[str, NDArray[np.float32]]:
+    """Shares (m, 1) of each part, 0..1, by the part's name; empty where the head has no such file.
+
+    Parameters
+    ----------
+    head : the head's folder or its head.toml.
+
+    Raises
+    ------
+    HeadFileError : the file is damaged.
+    """
+    path = shade_path(head)
+    if not path.is_file():
+        return {}
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
+            return {name: stored[name].reshape(-1, 1).astype(np.float32) / np.float32(255) for name in stored.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise HeadFileError(f"{path}: {error}", hint=f"delete {path}, or make the head again: omote fit") from error
+
+
+def write_shade(head: str | Path, shares: Shares) -> Path:
+    """Keep shares (m, 1), 0..1, beside the head; returns the file's path."""
+    path = shade_path(head)
+    packed = {
+        name: np.rint(np.clip(share.ravel(), 0.0, 1.0) * 255.0).astype(np.uint8) for name, share in shares.items()
+    }
+    temporary = path.with_suffix(".part")
+    with temporary.open("wb") as stream:
+        np.savez_compressed(stream, **packed)
+    temporary.replace(path)
+    return path
+
+
+def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:
+    """Multiply the parts' ``occlusion`` attribute by their shares; shares of another tessellation are passed over."""
+    for part in parts:
+        share = shares.get(part.name)
+        if share is not None and share.shape == (len(part.vertices), 1):
+            painted = part.attributes.get("occlusion", np.float32(1.0))
+            part.attributes["occlusion"] = (painted * share).astype(np.float32)
+
+
+def shade_path(head: str | Path) -> Path:
+    """Where a head's shade is kept."""
+    folder = Path(head)
+    return (folder.parent if folder.suffix == ".toml" else folder) / FILE
