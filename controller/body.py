@@ -27,6 +27,7 @@ from controller.links import open_links
 from controller.livelink import Take, TakePlayer
 from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS, Parameters
+from controller.speech import layer_of, load_take
 from controller.stage import Stage, load_stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
 
@@ -43,14 +44,22 @@ class Body:
     stage : what to run.
     parameters : the vocabulary.
     mailbox : where the parameters are published, one per entry of ``parameters.names``.
-    take : a recorded take played into the live-capture layer; None for none.
+    take, layer : a recorded take and the layer it is played into; None for none.
     """
 
-    def __init__(self, stage: Stage, parameters: Parameters, mailbox: Mailbox, take: Take | None = None) -> None:
+    def __init__(
+        self,
+        stage: Stage,
+        parameters: Parameters,
+        mailbox: Mailbox,
+        take: Take | None = None,
+        layer: str = "capture",
+    ) -> None:
         self.stage = stage
         self.state = CommandState(parameters)
         self.clock = Clock(stage.settings.control_hz)
-        self.player = TakePlayer(take, self.state) if take is not None else None
+        self.state.live(stage.settings.liveliness, time.monotonic_ns())
+        self.player = TakePlayer(take, self.state, layer) if take is not None else None
         self.links: list[LineLink] = []
         self.buses = [
             BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest)
@@ -137,9 +146,19 @@ class Body:
         """What was measured by the control loop, the links and the buses."""
         return {
             "control": self.clock.report(),
+            "take": _played(self.player),
             "links": [link.report() for link in self.links],
             "buses": [bus.report() for bus in self.buses],
         }
+
+
+def _played(player: TakePlayer | None) -> dict[str, object] | None:
+    """How far a take was played (s); None without one."""
+    if player is None:
+        return None
+    played = min(player.position_s, player.take.duration_s)
+    return {"rows": player.take.frames, "rate_hz": player.take.rate_hz, "played_s": played,
+            "duration_s": player.take.duration_s}  # fmt: skip
 
 
 def body_main(orders: BodyOrders, pipe: Connection) -> None:
@@ -167,9 +186,12 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
 def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     parameters = PARAMETERS
     stage = load_stage(orders.stage, parameters)
-    take = Take.load(Path(orders.take), parameters) if orders.take else None
     mailbox = Mailbox(orders.mailbox, len(parameters.names))
-    body = Body(stage, parameters, mailbox, take)
+    if orders.take:
+        path = Path(orders.take)
+        body = Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path))
+    else:
+        body = Body(stage, parameters, mailbox)
     body.start()
     try:
         _tell(pipe, Ready())

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from surface.head import Head
 
 
+TAKE_SUFFIXES = (".csv", ".tsv", ".json", ".wav")
+
+
 def check_anything(name: str) -> list[str]:
     """Check a stage, robot, head or take; returns what it is, in a line or two.
 
@@ -31,7 +34,7 @@ def check_anything(name: str) -> list[str]:
     path = _find(name)
     if path.is_dir() or path.name == "head.toml":
         return _check_head(path if path.is_dir() else path.parent)
-    if path.suffix.lower() == ".csv":
+    if path.suffix.lower() in TAKE_SUFFIXES:
         return _check_take(path)
     return _check_toml(path)
 
@@ -68,9 +71,9 @@ def _check_poses(head: Head, folder: Path) -> None:
 
 
 def _check_take(path: Path) -> list[str]:
-    from controller.livelink import Take
+    from controller.speech import load_take
 
-    take = Take.load(path, PARAMETERS)
+    take = load_take(path, PARAMETERS)
     return [f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz: good"]
 
 

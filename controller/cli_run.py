@@ -70,7 +70,7 @@ def run(
 
 
 def play(
-    take: Annotated[Path, typer.Argument(help="Live Link Face take (CSV).")],
+    take: Annotated[Path, typer.Argument(help="Live Link Face take (.csv), speech (.wav, .tsv, Rhubarb .json).")],
     stage: StageName = "play",
     seconds: Seconds = None,
     headless: Headless = False,

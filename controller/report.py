@@ -28,6 +28,9 @@ def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
     found = []
     if control := report.get("control"):
         found.append(("control loop", _loop(control)))
+    if take := report.get("take"):
+        rate = f"{take['rows']} rows at {take['rate_hz']:.0f} Hz"
+        found.append(("take", f"{take['played_s']:.1f} of {take['duration_s']:.1f} s played, {rate}"))
     return found + [
         (f"link {link['port']}", f"{link['accepted']} lines accepted, {sum(link['refused'].values())} refused")
         for link in report.get("links", [])

@@ -56,9 +56,9 @@ class Session:
     def load(cls, stage: str, take: Path | None = None, tell: Tell = lambda _: None) -> Session:
         """Find and check a stage and, where given, a take; raises before anything is opened."""
         if take is not None:
-            from controller.livelink import Take
+            from controller.speech import load_take
 
-            Take.load(take, PARAMETERS)
+            load_take(take, PARAMETERS)
         return cls(load_stage(stage, PARAMETERS), take, tell)
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:

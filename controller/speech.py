@@ -103,6 +103,11 @@ def load_take(path: Path, parameters: Parameters, visemes: Visemes | None = None
     raise TakeError(f"{path}: no take: its name ends in {kind or 'nothing'}", hint="use .csv, .tsv, .json or .wav")
 
 
+def layer_of(path: Path) -> str:
+    """The layer a take plays into: a captured face moves all of it, speech leaves the rest alone."""
+    return "capture" if path.suffix.lower() == ".csv" else "speech"
+
+
 def cue_take(path: Path, parameters: Parameters, visemes: Visemes) -> Take:
     """A take from Rhubarb's TSV or JSON, or from a TSV of phonemes or visemes (time, tab, name). Raises TakeError."""
     try:

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from controller.config import Settings, config_error, load
 from controller.errors import ConfigError
+from controller.host import load_script
 from controller.parameters import Parameters
 from controller.paths import find_config
 from controller.robot import RobotSettings, load_robot
@@ -49,6 +50,7 @@ class StageSettings(Settings):
     head: str = "ict"
     robots: list[str] = []
     control_hz: Annotated[float, Field(ge=10, le=1000)] = 100.0
+    liveliness: Annotated[float, Field(ge=0, le=1)] = 0.0
     face: FaceSettings = FaceSettings()
     links: list[LinkSettings] = []
 
@@ -95,6 +97,9 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
         )
         for i, robot in enumerate(settings.robots)
     ]
+    for i, link in enumerate(settings.links):
+        if link.script is not None:
+            _collect(faults, f"links[{i}].script", lambda name=link.script: load_script(name, parameters))
     if faults:
         raise config_error(path, faults)
     return Stage(path, settings, head, tuple(robots))
