@@ -15,10 +15,9 @@ from typing import Any
 
 from drivers.errors import DriverError
 from drivers.priority import take_priority
-from drivers.sim.bus import SimulatedChain
 from drivers.sim.control import Commands
 from drivers.sim.device import SimulatedServo
-from drivers.sim.serve import PtyServer
+from drivers.sim.serve import PtyServer, make_chain
 
 
 def build(settings: dict[str, Any]) -> PtyServer:
@@ -27,7 +26,7 @@ def build(settings: dict[str, Any]) -> PtyServer:
     servos = [
         SimulatedServo(device_id, model, now_s=now_s, baud=settings["baud"]) for device_id, model in settings["servos"]
     ]
-    chain = SimulatedChain(servos, now_s, seed=settings["seed"])
+    chain = make_chain(servos, now_s, settings["seed"])
     server = PtyServer(
         chain,
         settings["link"],

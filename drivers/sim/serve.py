@@ -8,11 +8,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 
+from drivers.errors import DriverError
 from drivers.sim.bus import SimulatedChain
 from drivers.sim.chain import Chain
 from drivers.sim.control import Commands, ControlSocket, Lines
 from drivers.sim.device import SimulatedServo
 from drivers.sim.faults import Fault
+from drivers.sim.legacy import LegacyChain
 from drivers.sim.ptyport import PtyPort
 from drivers.sim.wire import Timed, WireTiming, without_timing
 
@@ -170,6 +172,24 @@ def make_servos(servos: Iterable[object], model: str | int, baud: int, now_s: fl
     ]
 
 
+def make_chain(servos: list[SimulatedServo], now_s: float, seed: int = 0) -> Chain:
+    """A wire with these servos, of the protocol they speak.
+
+    Raises
+    ------
+    DriverError : some speak Protocol 1.0 and some 2.0.
+    """
+    protocols = {servo.table.protocol for servo in servos}
+    if len(protocols) > 1:
+        models = ", ".join(sorted({servo.table.model for servo in servos}))
+        raise DriverError(
+            f"cannot simulate servos of Protocol 1.0 and 2.0 on one wire ({models})",
+            hint="give each protocol a bus of its own",
+        )
+    kind = LegacyChain if protocols == {1} else SimulatedChain
+    return kind(servos, now_s, seed=seed)
+
+
 def serve_dynamixel(
     ids: Iterable[object],
     model: str | int = "xl330-m288",
@@ -184,12 +204,13 @@ def serve_dynamixel(
     stop: int | None = None,
     seed: int = 0,
 ) -> None:
-    """Serve a simulated Dynamixel bus until it is interrupted. Prints nothing.
+    """Serve a simulated bus of Dynamixel or Feetech servos until it is interrupted. Prints nothing.
 
     Parameters
     ----------
     ids : servo ids, or specs with ``id`` and ``model``.
-    model : of the servos given as bare ids.
+    model : of the servos given as bare ids, for example ``"xm430-w350"``, ``"ax-12a"``, ``"sts3215"``; it decides
+        the protocol.
     baud : bit rate of the servos.
     link : path that shall point at the terminal.
     wire : bytes take their time at the bit rate, with return delay and `latency_s`.
@@ -204,7 +225,7 @@ def serve_dynamixel(
     DriverError : unknown model, unreadable fault, or the terminal or link cannot be made.
     """
     now_s = time.monotonic()
-    chain = SimulatedChain(make_servos(ids, model, baud, now_s), now_s, seed=seed)
+    chain = make_chain(make_servos(ids, model, baud, now_s), now_s, seed)
     server = PtyServer(chain, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
     reading, writing = os.pipe()
     try:

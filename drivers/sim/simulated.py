@@ -14,11 +14,10 @@ from types import TracebackType
 from typing import Any, Self
 
 from drivers.errors import PortError
-from drivers.sim.bus import SimulatedChain
 from drivers.sim.chain import Chain
 from drivers.sim.control import Commands
 from drivers.sim.faults import parse_fault
-from drivers.sim.serve import PtyServer, make_servos
+from drivers.sim.serve import PtyServer, make_chain, make_servos
 
 START_S = 20.0
 """A child process that is not ready after this time is given up."""
@@ -77,7 +76,7 @@ class ServoView:
 
 
 class SimulatedBus:
-    """A simulated Dynamixel bus behind a pseudo-terminal; a context manager.
+    """A simulated bus of Dynamixel or Feetech servos behind a pseudo-terminal; a context manager.
 
     Parameters
     ----------
@@ -182,7 +181,7 @@ class SimulatedBus:
     def _start_thread(self) -> None:
         now_s = time.monotonic()
         servos = make_servos([_Entry(*entry) for entry in self._servos], 0, self.baud, now_s)
-        chain = SimulatedChain(servos, now_s, seed=self._seed)
+        chain = make_chain(servos, now_s, self._seed)
         server = PtyServer(
             chain,
             self._link,
