@@ -8,6 +8,7 @@ expression for a CG robot using real-time surface modification", Eq. 1).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike
 from .basis import Floats, Ints, check_knots, pad_knots
 from .bins import Bins, build_bins
 from .checks import check_points, check_sides, check_uv, check_weights
+from .closed import Interval, check_closed, shifts_of, wrap
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -37,6 +39,8 @@ class DCPSurface:
     weights : (n,) float64, positive
     knots_u, knots_v : n sequences of degree + 2 knots each, or (n, degree + 2) arrays; the degree may differ
         per point and direction (0 to 7)
+    closed_u, closed_v : (start, end) of a direction that is joined at its ends, as around a neck or a torus; the
+        points that reach over one end act at the other
 
     Raises
     ------
@@ -50,13 +54,22 @@ class DCPSurface:
     the left are tried (first in u, then v, then both), which includes the right end of a clamped domain.
     """
 
-    def __init__(self, points: ArrayLike, weights: ArrayLike, knots_u: Any, knots_v: Any) -> None:
+    def __init__(
+        self,
+        points: ArrayLike,
+        weights: ArrayLike,
+        knots_u: Any,
+        knots_v: Any,
+        *,
+        closed_u: Interval = None,
+        closed_v: Interval = None,
+    ) -> None:
         xyz, w = check_points(points), check_weights(weights)
         if len(w) != len(xyz):
             raise ValueError(f"weights: {len(w)} weights for {len(xyz)} points")
         ku, pu = pad_knots(knots_u, "knots_u", len(xyz))
         kv, pv = pad_knots(knots_v, "knots_v", len(xyz))
-        self._set(xyz, w, (ku, kv), (pu, pv), None)
+        self._set(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
 
     def _set(
         self,
@@ -64,13 +77,19 @@ class DCPSurface:
         weights: Floats,
         knots: tuple[Floats, Floats],
         degrees: tuple[Ints, Ints],
-        bins: Bins | None,
+        closed: tuple[Interval, Interval],
     ) -> None:
-        self._points, self._weights = points, weights
-        self._ku, self._kv = knots
-        self._pu, self._pv = degrees
-        self._lazy_bins = bins
-        for array in (points, weights, *knots, *degrees):
+        """Keep arrays; of a closed direction also shifted copies of every point, block after block."""
+        self._n = len(points)
+        self._closed = check_closed(closed)
+        self._shifts = shifts_of(knots, self._closed)
+        blocks = len(self._shifts)
+        self._points, self._weights = np.tile(points, (blocks, 1)), np.tile(weights, blocks)
+        moved = [np.concatenate([knots[k] + shift[k] for shift in self._shifts]) for k in range(2)]
+        self._ku, self._kv = moved
+        self._pu, self._pv = (np.tile(p, blocks) for p in degrees)
+        self._lazy_bins: Bins | None = None
+        for array in (self._points, self._weights, self._ku, self._kv, self._pu, self._pv):
             array.flags.writeable = False
 
     @classmethod
@@ -100,6 +119,9 @@ class DCPSurface:
         knots_v: ArrayLike,
         degrees_u: ArrayLike,
         degrees_v: ArrayLike,
+        *,
+        closed_u: Interval = None,
+        closed_v: Interval = None,
     ) -> DCPSurface:
         """From the arrays that :attr:`padded` gives: the fast way in and out of a binary file.
 
@@ -121,67 +143,82 @@ class DCPSurface:
             check_knots(knots, p, f"knots_{name}")
             sides.append((np.take_along_axis(knots, np.minimum(np.arange(knots.shape[1]), p[:, None] + 1), 1), p))
         surface = cls.__new__(cls)
-        surface._set(xyz, w, (sides[0][0], sides[1][0]), (sides[0][1], sides[1][1]), None)
+        surface._set(xyz, w, (sides[0][0], sides[1][0]), (sides[0][1], sides[1][1]), (closed_u, closed_v))
         return surface
 
     def with_points(self, points: ArrayLike) -> DCPSurface:
         """The same surface with other positions ``(n, 3)``; knots and bins are shared."""
         xyz = check_points(points)
-        if xyz.shape != self._points.shape:
-            raise ValueError(f"points: shape {xyz.shape}, expected {self._points.shape}")
-        surface = type(self).__new__(type(self))
-        surface._set(xyz, self._weights, (self._ku, self._kv), (self._pu, self._pv), self._lazy_bins)
+        if xyz.shape != (self._n, 3):
+            raise ValueError(f"points: shape {xyz.shape}, expected {(self._n, 3)}")
+        surface = copy(self)
+        surface._points = np.tile(xyz, (len(self._shifts), 1))
+        surface._points.flags.writeable = False
+        surface._lazy_bins = self.bins
         return surface
 
     @property
     def n(self) -> int:
         """How many control points."""
-        return len(self._points)
+        return self._n
+
+    @property
+    def closed(self) -> tuple[Interval, Interval]:
+        """(start, end) of u and of v where they are joined, None where they are not."""
+        return self._closed
+
+    @property
+    def shifts(self) -> Floats:
+        """(b, 2) float64: shifts in u and v of the copies of a closed surface, (0, 0) first."""
+        return self._shifts
 
     @property
     def points(self) -> Floats:
         """(n, 3) float64, read-only."""
-        return self._points
+        return self._points[: self._n]
 
     @property
     def weights(self) -> Floats:
         """(n,) float64, read-only."""
-        return self._weights
+        return self._weights[: self._n]
 
     @property
     def knots_u(self) -> Sequence[Floats]:
         """n arrays of degree + 2 knots, read-only."""
-        return [row[: p + 2] for row, p in zip(self._ku, self._pu, strict=True)]
+        return [row[: p + 2] for row, p in zip(self.padded[0], self.degrees[0], strict=True)]
 
     @property
     def knots_v(self) -> Sequence[Floats]:
         """n arrays of degree + 2 knots, read-only."""
-        return [row[: p + 2] for row, p in zip(self._kv, self._pv, strict=True)]
+        return [row[: p + 2] for row, p in zip(self.padded[1], self.degrees[1], strict=True)]
 
     @property
     def degrees(self) -> tuple[Ints, Ints]:
         """Degrees in u and v, (n,) int64 each, read-only."""
-        return self._pu, self._pv
+        return self._pu[: self._n], self._pv[: self._n]
 
     @property
     def padded(self) -> tuple[Floats, Floats]:
         """Knots in u and v, (n, w) float64 each, read-only; rows repeat their last knot."""
-        return self._ku, self._kv
+        return self._ku[: self._n], self._kv[: self._n]
 
     @property
     def supports(self) -> Floats:
         """(n, 4) float64: u0, u1, v0, v1 of every point's subdomain."""
+        return self.all_supports[: self._n]
+
+    @property
+    def all_supports(self) -> Floats:
+        """As :attr:`supports`, with the shifted copies of a closed surface after them; what :attr:`bins` lists."""
         return np.stack([self._ku[:, 0], self._ku[:, -1], self._kv[:, 0], self._kv[:, -1]], axis=1)
 
     @property
     def rect(self) -> tuple[float, float, float, float]:
-        """u0, u1, v0, v1 of the smallest rectangle that holds every subdomain."""
-        return (
-            float(self._ku[:, 0].min()),
-            float(self._ku[:, -1].max()),
-            float(self._kv[:, 0].min()),
-            float(self._kv[:, -1].max()),
-        )
+        """u0, u1, v0, v1 of the smallest rectangle that holds every subdomain, or of the closed interval."""
+        ends = []
+        for knots, closed in zip(self.padded, self._closed, strict=True):
+            ends.append(closed or (float(knots[:, 0].min()), float(knots[:, -1].max())))
+        return (*ends[0], *ends[1])
 
     @property
     def bins(self) -> Bins:
@@ -271,13 +308,16 @@ class DCPSurface:
             raise ValueError(f"derivative: must be (0, 0), (1, 0) or (0, 1), not {derivative!r}")
         samples, sides, _ = self._sample(uv, side)
         data, columns, start = self._rows(samples, sides)
+        columns %= self._n  # shifted copies are the same point
         rows = np.repeat(np.arange(len(samples)), np.diff(start))
         total = np.stack([np.bincount(rows, data[:, k], len(samples)) for k in range(3)], axis=1)
         ratio = data[:, 0] / total[rows, 0]
         if tuple(derivative) != (0, 0):
             k = 1 if derivative[0] else 2
             ratio = (data[:, k] - ratio * total[rows, k]) / total[rows, 0]
-        return csr_matrix((ratio, columns, start), shape=(len(samples), self.n))
+        matrix = csr_matrix((ratio, columns, start), shape=(len(samples), self.n))
+        matrix.sum_duplicates()
+        return matrix
 
     def tessellate(
         self,
@@ -348,20 +388,20 @@ class DCPSurface:
         """
         from . import kernels
 
-        samples = check_uv(uv)
+        samples = wrap(check_uv(uv), self._closed)
         sides = check_sides(samples, side)
         out = np.zeros((len(samples), 6 if second else 3, 3))
-        kernels.sample_derivatives(*self._arrays(), *self._bin_arrays(), samples, sides, out)
+        kernels.sample_derivatives(*self.arrays(), *self._bin_arrays(), samples, sides, out)
         return sides, out
 
     def _sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
         """Checked samples, the side really used (-1: uncovered) and S."""
         from . import kernels
 
-        samples = check_uv(uv)
+        samples = wrap(check_uv(uv), self._closed)
         sides = check_sides(samples, side)
         out = np.zeros((len(samples), 3))
-        kernels.sample(*self._arrays(), *self._bin_arrays(), samples, sides, out)
+        kernels.sample(*self.arrays(), *self._bin_arrays(), samples, sides, out)
         return samples, sides, out
 
     def _rows(self, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:
@@ -375,7 +415,7 @@ class DCPSurface:
             capacity = kernels.row_capacity(*bins[:3], part)
             chunk, ids = np.zeros((capacity, 3)), np.zeros(capacity, dtype=np.int32)
             start = np.zeros(len(part) + 1, dtype=np.int64)
-            arrays = self._arrays()
+            arrays = self.arrays()
             used = kernels.fill_rows(*arrays[:4], arrays[5], *bins, part, sub, chunk, ids, start)
             data.append(chunk[:used].copy())
             columns.append(ids[:used].copy())
@@ -383,7 +423,8 @@ class DCPSurface:
         starts = np.concatenate([[0], *counts]).cumsum()
         return np.concatenate(data), np.concatenate(columns), starts
 
-    def _arrays(self) -> tuple[np.ndarray, ...]:
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """Knots in u and v, degrees, points and weights, shifted copies included; what the kernels take."""
         return self._ku, self._kv, self._pu, self._pv, self._points, self._weights
 
     def _bin_arrays(self) -> tuple[np.ndarray, ...]:

@@ -51,10 +51,10 @@ class Deformation:
         self._threads = threads
         self._pool: ThreadPoolExecutor | None = None
         self._lists = build_lists(surface, mesh, normals)
-        self._points = surface.points.copy()
-        self._weights = surface.weights.copy()
-        self._knots = [knots.copy() for knots in surface.padded]
-        self._degrees = [degrees.copy() for degrees in surface.degrees]
+        arrays = [array.copy() for array in surface.arrays()]
+        self._knots, self._degrees = arrays[:2], arrays[2:4]
+        self._points, self._weights = arrays[4:]
+        self._n, self._shifts, self._closed = surface.n, surface.shifts, surface.closed
         self._allocate(normals)
         self._sum_weights(np.arange(len(mesh.cell_start) - 1))
         self.refresh()
@@ -78,7 +78,7 @@ class Deformation:
         self._cells = np.arange(cells, dtype=np.int32)
         self._ranges = np.zeros((max(cells, 1), 2), dtype=np.int64)
         self._changed_ids, self._delta = np.zeros(n, dtype=np.int64), np.zeros((n, 3))
-        self._all = np.arange(n)
+        self._all = np.arange(self._n)
         self._cell_boxes: tuple[np.ndarray, Bins] | None = None
         self._spare = np.zeros(24, dtype=np.float32)
         self._count = 0
@@ -94,7 +94,7 @@ class Deformation:
     @property
     def points(self) -> np.ndarray:
         """(n, 3) float64 control points as they stand now, read-only."""
-        view = self._points.view()
+        view = self._points[: self._n]
         view.flags.writeable = False
         return view
 
@@ -108,7 +108,15 @@ class Deformation:
         """A new surface with the points, weights and knots as they stand now."""
         from .dcp import DCPSurface
 
-        return DCPSurface.from_padded(self._points, self._weights, *self._knots, *self._degrees)
+        own = slice(0, self._n)
+        return DCPSurface.from_padded(
+            self._points[own],
+            self._weights[own],
+            *(knots[own] for knots in self._knots),
+            *(degrees[own] for degrees in self._degrees),
+            closed_u=self._closed[0],
+            closed_v=self._closed[1],
+        )
 
     @property
     def nbytes(self) -> int:
@@ -158,6 +166,7 @@ class Deformation:
         if not good.all():
             i = int(np.argmin(good))
             raise ValueError(f"weights[{i}]: must be positive and finite, got {w[i]}")
+        which, w = self._copies(which), np.tile(w, len(self._shifts))
         self._weights[which] = w
         cells = [self._rewrite(int(i)) for i in which]
         self._recompute(np.unique(np.concatenate(cells)) if cells else np.zeros(0, dtype=np.int64))
@@ -209,15 +218,18 @@ class Deformation:
         from . import binding
 
         which, target = _integers(ids), np.ascontiguousarray(rows, dtype=np.float64)
-        n = len(self._points)
+        n = self._n
         if target.shape != (len(which), 3):
             raise ValueError(f"{name}: shape {target.shape}, expected {(len(which), 3)}")
         if len(which) > n:  # ids that stand several times: the last position counts, moves add up
             which, target = _gathered(which, target, relative, n)
+        if len(self._shifts) > 1:
+            which = self._copies(self._check_ids(which))
+            target = np.tile(target, (len(self._shifts), 1))
         if self._table is None:
             self._table = binding.address_table(self._arrays())
         count = binding.place_bound(
-            self._table, which, target, relative, int(MOST_MOVED * n), LIMIT, BIAS, GAP, self._sign
+            self._table, which, target, relative, int(MOST_MOVED * len(self._points)), LIMIT, BIAS, GAP, self._sign
         )
         if count == -1:
             self.refresh()
@@ -228,9 +240,7 @@ class Deformation:
 
     def _complain(self, which: np.ndarray, target: np.ndarray, bad: int, name: str) -> None:
         if bad < 0:
-            raise ValueError(
-                f"ids[{-1 - bad}]: {which[-1 - bad]} is not a control point (0 to {len(self._points) - 1})"
-            )
+            raise ValueError(f"ids[{-1 - bad}]: {which[-1 - bad]} is not a control point (0 to {self._n - 1})")
         raise ValueError(f"{name}[{bad}]: must be finite, got {target[bad].tolist()}")
 
     def _rewrite(self, i: int) -> np.ndarray:
@@ -284,12 +294,16 @@ class Deformation:
         own += ["state", "kept", "vertices", "normals", "local", "spare"]
         return vars(self._lists) | {name: getattr(self, f"_{name}") for name in own}
 
+    def _copies(self, which: np.ndarray) -> np.ndarray:
+        """Points and their shifted copies, block after block."""
+        return np.concatenate([which + block * self._n for block in range(len(self._shifts))])
+
     def _check_ids(self, ids: ArrayLike) -> np.ndarray:
         which = _integers(ids)
-        bad = (which < 0) | (which >= len(self._points))
+        bad = (which < 0) | (which >= self._n)
         if bad.any():
             k = int(np.argmax(bad))
-            raise ValueError(f"ids[{k}]: {which[k]} is not a control point (0 to {len(self._points) - 1})")
+            raise ValueError(f"ids[{k}]: {which[k]} is not a control point (0 to {self._n - 1})")
         return which
 
 

@@ -82,10 +82,10 @@ def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool) -> Lists:
     ids = np.zeros(len(mesh.list_ids), dtype=np.int32)
     at, ids_at = np.zeros(len(count) + 1, dtype=np.int64), np.zeros(len(count) + 1, dtype=np.int64)
     rows = np.zeros(len(count), dtype=np.int64)
+    arrays = surface.arrays()
     kernels.fill_blocks(
-        *surface.padded,
-        *surface.degrees,
-        surface.weights,
+        *arrays[:4],
+        arrays[5],
         mesh.uv,
         mesh.side,
         mesh.cell_start,
@@ -100,7 +100,7 @@ def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool) -> Lists:
     )
     used, entries = int(at[-1]), int(ids_at[-1])
     ids = ids[:entries].copy()
-    back = back_lists(ids, rows, surface.n)
+    back = back_lists(ids, rows, len(arrays[4]))
     return Lists(
         mesh.cell_start,
         np.concatenate([[0], np.cumsum(tiles)]),

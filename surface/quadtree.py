@@ -22,11 +22,13 @@ class Lattice:
     ----------
     lines_u, lines_v : root borders, rising
     depth : deepest level a cell can have
+    joined : which directions are joined at their ends, so that cells there are neighbours
     """
 
     lines_u: Floats
     lines_v: Floats
     depth: int
+    joined: tuple[bool, bool] = (False, False)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -105,6 +107,11 @@ def children(cells: Ints) -> Ints:
 def codes(lattice: Lattice, level: int, cells: Ints) -> Ints:
     """(n,) one integer per cell of a level; cells outside the domain give -1."""
     width, height = lattice.shape[0] << level, lattice.shape[1] << level
+    if any(lattice.joined):
+        cells = cells.copy()
+        for axis, size in enumerate((width, height)):
+            if lattice.joined[axis]:
+                cells[:, axis] %= size
     valid = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
     return np.where(valid, cells[:, 1] * width + cells[:, 0], -1)
 
@@ -128,7 +135,8 @@ def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
     for level in range(len(split) - 1, 0, -1):
         cells = _decode(lattice, level, split[level])
         around = (cells[:, None, :] + NEIGHBOURS).reshape(-1, 2)
-        around = around[codes(lattice, level, around) >= 0]
+        code = codes(lattice, level, around)
+        around = _decode(lattice, level, code[code >= 0])
         parents = np.concatenate([cells, around]) // 2
         split[level - 1] = np.union1d(split[level - 1], codes(lattice, level - 1, parents))
     levels, found = [], []

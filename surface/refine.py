@@ -79,7 +79,10 @@ def insert_knot(surface: DCPSurface, axis: str, value: float, ids: ArrayLike | N
             raise ValueError(f"ids: must be 0 to {surface.n - 1}")
         chosen[:] = False
         chosen[which] = True
-    return _join(surface, _split(pieces, "uv".index(axis), np.full(surface.n, float(value)), chosen))
+    k = "uv".index(axis)
+    for shift in np.unique(surface.shifts[:, k]):
+        pieces = _split(pieces, k, np.full(len(pieces.parent), value - shift), chosen[pieces.parent])
+    return _join(surface, pieces)
 
 
 def refine(surface: DCPSurface, region: tuple[float, float, float, float]) -> Refinement:
@@ -87,14 +90,15 @@ def refine(surface: DCPSurface, region: tuple[float, float, float, float]) -> Re
     u0, u1, v0, v1 = region
     if not np.isfinite(region).all() or not (u0 < u1 and v0 < v1):
         raise ValueError(f"region: needs finite u0 < u1 and v0 < v1, got {tuple(region)}")
-    s = surface.supports
-    reached = (s[:, 0] < u1) & (s[:, 1] > u0) & (s[:, 2] < v1) & (s[:, 3] > v0)
-    pieces = _pieces(surface)
-    for axis, (low, high) in enumerate(((u0, u1), (v0, v1))):
-        targets = _middles(surface.padded[axis], low, high)
-        for column in range(targets.shape[1]):
-            value = targets[pieces.parent, column]
-            pieces = _split(pieces, axis, value, reached[pieces.parent] & np.isfinite(value))
+    pieces, s = _pieces(surface), surface.supports
+    for du, dv in surface.shifts:
+        a, b, c, d = u0 - du, u1 - du, v0 - dv, v1 - dv
+        reached = (s[:, 0] < b) & (s[:, 1] > a) & (s[:, 2] < d) & (s[:, 3] > c)
+        for axis, (low, high) in enumerate(((a, b), (c, d))):
+            targets = _middles(surface.padded[axis], low, high)
+            for column in range(targets.shape[1]):
+                value = targets[pieces.parent, column]
+                pieces = _split(pieces, axis, value, reached[pieces.parent] & np.isfinite(value))
     return _join(surface, pieces)
 
 
@@ -170,5 +174,7 @@ def _join(surface: DCPSurface, pieces: _Pieces) -> Refinement:
     share = pieces.weight / weight[point]
     xyz = np.zeros((len(keep), 3))
     np.add.at(xyz, point, surface.points[pieces.parent] * share[:, None])
-    made = DCPSurface.from_padded(xyz, weight, *(k[keep] for k in pieces.knots), *(p[keep] for p in pieces.degree))
+    knots, degrees = [k[keep] for k in pieces.knots], [p[keep] for p in pieces.degree]
+    closed_u, closed_v = surface.closed
+    made = DCPSurface.from_padded(xyz, weight, *knots, *degrees, closed_u=closed_u, closed_v=closed_v)
     return Refinement(made, point, pieces.parent, share)

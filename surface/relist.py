@@ -23,10 +23,14 @@ def change_knots(deformation: Deformation, i: int, knots: list[Floats], degrees:
     ValueError
         Where a vertex would be covered by no point; everything is as before then.
     """
-    bare = _bare(deformation, i, knots)
-    if bare >= 0:
-        raise ValueError(f"knots_u, knots_v: point {i} would leave vertex {bare} of the mesh uncovered")
-    return _exchange(deformation, i, knots, degrees)
+    n, shifts = deformation._n, deformation._shifts
+    copies = [(b * n + i, [knots[k] + shift[k] for k in range(2)]) for b, shift in enumerate(shifts)]
+    for copy, moved in copies:
+        bare = _bare(deformation, copy, moved)
+        if bare >= 0:
+            raise ValueError(f"knots_u, knots_v: point {i} would leave vertex {bare} of the mesh uncovered")
+    cells = [_exchange(deformation, copy, moved, degrees) for copy, moved in copies]
+    return np.unique(np.concatenate(cells))
 
 
 def _bare(deformation: Deformation, i: int, knots: list[Floats]) -> int:

@@ -39,7 +39,8 @@ def tessellate(
     if max_points is None and chord_error is None:
         chord_error = 1e-3 * size
     scale = _lengths(surface, where)
-    lattice = _lattice(where, scale, max_depth, roots)
+    joined = _joined(surface, where)
+    lattice = _lattice(where, scale, max_depth, roots, joined)
     tests = _Tests(surface, where, lattice, scale)
     tests.max_points, tests.chord_error, tests.min_depth = max_points, chord_error, min_depth
     if len(where.segments):
@@ -77,7 +78,9 @@ def _lengths(surface: DCPSurface, domain: Domain) -> tuple[float, float]:
     return max(lengths[0], low), max(lengths[1], low)
 
 
-def _lattice(domain: Domain, scale: tuple[float, float], depth: int, roots: tuple[int, int] | None) -> Lattice:
+def _lattice(
+    domain: Domain, scale: tuple[float, float], depth: int, roots: tuple[int, int] | None, joined: tuple[bool, bool]
+) -> Lattice:
     """Roots bordered by the rectangle and by the lines of all slits, roughly square on the surface."""
     u0, u1, v0, v1 = domain.rect
     cuts: tuple[list[float], list[float]] = ([u0, u1], [v0, v1])
@@ -87,11 +90,19 @@ def _lattice(domain: Domain, scale: tuple[float, float], depth: int, roots: tupl
         cuts[across].append(slit.at)
     lines_u, lines_v = np.unique(np.clip(cuts[0], u0, u1)), np.unique(np.clip(cuts[1], v0, v1))
     if roots is not None:
-        return Lattice(_divide(lines_u, (u1 - u0) / roots[0]), _divide(lines_v, (v1 - v0) / roots[1]), depth)
+        return Lattice(_divide(lines_u, (u1 - u0) / roots[0]), _divide(lines_v, (v1 - v0) / roots[1]), depth, joined)
     extent = (u1 - u0) * scale[0], (v1 - v0) * scale[1]
     least = min(float(np.diff(lines_u).min()) * scale[0], float(np.diff(lines_v).min()) * scale[1])
     edge = max(min(*extent, 2.0 * least), max(extent) / MOST_ROOTS)
-    return Lattice(_divide(lines_u, edge / scale[0]), _divide(lines_v, edge / scale[1]), depth)
+    edge_u = min(edge, extent[0] / 3) if joined[0] else edge  # a ring of fewer than three cells would fold flat
+    edge_v = min(edge, extent[1] / 3) if joined[1] else edge
+    return Lattice(_divide(lines_u, edge_u / scale[0]), _divide(lines_v, edge_v / scale[1]), depth, joined)
+
+
+def _joined(surface: DCPSurface, domain: Domain) -> tuple[bool, bool]:
+    """In which directions does the rectangle go once around a closed surface?"""
+    u0, u1, v0, v1 = domain.rect
+    return surface.closed[0] == (u0, u1), surface.closed[1] == (v0, v1)
 
 
 def _divide(borders: Floats, edge: float) -> Floats:
@@ -179,7 +190,7 @@ class _Tests:
     def _counts(self, rect: Floats) -> Ints:
         bins = self.surface.bins
         out = np.zeros(len(rect), dtype=np.int64)
-        blocks.count_open(rect, self.surface.supports, bins.grid, bins.shape, bins.start, bins.ids, out)
+        blocks.count_open(rect, self.surface.all_supports, bins.grid, bins.shape, bins.start, bins.ids, out)
         return out
 
     def _errors(self, level: int, cells: Ints) -> Floats:
@@ -230,11 +241,16 @@ def _finish(surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, l
     side, out = surface.sample_derivatives(flat.uv, side)
     points, su, sv = out[:, 0], out[:, 1], out[:, 2]
     keep = (side >= 0)[flat.triangles].all(axis=1)
-    order, code = _order(Flat(flat.uv, flat.triangles[keep], flat.owner[keep]), lattice, leaves)
+    flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])
+    code = _codes(flat, lattice, leaves)
+    if any(lattice.joined):
+        flat = _weld(flat, side, domain, lattice.joined)
+    order = _used_in_order(flat, code)
+    code = code[order]
     rank = np.zeros(len(flat.uv), dtype=np.int32)
     rank[order] = np.arange(len(order))
-    triangles = rank[flat.triangles[keep]]
-    uv, supports = np.ascontiguousarray(flat.uv[order]), surface.supports
+    triangles = rank[flat.triangles]
+    uv, supports = np.ascontiguousarray(flat.uv[order]), surface.all_supports
     start = blocks.group(code, lattice.depth, uv, supports, surface.bins) if len(order) else np.zeros(1, np.int64)
     list_start, list_ids = blocks.point_lists(start, uv, supports, surface.bins)
     normals = unit_normals(points[order], su[order], sv[order], triangles)
@@ -262,8 +278,30 @@ def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
     return Flat(flat.uv[unique // 4], triangles.reshape(-1, 3), flat.owner), unique % 4
 
 
-def _order(flat: Flat, lattice: Lattice, leaves: Leaves) -> tuple[Ints, Ints]:
-    """Used vertices in the order of the leaves that own them, and the code of each one's leaf."""
+def _weld(flat: Flat, side: Ints, domain: Domain, joined: tuple[bool, bool]) -> Flat:
+    """Use the vertices at the start of a closed direction instead of those at its end."""
+    target = np.arange(len(flat.uv))
+    for axis in range(2):
+        if not joined[axis]:
+            continue
+        start, end = domain.rect[2 * axis : 2 * axis + 2]
+        low, high = np.flatnonzero(flat.uv[:, axis] == start), np.flatnonzero(flat.uv[:, axis] == end)
+        ours, theirs = (_seam_keys(flat.uv[at, 1 - axis], side[at], 1 - axis) for at in (low, high))
+        _, first, second = np.intersect1d(ours, theirs, assume_unique=True, return_indices=True)
+        target[high[second]] = low[first]
+    target = target[target]  # the corner of a torus goes both ways
+    triangles = target[flat.triangles]
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return Flat(flat.uv, triangles[whole], flat.owner[whole])
+
+
+def _seam_keys(along: Floats, side: Ints, axis: int) -> np.ndarray:
+    """(k,) complex: place along a seam, and the limit in that direction."""
+    return along + 1j * (side >> axis & 1)
+
+
+def _codes(flat: Flat, lattice: Lattice, leaves: Leaves) -> Ints:
+    """(m,) code of the first leaf that uses a vertex; the greatest number for vertices that none uses."""
     shift = lattice.depth - leaves.level
     x, y = leaves.cell[:, 0] << shift, leaves.cell[:, 1] << shift
     unit = 1 << lattice.depth
@@ -271,9 +309,15 @@ def _order(flat: Flat, lattice: Lattice, leaves: Leaves) -> tuple[Ints, Ints]:
     leaf_code = (root << (2 * lattice.depth)) | blocks.morton(x % unit, y % unit)
     code = np.full(len(flat.uv), np.iinfo(np.int64).max)
     np.minimum.at(code, flat.triangles.ravel(), np.repeat(leaf_code[flat.owner], 3))
+    return code
+
+
+def _used_in_order(flat: Flat, code: Ints) -> Ints:
+    """Used vertices, rising by code."""
+    used = np.zeros(len(flat.uv), dtype=bool)
+    used[flat.triangles] = True
     order = np.argsort(code, kind="stable")
-    order = order[: np.count_nonzero(code < np.iinfo(np.int64).max)]
-    return order, code[order]
+    return order[used[order]]
 
 
 def unit_normals(points: Floats, su: Floats, sv: Floats, triangles: np.ndarray) -> Floats:
