@@ -24,6 +24,7 @@ _PAPER = (24, 26, 29)
 _INK = (232, 233, 235)
 _GAP = 4
 _LEGIBLE = 9.0
+_LIFT_MM, _CLOSER = 30.0, 1.36
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ def contact_sheet(
     Parameters
     ----------
     entries : (label, values (P,)) in `head.parameters` order.
-    views : cameras; the front when not given. Each entry's views stand side by side.
+    views : cameras; the front when not given. Each entry's views stand side by side, moved closer since tiles
+        are small.
     tile : (width, height) of one picture, pixels.
     columns : entries across; about square when not given.
     progress : called with (done, total) after each entry.
@@ -83,7 +85,7 @@ def contact_sheet(
     ------
     ViewError : no entries, no OpenGL, no Pillow.
     """
-    cameras = tuple(views) if views else (Camera.front(),)
+    cameras = [closer(camera) for camera in views or (Camera.front(),)]
     pictures = []
     with Offscreen(head, tile, quality=quality, theme=theme) as screen:
         for index, (_, values) in enumerate(entries):
@@ -91,6 +93,12 @@ def contact_sheet(
             if progress is not None:
                 progress(index + 1, len(entries))
     return compose(pictures, [label for label, _ in entries], columns=columns)
+
+
+def closer(camera: Camera) -> Camera:
+    """The camera moved nearer, so that the head without its shoulders fills a small picture."""
+    x, y, z = camera.target
+    return camera.aimed((x, y + _LIFT_MM, z)).zoom(_CLOSER)
 
 
 def compose(pictures: Sequence[np.ndarray], labels: Sequence[str], *, columns: int | None = None) -> Image:
@@ -151,12 +159,13 @@ def _write_label(sheet: Image, label: str, index: int, layout: Layout) -> None:
     from PIL import ImageDraw, ImageFont
 
     draw: ImageDraw.ImageDraw = ImageDraw.Draw(sheet)
+    label = label.replace("\N{MINUS SIGN}", "-")  # Pillow's own font has no such sign
     x, y = layout.corner(index)
     size, room = layout.label * 0.72, layout.tile[0] - 6
     while size > _LEGIBLE and draw.textlength(label, font=ImageFont.load_default(size)) > room:
         size *= 0.9
     font = ImageFont.load_default(size)
     while len(label) > 2 and draw.textlength(label, font=font) > room:
-        label = label[:-2] + "\N{HORIZONTAL ELLIPSIS}"
+        label = label[:-3] + ".."
     middle = (x + layout.tile[0] // 2, y + layout.tile[1] + layout.label // 2)
     draw.text(middle, label, fill=_INK, font=font, anchor="mm")
