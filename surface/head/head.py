@@ -16,6 +16,7 @@ from surface.head.paint import paint_part
 from surface.head.parameters import NAMES, read_pose, rotation
 from surface.head.part import HeadPart, RigidPart, SkinPart, make_surface
 from surface.head.seams import Zipper
+from surface.head.shade import apply_shade, read_shade
 
 RIGID = ("skull", "jaw", "left_eye", "right_eye")
 
@@ -49,7 +50,9 @@ class Head:
         ------
         HeadFileError : a file is missing, damaged, cut short or of another version; names file and key.
         """
-        return cls(load_data(path), str(path))
+        head = cls(load_data(path), str(path))
+        apply_shade(head.parts, read_shade(path))
+        return head
 
     @property
     def name(self) -> str:
