@@ -1,4 +1,4 @@
-"""drivers.sim.drive: angles to registers and back, and sensing in part or in whole."""
+"""drivers.sim.drive and drive_x: angles to registers and back, and sensing in part or in whole."""
 
 from __future__ import annotations
 
@@ -77,3 +77,14 @@ def test_a_timed_move_too_quick_for_the_motor_goes_at_its_top_speed():
     speeds = [one.plant.motion(0.01 * k).velocity for k in range(60)]
     assert max(speeds) == pytest.approx(one.top_speed)
     assert one.plant.motion(9.0).position == 4000.0
+
+
+def test_pwm_is_given_only_by_a_powered_motor():
+    one = drive()
+    one.registers.put("Goal Position", 3000)
+    one.plan(0.0)
+    one.sense(0.05)
+    assert one.registers.get("Present PWM") == 0
+    one.plant.powered = True
+    one.sense(0.05)
+    assert one.registers.get("Present PWM") > 600
