@@ -75,16 +75,7 @@ def run_window(
     runner = _imgui()
     window = _Window(head, source, Viewpoint(camera), quality, theme)
     window.gui, window.seconds, window.keep_going = gui, seconds, keep_going
-    params = _parameters(runner, window, size, title, full_screen)
-    try:
-        runner.run(params)
-    except Exception as error:
-        raise window.failure or _no_window(error) from error
-    if window.failure is not None:
-        raise window.failure
-    if window.frames == 0:
-        raise ViewError("the window closed before it drew anything", hint=HEADLESS_HINT)
-    return WindowReport(window.frames, window.last - window.first)
+    return _show(runner, window, _parameters(runner, window, size, title, full_screen))
 
 
 def has_display() -> bool:
@@ -98,6 +89,19 @@ def _require_display() -> None:
     """ViewError without a display: the window library would end the process instead."""
     if not has_display():
         raise ViewError("there is no display to open a window on (DISPLAY is not set)", hint=HEADLESS_HINT)
+
+
+def _show(runner: Any, window: _Window, params: Any) -> WindowReport:
+    """Hand over to the runner until the window closes."""
+    try:
+        runner.run(params)
+    except Exception as error:
+        raise window.failure or _no_window(error) from error
+    if window.failure is not None:
+        raise window.failure
+    if window.frames == 0:
+        raise ViewError("the window closed before it drew anything", hint=HEADLESS_HINT)
+    return WindowReport(window.frames, window.last - window.first)
 
 
 def _no_window(error: Exception) -> ViewError:
