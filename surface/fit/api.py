@@ -22,7 +22,7 @@ from surface.fit.report import FitReport, measure
 from surface.fit.rigging import find_jaw
 from surface.fit.seat import close_lips, seat_lids, strengthen
 from surface.fit.strokes import make_paint
-from surface.head.data import HeadData, PartData
+from surface.head.data import HeadData, Neck, PartData
 from surface.head.file import save_data
 from surface.head.meshes import pack, tessellate
 from surface.head.parameters import NAMES, read_pose
@@ -77,7 +77,7 @@ def fit_mesh(mesh: FitMesh, recipe: Recipe, name: str, progress: Progress) -> tu
     if body.radius > 0:
         parts += [eyeball_part(side, e, body.radius) for side, e in zip(("left", "right"), body.eyes, strict=True)]
     head = HeadData(
-        name, _provenance(recipe), recipe.neck or _low_middle(mesh), body.eyes, body.radius, body.jaw,
+        name, _provenance(recipe), _neck(mesh, recipe), body.eyes, body.radius, body.jaw,
         parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
     )  # fmt: skip
     head = replace(head, parts=[_with_mesh(p, head) for p in parts])
@@ -136,7 +136,7 @@ def _with_mesh(part: PartData, head: HeadData) -> PartData:
     """The part with its tessellation, so that a face starts at once; fine enough for a face that moves."""
     surface = make_surface(part)
     if part.follows == "skin":
-        lively = SkinRig(part, head).apply(read_pose(np.array([LIVELY.get(n, 0.0) for n in NAMES])), np.eye(3))
+        lively = SkinRig(part, head).apply(read_pose(np.array([LIVELY.get(n, 0.0) for n in NAMES])))
         surface = surface.with_points(lively)
     return replace(part, mesh=pack(tessellate(part, surface), part.budget))
 
@@ -149,10 +149,14 @@ def _eyes(recipe: Recipe) -> tuple[Floats, float]:
     return np.stack([centre, centre * [-1.0, 1.0, 1.0]]), recipe.eyes.radius
 
 
-def _low_middle(mesh: FitMesh) -> tuple[float, float, float]:
-    """A neck pivot for a head nothing is known of: a quarter up, in the middle."""
+def _neck(mesh: FitMesh, recipe: Recipe) -> Neck:
+    """The recipe's neck, or one in the lower quarter of a head nothing is known of."""
+    if recipe.neck is not None:
+        return Neck(recipe.neck)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    return (0.0, float(low[1] + 0.25 * (high[1] - low[1])), float(0.5 * (low[2] + high[2])))
+    height = float(high[1] - low[1])
+    pivot = (0.0, float(low[1]) + 0.3 * height, float(0.5 * (low[2] + high[2])))
+    return Neck(pivot, 0.0, float(low[1]) + 0.02 * height, float(low[1]) + 0.2 * height)
 
 
 def _provenance(recipe: Recipe) -> dict[str, str]:

@@ -15,8 +15,8 @@ from surface.fit.mesh import FitMesh, triangles
 
 Floats = NDArray[np.float64]
 GRID = (15, 21)  # rays along u and v
-U_RANGE = np.radians([7.0, 173.0])
-V_RANGE = np.radians([150.0, -150.0])
+U_RANGE = (np.radians(7.0), np.radians(173.0))
+V_RANGE = (np.radians(150.0), np.radians(-150.0))
 TALL_MM = 10.0  # of a tooth, only this much below its tip is a crown
 
 
@@ -75,7 +75,8 @@ def _sample(mesh: FitMesh, faces: NDArray[np.int64], upper: bool, middle: Floats
     centre = 0.5 * (crown.min(axis=0) + crown.max(axis=0))
     outward = centre - middle
     outward[1] = 0.0
-    outward /= np.linalg.norm(outward)
+    length = float(np.linalg.norm(outward))
+    outward = outward / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
     across = np.cross(down, outward)
     u = np.linspace(*U_RANGE, GRID[0])
     v = np.linspace(*V_RANGE, GRID[1])

@@ -17,8 +17,9 @@ BACK = np.radians(140.0)  # how far round the sclera reaches from the optical ax
 def eyeball_surface(centre: Floats, radius: float) -> DCPSurface:
     """Cornea and sclera with the pupil towards +z.
 
-    u in 0..1 goes once around the optical axis, clockwise seen from the front so that normals point out; v goes from the cornea's apex (0) over the limbus
-    (:data:`LIMBUS_V`) to the back (1). Both spheres are exact: degree 2 in both directions.
+    u in 0..1 goes once around the optical axis, clockwise seen from the front so that normals point out; v goes from
+    the cornea's apex (0) over the limbus (:data:`LIMBUS_V`) to the back (1). Both spheres are exact: degree 2 in
+    both directions.
     """
     limbus = np.arcsin(IRIS)
     cornea_angle = np.arcsin(IRIS / CORNEA)

@@ -52,9 +52,9 @@ class Skin:
 def fit_strip(rows: Floats, n_u: int, n_v: int, loops: list[Floats]) -> Strip:
     """A strip through sampled rows (1 + k, a, b, 3): a samples along, b across."""
     count, a, b, _ = rows.shape
-    knots = [_clamped(n, d) for n, d in zip((n_u, n_v), DEGREES, strict=True)]
+    p, q = DEGREES
     empty = np.zeros((n_u, n_v, 3))
-    net = DCPSurface.from_nurbs(*DEGREES, *knots, empty, np.ones((n_u, n_v)))
+    net = DCPSurface.from_nurbs(p, q, _clamped(n_u, p), _clamped(n_v, q), empty, np.ones((n_u, n_v)))
     s, t = np.meshgrid(np.linspace(0, 1, a), np.linspace(0, 1, b), indexing="ij")
     matrix = net.basis_matrix(np.column_stack([s.ravel(), t.ravel()])).toarray()
     x = np.linalg.lstsq(matrix, rows.reshape(count, a * b, 3).transpose(1, 0, 2).reshape(a * b, -1), rcond=None)[0]

@@ -7,6 +7,7 @@ island is a chart of its own: control points of one never reach another.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +108,7 @@ def _walk(following: dict[int, list[int]]) -> list[int]:
 
 def _close(path: list[int], begin: int, following: dict[int, list[int]]) -> list[int]:
     """Put back what was walked before the loop closed on itself."""
-    for i, j in zip(path[:begin], path[1 : begin + 1], strict=True):
+    for i, j in pairwise(path[: begin + 1]):
         following.setdefault(i, []).append(j)
     return path[begin:]
 

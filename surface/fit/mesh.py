@@ -68,7 +68,7 @@ def _read(path: Path) -> dict[str, NDArray]:
     if not path.is_file():
         raise FitError(f"{path}: no such mesh file", hint="give the path of an .npz mesh with UVs and shapes")
     try:
-        with np.load(path, allow_pickle=False) as z:
+        with path.open("rb") as f, np.load(f, allow_pickle=False) as z:
             missing = [k for k in KEYS if k not in z.files]
             if missing:
                 raise FitError(

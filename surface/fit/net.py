@@ -114,7 +114,7 @@ def wanted_places(
     for di in (0, 1):
         for dj in (0, 1):
             share = np.abs(1 - di - fraction[:, 0]) * np.abs(1 - dj - fraction[:, 1])
-            places.append(np.column_stack([level, cell + [di, dj]]))
+            places.append(np.column_stack([level, cell + np.array([di, dj])]))
             wants.append(share * error[bad] ** 2)
     unique, inverse = np.unique(np.concatenate(places), axis=0, return_inverse=True)
     want = np.bincount(inverse.ravel(), np.concatenate(wants), len(unique))

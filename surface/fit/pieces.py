@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.fit.chart import Chart
+from surface.fit.chart import TILE, Chart
 from surface.fit.crowns import crown_chart, split_teeth
 from surface.fit.eyeball import eyeball_surface
 from surface.fit.hair import Skin, Strip, brow_strip, lash_strip
@@ -15,7 +15,7 @@ from surface.fit.mesh import FitMesh
 from surface.fit.recipe import PartRecipe
 from surface.fit.refine import Fitted, fit_chart
 from surface.fit.report import PartReport, measure
-from surface.fit.rigging import lid_share, make_groups, neck_share, tongue_group
+from surface.fit.rigging import lid_share, make_groups, tongue_group
 from surface.fit.strokes import mirrored, vertex_line
 from surface.head.data import Jaw, PartData
 
@@ -46,7 +46,6 @@ def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, body: Body) -> Par
     return PartData(
         part.name, part.material, part.follows, fitted.points, np.ones(n),
         fitted.net.knots_u, fitted.net.knots_v, np.full((n, 2), 3), chart.loops, slits, part.budget, groups, share,
-        neck_share(fitted.points) if skin else np.ones(n),
         lid_share(fitted.points, body.eyes, body.radius) if skin and body.radius > 0 else np.zeros(n),
     )  # fmt: skip
 
@@ -67,9 +66,10 @@ def eyeball_part(side: str, centre: Floats, radius: float) -> PartData:
     s = eyeball_surface(centre, radius)
     none = np.zeros(s.n)
     loop = np.array([[0.0, 1e-3], [1.0, 1e-3], [1.0, 1.0], [0.0, 1.0]])
+    ku, kv = s.padded
     return PartData(
-        f"eye_{side}", "eye", f"{side}_eye", s.points.copy(), s.weights.copy(), *(k.copy() for k in s.padded),
-        np.stack(s.degrees, axis=1), [loop], np.zeros((0, 3)), (0, 0.01 * radius, 6), [], none, none, none,
+        f"eye_{side}", "eye", f"{side}_eye", s.points.copy(), s.weights.copy(), ku.copy(), kv.copy(),
+        np.stack(s.degrees, axis=1), [loop], np.zeros((0, 3)), (0, 0.01 * radius, 6), [], none, none,
     )  # fmt: skip
 
 
@@ -77,18 +77,16 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], bod
     """Brows and lashes of both sides, rooted in the fitted face."""
     skin = Skin(fitted)
     left = np.array(brow)
-    parts = []
-    for side, ids, eye in zip(("left", "right"), (left, mirrored(mesh, left)), body.eyes, strict=True):
+    brows, lashes = [], []
+    for ids, eye, is_left in zip((left, mirrored(mesh, left)), body.eyes, (True, False), strict=True):
         line = vertex_line(chart, mesh, ids, closed=False)
-        parts.append(_strip_part(f"brow_{side}", "brow", brow_strip(skin, line, (0.0105, 0.0125), hairs=40), body))
+        brows.append(brow_strip(skin, line, (0.0105, 0.0125), hairs=40))
         rim = _rim_near(chart, mesh, eye)
         for upper in (True, False):
-            root, along = _lid_line(rim, upper=upper, inner_first=side == "left")
+            root, along = _lid_line(rim, upper=upper, inner_first=is_left)
             length = (LASH_MM if upper else LOWER_LASH_MM) * _length_profile(along)
-            strip = lash_strip(skin, root, eye, length, upper=upper, hairs=28 if upper else 18)
-            name = f"lash_{'upper' if upper else 'lower'}_{side}"
-            parts.append(_strip_part(name, "lash", strip, body))
-    return parts
+            lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=28 if upper else 18))
+    return [_strips_part("brows", "brow", brows, body), _strips_part("lashes", "lash", lashes, body)]
 
 
 def _length_profile(along: Floats) -> Floats:
@@ -115,11 +113,16 @@ def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, F
     return np.column_stack([u, v + (LASH_ROOT if upper else -LASH_ROOT)]), along
 
 
-def _strip_part(name: str, material: str, strip: Strip, body: Body) -> PartData:
-    n = len(strip.points)
-    groups, share = make_groups(strip.points, strip.moves, body.sources, body.jaw)
+def _strips_part(name: str, material: str, strips: list[Strip], body: Body) -> PartData:
+    """Strips as one part, each in a tile of its own."""
+    points = np.concatenate([s.points for s in strips])
+    moves = np.concatenate([s.moves for s in strips], axis=1)
+    groups, share = make_groups(points, moves, body.sources, body.jaw)
+    knots_u = np.concatenate([s.surface.padded[0] + TILE * k for k, s in enumerate(strips)])
+    knots_v = np.concatenate([s.surface.padded[1] for s in strips])
+    degrees = np.concatenate([np.stack(s.surface.degrees, axis=1) for s in strips])
+    loops = [loop + np.array([TILE * k, 0.0]) for k, s in enumerate(strips) for loop in s.loops]
     return PartData(
-        name, material, "skin", strip.points, np.ones(n), *(k.copy() for k in strip.surface.padded),
-        np.stack(strip.surface.degrees, axis=1), strip.loops, np.zeros((0, 3)), (0, 0.5, 4), groups, share,
-        neck_share(strip.points), lid_share(strip.points, body.eyes, body.radius),
+        name, material, "skin", points, np.ones(len(points)), knots_u, knots_v, degrees, loops, np.zeros((0, 3)),
+        (0, 0.6, 5), groups, share, lid_share(points, body.eyes, body.radius),
     )  # fmt: skip

@@ -12,9 +12,8 @@ from surface.head.rig import jaw_path
 
 Floats = NDArray[np.float64]
 LEAST_MM = 0.004  # displacements smaller than this are dropped
+LEAST_GROUP_MM = 0.25  # a part in which a shape moves nothing further than this does not take part in it
 TILTS = ("jawForward", "jawLeft", "jawRight")
-NECK_SLOPE = 0.35  # the neck's bend starts lower at the chin than at the nape
-NECK_FROM_TO = (-152.0, -78.0)  # where along it the head's rotation begins and is whole, mm
 
 
 def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: NDArray[np.int64], hinge: Floats) -> Jaw:
@@ -38,8 +37,8 @@ def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     """Rotation (3, 3) and shift (3,) that bring points nearest to others (Kabsch, 1976)."""
     b0, a0 = before.mean(axis=0), after.mean(axis=0)
     u, _, vt = np.linalg.svd((before - b0).T @ (after - a0))
-    sign = np.sign(np.linalg.det(vt.T @ u.T))
-    turn = vt.T @ np.diag([1.0, 1.0, sign]) @ u.T
+    sign = float(np.sign(np.linalg.det(vt.T @ u.T)))
+    turn: NDArray = vt.T @ np.diag([1.0, 1.0, sign]) @ u.T
     return turn, a0 - turn @ b0
 
 
@@ -71,7 +70,7 @@ def make_groups(points: Floats, moves: Floats, sources: dict[str, list[int]], ja
             turn, shift = jaw_path(jaw, 1.0)
             field = field - share[:, None] * (points @ turn.T + shift - points)
         ids = np.flatnonzero(np.linalg.norm(field, axis=1) > LEAST_MM)
-        if len(ids):
+        if np.linalg.norm(field, axis=1).max(initial=0.0) > LEAST_GROUP_MM:
             groups.append(Group(name, ids.astype(np.int32), np.round(field[ids], 4).astype(np.float32)))
     return groups, share
 
@@ -96,13 +95,6 @@ def tongue_group(points: Floats, path: Floats, jaw: Jaw) -> Group:
     move = target - (points @ turn.T + shift)
     move *= np.clip((points[:, 2] - path[0, 0]) / 20.0, 0.0, 1.0)[:, None]
     return Group("tongueOut", np.arange(len(points), dtype=np.int32), np.round(move, 4).astype(np.float32))
-
-
-def neck_share(points: Floats) -> Floats:
-    """(n,) how much of the head's rotation each point follows: all above the jaw, none at the shoulders."""
-    height = points[:, 1] + NECK_SLOPE * points[:, 2]
-    t = np.clip((height - NECK_FROM_TO[0]) / (NECK_FROM_TO[1] - NECK_FROM_TO[0]), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
 
 
 def lid_share(points: Floats, eyes: Floats, radius: float) -> Floats:

@@ -1,9 +1,21 @@
 """The head: parts, groups, parameters, and the file they are kept in."""
 
-from surface.head.data import Group, HeadData, Jaw, PartData, Seam
+from surface.head.data import Group, HeadData, Jaw, Neck, PartData, Seam
 from surface.head.file import load_data, save_data
 from surface.head.head import Head
 from surface.head.parameters import NAMES
 from surface.head.part import HeadPart
 
-__all__ = ["NAMES", "Group", "Head", "HeadData", "HeadPart", "Jaw", "PartData", "Seam", "load_data", "save_data"]
+__all__ = [
+    "NAMES",
+    "Group",
+    "Head",
+    "HeadData",
+    "HeadPart",
+    "Jaw",
+    "Neck",
+    "PartData",
+    "Seam",
+    "load_data",
+    "save_data",
+]

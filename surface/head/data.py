@@ -40,7 +40,7 @@ class PartData:
     loops : closed polylines (k, 2) in (u, v) that trim it; slits : (s, 3) v, u from, u to.
     budget : (max_points per cell, chord_error in mm, max_depth) for the tessellation.
     groups : displacements of its control points.
-    jaw : (n,) how much of the jaw's rotation each point follows; neck : (n,) the same for the head's.
+    jaw : (n,) how much of the jaw's rotation each point follows.
     lids : (n,) signed: how closely a point keeps to the left (+) or right (-) eyeball when lids move.
     mesh : the kept tessellation as arrays (see :mod:`surface.head.meshes`); may be empty.
     """
@@ -58,7 +58,6 @@ class PartData:
     budget: tuple[int, float, int]
     groups: list[Group]
     jaw: Floats
-    neck: Floats
     lids: Floats
     mesh: dict[str, NDArray] = field(default_factory=dict)
 
@@ -87,19 +86,40 @@ class Jaw:
 
 
 @dataclass(frozen=True)
+class Neck:
+    """How the head turns on the shoulders.
+
+    Attributes
+    ----------
+    pivot : (3,) mm. What lies, at rest, above y + slope * z = ``whole`` turns with the head, what lies below
+        ``still`` stays, and the neck between bends.
+    """
+
+    pivot: tuple[float, float, float]
+    slope: float = 0.35
+    still: float = -152.0
+    whole: float = -78.0
+
+    def share(self, points: Floats) -> Floats:
+        """(n,) how much of the head's rotation each point at rest (n, 3) follows, 0..1."""
+        height = points[:, 1] + self.slope * points[:, 2]
+        t = np.clip((height - self.still) / (self.whole - self.still), 0.0, 1.0)
+        return t * t * (3.0 - 2.0 * t)
+
+
+@dataclass(frozen=True)
 class HeadData:
     """All of a head.
 
     Attributes
     ----------
     name : short name; provenance : free text by key (source, licence, how it was made).
-    neck : pivot (3,) of the head's rotation, mm; eyes : centres (2, 3), left then right, mm.
-    eye_radius : mm.
+    eyes : centres (2, 3), left then right, mm; eye_radius : mm.
     """
 
     name: str
     provenance: dict[str, str]
-    neck: tuple[float, float, float]
+    neck: Neck
     eyes: Floats
     eye_radius: float
     jaw: Jaw

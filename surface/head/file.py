@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.errors import HeadFileError
-from surface.head.data import Group, HeadData, Jaw, PartData, Seam
+from surface.head.data import Group, HeadData, Jaw, Neck, PartData, Seam
 from surface.head.meshes import KEYS
 from surface.head.toml import toml_text
 
 VERSION = 1
 ARRAYS = {  # key of a part: columns (0 = one-dimensional)
     "points": 3, "weights": 0, "knots_u": -1, "knots_v": -1, "degrees": 2, "loops": 2, "loop_ends": 0,
-    "slits": 3, "group_ids": 0, "group_ends": 0, "group_moves": 3, "jaw": 0, "neck": 0, "lids": 0,
+    "slits": 3, "group_ids": 0, "group_ends": 0, "group_moves": 3, "jaw": 0, "lids": 0,
 }  # fmt: skip
-PER_POINT = ("weights", "knots_u", "knots_v", "degrees", "jaw", "neck", "lids")
+PER_POINT = ("weights", "knots_u", "knots_v", "degrees", "jaw", "lids")
 
 
 class Source:
@@ -51,7 +51,7 @@ class Source:
 
     def _npz(self) -> dict[str, NDArray]:
         try:
-            with np.load(self.npz_path, allow_pickle=False) as z:
+            with self.npz_path.open("rb") as f, np.load(f, allow_pickle=False) as z:
                 return {k: z[k] for k in z.files}
         except FileNotFoundError as e:
             raise self.bad(self.npz_path, "file", "missing") from e
@@ -103,7 +103,7 @@ def load_data(path: str | Path) -> HeadData:
     return HeadData(
         name=src.value(t, "name", str),
         provenance={k: str(v) for k, v in src.value(t, "provenance", dict).items()},
-        neck=tuple(src.numbers(pivots, "neck", (3,), "pivots.").tolist()),
+        neck=_neck(src, src.value(t, "neck", dict)),
         eyes=src.numbers(pivots, "eyes", (2, 3), "pivots."),
         eye_radius=float(src.numbers(pivots, "eye_radius", (), "pivots.")),
         jaw=_jaw(src, src.value(t, "jaw", dict)),
@@ -111,6 +111,11 @@ def load_data(path: str | Path) -> HeadData:
         seams=[_seam(src, s, i, names) for i, s in enumerate(src.value(t, "seams", list))],
         paint=src.value(t, "paint", list),
     )
+
+
+def _neck(src: Source, t: dict[str, Any]) -> Neck:
+    slope, still, whole = (float(src.numbers(t, k, (), "neck.")) for k in ("slope", "still", "whole"))
+    return Neck(tuple(src.numbers(t, "pivot", (3,), "neck.").tolist()), slope, still, whole)
 
 
 def _jaw(src: Source, t: dict[str, Any]) -> Jaw:
@@ -134,7 +139,7 @@ def _part(src: Source, t: dict[str, Any], where: str) -> PartData:
         a["points"], a["weights"], a["knots_u"], a["knots_v"], a["degrees"],
         _split(src, f"{name}/loop_ends", a["loops"], a["loop_ends"]), a["slits"],
         _budget(src, t, where), _groups(src, t, name, n, a, where),
-        a["jaw"], a["neck"], a["lids"],
+        a["jaw"], a["lids"],
         {k: src.arrays[f"{name}/{k}"] for k in KEYS if f"{name}/{k}" in src.arrays},
     )  # fmt: skip
 
@@ -197,7 +202,7 @@ def _part_arrays(p: PartData) -> dict[str, NDArray]:
         "group_ids": np.concatenate([g.ids for g in p.groups]) if p.groups else np.zeros(0, np.int32),
         "group_ends": np.cumsum([len(g.ids) for g in p.groups]).astype(np.int32),
         "group_moves": np.concatenate([g.moves for g in p.groups]) if p.groups else np.zeros((0, 3), np.float32),
-        "jaw": p.jaw, "neck": p.neck, "lids": p.lids, **p.mesh,
+        "jaw": p.jaw, "lids": p.lids, **p.mesh,
     }  # fmt: skip
 
 
@@ -206,7 +211,8 @@ def _table(head: HeadData) -> dict[str, Any]:
         "format": VERSION,
         "name": head.name,
         "provenance": head.provenance,
-        "pivots": {"neck": list(head.neck), "eyes": head.eyes.tolist(), "eye_radius": head.eye_radius},
+        "neck": {**vars(head.neck), "pivot": list(head.neck.pivot)},
+        "pivots": {"eyes": head.eyes.tolist(), "eye_radius": head.eye_radius},
         "jaw": {
             "centre": list(head.jaw.centre),
             "angle_rad": head.jaw.angle_rad,

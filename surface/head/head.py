@@ -14,7 +14,7 @@ from surface.head.file import load_data
 from surface.head.meshes import tessellate, unpack
 from surface.head.paint import paint_part
 from surface.head.parameters import NAMES, read_pose, rotation
-from surface.head.part import HeadPart, RigidPart, SkinPart, make_surface
+from surface.head.part import HeadPart, RigidPart, SkinPart, Turn, make_surface
 from surface.head.seams import Zipper
 from surface.head.shade import apply_shade, read_shade
 
@@ -99,7 +99,7 @@ class Head:
         ValueError : wrong shape or a value that is not a number; the head keeps its pose.
         """
         pose = read_pose(values)
-        turn = rotation(*pose.head)
+        turn = Turn(rotation(*pose.head), self.data.neck.pivot)
         for part in self.parts:
             part.pose(pose, turn)
         for zipper in self._zippers:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from surface.jit import kernel
 
 Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
 
 
 @kernel
@@ -52,24 +53,35 @@ def keep_on_eyeball(ids: NDArray[np.int64], eye: Floats, hold: Floats, radius: F
 
 
 @kernel
-def bend_neck(share: Floats, turn: Floats, pivot: Floats, points: Floats) -> None:
-    """Rotate every point about ``pivot (3,)`` by its ``share (n,)`` of the rotation vector ``turn (3,)``.
+def turn_head(
+    vertices: Floats32, normals: Floats32, share: Floats32, matrix: Floats, turn: Floats, pivot: Floats, start: int,
+    stop: int, out_vertices: Floats32, out_normals: Floats32,
+) -> None:  # fmt: skip
+    """Rotate rows start..stop about ``pivot (3,)`` by each one's ``share`` of the rotation.
 
-    Rodrigues' formula with the angle scaled per point: the neck bends instead of shearing.
+    ``matrix (3, 3)`` is the whole rotation and ``turn (3,)`` its rotation vector. A vertex that follows in part
+    turns by part of the angle (Rodrigues' formula): the neck bends instead of shearing.
     """
-    full = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
-    if full == 0.0:
-        return
-    a, b, c = turn[0] / full, turn[1] / full, turn[2] / full
-    for i in range(points.shape[0]):
-        if share[i] == 0.0:
-            continue
-        sine, cosine = np.sin(share[i] * full), np.cos(share[i] * full)
-        x, y, z = points[i, 0] - pivot[0], points[i, 1] - pivot[1], points[i, 2] - pivot[2]
-        along = (a * x + b * y + c * z) * (1.0 - cosine)
-        points[i, 0] = pivot[0] + x * cosine + (b * z - c * y) * sine + a * along
-        points[i, 1] = pivot[1] + y * cosine + (c * x - a * z) * sine + b * along
-        points[i, 2] = pivot[2] + z * cosine + (a * y - b * x) * sine + c * along
+    own = matrix.copy()
+    angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    a, b, c = turn[0] / angle, turn[1] / angle, turn[2] / angle
+    for i in range(start, stop):
+        whole = share[i] >= 1.0
+        if not whole:
+            s, k = np.sin(share[i] * angle), np.cos(share[i] * angle)
+            m = 1.0 - k
+            own[0, 0], own[0, 1], own[0, 2] = k + a * a * m, a * b * m - c * s, a * c * m + b * s
+            own[1, 0], own[1, 1], own[1, 2] = a * b * m + c * s, k + b * b * m, b * c * m - a * s
+            own[2, 0], own[2, 1], own[2, 2] = a * c * m - b * s, b * c * m + a * s, k + c * c * m
+        x, y, z = vertices[i, 0] - pivot[0], vertices[i, 1] - pivot[1], vertices[i, 2] - pivot[2]
+        p, q, r = normals[i, 0], normals[i, 1], normals[i, 2]
+        for row in range(3):
+            if whole:
+                f, g, h = matrix[row, 0], matrix[row, 1], matrix[row, 2]
+            else:
+                f, g, h = own[row, 0], own[row, 1], own[row, 2]
+            out_vertices[i, row] = pivot[row] + f * x + g * y + h * z
+            out_normals[i, row] = f * p + g * q + h * r
 
 
 @kernel
@@ -90,3 +102,26 @@ def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at
                 best = d
                 at[i] = k + t
         distance[i] = np.sqrt(best)
+
+
+@kernel
+def zip_border(
+    source: Floats32, target: Floats32, ids: NDArray[np.int64], low: NDArray[np.int64], high: NDArray[np.int64],
+    share: Floats32,
+) -> None:  # fmt: skip
+    """Put rows ``ids`` of ``target (m, 3)`` between rows ``low`` and ``high`` of ``source``, at ``share`` of it."""
+    for k in range(ids.shape[0]):
+        for c in range(3):
+            a = source[low[k], c]
+            target[ids[k], c] = a + share[k] * (source[high[k], c] - a)
+
+
+@kernel
+def unit_rows(array: Floats32, ids: NDArray[np.int64]) -> None:
+    """Scale rows ``ids`` of ``array (m, 3)`` to length 1; rows without length stay."""
+    for i in ids:
+        x, y, z = array[i, 0], array[i, 1], array[i, 2]
+        length = np.sqrt(x * x + y * y + z * z)
+        if length > 1e-12:
+            for c in range(3):
+                array[i, c] /= length

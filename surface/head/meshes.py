@@ -21,13 +21,14 @@ LOOP_SHARE = 0.4  # how near a border follows its loop, in chord errors
 def tessellate(data: PartData, surface: DCPSurface) -> Mesh:
     """Triangles for a part by its budget."""
     most, chord, depth = data.budget
-    return surface.tessellate(
-        max_points=most or None,
-        chord_error=chord,
-        max_depth=depth,
-        domain=domain_of(data),
-        loop_error=LOOP_SHARE * chord,
-    )
+    with np.errstate(divide="ignore", invalid="ignore"):  # triangles without area while borders are cut
+        return surface.tessellate(
+            max_points=most or None,
+            chord_error=chord,
+            max_depth=depth,
+            domain=domain_of(data),
+            loop_error=LOOP_SHARE * chord,
+        )
 
 
 def domain_of(data: PartData) -> Domain:

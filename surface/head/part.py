@@ -10,11 +10,21 @@ from numpy.typing import NDArray
 from surface.dcp import DCPSurface
 from surface.deformation import Deformation
 from surface.head.data import HeadData, PartData
-from surface.head.parameters import Pose
+from surface.head.kernels import turn_head
+from surface.head.parameters import Pose, rotation_vector
 from surface.head.rig import SkinRig, rigid_motion
 from surface.mesh import Mesh
 
+Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
+
+
+class Turn:
+    """The head's rotation of one pose: matrix (3, 3), rotation vector (3,), pivot (3,)."""
+
+    def __init__(self, matrix: Floats, pivot: tuple[float, float, float]) -> None:
+        self.matrix, self.vector, self.pivot = matrix, rotation_vector(matrix), np.array(pivot)
+        self.none = not self.vector.any()
 
 
 class HeadPart:
@@ -26,8 +36,8 @@ class HeadPart:
     triangles : (t, 3) int32; uv : (m, 2) float32.
     vertices, normals : (m, 3) float32, current, in head space including the head's rotation.
     changed : vertex ranges [start, stop) that the last pose touched.
-    borders : (k, 2) directed edges that only one triangle of the tessellation has.
     attributes : static per-vertex arrays (m, k) float32 by name.
+    borders : (k, 2) directed edges that only one triangle of the tessellation has.
     surface : the DCP surface at rest.
     """
 
@@ -41,14 +51,30 @@ class HeadPart:
         self.attributes = dict(attributes)
         self.borders = border_edges(self.triangles)
         self.changed: list[tuple[int, int]] = [(0, len(self.vertices))]
+        self._turn = Turn(np.eye(3), (0.0, 0.0, 0.0))
+        self._share = np.ones(len(self.vertices), np.float32)
 
-    def pose(self, pose: Pose, turn: NDArray[np.float64]) -> None:
-        """Move to a pose; ``turn`` is the head's rotation (3, 3)."""
+    def pose(self, pose: Pose, turn: Turn) -> None:
+        """Move to a pose; ``turn`` is the head's rotation."""
+        ranges, vertices, normals = self._express(pose)
+        if not np.array_equal(turn.matrix, self._turn.matrix):
+            ranges = [(0, len(vertices))]
+        self._turn, self.changed = turn, ranges
+        for start, stop in ranges:
+            if turn.none:
+                self.vertices[start:stop] = vertices[start:stop]
+                self.normals[start:stop] = normals[start:stop]
+            else:
+                turn_head(vertices, normals, self._share, turn.matrix, turn.vector, turn.pivot, start, stop,
+                          self.vertices, self.normals)  # fmt: skip
+
+    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
+        """Everything but the head's rotation: ranges that changed, vertices, normals."""
         raise NotImplementedError
 
     @property
-    def control_points(self) -> NDArray[np.float64]:
-        """(n, 3) float64, where the control points stand now."""
+    def control_points(self) -> Floats:
+        """(n, 3) where the control points stand now, before the head turns."""
         raise NotImplementedError
 
     def append(self, like: NDArray[np.int64], triangles: NDArray[np.int32]) -> None:
@@ -70,25 +96,21 @@ class HeadPart:
 class SkinPart(HeadPart):
     """A part whose control points move one by one; vertices follow by Eq. (2)."""
 
-    def __init__(self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface,
-                 attributes: Mapping[str, Floats32]) -> None:  # fmt: skip
+    def __init__(
+        self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface, attributes: Mapping[str, Floats32]
+    ) -> None:
         super().__init__(data, mesh, surface, attributes)
         self.rig = SkinRig(data, head)
         self.deformation = Deformation(surface, mesh)
-        self._follow([(0, len(self.vertices))])
+        self.vertices[:], self.normals[:] = self.deformation.vertices, self.deformation.normals
+        self._share[:] = head.neck.share(self.vertices.astype(np.float64))
 
-    def pose(self, pose: Pose, turn: NDArray[np.float64]) -> None:
-        self.deformation.set_points(self.rig.apply(pose, turn))
-        self.changed = self.deformation.changed
-        self._follow(self.changed)
-
-    def _follow(self, ranges: list[tuple[int, int]]) -> None:
-        for start, stop in ranges:
-            self.vertices[start:stop] = self.deformation.vertices[start:stop]
-            self.normals[start:stop] = self.deformation.normals[start:stop]
+    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
+        self.deformation.set_points(self.rig.apply(pose))
+        return self.deformation.changed, self.deformation.vertices, self.deformation.normals
 
     @property
-    def control_points(self) -> NDArray[np.float64]:
+    def control_points(self) -> Floats:
         return self.deformation.points
 
 
@@ -99,29 +121,28 @@ class RigidPart(HeadPart):
     to the vertices themselves.
     """
 
-    def __init__(self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface,
-                 attributes: Mapping[str, Floats32]) -> None:  # fmt: skip
+    def __init__(
+        self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface, attributes: Mapping[str, Floats32]
+    ) -> None:
         super().__init__(data, mesh, surface, attributes)
         self._head = head
         self._rest, self._rest_normals = self.vertices.copy(), self.normals.copy()
-        self._own = len(self._rest)
+        self._now, self._now_normals = self._rest.copy(), self._rest_normals.copy()
         self._linear, self._shift = np.eye(3), np.zeros(3)
 
-    def pose(self, pose: Pose, turn: NDArray[np.float64]) -> None:
-        linear, shift = rigid_motion(self.follows, self._head, pose, turn)
+    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
+        linear, shift = rigid_motion(self.follows, self._head, pose)
         if np.array_equal(linear, self._linear) and np.array_equal(shift, self._shift):
-            self.changed = []
-            return
+            return [], self._now, self._now_normals
         self._linear, self._shift = linear, shift
         matrix = np.ascontiguousarray(linear.T, np.float32)
-        own = slice(self._own)
-        np.dot(self._rest, matrix, out=self.vertices[own])
-        self.vertices[own] += shift.astype(np.float32)
-        np.dot(self._rest_normals, matrix, out=self.normals[own])
-        self.changed = [(0, len(self.vertices))]
+        np.dot(self._rest, matrix, out=self._now)
+        self._now += shift.astype(np.float32)
+        np.dot(self._rest_normals, matrix, out=self._now_normals)
+        return [(0, len(self._now))], self._now, self._now_normals
 
     @property
-    def control_points(self) -> NDArray[np.float64]:
+    def control_points(self) -> Floats:
         return self.surface.points @ self._linear.T + self._shift
 
 

@@ -1,4 +1,4 @@
-"""From a pose to control points: group displacements, the jaw's arc, lids on the eyeball, the neck's bend."""
+"""From a pose to control points: group displacements, the jaw's arc, lids on the eyeball."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.head.data import HeadData, Jaw, PartData
-from surface.head.kernels import bend_neck, keep_on_eyeball, swing_jaw
-from surface.head.parameters import SHAPES, Pose, rotation, rotation_vector
+from surface.head.kernels import keep_on_eyeball, swing_jaw
+from surface.head.parameters import SHAPES, Pose, rotation
 
 Floats = NDArray[np.float64]
 LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
@@ -28,8 +28,7 @@ class SkinRig:
         n = len(part.points)
         self.rest = np.ascontiguousarray(part.points, np.float64)
         self.used, self._moves = _stack(part)
-        self._open, self._neck = part.jaw.astype(np.float64), part.neck.astype(np.float64)
-        self._jaw, self._pivot = head.jaw, np.array(head.neck)
+        self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
         self._undo = _undo_share(part)
         self._lid = np.flatnonzero(part.lids).astype(np.int64)
         self._lid_hold = np.abs(part.lids[self._lid])
@@ -44,13 +43,13 @@ class SkinRig:
         """Distances of the lid points from the eyeball's centre, and what every group at 1 adds to them."""
         from_eye = self.rest[self._lid] - self._lid_eye
         rest = np.linalg.norm(from_eye, axis=1)
-        moves = self._moves.reshape(len(self.used), -1, 3)[:, self._lid]
+        moves = self._moves.reshape(len(self.used), len(self.rest), 3)[:, self._lid]
         return rest, np.linalg.norm(from_eye + moves, axis=2) - rest
 
-    def apply(self, pose: Pose, head: Floats) -> Floats:
-        """Positions (n, 3) of all control points; the array is the rig's own and is overwritten each time.
+    def apply(self, pose: Pose) -> Floats:
+        """Positions (n, 3) of all control points before the head turns.
 
-        ``head`` is the rotation (3, 3) of the head.
+        The array is the rig's own and is overwritten each time.
         """
         self._amounts[:] = pose.shapes[self.used]
         np.dot(self._amounts, self._moves, out=self._linear)
@@ -65,8 +64,6 @@ class SkinRig:
             radius = self._radius + self._amounts.astype(np.float64) @ self._radius_moves
             np.maximum(radius, self._least, out=radius)
             keep_on_eyeball(self._lid, self._lid_eye, self._lid_hold, radius, self.points)
-        if pose.head.any():
-            bend_neck(self._neck, rotation_vector(head), self._pivot, self.points)
         return self.points
 
 
@@ -77,7 +74,7 @@ def _stack(part: PartData) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     for row, g in zip(moves, groups, strict=True):
         row[g.ids] = g.moves
     used = np.array([SHAPES.index(g.name) for g in groups], np.int64)
-    return used, moves.reshape(len(groups), -1)
+    return used, moves.reshape(len(groups), 3 * len(part.points))
 
 
 def _undo_share(part: PartData) -> Floats:
@@ -99,8 +96,8 @@ def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
     return turn, centre - turn @ centre + amount * np.array(jaw.glide)
 
 
-def rigid_motion(follows: str, head: HeadData, pose: Pose, turn: Floats) -> tuple[Floats, Floats]:
-    """Linear part (3, 3) and shift (3,) of a part that is fixed to skull, jaw or an eye.
+def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
+    """Linear part (3, 3) and shift (3,) of a part that is fixed to skull, jaw or an eye, before the head turns.
 
     Control points of a rational surface may be moved by any affine map: the surface follows exactly.
     """
@@ -114,5 +111,4 @@ def rigid_motion(follows: str, head: HeadData, pose: Pose, turn: Floats) -> tupl
         side = int(follows == "right_eye")
         linear = rotation(*pose.gaze[side])
         shift = head.eyes[side] - linear @ head.eyes[side]
-    pivot = np.array(head.neck)
-    return turn @ linear, turn @ (shift - pivot) + pivot
+    return linear, shift

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.head.data import Seam
-from surface.head.kernels import nearest_on_line
+from surface.head.kernels import nearest_on_line, unit_rows, zip_border
 from surface.head.part import HeadPart
 
 NEAR = 2e-3  # in (u, v): a vertex nearer than this to the seam's polyline is on it
@@ -32,18 +32,21 @@ class Zipper:
         b_ids, b_at = _along(second, seam.uv_b)
         inside = (b_at >= a_at.min(initial=np.inf) - SAME) & (b_at <= a_at.max(initial=-np.inf) + SAME)
         self.ids, at = b_ids[inside], b_at[inside]
-        if not len(self.ids):
+        if len(a_ids) < 2 or not len(self.ids):
+            self.ids = self.ids[:0]
             return
         after = np.clip(np.searchsorted(a_at, at), 1, max(len(a_at) - 1, 1))
         self.low, self.high = a_ids[after - 1], a_ids[after]
         gap = np.maximum(a_at[after] - a_at[after - 1], 1e-12)
-        self.share = np.clip((at - a_at[after - 1]) / gap, 0.0, 1.0).astype(np.float32)[:, None]
+        self.share = np.clip((at - a_at[after - 1]) / gap, 0.0, 1.0).astype(np.float32)
         self._fill(a_ids, a_at, at)
 
     def _fill(self, a_ids: NDArray[np.int64], a_at: NDArray[np.float64], at: NDArray[np.float64]) -> None:
         """Slivers over the first part's vertices that stand between two neighbours of the second part's."""
         directed = {(int(p), int(q)) for p, q in self.second.borders}
-        triangles, copies, like = [], [], []
+        triangles: list[NDArray[np.int64]] = []
+        copies: list[int] = []
+        like: list[int] = []
         for p, q, start, end in zip(self.ids, self.ids[1:], at, at[1:], strict=False):
             between = a_ids[(a_at > start + SAME) & (a_at < end - SAME)]
             forward = (int(p), int(q)) in directed
@@ -61,16 +64,16 @@ class Zipper:
             self.ids = np.concatenate([self.ids, new])
             self.low = np.concatenate([self.low, copies])
             self.high = np.concatenate([self.high, copies])
-            self.share = np.vstack([self.share, np.zeros((len(copies), 1), np.float32)])
+            self.share = np.concatenate([self.share, np.zeros(len(copies), np.float32)])
 
     def close(self) -> None:
         """Put the second part's border onto the first one's."""
         if not len(self.ids) or not (self.first.changed or self.second.changed):
             return
-        for name in ("vertices", "normals"):
-            source, target = getattr(self.first, name), getattr(self.second, name)
-            low = source[self.low]
-            target[self.ids] = low + self.share * (source[self.high] - low)
+        one, two = self.first, self.second
+        zip_border(one.vertices, two.vertices, self.ids, self.low, self.high, self.share)
+        zip_border(one.normals, two.normals, self.ids, self.low, self.high, self.share)
+        unit_rows(two.normals, self.ids)
         self.second.touch()
 
 

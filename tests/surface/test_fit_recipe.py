@@ -1,0 +1,27 @@
+"""Recipes know the meshes they were made for."""
+
+from dataclasses import replace
+
+import numpy as np
+from slit_sheet import slit_sheet
+
+from surface.fit.mesh import FitMesh
+from surface.fit.recipe import recipe_for
+
+
+def test_an_unknown_mesh_is_one_skin():
+    recipe = recipe_for(slit_sheet())
+    assert [p.name for p in recipe.parts] == ["face"]
+    assert recipe.eyes is None and recipe.teeth == [] and len(recipe.seated) == 0
+
+
+def test_ict_is_taken_apart():
+    sizes = FitMesh(np.zeros((26719, 3)), np.zeros((26384, 4), int), np.zeros((1, 2)), np.zeros((26384, 4), int), (),
+                    np.zeros((0, 26719, 3)))  # fmt: skip
+    recipe = recipe_for(sizes)
+    names = [p.name for p in recipe.parts + recipe.teeth]
+    assert names == ["face", "back", "cavity", "sockets", "gums_upper", "gums_lower", "tongue", "teeth_upper",
+                     "teeth_lower"]  # fmt: skip
+    assert recipe.parts[0].wish.points <= 2500
+    assert recipe.parts[0].holds(4704) and not recipe.parts[0].holds(9409)
+    assert recipe_for(replace(sizes, faces=sizes.faces[1:])).eyes is None

@@ -1,0 +1,59 @@
+"""Warps before the fit: lids onto another eyeball, lips together."""
+
+import numpy as np
+from slit_sheet import slit_sheet
+
+from surface.fit.mesh import FitMesh
+from surface.fit.seat import Eyeball, close_lips, seat_lids, strengthen
+
+OLD = Eyeball((30.0, 36.0, 80.0), 15.0)
+NEW = Eyeball((30.0, 36.0, 83.5), 12.0)
+
+
+def on_ball(ball: Eyeball, across: np.ndarray) -> np.ndarray:
+    x = ball.centre[0] + across
+    z = ball.centre[2] + np.sqrt(ball.radius**2 - across**2)
+    return np.column_stack([x, np.full(len(x), ball.centre[1]), z])
+
+
+def cloud(points: np.ndarray, delta: np.ndarray) -> FitMesh:
+    none = np.zeros((0, 4), np.int64)
+    return FitMesh(points, none, np.zeros((0, 2)), none, ("s",), delta[None])
+
+
+def test_what_touched_the_old_ball_touches_the_new_one():
+    across = np.linspace(-9, 9, 13)
+    points = on_ball(OLD, across)
+    seated = seat_lids(cloud(points, np.zeros_like(points)), OLD, NEW, np.arange(13)).vertices
+    distance = np.linalg.norm(seated - NEW.centre, axis=1)
+    assert np.abs(distance - NEW.radius).max() < 0.25
+    np.testing.assert_array_equal(seated[:, :2], points[:, :2])
+
+
+def test_shapes_slide_over_the_new_ball_too():
+    start, end = on_ball(OLD, np.array([-6.0])), on_ball(OLD, np.array([5.0]))
+    mesh = seat_lids(cloud(start, end - start), OLD, NEW, np.array([0]))
+    reached = mesh.vertices + mesh.deltas[0]
+    assert abs(np.linalg.norm(reached - NEW.centre) - NEW.radius) < 0.25
+
+
+def test_both_eyes_are_mirror_images_and_far_points_stay():
+    points = np.vstack([on_ball(OLD, np.array([-4.0, 3.0])), [[0.0, 36.0, 110.0], [70.0, 36.0, 60.0]]])
+    mirrored = points * [-1.0, 1.0, 1.0]
+    a = seat_lids(cloud(points, np.zeros_like(points)), OLD, NEW, np.arange(4)).vertices
+    b = seat_lids(cloud(mirrored, np.zeros_like(points)), OLD, NEW, np.arange(4)).vertices
+    np.testing.assert_allclose(a * [-1.0, 1.0, 1.0], b)
+    np.testing.assert_allclose(a[2:], points[2:])
+
+
+def test_closing_lips_keeps_the_closed_pose():
+    mesh = slit_sheet()
+    closed = close_lips(mesh, 0.1, "jawOpen")
+    np.testing.assert_allclose(closed.vertices + closed.deltas[0], mesh.vertices + mesh.deltas[0], atol=1e-12)
+    assert close_lips(mesh, 0.1, "mouthClose") is mesh
+
+
+def test_strengthening_touches_the_named_shapes_only():
+    mesh = strengthen(slit_sheet(), "jaw", 1.5)
+    np.testing.assert_allclose(mesh.deltas[0], 1.5 * slit_sheet().deltas[0])
+    np.testing.assert_array_equal(mesh.deltas[1], slit_sheet().deltas[1])
