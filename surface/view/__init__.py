@@ -8,7 +8,7 @@ from surface.view.camera import PRESETS, Camera
 from surface.view.clip import write_clip
 from surface.view.offscreen import Offscreen
 from surface.view.renderer import Renderer
-from surface.view.sheet import contact_sheet, write_png
+from surface.view.sheet import compose, contact_sheet, write_png
 from surface.view.theme import THEMES, Light, Theme
 from surface.view.window import run_window
 
@@ -20,6 +20,7 @@ __all__ = [
     "Offscreen",
     "Renderer",
     "Theme",
+    "compose",
     "contact_sheet",
     "run_window",
     "write_clip",

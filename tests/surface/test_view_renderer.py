@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from ball_head import BallHead, values
 
 from surface.errors import ViewError
+from surface.head import Head
 from surface.view import Camera, Offscreen, Theme
 from surface.view.renderer import box_corners, light_direction, theme_named
 from surface.view.theme import THEMES, Light
@@ -150,3 +152,27 @@ def test_box_corners() -> None:
     assert len(np.unique(corners, axis=0)) == 8
     assert corners.min(axis=0) == pytest.approx([0, 2, -1])
     assert corners.max(axis=0) == pytest.approx([1, 5, 3])
+
+
+@pytest.mark.parametrize("quality", ["full", "fast"])
+def test_the_shipped_head_looks_at_you(gl: None, root: Path, quality: str) -> None:
+    head = Head.load(root / "configs" / "heads" / "ict")
+    camera, size = Camera.front(), (480, 480)
+    with Offscreen(head, size, quality=quality) as screen:
+        picture = screen.render(np.zeros(len(head.parameters)), camera).astype(int)
+    for part in (p for p in head.parts if p.material == "eye"):
+        column, row = pixel(camera, part.vertices[np.argmax(part.vertices[:, 2])], size)
+        around = picture[row - 3 : row + 4, column - 14 : column + 15]
+        assert around[:, 10:19].sum(axis=2).min() < 120, "a dark pupil"
+        assert around[:, :8].sum(axis=2).max() > 270, "white beside it"
+        assert around[:, -8:].sum(axis=2).max() > 270, "white on the other side"
+    face = picture[120:300, 180:300]
+    assert (face.max(axis=2) > 250).mean() < 0.003, "nothing blown out"
+    assert (face.sum(axis=2) < 45).mean() < 0.02, "no black holes"
+    assert (face[..., 0] > face[..., 2]).mean() > 0.9, "warm skin"
+
+
+def pixel(camera: Camera, point: np.ndarray, size: tuple[int, int]) -> tuple[int, int]:
+    """Column and row of a point in head space."""
+    clip = camera.matrix(size[0] / size[1]).astype(float) @ [*point, 1.0]
+    return int((clip[0] / clip[3] * 0.5 + 0.5) * size[0]), int((0.5 - clip[1] / clip[3] * 0.5) * size[1])
