@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-import threading
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable
-from typing import Any, Protocol
+from typing import Any
 
 from drivers.sim.device import SimulatedServo
-from drivers.sim.faults import Fault, FaultSet
+from drivers.sim.faults import KINDS, Fault
+from drivers.sim.line import Line
 from drivers.sim.replies import Reply, collide
 from drivers.sim.state import WATCHDOG_STEP_S, Heard, same_rate
 
 
-class Reader(Protocol):
-    """Cuts a byte stream into packets."""
-
-    @property
-    def pending(self) -> int:
-        """Bytes of a packet that is not complete."""
-
-    def feed(self, data: bytes) -> list[Any]:
-        """Packets completed by these bytes."""
-
-    def flush(self) -> list[Any]:
-        """Give up on the incomplete packet."""
-
-    def take_pending(self) -> bytes:
-        """Forget the incomplete packet."""
-
-
-class Chain(ABC):
+class Chain(Line):
     """Servos on one wire; what the packets mean is the subclass's.
 
     Parameters
@@ -43,12 +26,8 @@ class Chain(ABC):
     Attributes
     ----------
     servos : the servos, in the order given.
-    line_baud : bit rate of the port, or None while unknown; servos set to another rate do not hear it.
-    echo : the adapter gives back what it was sent.
+    by_id, twins : who hears the wire at its bit rate, by id; more servos of an id that is taken.
     chain_stop : in reads of several servos nobody answers behind a silent one; otherwise the next one does.
-    on_unplug : called with (fault, begins) when the port goes away or comes back.
-    packets : instruction packets handled.
-    lock : held while a packet is handled; hold it to look at servos from another thread.
     """
 
     def __init__(
@@ -59,21 +38,16 @@ class Chain(ABC):
         seed: int = 0,
     ) -> None:
         self.servos = list(servos)
-        self.line_baud: int | None = None
-        self.echo = self.chain_stop = False
-        self.on_unplug: Callable[[Fault, bool], None] = lambda fault, begins: None
-        self.packets = 0
-        self.lock = threading.RLock()
-        self.reader = self.make_reader()
+        self.chain_stop = False
         self._heard = Heard(now_s)
         self._muted: frozenset[int] = frozenset()
         self.by_id: dict[int, SimulatedServo] = {}
         self.twins: dict[int, list[SimulatedServo]] = {}
         self._extra: dict[Fault, list[SimulatedServo]] = {}
         self._stale = True
+        super().__init__(seed)
         for servo in self.servos:
             self._adopt(servo)
-        self.faults = FaultSet(self._fault_changed, seed)
         self.faults.add(faults, now_s)
 
     def servo(self, device_id: int) -> SimulatedServo:
@@ -88,31 +62,28 @@ class Chain(ABC):
                 return servo
         raise KeyError(f"no simulated servo has id {device_id}")
 
-    def feed(self, data: bytes, now_s: float) -> list[Reply]:
-        """Bytes from the host; returns what comes back, in order."""
-        replies = []
-        for packet in self.reader.feed(data):
-            replies += self.handle(packet, now_s)
-        return replies
+    def describe(self, now_s: float) -> list[dict[str, Any]]:
+        """Id, model, position, goal, torque and latched errors of each servo."""
+        return [
+            {
+                "id": servo.id,
+                "model": servo.table.model,
+                "position": servo.position_ticks(now_s),
+                "goal": servo.goal,
+                "torque": servo.torque,
+                "error": servo.hardware_error,
+            }
+            for servo in self.servos
+        ]
 
-    def handle(self, packet: Any, now_s: float) -> list[Reply]:
-        """One instruction packet; returns what comes back, in order."""
-        with self.lock:
-            self._catch_up(now_s)
-            self.packets += 1
-            return self.carry_out(packet, now_s)
+    def place(self, device_id: int, position: float, now_s: float) -> None:
+        """Move a limp shaft by hand.
 
-    @abstractmethod
-    def make_reader(self) -> Reader:
-        """A reader of the protocol's instruction packets."""
-
-    @abstractmethod
-    def size(self, packet: Any) -> int:
-        """Bytes of an instruction packet on the wire."""
-
-    @abstractmethod
-    def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
-        """What an instruction packet does, and who answers."""
+        Raises
+        ------
+        KeyError : nobody has the id. ValueError : the motor holds the shaft.
+        """
+        self.servo(device_id).place(position, now_s)
 
     @abstractmethod
     def encode_status(self, device_id: int, error: int, data: bytes) -> bytes:
@@ -121,7 +92,7 @@ class Chain(ABC):
     def set_line_baud(self, baud: int | None) -> None:
         """The port's bit rate was changed."""
         if baud != self.line_baud:
-            self.line_baud = baud
+            super().set_line_baud(baud)
             self._stale = True
 
     def _adopt(self, servo: SimulatedServo) -> None:
@@ -132,10 +103,9 @@ class Chain(ABC):
     def _mark_stale(self) -> None:
         self._stale = True
 
-    def _catch_up(self, now_s: float) -> None:
+    def catch_up(self, now_s: float) -> None:
         """What happened on the wire since the last packet: faults that are due, watchdogs that tripped."""
-        if now_s >= self.faults.next_change_s:
-            self.faults.advance(now_s)
+        super().catch_up(now_s)
         if now_s - self._heard.at_s > WATCHDOG_STEP_S:
             for servo in self.servos:
                 servo.watch(now_s)
@@ -208,17 +178,14 @@ class Chain(ABC):
         return collide([reply for reply in replies if reply])
 
     # ------------------------------------------------------------ faults
-    def _fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:
+    def fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:
         """A fault that is not about replies begins or ends."""
-        if fault.kind == "echo":
-            self.echo = begins
-        elif fault.kind == "chain-stop":
+        super().fault_changed(fault, begins, now_s)
+        if fault.kind == "chain-stop":
             self.chain_stop = begins
-        elif fault.kind == "unplug":
-            self.on_unplug(fault, begins)
         elif fault.kind == "mute":
             self._stale = True
-        else:
+        elif KINDS[fault.kind].scope == "servo":
             for servo in self.servos:
                 if fault.concerns(servo.id):
                     self._change_servo(servo, fault, begins, now_s)

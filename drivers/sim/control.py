@@ -4,7 +4,7 @@
 ``fault SPEC [SPEC ...]``         sets faults (``drivers.sim.faults``)
 ``clear [KIND]``                  ends the faults of a kind, or all
 ``faults``                        answers with the faults that are set
-``servos``                        answers with a JSON list of the servos' state
+``servos``                        answers with a JSON list of the servos' (or channels') state
 ``place ID TICKS``                moves a limp shaft by hand
 ================================  =====================================================================
 
@@ -23,7 +23,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from drivers.errors import DriverError, PortBusy, PortError
-from drivers.sim.chain import Chain
+from drivers.sim.line import Line
 
 MAX_LINE = 4096
 
@@ -35,11 +35,11 @@ class Commands:
 
     Parameters
     ----------
-    chain : the servos.
+    line : the bus.
     """
 
-    def __init__(self, chain: Chain) -> None:
-        self._chain = chain
+    def __init__(self, line: Line) -> None:
+        self._line = line
         self._words: dict[str, Callable[[list[str], float], str]] = {
             "fault": self._fault,
             "clear": self._clear,
@@ -55,7 +55,7 @@ class Commands:
         if command is None:
             return f"error there is no command {word!r} (there are {', '.join(self._words)})"
         try:
-            with self._chain.lock:
+            with self._line.lock:
                 return f"ok {command(rest, time.monotonic())}".rstrip()
         except DriverError as error:
             return f"error {error}; {error.hint}"
@@ -63,34 +63,22 @@ class Commands:
             return f"error {line!r}: {error.args[0] if error.args else error}"
 
     def _fault(self, specs: list[str], now_s: float) -> str:
-        self._chain.faults.add(specs, now_s)
+        self._line.faults.add(specs, now_s)
         return ""
 
     def _clear(self, kinds: list[str], now_s: float) -> str:
-        self._chain.faults.clear(kinds[0] if kinds else None, now_s)
+        self._line.faults.clear(kinds[0] if kinds else None, now_s)
         return ""
 
     def _faults(self, words: list[str], now_s: float) -> str:
-        return " ".join(fault.spec for fault in self._chain.faults.active)
+        return " ".join(fault.spec for fault in self._line.faults.active)
 
     def _servos(self, words: list[str], now_s: float) -> str:
-        return json.dumps(
-            [
-                {
-                    "id": servo.id,
-                    "model": servo.table.model,
-                    "position": servo.position_ticks(now_s),
-                    "goal": servo.goal,
-                    "torque": servo.torque,
-                    "error": servo.hardware_error,
-                }
-                for servo in self._chain.servos
-            ]
-        )
+        return json.dumps(self._line.describe(now_s))
 
     def _place(self, words: list[str], now_s: float) -> str:
         device_id, ticks = (int(word) for word in words)
-        self._chain.servo(device_id).place(ticks, now_s)
+        self._line.place(device_id, ticks, now_s)
         return ""
 
 

@@ -260,9 +260,16 @@ class FaultSet:
     ----------
     on_change : called with (fault, begins, time) when one begins or ends.
     seed : of the chance.
+    kinds : faults that the bus can have.
     """
 
-    def __init__(self, on_change: Callable[[Fault, bool, float], None], seed: int = 0) -> None:
+    def __init__(
+        self,
+        on_change: Callable[[Fault, bool, float], None],
+        seed: int = 0,
+        kinds: Iterable[str] = KINDS,
+    ) -> None:
+        self._kinds = frozenset(kinds)
         self.spoilers: list[Spoiler] = []
         self.active: list[Fault] = []
         self.next_change_s = float("inf")
@@ -276,9 +283,13 @@ class FaultSet:
 
         Raises
         ------
-        DriverError : a spec cannot be read; then none of them is set.
+        DriverError : a spec cannot be read, or this bus has no such fault; then none of them is set.
         """
-        for fault in [parse_fault(item) if isinstance(item, str) else item for item in faults]:
+        wanted = [parse_fault(item) if isinstance(item, str) else item for item in faults]
+        for fault in wanted:
+            if fault.kind not in self._kinds:
+                raise _bad(fault.spec, f"a bus of this kind has only {', '.join(sorted(self._kinds))}")
+        for fault in wanted:
             self._schedule(now_s + fault.at_s, True, fault)
             if fault.for_s is not None:
                 self._schedule(now_s + fault.at_s + fault.for_s, False, fault)

@@ -15,6 +15,7 @@ from drivers.sim.control import Commands, ControlSocket, Lines
 from drivers.sim.device import SimulatedServo
 from drivers.sim.faults import Fault
 from drivers.sim.legacy import LegacyChain
+from drivers.sim.line import Line
 from drivers.sim.ptyport import PtyPort
 from drivers.sim.wire import Timed, WireTiming, without_timing
 
@@ -43,7 +44,7 @@ class PtyServer:
 
     def __init__(
         self,
-        chain: Chain,
+        chain: Line,
         link: str | os.PathLike[str] | None = None,
         *,
         baud: int = 1_000_000,

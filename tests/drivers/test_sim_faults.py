@@ -176,3 +176,11 @@ def test_one_bad_spec_sets_none():
     with pytest.raises(DriverError):
         faults.add(["mute:1", "mute:x"], 0.0)
     assert (seen, faults.active) == ([], [])
+
+
+def test_a_bus_may_have_few_kinds_of_fault():
+    faults = FaultSet(lambda *change: None, kinds=("echo", "unplug"))
+    faults.add(["echo"], 0.0)
+    with pytest.raises(DriverError, match=r"'mute:1': a bus of this kind has only echo, unplug"):
+        faults.add(["unplug", "mute:1"], 0.0)
+    assert [fault.kind for fault in faults.active] == ["echo"]
