@@ -18,14 +18,6 @@ class Reader(Protocol):
     def pending(self) -> int:
         """Bytes of a packet that is not complete."""
 
-    @abstractmethod
-    def describe(self, now_s: float) -> list[dict[str, Any]]:
-        """The state of each device, for people and tools."""
-
-    def place(self, device_id: int, position: float, now_s: float) -> None:
-        """Move a shaft by hand; ValueError where that cannot be done."""
-        raise ValueError("nothing on this bus can be moved by hand")
-
     def feed(self, data: bytes) -> list[Any]:
         """Packets completed by these bytes."""
 
@@ -74,6 +66,14 @@ class Line(ABC):
     @abstractmethod
     def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
         """What a packet does, and who answers."""
+
+    @abstractmethod
+    def describe(self, now_s: float) -> list[dict[str, Any]]:
+        """The state of each device, for people and tools."""
+
+    def place(self, device_id: int, position: float, now_s: float) -> None:
+        """Move a shaft by hand; ValueError where that cannot be done."""
+        raise ValueError("nothing on this bus can be moved by hand")
 
     def feed(self, data: bytes, now_s: float) -> list[Reply]:
         """Bytes from the host; returns what comes back, in order."""

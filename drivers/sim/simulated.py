@@ -120,6 +120,7 @@ class SimulatedBus:
         self._path = ""
         self._child: subprocess.Popen[bytes] | None = None
         self._server: PtyServer | None = None
+        self._chain: Chain | None = None
         self._thread: threading.Thread | None = None
         self._stop = -1
         self._obeyed = threading.Event()
@@ -132,9 +133,9 @@ class SimulatedBus:
     @property
     def chain(self) -> Chain:
         """The servos themselves (thread mode only)."""
-        if self._server is None:
+        if self._chain is None:
             raise RuntimeError("the servos can be looked at only while the bus runs in a thread of this process")
-        return self._server.chain
+        return self._chain
 
     def servo(self, device_id: int) -> ServoView:
         """One servo (thread mode only); KeyError where nobody has the id."""
@@ -175,7 +176,7 @@ class SimulatedBus:
         if self._thread:
             os.close(self._stop)
             self._thread.join()
-            self._thread = self._server = None
+            self._thread = self._server = self._chain = None
 
     # ------------------------------------------------------------ in a thread
     def _start_thread(self) -> None:
@@ -196,7 +197,7 @@ class SimulatedBus:
             server.close()
             raise
         self._commands = Commands(chain)
-        self._server, self._path = server, server.port.path
+        self._server, self._chain, self._path = server, chain, server.port.path
         reading, self._stop = os.pipe()
         self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
         self._thread.start()
