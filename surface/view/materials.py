@@ -22,6 +22,7 @@ Arrays = dict[str, np.ndarray]
 _DETAIL_TILES = 18
 #: Middle of the ball that the detail is wrapped on, mm.
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
+_DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
 _DETAIL_SIZE = 128
 
 
@@ -95,12 +96,17 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
 
 
 def detail_uv(part: ViewPart) -> np.ndarray:
-    """Where the detail texture lies on a part at rest, (m, 2), in tiles: longitude and latitude, since a head's
-    own (u, v) are stretched and differ from part to part."""
-    offset = np.asarray(part.vertices, np.float64) - _DETAIL_CENTRE
-    longitude = np.arctan2(offset[:, 0], offset[:, 2])
-    latitude = np.arctan2(offset[:, 1], np.hypot(offset[:, 0], offset[:, 2]))
-    return np.column_stack([longitude, latitude]) * (_DETAIL_TILES / (2.0 * np.pi))
+    """Where the detail texture lies on a part at rest, (m, 2), in tiles.
+
+    Longitude and latitude on the skull, height and reach on neck and shoulders: a head's own (u, v) are
+    stretched, and differ from part to part.
+    """
+    x, y, z = (np.asarray(part.vertices, np.float64) - _DETAIL_CENTRE).T
+    reach = np.hypot(x, z)
+    below = np.clip(-y / _DETAIL_BLEND, 0.0, 1.0)
+    down = (y - 0.7 * (reach - _DETAIL_RADIUS)) / _DETAIL_RADIUS
+    height = np.arctan2(y, reach) * (1.0 - below) + down * below
+    return np.column_stack([np.arctan2(x, z), height]) * (_DETAIL_TILES / (2.0 * np.pi))
 
 
 def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
