@@ -62,7 +62,7 @@ class Body:
         self.player = TakePlayer(take, self.state, layer) if take is not None else None
         self.links: list[LineLink] = []
         self.buses = [
-            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest)
+            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules)
             for robot in stage.robots
             for bus in robot.buses
         ]

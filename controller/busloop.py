@@ -15,10 +15,12 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.channels import build_table, limiter_of, servo_specs
+from controller.channels import build_table, limiter_of, play, servo_specs
 from controller.clock import Clock, Samples
 from controller.parameters import Parameters
 from controller.robot import BusSettings, ChannelSettings
+from controller.rules import RuleSettings
+from controller.safety import Guard
 from drivers import open_bus
 from drivers.bus import Bus, BusState
 from drivers.errors import DriverError, PortLost
@@ -44,6 +46,7 @@ class BusLoop:
     parameters : the vocabulary the channels' mixes refer to.
     newest : gives the newest parameter vector ``(p,) float64`` and the time (monotonic ns) at which the command
         behind it arrived, 0 for none.
+    rules : what no servo does, whoever asks.
     """
 
     def __init__(
@@ -52,6 +55,7 @@ class BusLoop:
         channels: Sequence[ChannelSettings],
         parameters: Parameters,
         newest: Newest,
+        rules: RuleSettings = RuleSettings(),
     ) -> None:
         self.settings = settings
         self.table = build_table(channels, parameters)
@@ -69,6 +73,7 @@ class BusLoop:
         self.realtime = False
         self.error: Exception | None = None
         self._newest = newest
+        self._guard = Guard(rules, self.table, *play(channels))
         self._limiter = limiter_of(self.table, 1.0 / settings.rate_hz)
         self._sent = np.zeros(len(channels))
         self._last_stamp = 0
@@ -142,8 +147,10 @@ class BusLoop:
             self._retry_ns = 0
 
     def _send(self, angles: Floats) -> None:
-        """One step towards ``angles`` (n,) rad within the limits of motion."""
-        self._limiter.step(self.clock.period_ns / 1e9, angles, self._sent)
+        """One step towards ``angles`` (n,) rad, as far as the rules and the limits of motion allow."""
+        dt = self.clock.period_ns / 1e9
+        allowed = self._guard.apply(angles, self._sent, self._limiter.velocity, self._state, dt)
+        self._limiter.step(dt, allowed, self._sent)
         self.bus.write(self._sent)
 
     def _come_to_rest(self) -> None:
@@ -182,6 +189,7 @@ class BusLoop:
             **self.clock.report(),
             "command_to_wire_ms": self.latency_ms.summary(),
             "channels_held_at_limit": self.held,
+            "rules": self._guard.report(),
             "bus": self.bus.report().as_dict(),
             "fault": str(self.error) if self.error else None,
         }

@@ -82,7 +82,7 @@ def build_table(channels: Sequence[ChannelSettings], parameters: Parameters) -> 
     return ChannelTable(
         names=tuple(channel.name for channel in channels),
         mix=mix,
-        start_rad=np.radians([channel.map.deg[0] for channel in channels]),
+        start_rad=np.radians([channel.map.deg[0] + channel.trim_deg for channel in channels]),
         knots=knots,
         widths=widths,
         slopes=slopes,
@@ -103,6 +103,14 @@ def _pieces(channels: Sequence[ChannelSettings]) -> tuple[Floats, Floats, Floats
         widths[i, :k] = np.diff(at)
         slopes[i, :k] = np.diff(rad) / np.diff(at)
     return knots, widths, slopes
+
+
+def play(channels: Sequence[ChannelSettings]) -> tuple[Floats, Floats]:
+    """Dead band and slack of ``n`` channels, each (n,) rad."""
+    return (
+        np.radians([channel.dead_band_deg for channel in channels]),
+        np.radians([channel.slack_deg for channel in channels]),
+    )
 
 
 def servo_specs(channels: Sequence[ChannelSettings]) -> list[ServoSpec]:

@@ -49,7 +49,12 @@ def _buses(buses: list[dict[str, Any]]) -> list[tuple[str, str]]:
             (f"{name}: errors", errors),
             (f"{name}: targets held at a limit", str(bus["channels_held_at_limit"] + bus["bus"]["limits_hit"])),
         ]
+        found += [(f"{name}: rule", _rule(rule)) for rule in bus.get("rules", [])]
     return found
+
+
+def _rule(rule: dict[str, Any]) -> str:
+    return f"{rule['rule']}: {rule['times']} times, {rule['seconds']:.1f} s"
 
 
 def _loop(loop: dict[str, Any]) -> str:

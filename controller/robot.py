@@ -7,15 +7,17 @@ inside its limits, speed and acceleration. Angles are degrees from the servo's c
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from controller.config import Settings, config_error, load
-from controller.parameters import Parameters
+from controller.parameters import Parameters, did_you_mean
+from controller.rules import RuleSettings
 
 Degrees = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Play = Annotated[float, Field(ge=0, le=20, allow_inf_nan=False)]
 
 
 class BusSettings(Settings):
@@ -65,6 +67,10 @@ class ChannelSettings(Settings):
     max_accel_deg_s2: Positive
     reverse: bool = False
     zero_deg: Degrees = 0.0
+    trim_deg: Degrees = 0.0
+    dead_band_deg: Play = 0.0
+    slack_deg: Play = 0.0
+    profile: str | None = None
 
     @field_validator("limit_deg")
     @classmethod
@@ -81,10 +87,31 @@ class RobotSettings(Settings):
     description: str = ""
     buses: list[BusSettings] = Field(min_length=1)
     channels: list[ChannelSettings] = Field(min_length=1)
+    profiles: dict[str, dict[str, Any]] = {}
+    rules: RuleSettings = RuleSettings()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in_profiles(cls, table: Any) -> Any:
+        """Give channels what their profile says and they do not."""
+        channels, profiles = table.get("channels"), table.get("profiles", {})
+        if not isinstance(channels, list) or not isinstance(profiles, dict):
+            return table
+        filled = [_with_profile(i, channel, profiles) for i, channel in enumerate(channels)]
+        return {**table, "channels": filled}
 
     def on_bus(self, name: str) -> list[ChannelSettings]:
         """The channels on the bus called ``name``, in file order."""
         return [channel for channel in self.channels if channel.bus == name]
+
+
+def _with_profile(i: int, channel: Any, profiles: dict[str, Any]) -> Any:
+    if not isinstance(channel, dict) or "profile" not in channel:
+        return channel
+    name = channel["profile"]
+    if not isinstance(profiles.get(name), dict):
+        raise ValueError(f"channels[{i}].profile: no profile called {name!r}{did_you_mean(str(name), profiles)}")
+    return {**profiles[name], **channel}
 
 
 def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
@@ -96,7 +123,7 @@ def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
         listing every fault: unknown keys and parameters, doubled names and ids, buses that do not exist.
     """
     robot = load(path, RobotSettings)
-    faults = _doubled(robot) + _references(robot, parameters)
+    faults = _doubled(robot) + _references(robot, parameters) + _rules(robot)
     if faults:
         raise config_error(path, faults)
     return robot
@@ -134,4 +161,20 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
             for deg in channel.map.deg
             if not low <= deg <= high
         ]
+    return faults
+
+
+def _rules(robot: RobotSettings) -> list[str]:
+    """Rules must name channels that exist, and pairs that share a bus."""
+    bus = {channel.name: channel.bus for channel in robot.channels}
+    faults = [
+        f"{key}: no channel called {name!r}{did_you_mean(name, bus)}"
+        for key, name in robot.rules.mentions()
+        if name not in bus
+    ]
+    for i, rule in enumerate(robot.rules.prevent):
+        if rule.channel == rule.other:
+            faults.append(f"rules.prevent[{i}].other: is the channel itself")
+        elif bus.get(rule.channel) != bus.get(rule.other) and {rule.channel, rule.other} <= set(bus):
+            faults.append(f"rules.prevent[{i}].other: {rule.other!r} is on another bus than {rule.channel!r}")
     return faults
