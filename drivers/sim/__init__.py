@@ -1,9 +1,12 @@
 """Simulated servo buses that any program can open: byte-exact devices behind a pseudo-terminal.
 
-``SimulatedBus`` serves one from a thread or a child process; ``serve_dynamixel`` serves until interrupted.
+``SimulatedBus`` serves Dynamixel or Feetech servos from a thread or a child process, ``serve_dynamixel`` serves
+them until interrupted; ``serve`` does the same for a ``Maestro`` or an ``Ssc32``.
 """
 
-from drivers.sim.serve import serve_dynamixel
+from drivers.sim.maestro import Maestro
+from drivers.sim.serve import serve, serve_dynamixel
 from drivers.sim.simulated import ServoView, SimulatedBus
+from drivers.sim.ssc32 import Ssc32
 
-__all__ = ["ServoView", "SimulatedBus", "serve_dynamixel"]
+__all__ = ["Maestro", "ServoView", "SimulatedBus", "Ssc32", "serve", "serve_dynamixel"]

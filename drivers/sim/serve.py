@@ -227,10 +227,30 @@ def serve_dynamixel(
     """
     now_s = time.monotonic()
     chain = make_chain(make_servos(ids, model, baud, now_s), now_s, seed)
-    server = PtyServer(chain, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
+    chain.faults.add(faults, now_s)
+    serve(chain, link, on_ready, baud=baud, wire=wire, latency_s=latency_s, commands=commands, stop=stop)
+
+
+def serve(
+    line: Line,
+    link: str | os.PathLike[str] | None = None,
+    on_ready: Callable[[str], None] = lambda path: None,
+    *,
+    baud: int = 1_000_000,
+    wire: bool = False,
+    latency_s: float = 0.0,
+    commands: str | os.PathLike[str] | None = None,
+    stop: int | None = None,
+) -> None:
+    """Serve any simulated bus, for example ``Maestro()`` or ``Ssc32()``; parameters as for `serve_dynamixel`.
+
+    Raises
+    ------
+    DriverError : the terminal, link or socket cannot be made.
+    """
+    server = PtyServer(line, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
     reading, writing = os.pipe()
     try:
-        chain.faults.add(faults, now_s)
         on_ready(server.port.path)
         server.run(reading if stop is None else stop)
     finally:
