@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
-_NEAR_RAD = 1e-6
+_NEAR_RAD = 1e-3
 
 
 @dataclass
@@ -32,7 +32,7 @@ class Moment:
     Attributes
     ----------
     target : where the servos are asked to be. position : where they were last told to be.
-    stop : where they would come to rest if they braked now. state : the newest measurement. dt : s.
+    stop : where they would come to rest if they braked from the next step on. state : the newest measurement. dt : s.
     """
 
     target: Floats
@@ -117,8 +117,8 @@ class Prevent:
     def narrow(self, now: Moment, window: Window) -> None:
         """See :class:`Guard`."""
         own, other = self._own, self._other
-        yields = other.past(now.target) | other.past(now.stop)
-        waits = own.past(now.stop)
+        yields = other.past(now.target) | other.past(now.position) | other.past(now.stop)
+        waits = own.past(now.position) | own.past(now.stop)
         window.narrow(own.at, own.sign, own.bound, yields)
         window.narrow(other.at, other.sign, other.bound, waits)
         self.tally.note((yields & own.past(now.target)) | (waits & other.past(now.target)), now.dt)
@@ -276,10 +276,12 @@ class Guard:
         (n,) rad, inside the limits and every rule.
         """
         table, window = self._table, self._window
-        wanted = np.clip(self._takeup.apply(target), table.low_rad, table.high_rad)
+        sound = np.where(np.isfinite(target), target, position)  # what is no number asks to stay
+        wanted = self._takeup.apply(np.clip(sound, table.low_rad, table.high_rad))
+        np.clip(wanted, table.low_rad, table.high_rad, out=wanted)
         np.copyto(window.low, table.low_rad)
         np.copyto(window.high, table.high_rad)
-        stop = position + velocity * np.abs(velocity) / (2.0 * table.max_accel_rad_s2)
+        stop = position + velocity * (np.abs(velocity) / (2.0 * table.max_accel_rad_s2) + dt)
         now = Moment(wanted, position, stop, state, dt)
         for rule in self._rules:
             rule.narrow(now, window)

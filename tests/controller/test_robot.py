@@ -104,3 +104,61 @@ def test_doubled_names_and_ids_are_all_listed(tmp_path: Path) -> None:
 
 def test_the_good_file_is_good(tmp_path: Path) -> None:
     assert tomllib.loads(GOOD)["name"] == load_robot(robot_file(tmp_path, GOOD), PARAMETERS).name
+
+
+RULES = """
+[profiles.lid]
+max_speed_deg_s = 600
+[[rules.timing]]
+channels = ["jaw"]
+toward = "high"
+extreme = 0.6
+hold_s = 1
+fall_s = 1
+rest_s = 5
+recover_s = 1
+[[rules.prevent]]
+channel = "jaw"
+toward = "high"
+extreme = 0.5
+other = "lid"
+other_toward = "high"
+other_extreme = 0.5
+"""
+LID = GOOD[GOOD.index("[[channels]]") :].replace('"jaw"', '"lid"').replace("id = 1", "id = 2")
+LID = LID.replace("max_speed_deg_s = 300", 'profile = "lid"')
+
+
+def test_a_profile_gives_what_the_channel_does_not_say(tmp_path: Path) -> None:
+    robot = load_robot(robot_file(tmp_path, GOOD + LID + RULES), PARAMETERS)
+    assert [channel.max_speed_deg_s for channel in robot.channels] == [300, 600]
+    assert robot.rules.timing[0].rest_s == 5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ('profile = "lid"', 'profile = "lit"', "channels[1].profile: no profile called 'lit', did you mean 'lid'"),
+        ('channels = ["jaw"]', 'channels = ["jwa"]', "rules.timing[0].channels[0]: no channel called 'jwa'"),
+        ('channels = ["jaw"]', "channels = []", "rules.timing[0].channels: "),
+        ('other = "lid"', 'other = "lidd"', "rules.prevent[0].other: no channel called 'lidd', did you mean 'lid'"),
+        ('other = "lid"', 'other = "jaw"', "rules.prevent[0].other: is the channel itself"),
+        ("extreme = 0.6", "extreme = 1.6", "rules.timing[0].extreme: "),
+        ("hold_s", "hold", "rules.timing[0].hold: unknown key, did you mean 'hold_s'?"),
+        ('toward = "high"\nextreme = 0.6', 'toward = "up"\nextreme = 0.6', "rules.timing[0].toward: "),
+        ("[[rules.timing]]", "[[rules.timig]]", "rules.timig: unknown key, did you mean 'timing'?"),
+    ],
+)
+def test_a_faulty_rule_is_named_with_its_key(tmp_path: Path, old: str, new: str, fault: str) -> None:
+    text = GOOD + LID + RULES
+    assert old in text
+    with pytest.raises(ConfigError) as caught:
+        load_robot(robot_file(tmp_path, text.replace(old, new)), PARAMETERS)
+    assert fault in str(caught.value)
+
+
+def test_antagonists_share_a_bus(tmp_path: Path) -> None:
+    bus = GOOD[GOOD.index("[[buses]]") : GOOD.index("[[channels]]")].replace('"b"', '"c"')
+    text = GOOD.replace("[[channels]]", bus + "[[channels]]") + LID.replace('bus = "b"', 'bus = "c"') + RULES
+    with pytest.raises(ConfigError, match="rules.prevent.0..other: 'lid' is on another bus than 'jaw'"):
+        load_robot(robot_file(tmp_path, text), PARAMETERS)
