@@ -271,9 +271,9 @@ def test_the_models_decide_the_protocol_and_must_agree():
 # ---------------------------------------------------------------- served
 def test_dynamixel_sdk_speaks_protocol_1_to_it():
     packets = PacketHandler(1.0)
-    with SimulatedBus((1, 2), model="mx1-28") as bus:
+    with SimulatedBus((1, 2), model="mx1-28", process=True) as bus:
         port = PortHandler(bus.path)
-        port.setPacketTimeout = lambda length: PortHandler.setPacketTimeoutMillis(port, 500.0)
+        port.setPacketTimeout = lambda length: PortHandler.setPacketTimeoutMillis(port, 3000.0)
         port.setBaudRate(1_000_000)
         assert packets.ping(port, 1) == (29, 0, 0)
         assert packets.write2ByteTxRx(port, 1, 32, 100) == (0, 0)

@@ -43,7 +43,7 @@ class PatientPort(PortHandler):
 
     def setPacketTimeout(self, packet_length: int) -> None:
         super().setPacketTimeout(packet_length)
-        self.packet_timeout += 500.0
+        self.packet_timeout += 3000.0
 
 
 @pytest.fixture
@@ -102,7 +102,7 @@ def test_sdk_reg_write_action_reboot_clear_factory_reset(bus: SimulatedBus, port
     wait_until(lambda: bus.servo(1).register("LED") == 1)
     assert packets.clearMultiTurn(port, 1) == (0, 0)
     assert packets.reboot(port, 1) == (0, 0)
-    wait_until(lambda: packets.ping(port, 1)[1] == 0)
+    wait_until(lambda: len(exchange(bus.path, PING_1, 14, 0.05)) == 14)
     assert bus.servo(1).register("LED") == 0
     assert packets.write4ByteTxRx(port, 1, 20, 5) == (0, 0)
     assert packets.factoryReset(port, 1, 0x02) == (0, 0)
