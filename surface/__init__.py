@@ -5,7 +5,7 @@ from __future__ import annotations
 from .basis import blending
 from .dcp import DCPSurface
 from .domain import Domain, Slit
-from .errors import FitError, HeadFileError, SurfaceError, ViewError
+from .errors import FitError, HeadFileError, SurfaceError, SurfaceFileError, ViewError
 from .mesh import Mesh
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Mesh",
     "Slit",
     "SurfaceError",
+    "SurfaceFileError",
     "ViewError",
     "blending",
 ]

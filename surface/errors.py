@@ -3,9 +3,10 @@
 The tree::
 
     SurfaceError
-    ├── HeadFileError   a head's files are missing, damaged or of another version
-    ├── FitError        a mesh cannot be turned into a head (no UVs, NaN, mismatched shapes)
-    └── ViewError       no picture can be drawn (no OpenGL, no display, context too old)
+    ├── HeadFileError     a head's files are missing, damaged or of another version
+    ├── FitError          a mesh cannot be turned into a head (no UVs, NaN, mismatched shapes)
+    ├── SurfaceFileError  a surface file is damaged, or holds what no DCP surface can be exactly
+    └── ViewError         no picture can be drawn (no OpenGL, no display, context too old)
 
 A wrong argument to :class:`surface.DCPSurface` is a ``ValueError`` that names the argument and the index.
 """
@@ -33,6 +34,10 @@ class HeadFileError(SurfaceError):
 
 class FitError(SurfaceError):
     """A mesh cannot be turned into a head."""
+
+
+class SurfaceFileError(SurfaceError):
+    """A surface file is damaged, or holds what no DCP surface can be exactly."""
 
 
 class ViewError(SurfaceError):
