@@ -86,8 +86,11 @@ def test_sdk_ping_read_write(bus: SimulatedBus, port: PortHandler):
     assert bus.servo(2).register("Profile Velocity") == 77
 
 
-def test_sdk_silent_id_times_out(port: PortHandler):
+def test_sdk_silent_id_times_out(bus: SimulatedBus):
+    port = PortHandler(bus.path)
+    port.setBaudRate(1_000_000)
     assert packets.ping(port, 9)[1] == COMM_RX_TIMEOUT
+    port.closePort()
 
 
 def test_sdk_broadcast_ping(port: PortHandler):
@@ -149,8 +152,10 @@ def test_sdk_stuffed_reply(bus: SimulatedBus, port: PortHandler):
 
 
 def test_sdk_at_the_wrong_bit_rate_hears_nobody(bus: SimulatedBus, port: PortHandler):
-    assert port.setBaudRate(57_600)
-    assert packets.ping(port, 1)[1] == COMM_RX_TIMEOUT
+    wrong = PortHandler(bus.path)
+    assert wrong.setBaudRate(57_600)
+    assert packets.ping(wrong, 1)[1] == COMM_RX_TIMEOUT
+    wrong.closePort()
     assert port.setBaudRate(1_000_000)
     assert packets.ping(port, 1)[1] == 0
 
