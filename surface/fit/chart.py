@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from surface.fit.islands import Island, boundary_loops, directed_edges
 from surface.fit.mesh import FitMesh
+from surface.fit.slopes import Slopes, face_slopes, join_slopes
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -23,6 +24,7 @@ NARROW = 0.7  # a hole lower than this part of its width is a slit
 BORDER_WEIGHT = 4.0  # samples on a border hold the surface to its neighbour
 CLUTTER = (4.5, 7.0)  # stretch, in medians, where a fold of the mesh begins and where it is only held loosely
 CLUTTER_WEIGHT = 0.05
+SLOPE_WEIGHT = 2.0  # of a face's slope, beside a sample's position
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Chart:
     spacing : (m, 2) float64, how far apart mesh vertices stand around each sample, in u and in v.
     folded : (m,) bool, samples inside folds (nostrils, ear canals) that are not measured.
     loops : closed polylines (k, 2) in (u, v); loop_vertices : the mesh vertex of each of their points.
-    cuts : slits of the chart.
+    cuts : slits of the chart; slopes : what the surface's derivatives should be, if asked for.
     size : side of the square that one island fills in (u, v).
     """
 
@@ -58,6 +60,7 @@ class Chart:
     loops: list[NDArray[np.float64]]
     loop_vertices: list[NDArray[np.int64]]
     cuts: list[Cut] = field(default_factory=list)
+    slopes: Slopes | None = None
     size: float = 1.0
 
 
@@ -66,26 +69,37 @@ def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True) 
 
     ``normalise=False`` keeps the mesh's own (u, v), for a single island that is known to fill the unit square.
     """
-    uv, mix, weight, spacing, folded, loops, ids, cuts = [], [], [], [], [], [], [], []
-    for k, island in enumerate(islands):
-        placed = _place(island, k) if normalise else island
-        rows, on_border = _sample_rows(placed)
-        uv.append(rows @ placed.uv)
-        mix.append(rows @ _pick(placed.vertex, len(mesh.vertices)))
-        spacing.append(rows @ _spacing(placed))
-        fold = np.clip(rows @ _fold(mesh, placed), 0, 1)
-        folded.append(fold > 0.5)
-        weight.append((CLUTTER_WEIGHT + (1 - CLUTTER_WEIGHT) * (1 - fold)) * np.where(on_border, BORDER_WEIGHT, 1.0))
-        around = boundary_loops(placed)
-        loops += [placed.uv[loop] for loop in around]
-        ids += [placed.vertex[loop] for loop in around]
-        cuts += [c for loop in around[1:] if (c := slit_of(placed.uv[loop])) is not None]
+    pieces = [_piece(mesh, _place(island, k) if normalise else island) for k, island in enumerate(islands)]
     from scipy.sparse import vstack
 
     return Chart(
-        np.concatenate(uv), vstack(mix).tocsr(), np.concatenate(weight), np.concatenate(spacing),
-        np.concatenate(folded), loops, ids, cuts,
+        np.concatenate([p.uv for p in pieces]), vstack([p.mix for p in pieces]).tocsr(),
+        np.concatenate([p.weight for p in pieces]), np.concatenate([p.spacing for p in pieces]),
+        np.concatenate([p.folded for p in pieces]), [x for p in pieces for x in p.loops],
+        [x for p in pieces for x in p.loop_vertices], [x for p in pieces for x in p.cuts],
+        join_slopes([p.slopes for p in pieces if p.slopes is not None]),
     )  # fmt: skip
+
+
+def _piece(mesh: FitMesh, island: Island) -> Chart:
+    """The chart of one island."""
+    rows, on_border = _sample_rows(island)
+    n = len(mesh.vertices)
+    fold = _fold(mesh, island)
+    sampled = np.clip(rows @ fold, 0, 1)
+    around = boundary_loops(island)
+    return Chart(
+        rows @ island.uv, rows @ _pick(island.vertex, n),
+        _loosened(sampled) * np.where(on_border, BORDER_WEIGHT, 1.0), rows @ _spacing(island), sampled > 0.5,
+        [island.uv[loop] for loop in around], [island.vertex[loop] for loop in around],
+        [c for loop in around[1:] if (c := slit_of(island.uv[loop])) is not None],
+        face_slopes(island, n, SLOPE_WEIGHT * _loosened(fold)),
+    )  # fmt: skip
+
+
+def _loosened(fold: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights of points that lie in a fold by 0..1."""
+    return CLUTTER_WEIGHT + (1 - CLUTTER_WEIGHT) * (1 - fold)
 
 
 def slit_of(loop: NDArray[np.float64]) -> Cut | None:

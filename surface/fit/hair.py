@@ -102,18 +102,12 @@ def _comb(hairs: int, *, lean: float) -> Floats:
     return np.clip(line, 0.0, 1.0)
 
 
-def brow_strip(skin: Skin, line: Floats, width: tuple[float, float], *, hairs: int) -> Strip:
-    """A brow along a line (m, 2) in (u, v), inner end first.
-
-    ``width`` is how far it reaches below and above the line in v, at its widest.
-    """
-    m, across = len(line), 5
-    s = np.linspace(0, 1, m)
-    taper = np.minimum(1.0, 0.75 + 1.2 * s) * np.minimum(1.0, (1.02 - s) * 2.2) ** 0.7
-    t = np.linspace(-width[0], width[1], across)
-    uv = np.stack([np.column_stack([line[:, 0], line[:, 1] + taper * x]) for x in t], axis=1).reshape(-1, 2)
+def brow_strip(skin: Skin, uv: Floats, *, hairs: int) -> Strip:
+    """A brow over a patch of skin, ``uv (m, k, 2)``: m places along it from the inner end, k from its lower edge."""
+    m, across, _ = uv.shape
+    flat = uv.reshape(-1, 2)
     arch = (0.35 + 0.35 * np.sin(np.linspace(0, np.pi, across)))[None, None, :, None]
-    rows = skin.at(uv).reshape(-1, m, across, 3) + arch * skin.normals(uv).reshape(-1, m, across, 3)
+    rows = skin.at(flat).reshape(-1, m, across, 3) + arch * skin.normals(flat).reshape(-1, m, across, 3)
     return fit_strip(rows, 10, 4, [_ragged(hairs)])
 
 

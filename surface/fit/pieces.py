@@ -16,13 +16,14 @@ from surface.fit.recipe import PartRecipe
 from surface.fit.refine import Fitted, fit_chart
 from surface.fit.report import PartReport, measure
 from surface.fit.rigging import lid_share, make_groups, tongue_group
-from surface.fit.strokes import mirrored, vertex_line
+from surface.fit.strokes import mirrored, smooth_line, uv_of
 from surface.head.data import Jaw, PartData
 
 Floats = NDArray[np.float64]
 STILL = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
 LASH_ROOT = 0.0145  # how far outside the hole in the skin the lashes stand, in v
 LASH_MM, LOWER_LASH_MM = 8.0, 4.0
+BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
 
 
 @dataclass(frozen=True)
@@ -79,14 +80,23 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], bod
     left = np.array(brow)
     brows, lashes = [], []
     for ids, eye, is_left in zip((left, mirrored(mesh, left)), body.eyes, (True, False), strict=True):
-        line = vertex_line(chart, mesh, ids, closed=False)
-        brows.append(brow_strip(skin, line, (0.0105, 0.0125), hairs=40))
+        brows.append(brow_strip(skin, _brow_patch(chart, mesh, ids), hairs=40))
         rim = _rim_near(chart, mesh, eye)
         for upper in (True, False):
             root, along = _lid_line(rim, upper=upper, inner_first=is_left)
             length = (LASH_MM if upper else LOWER_LASH_MM) * _length_profile(along)
             lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=28 if upper else 18))
     return [_strips_part("brows", "brow", brows, body), _strips_part("lashes", "lash", lashes, body)]
+
+
+def _brow_patch(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64]) -> Floats:
+    """(m, k, 2) the skin under a brow in (u, v): along a smooth line through vertices, up and down from it."""
+    line = smooth_line(mesh.vertices[ids], closed=False)
+    along = np.linspace(0.0, 1.0, len(line))
+    width = np.minimum(1.0, 0.75 + 1.2 * along) * np.minimum(1.0, (1.02 - along) * 2.2) ** 0.7
+    heights = np.linspace(-BROW_MM[0], BROW_MM[1], 5)
+    points = line[:, None, :] + (width[:, None] * heights)[..., None] * np.array([0.0, 1.0, 0.0])
+    return uv_of(chart, mesh, points.reshape(-1, 3)).reshape(len(line), len(heights), 2)
 
 
 def _length_profile(along: Floats) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from surface.fit.chart import Chart
 from surface.fit.mesh import FitMesh
 from surface.fit.net import Net, coarse_places, level_caps, net_at, wanted_places
 from surface.fit.solve import basis, solve
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 FINEST = 1.2  # a net may be this fine, in spacings of the mesh's vertices
 
@@ -54,10 +58,14 @@ class Fitted:
 
 def fit_chart(mesh: FitMesh, chart: Chart, wish: Wish, tell: Callable[[float], None] = lambda _: None) -> Fitted:
     """Control points for neutral and shapes of one chart; ``tell`` hears the fraction done."""
-    targets = chart_targets(mesh, chart)
+    targets = _targets(mesh, chart.mix)
+    slopes = None
+    if chart.slopes is not None:
+        slopes = chart.slopes, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
     net = net_at(coarse_places(chart.uv, wish.coarse), wish.coarse, chart.cuts, chart.uv)
     while True:
-        fitted = _solve(mesh, chart, net, targets, wish)
+        b = basis(net, chart.uv)
+        fitted = _measured(net, b, targets, solve(net, b, chart.weight, targets, wish.fair, slopes))
         tell(min(1.0, len(net) / wish.points))
         room = wish.points - len(net)
         if room <= 0:
@@ -67,14 +75,12 @@ def fit_chart(mesh: FitMesh, chart: Chart, wish: Wish, tell: Callable[[float], N
             return fitted
 
 
-def chart_targets(mesh: FitMesh, chart: Chart) -> NDArray[np.float64]:
-    """(m, 3 (1 + k)): neutral and shape displacements at the samples."""
-    return np.hstack([chart.mix @ mesh.vertices, *(chart.mix @ d for d in mesh.deltas)])
+def _targets(mesh: FitMesh, mix: csr_matrix) -> NDArray[np.float64]:
+    """(m, 3 (1 + k)): neutral and shape displacements at rows of ``mix``."""
+    return np.hstack([mix @ mesh.vertices, *(mix @ d for d in mesh.deltas)])
 
 
-def _solve(mesh: FitMesh, chart: Chart, net: Net, targets: NDArray[np.float64], wish: Wish) -> Fitted:
-    b = basis(net, chart.uv)
-    x = solve(net, b, chart.weight, targets, wish.fair)
+def _measured(net: Net, b: csr_matrix, targets: NDArray[np.float64], x: NDArray[np.float64]) -> Fitted:
     off = np.linalg.norm((b @ x - targets).reshape(len(targets), -1, 3), axis=2)
     x3 = x.reshape(len(net), -1, 3)
     return Fitted(net, x3[:, 0].copy(), x3[:, 1:].transpose(1, 0, 2).copy(), off[:, 0], off[:, 1:].T)

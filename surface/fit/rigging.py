@@ -39,7 +39,7 @@ def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     u, _, vt = np.linalg.svd((before - b0).T @ (after - a0))
     sign = float(np.sign(np.linalg.det(vt.T @ u.T)))
     turn: NDArray = vt.T @ np.diag([1.0, 1.0, sign]) @ u.T
-    return turn, a0 - turn @ b0
+    return np.asarray(turn, np.float64), np.asarray(a0 - turn @ b0, np.float64)
 
 
 def affine_fit(points: Floats, moves: Floats) -> Floats:

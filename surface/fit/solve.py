@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,15 +10,16 @@ from numpy.typing import NDArray
 
 from surface import DCPSurface
 from surface.fit.net import Net
+from surface.fit.slopes import Slopes
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 
-def basis(net: Net, uv: NDArray[np.float64]) -> csr_matrix:
-    """Rational weights (m, n) of all control points (weights 1) at the samples."""
+def basis(net: Net, uv: NDArray[np.float64], derivative: tuple[int, int] = (0, 0)) -> csr_matrix:
+    """Rational weights (m, n) of all control points (weights 1) at the samples, or their derivative."""
     n = len(net)
-    return DCPSurface(np.zeros((n, 3)), np.ones(n), net.knots_u, net.knots_v).basis_matrix(uv)
+    return DCPSurface(np.zeros((n, 3)), np.ones(n), net.knots_u, net.knots_v).basis_matrix(uv, derivative)
 
 
 def fairness(net: Net) -> csr_matrix:
@@ -30,21 +32,46 @@ def fairness(net: Net) -> csr_matrix:
     return (identity(len(net)) - basis(net, net.centres)).tocsr()
 
 
+@dataclass
+class System:
+    """Normal equations of a weighted least squares problem: matrix (n, n) sparse, right-hand sides (n, c)."""
+
+    matrix: csr_matrix
+    right: NDArray[np.float64]
+
+    def add(self, rows: csr_matrix, weight: NDArray[np.float64], targets: NDArray[np.float64]) -> None:
+        """Ask for rows @ x = targets, each row with its weight."""
+        weighted = rows.T.multiply(weight).tocsr()
+        self.matrix = self.matrix + weighted @ rows
+        self.right = self.right + weighted @ targets
+
+
 def solve(
-    net: Net, samples: csr_matrix, weight: NDArray[np.float64], targets: NDArray[np.float64], fair: float
+    net: Net,
+    samples: csr_matrix,
+    weight: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    fair: float,
+    slopes: tuple[Slopes, NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> NDArray[np.float64]:
     """Control point coordinates (n, c) for all targets (m, c) at once.
 
-    Minimises sum weight (B P - target)^2 + fair (m / n) |F P|^2 with F of :func:`fairness`; one factorisation
-    serves every right-hand side.
+    Minimises sum weight (B P - target)^2 + slopes + fair (m / n) |F P|^2 with F of :func:`fairness`; one
+    factorisation serves every right-hand side. ``slopes`` come with their targets (f, c) in u and in v.
     """
     from scipy.linalg import cho_factor, cho_solve
-    from scipy.sparse import diags
+    from scipy.sparse import csr_matrix, diags
 
     n = len(net)
-    weighted = samples.T @ diags(weight)
+    system = System(csr_matrix((n, n)), np.zeros((n, targets.shape[1])))
+    system.add(samples, weight, targets)
+    if slopes is not None:
+        where, *wanted = slopes
+        for axis, derivative in enumerate(((1, 0), (0, 1))):
+            rows = diags(where.span[:, axis]) @ basis(net, where.uv, derivative)
+            system.add(rows.tocsr(), where.weight, wanted[axis])
+    strength = weight.sum() / n
     f = fairness(net)
-    strength = fair * weight.sum() / n
-    normal = (weighted @ samples + strength * (f.T @ f)).toarray()
-    normal[np.diag_indices(n)] += 1e-7 * weight.sum() / n
-    return cho_solve(cho_factor(normal, check_finite=False), weighted @ targets, check_finite=False)
+    normal = (system.matrix + fair * strength * (f.T @ f)).toarray()
+    normal[np.diag_indices(n)] += 1e-7 * strength
+    return cho_solve(cho_factor(normal, check_finite=False), system.right, check_finite=False)

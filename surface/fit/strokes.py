@@ -42,8 +42,20 @@ def mirrored(mesh: FitMesh, ids: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def vertex_line(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64], *, closed: bool) -> Floats:
     """A smooth line through vertices, in (u, v)."""
+    if len(ids) > 2 and not closed:
+        return uv_of(chart, mesh, smooth_line(mesh.vertices[ids], closed=False))
     uv = np.array([chart.uv[vertex_row(chart, int(v))] for v in ids])
-    return uv if len(uv) < 3 else smooth_line(uv, closed=closed)
+    return smooth_line(uv, closed=True) if closed else uv
+
+
+def uv_of(chart: Chart, mesh: FitMesh, points: Floats) -> Floats:
+    """(m, 2) where points (m, 3) near the mesh lie in (u, v), from the samples around each."""
+    from scipy.spatial import cKDTree
+
+    samples = chart.mix @ mesh.vertices
+    distance, nearest = cKDTree(samples).query(points, k=6)
+    weight = 1.0 / (distance**2 + 0.05)
+    return (weight[..., None] * chart.uv[nearest]).sum(axis=1) / weight.sum(axis=1, keepdims=True)
 
 
 def vertex_row(chart: Chart, vertex: int) -> int:

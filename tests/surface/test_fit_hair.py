@@ -41,15 +41,18 @@ def test_lashes_are_rooted_in_the_lid_in_every_shape(skin):
     assert length.min() > 6.5 and length.max() < 9.0
 
 
+def brow_uv() -> np.ndarray:
+    u, v = np.meshgrid(np.linspace(0.55, 0.8, 20), np.linspace(0.78, 0.82, 5), indexing="ij")
+    return np.stack([u, v], axis=-1)
+
+
 def test_brows_lie_just_above_the_skin(skin):
-    line = np.column_stack([np.linspace(0.55, 0.8, 20), np.full(20, 0.8)])
-    strip = brow_strip(skin, line, (0.02, 0.02), hairs=12)
+    strip = brow_strip(skin, brow_uv(), hairs=12)
     uv = np.column_stack([0.55 + 0.25 * np.linspace(0.02, 0.98, 9), np.full(9, 0.8)])
     above = ((ends(strip, 0.5) - skin.at(uv)) * skin.normals(uv)).sum(axis=2)
     assert above.min() > 0.3 and above.max() < 1.2
 
 
 def test_combs_are_closed_lines_inside_the_strip(skin):
-    line = np.column_stack([np.linspace(0.55, 0.8, 20), np.full(20, 0.8)])
-    (loop,) = brow_strip(skin, line, (0.02, 0.02), hairs=12).loops
+    (loop,) = brow_strip(skin, brow_uv(), hairs=12).loops
     assert loop.min() >= 0 and loop.max() <= 1 and len(loop) > 40

@@ -5,7 +5,7 @@ from slit_sheet import N, slit_sheet
 
 from surface.fit.chart import make_chart
 from surface.fit.islands import find_islands
-from surface.fit.strokes import PIECES, make_paint, mirrored, smooth_line, vertex_row
+from surface.fit.strokes import PIECES, make_paint, mirrored, smooth_line, uv_of, vertex_row
 
 MESH = slit_sheet()
 CHART = make_chart(MESH, find_islands(MESH), normalise=False)
@@ -17,6 +17,11 @@ def at(i: int, j: int) -> int:
 
 def test_a_vertex_is_found_in_the_chart():
     np.testing.assert_allclose(CHART.uv[vertex_row(CHART, at(3, 5))], [3 / N, 5 / N])
+
+
+def test_points_on_the_mesh_are_found_in_uv():
+    points = 0.5 * (MESH.vertices[at(3, 5)] + MESH.vertices[at(4, 5)])
+    np.testing.assert_allclose(uv_of(CHART, MESH, points[None]), [[3.5 / N, 5 / N]], atol=0.2 / N)
 
 
 def test_the_mirror_image_of_a_vertex():
