@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 MOST_CELLS = 4_000_000
 MOST_ROOTS = 24  # along the longer side
+RIM = 64  # cells along a side where the border of what is covered is followed
 
 
 def tessellate(
@@ -122,6 +123,7 @@ class _Tests:
     def __init__(self, surface: DCPSurface, domain: Domain, lattice: Lattice, scale: tuple[float, float]) -> None:
         self.surface, self.domain, self.lattice, self.scale = surface, domain, lattice, scale
         self.rings: list[tuple[Floats, Floats]] = []
+        self.anchors: tuple[Floats, Floats] | None = None
 
     def follow_loops(self, error: float) -> None:
         """Ask for cells small enough that edges follow the loops within ``error``."""
@@ -205,7 +207,51 @@ class _Tests:
         key = self.lattice.key(x, y) * 4 + side
         unique, first, back = np.unique(key, return_index=True, return_inverse=True)
         points = self.surface.evaluate(uv.reshape(-1, 2)[first], side=unique & 3)
-        return _chord_errors(points[back.reshape(key.shape)])
+        corners = points[back.reshape(key.shape)]
+        worst = _chord_errors(corners)
+        self._add_anchors(level, cells, corners, worst)
+        held = np.isfinite(corners[:, :, 0])
+        partly = held.any(axis=1) & ~held.all(axis=1)
+        worst[partly & (self.lattice.shape[0] << level < RIM) & (self.lattice.shape[1] << level < RIM)] = np.inf
+        return worst
+
+    def _add_anchors(self, level: int, cells: Ints, p: Floats, worst: Floats) -> None:
+        """Raise ``worst`` to how far the surface is from its cell where control points stand.
+
+        So a feature between the samples of a large cell is not overlooked: where there is detail there are points.
+        """
+        if self.anchors is None:
+            self.anchors = _anchors(self.surface, self.domain)
+        uv, points = self.anchors
+        code, at = quadtree.codes(self.lattice, level, cells), self._find(level, uv)
+        order = np.argsort(code)
+        place = np.minimum(np.searchsorted(code[order], at), len(code) - 1)
+        hit = np.flatnonzero(code[order][place] == at)
+        cell = order[place[hit]]
+        rect = self._rects(level, cells[cell])
+        s = ((uv[hit, 0] - rect[:, 0]) / (rect[:, 1] - rect[:, 0]))[:, None]
+        t = ((uv[hit, 1] - rect[:, 2]) / (rect[:, 3] - rect[:, 2]))[:, None]
+        a, b, c, d = (p[cell, k] for k in (0, 2, 6, 8))
+        normal = np.cross(d - a, c - b)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        offset = points[hit] - (1 - t) * ((1 - s) * a + s * b) - t * ((1 - s) * c + s * d)
+        np.fmax.at(worst, cell, np.abs((offset * normal).sum(axis=1)))
+
+
+def _anchors(surface: DCPSurface, domain: Domain) -> tuple[Floats, Floats]:
+    """(k, 2) and (k, 3): the surface where the blending functions of its points are near their greatest."""
+    knots, degrees = surface.padded, surface.degrees
+    uv = np.zeros((surface.n, 2))
+    for k in range(2):
+        column = np.arange(knots[k].shape[1])
+        inner = (column >= 1) & (column <= degrees[k][:, None])
+        total = np.where(inner, knots[k], 0).sum(axis=1)
+        middle = (knots[k][:, 0] + knots[k][:, -1]) / 2
+        uv[:, k] = np.where(degrees[k] > 0, total / np.maximum(degrees[k], 1), middle)  # Greville abscissa
+    uv = uv[domain.inside(uv)]
+    points = surface.evaluate(uv)
+    covered = np.isfinite(points[:, 0])
+    return uv[covered], points[covered]
 
 
 def _inner_side(uv: Floats, centre: Floats, domain: Domain) -> Ints:

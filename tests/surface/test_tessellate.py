@@ -134,6 +134,23 @@ def test_uncovered_parts_are_left_out() -> None:
     assert not ((u > 0.4) & (u < 0.6)).any()
 
 
+def test_a_narrow_feature_in_a_large_flat_cell_is_found() -> None:
+    surface = shapes.hills(36)
+    points = surface.points * np.array([1, 1, 0])
+    points[np.linalg.norm(points[:, :2] - [70, 30], axis=1).argmin(), 2] = 20
+    bumped = surface.with_points(points)
+    mesh = bumped.tessellate(chord_error=0.05, roots=(1, 1))
+    top = bumped.evaluate(np.random.default_rng(0).uniform([0.6, 0.2], [0.8, 0.4], (4000, 2)))[:, 2].max()
+    assert mesh.vertices[:, 2].max() > 0.98 * top > 5
+    assert len(mesh.vertices) < 2000
+
+
+def test_the_rim_of_what_is_covered_is_followed() -> None:
+    surface = shapes.hills(12)
+    mesh = surface.tessellate(chord_error=1.0, domain=Domain((-0.07, 1.3, -0.2, 1.11)))
+    assert shapes.uv_areas(mesh).sum() > 0.9
+
+
 @pytest.mark.parametrize(
     ("limits", "name"),
     [
