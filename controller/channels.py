@@ -1,13 +1,14 @@
 """Channels: from the parameter vector to one angle per servo, as flat arrays.
 
-The chain of a channel is mix -> calibrated points -> limits; speed and acceleration are kept by
-:class:`controller.motion.MotionLimiter` at the clock of the bus.
+The chain of a channel is mix (or anchor) -> calibrated points -> limits; safety rules (:mod:`controller.safety`) and
+limits of motion (:class:`controller.motion.MotionLimiter`) follow at the clock of the bus.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,63 @@ from numpy.typing import NDArray
 from controller.motion import MotionLimiter
 from controller.parameters import Parameters
 from controller.robot import ChannelSettings
+from controller.terms import bend
 from drivers.bus import ServoSpec
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+class Anchors(Protocol):
+    """What solves the channels that say where they pull; see :mod:`controller.anchors`.
+
+    Attributes
+    ----------
+    names : the channels it solves, k of them. linear : (k, p) mm of pull per unit of each parameter, roughly.
+    """
+
+    names: tuple[str, ...]
+    linear: Floats
+
+    def pulls(self, values: Floats) -> Floats:
+        """(k,) mm of pull for parameters (p,)."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Terms of mixes that are more than a weight, ``t`` of them, those of one channel together.
+
+    Attributes
+    ----------
+    parameter, channel : (t,) where each leads from and to.
+    start : (t,) value of the first corner. knots, widths, slopes : (t, k) straight pieces.
+    first : (j,) where each channel's terms begin; target : (j,) the channels. join : (j,) 0 sum, 1 min, 2 max.
+    """
+
+    parameter: Indices
+    channel: Indices
+    start: Floats
+    knots: Floats
+    widths: Floats
+    slopes: Floats
+    first: Indices
+    target: Indices
+    join: Indices
+
+    def add_to(self, mixed: Floats, values: Floats) -> None:
+        """Add the terms for parameters (p,) to the mixes (n,), in place."""
+        x = values[self.parameter]
+        pieces = np.clip(x[:, None] - self.knots, 0.0, self.widths)
+        each = self.start + (pieces * self.slopes).sum(axis=1)
+        joins = [ufunc.reduceat(each, self.first) for ufunc in (np.add, np.minimum, np.maximum)]
+        mixed[self.target] += np.choose(self.join, joins)
+
+    def linear(self, shape: tuple[int, int]) -> Floats:
+        """(n, p) mean slope of each term."""
+        out = np.zeros(shape)
+        rise = (self.slopes * self.widths).sum(axis=1) / np.maximum(self.widths.sum(axis=1), 1e-12)
+        np.add.at(out, (self.channel, self.parameter), rise)
+        return out
 
 
 @dataclass(frozen=True)
@@ -27,13 +82,14 @@ class ChannelTable:
     Attributes
     ----------
     names : the channels, in order.
-    mix : (n, p) float64, what of each parameter reaches the channel.
+    mix : (n, p) float64, what of each parameter reaches the channel by weight alone.
     start_rad : (n,) angle of the first calibrated point.
     knots : (n, k) mix value where each straight piece begins.
     widths : (n, k) length of each piece; 0 where a channel has fewer pieces.
     slopes : (n, k) radians per unit of mix on each piece.
     low_rad, high_rad : (n,) limits.
     max_speed_rad_s, max_accel_rad_s2 : (n,) limits of the motion.
+    terms : terms that are more than a weight. anchors, anchored : what solves channels (k,) that pull at the skin.
     """
 
     names: tuple[str, ...]
@@ -46,6 +102,28 @@ class ChannelTable:
     high_rad: Floats
     max_speed_rad_s: Floats
     max_accel_rad_s2: Floats
+    terms: Terms | None = None
+    anchors: Anchors | None = None
+    anchored: Indices | None = None
+
+    @property
+    def linear(self) -> Floats:
+        """(n, p) what a unit of each parameter adds to each mix, curves by their mean slope."""
+        out = self.mix if self.terms is None else self.mix + self.terms.linear(self.mix.shape)
+        if self.anchors is None:
+            return out
+        out = out.copy()
+        out[self.anchored] = self.anchors.linear
+        return out
+
+    def mixed(self, values: Floats) -> Floats:
+        """(n,) mixes for parameters (p,); mm of pull where a channel is anchored."""
+        mixed = self.mix @ values
+        if self.terms is not None:
+            self.terms.add_to(mixed, values)
+        if self.anchors is not None:
+            mixed[self.anchored] = self.anchors.pulls(values)
+        return mixed
 
     def angles(self, values: Floats) -> tuple[Floats, int]:
         """Angles for parameters, before limits of motion.
@@ -58,7 +136,7 @@ class ChannelTable:
         -------
         (n,) float64 angles inside the limits, and how many channels the limits held back.
         """
-        mixed = self.mix @ values
+        mixed = self.mixed(values)
         pieces = np.clip(mixed[:, None] - self.knots, 0.0, self.widths)
         wanted = self.start_rad + (pieces * self.slopes).sum(axis=1)
         held = np.clip(wanted, self.low_rad, self.high_rad)
@@ -72,17 +150,27 @@ def limiter_of(table: ChannelTable, period_s: float) -> MotionLimiter:
     )
 
 
-def build_table(channels: Sequence[ChannelSettings], parameters: Parameters) -> ChannelTable:
-    """Flatten the settings of ``n`` channels into a :class:`ChannelTable`."""
+def build_table(
+    channels: Sequence[ChannelSettings], parameters: Parameters, anchors: Anchors | None = None
+) -> ChannelTable:  # fmt: skip
+    """Flatten the settings of ``n`` channels into a :class:`ChannelTable`.
+
+    Parameters
+    ----------
+    anchors : solves the channels that have an anchor; they stay at 0 mm without.
+    """
     mix = np.zeros((len(channels), len(parameters.names)))
     for row, channel in zip(mix, channels, strict=True):
-        for name, share in channel.mix.items():
-            row[parameters.index(name)] = share
-    knots, widths, slopes = _pieces(channels)
+        for name, term in channel.mix.items():
+            if term.plain and channel.join == "sum":
+                row[parameters.index(name)] = term.by
+    corners = [bend(np.array(c.map.at), np.radians(c.map.deg), c.map.curve) for c in channels]
+    start, knots, widths, slopes = _pieces(corners)
+    names = tuple(channel.name for channel in channels)
     return ChannelTable(
-        names=tuple(channel.name for channel in channels),
+        names=names,
         mix=mix,
-        start_rad=np.radians([channel.map.deg[0] + channel.trim_deg for channel in channels]),
+        start_rad=start + np.radians([channel.trim_deg for channel in channels]),
         knots=knots,
         widths=widths,
         slopes=slopes,
@@ -90,19 +178,39 @@ def build_table(channels: Sequence[ChannelSettings], parameters: Parameters) -> 
         high_rad=np.radians([channel.limit_deg[1] for channel in channels]),
         max_speed_rad_s=np.radians([channel.max_speed_deg_s for channel in channels]),
         max_accel_rad_s2=np.radians([channel.max_accel_deg_s2 for channel in channels]),
+        terms=_terms(channels, parameters),
+        anchors=anchors,
+        anchored=None if anchors is None else np.array([names.index(name) for name in anchors.names], dtype=np.intp),
     )
 
 
-def _pieces(channels: Sequence[ChannelSettings]) -> tuple[Floats, Floats, Floats]:
-    most = max(len(channel.map.at) for channel in channels) - 1
-    knots, widths, slopes = (np.zeros((len(channels), most)) for _ in range(3))
-    for i, channel in enumerate(channels):
-        at, rad = np.array(channel.map.at), np.radians(channel.map.deg)
+def _pieces(corners: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats, Floats, Floats]:
+    """First values (n,), and knots, widths and slopes (n, k) of curves given by their corners."""
+    most = max(len(at) for at, _ in corners) - 1
+    knots, widths, slopes = (np.zeros((len(corners), most)) for _ in range(3))
+    for i, (at, gives) in enumerate(corners):
         k = len(at) - 1
         knots[i, :k] = at[:-1]
         widths[i, :k] = np.diff(at)
-        slopes[i, :k] = np.diff(rad) / np.diff(at)
-    return knots, widths, slopes
+        slopes[i, :k] = np.diff(gives) / np.diff(at)
+    return np.array([gives[0] for _, gives in corners]), knots, widths, slopes
+
+
+def _terms(channels: Sequence[ChannelSettings], parameters: Parameters) -> Terms | None:
+    found = [
+        (i, parameters.index(name), term)
+        for i, channel in enumerate(channels)
+        for name, term in channel.mix.items()
+        if not (term.plain and channel.join == "sum")
+    ]
+    if not found:
+        return None
+    corners = [term.points(parameters.low[p], parameters.high[p]) for _, p, term in found]
+    channel = np.array([i for i, _, _ in found], dtype=np.intp)
+    target, first = np.unique(channel, return_index=True)
+    join = np.array([("sum", "min", "max").index(channels[i].join) for i in target], dtype=np.intp)
+    parameter = np.array([p for _, p, _ in found], dtype=np.intp)
+    return Terms(parameter, channel, *_pieces(corners), first=first, target=target, join=join)
 
 
 def play(channels: Sequence[ChannelSettings]) -> tuple[Floats, Floats]:

@@ -75,7 +75,7 @@ class Mirror:
             if len(self._solvers) > 64:
                 self._solvers.clear()
             self._solvers[key] = BoundedSolver(
-                self._table.mix,
+                self._table.linear,
                 *self._bounds,
                 weights=counted.astype(np.float64),
                 ridge=_RIDGE,

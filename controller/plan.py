@@ -28,5 +28,8 @@ def plan_rows(robot: RobotSettings, parameters: Parameters) -> list[dict[str, st
 
 
 def _mix(channel: ChannelSettings) -> str:
-    terms = [f"{share:+g} {name}" for name, share in channel.mix.items()]
-    return " ".join(terms).removeprefix("+")
+    if channel.anchor is not None:
+        point = channel.anchor.point
+        return "pulls at " + (point if isinstance(point, str) else ", ".join(f"{x:g}" for x in point))
+    words = " ".join(term.words(name) for name, term in channel.mix.items()).removeprefix("+")
+    return words if channel.join == "sum" else f"{channel.join} of {words}"

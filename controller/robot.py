@@ -14,6 +14,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from controller.config import Settings, config_error, load
 from controller.parameters import Parameters, did_you_mean
 from controller.rules import RuleSettings
+from controller.terms import Curve, Finite, Term, check_points
 
 Degrees = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -39,18 +40,38 @@ class BusSettings(Settings):
 
 
 class Calibration(Settings):
-    """Calibrated points of a channel: the mix at ``at`` gives the angle in ``deg``, straight between them."""
+    """Calibrated points of a channel: the mix at ``at`` gives the angle in ``deg``, straight or smooth between them."""
 
-    at: list[Annotated[float, Field(allow_inf_nan=False)]]
+    at: list[Finite]
     deg: list[Degrees]
+    curve: Curve = "straight"
 
     @model_validator(mode="after")
     def _pairs(self) -> Calibration:
-        if len(self.at) != len(self.deg) or len(self.at) < 2:
-            raise ValueError("at and deg need the same number of points, two or more")
-        if any(b <= a for a, b in zip(self.at, self.at[1:], strict=False)):
-            raise ValueError("at must rise from point to point")
+        check_points(self.at, self.deg, "deg")
         return self
+
+
+class AnchorSettings(Settings):
+    """Where on the skin a servo pulls; its ``map`` then gives degrees for millimetres of pull.
+
+    ``point`` is (u, v) of the part, a place [x, y, z] in mm, of which the nearest point of the skin is taken, or the
+    name of one of the robot's landmarks. Skin within ``reach_mm`` goes with it, less with distance; with ``like`` it
+    goes as that parameter moves it (a jaw on its hinge, a lid on its axle).
+    """
+
+    point: str | Annotated[list[Finite], Field(min_length=2, max_length=3)]
+    direction: tuple[Finite, Finite, Finite]
+    part: str = "face"
+    reach_mm: Positive = 15.0
+    like: str | None = None
+
+    @field_validator("direction")
+    @classmethod
+    def _is_one(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not any(value):
+            raise ValueError("a direction must not be zero")
+        return value
 
 
 class ChannelSettings(Settings):
@@ -60,7 +81,9 @@ class ChannelSettings(Settings):
     bus: str
     id: Annotated[int, Field(ge=0, le=252)]
     model: str
-    mix: dict[str, Annotated[float, Field(allow_inf_nan=False)]]
+    mix: dict[str, Term] = {}
+    join: Literal["sum", "min", "max"] = "sum"
+    anchor: AnchorSettings | None = None
     map: Calibration
     limit_deg: tuple[Degrees, Degrees]
     max_speed_deg_s: Positive
@@ -79,6 +102,12 @@ class ChannelSettings(Settings):
             raise ValueError("the lower limit must be below the upper one")
         return value
 
+    @model_validator(mode="after")
+    def _one_source(self) -> ChannelSettings:
+        if bool(self.mix) == (self.anchor is not None):
+            raise ValueError("needs either mix or anchor")
+        return self
+
 
 class RobotSettings(Settings):
     """The channels of one robot, on one or more buses."""
@@ -87,6 +116,7 @@ class RobotSettings(Settings):
     description: str = ""
     buses: list[BusSettings] = Field(min_length=1)
     channels: list[ChannelSettings] = Field(min_length=1)
+    landmarks: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=3)]] = {}
     profiles: dict[str, dict[str, Any]] = {}
     rules: RuleSettings = RuleSettings()
 
@@ -150,11 +180,15 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
     for i, channel in enumerate(robot.channels):
         if channel.bus not in buses:
             faults.append(f"channels[{i}].bus: no bus called {channel.bus!r} (buses: {', '.join(sorted(buses))})")
-        for name in channel.mix:
+        named = [(f"mix.{name}", name) for name in channel.mix]
+        if channel.anchor is not None:
+            faults += _landmark(robot, i, channel.anchor)
+            named += [("anchor.like", channel.anchor.like)] if channel.anchor.like is not None else []
+        for key, name in named:
             try:
                 parameters.index(name)
             except ParameterError as error:
-                faults.append(f"channels[{i}].mix.{name}: {error}")
+                faults.append(f"channels[{i}].{key}: {error}")
         low, high = channel.limit_deg
         faults += [
             f"channels[{i}].map.deg: {deg:g} lies outside limit_deg [{low:g}, {high:g}]"
@@ -162,6 +196,13 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
             if not low <= deg <= high
         ]
     return faults
+
+
+def _landmark(robot: RobotSettings, i: int, anchor: AnchorSettings) -> list[str]:
+    point = anchor.point
+    if not isinstance(point, str) or point in robot.landmarks:
+        return []
+    return [f"channels[{i}].anchor.point: no landmark called {point!r}{did_you_mean(point, robot.landmarks)}"]
 
 
 def _rules(robot: RobotSettings) -> list[str]:
