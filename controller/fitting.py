@@ -31,8 +31,24 @@ def fit_with_progress(mesh: Path, out: Path, name: str, console: Console) -> Non
             bar.update(task, description=f"fitting {part}", completed=done)
 
         report = fit_head(mesh, out, name=name, progress=tell)
+    shaded = _shade(out, console)
     console.print(report_table(report))
+    if not shaded:
+        console.print("no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture")
     console.print(f"wrote {out}", soft_wrap=True)
+
+
+def _shade(out: Path, console: Console) -> bool:
+    """Bake how much light reaches each vertex of the head; False without OpenGL."""
+    from surface.errors import ViewError
+    from surface.view.occlusion import shade_head
+
+    try:
+        with console.status("baking shade"):
+            shade_head(out)
+    except ViewError:
+        return False
+    return True
 
 
 def report_table(report: FitReport) -> Table:

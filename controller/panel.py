@@ -58,14 +58,16 @@ class Panel:
     def _top(self, imgui: Any) -> None:
         imgui.text(f"{imgui.get_io().framerate:.0f} frames/s")
         imgui.same_line()
-        if imgui.small_button("neutral"):
+        if imgui.small_button("release all"):
             self._held.clear()
             self._tell(Calm(_CALM_S))
         _, self._intensity = imgui.slider_float("intensity", self._intensity, 0.0, 1.0)
+        gap = imgui.get_style().item_spacing.x
+        width = (imgui.get_content_region_avail().x + gap) / _BUTTONS_A_ROW - gap
         for i, name in enumerate(self._expressions):
             if i % _BUTTONS_A_ROW:
                 imgui.same_line()
-            if imgui.button(name):
+            if imgui.button(name, imgui.ImVec2(width, 0)):
                 self._tell(Show(name, self._intensity))
 
     def _sliders(self, imgui: Any, members: NDArray[np.intp]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,10 +19,6 @@ if TYPE_CHECKING:
     from surface.head import Head
 
 _TITLE = "omote"
-
-
-class _TimeToClose(Exception):
-    """Raised inside the window's frame to end it; never leaves this module."""
 
 
 class WindowFace:
@@ -59,24 +54,22 @@ class WindowFace:
 
         def source() -> NDArray[np.float64]:
             nonlocal began
-            if not keep_going():
-                raise _TimeToClose
             values = self._values()
             now = time.monotonic_ns()
             self._log.add(values, began, now)
             began = now
             return values
 
-        with suppress(_TimeToClose):
-            run_window(
-                self._head,
-                source,
-                size=self._settings.size,
-                title=_TITLE,
-                gui=self._panel,
-                camera=getattr(Camera, self._settings.camera)(),
-                quality=self._settings.quality,
-            )
+        run_window(
+            self._head,
+            source,
+            size=self._settings.size,
+            title=_TITLE,
+            gui=self._panel,
+            keep_going=keep_going,
+            camera=getattr(Camera, self._settings.camera)(),
+            quality=self._settings.quality,
+        )
 
     def report(self) -> dict[str, object]:
         """What was drawn; see :meth:`controller.face.FrameLog.report`."""
