@@ -38,14 +38,14 @@ def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     b0, a0 = before.mean(axis=0), after.mean(axis=0)
     u, _, vt = np.linalg.svd((before - b0).T @ (after - a0))
     sign = float(np.sign(np.linalg.det(vt.T @ u.T)))
-    turn: NDArray = vt.T @ np.diag([1.0, 1.0, sign]) @ u.T
-    return np.asarray(turn, np.float64), np.asarray(a0 - turn @ b0, np.float64)
+    turn = vt.T @ np.diag([1.0, 1.0, sign]) @ u.T
+    return turn, a0 - turn @ b0
 
 
 def affine_fit(points: Floats, moves: Floats) -> Floats:
     """(3, 4) matrix with moves = points @ matrix[:, :3].T + matrix[:, 3], in least squares."""
     system = np.column_stack([points, np.ones(len(points))])
-    return np.linalg.lstsq(system, moves, rcond=None)[0].T
+    return np.linalg.lstsq(system, moves, rcond=None)[0].T.astype(np.float64)
 
 
 def jaw_share(points: Floats, opening: Floats, jaw: Jaw) -> Floats:
