@@ -106,9 +106,18 @@ def bend(at: Floats, gives: Floats, curve: Curve) -> tuple[Floats, Floats]:
 
 
 def _monotone_slopes(width: Floats, rise: Floats) -> Floats:
-    """Slopes (j,) at the points: weighted harmonic means, zero where the curve turns; flat ends stay straight."""
+    """Slopes (j,) at the points: weighted harmonic means, zero where the curve turns (Fritsch and Butland 1984)."""
     a, b = width[:-1] + 2 * width[1:], 2 * width[:-1] + width[1:]
     same = rise[:-1] * rise[1:] > 0
     inner = np.zeros(len(rise) - 1)
     inner[same] = (a + b)[same] / (a[same] / rise[:-1][same] + b[same] / rise[1:][same])
-    return np.concatenate([rise[:1], inner, rise[-1:]])
+    ends = [_end_slope(*width[:2], *rise[:2]), _end_slope(*width[:-3:-1], *rise[:-3:-1])]
+    return np.concatenate([ends[:1], inner, ends[1:]])
+
+
+def _end_slope(width: float, next_width: float, rise: float, next_rise: float) -> float:
+    """Slope at an end from the two pieces beside it, such that the curve does not overshoot."""
+    slope = ((2 * width + next_width) * rise - width * next_rise) / (width + next_width)
+    if slope * rise <= 0:
+        return 0.0
+    return slope if abs(slope) <= 3 * abs(rise) else 3 * rise
