@@ -18,9 +18,25 @@ def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:
     return sides
 
 
+def numbers(values: ArrayLike, name: str) -> Floats:
+    """A float64 copy; ``ValueError`` naming the first element that is not numbers like the one before."""
+    try:
+        return np.array(values, dtype=np.float64, order="C")
+    except (ValueError, TypeError):
+        rows = list(values)  # type: ignore[arg-type]
+    for i, row in enumerate(rows):
+        try:
+            shape = np.shape(np.asarray(row, dtype=np.float64))
+        except (ValueError, TypeError):
+            raise ValueError(f"{name}[{i}]: must be numbers, got {row!r}") from None
+        if shape != np.shape(rows[0]):
+            raise ValueError(f"{name}[{i}]: shape {shape}, expected {np.shape(rows[0])}")
+    raise ValueError(f"{name}: must be numbers")
+
+
 def check_points(points: ArrayLike, name: str = "points") -> Floats:
     """(n, 3) float64 copy; ``ValueError`` for another shape, no points, or numbers that are not finite."""
-    xyz = np.array(points, dtype=np.float64, order="C")
+    xyz = numbers(points, name)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise ValueError(f"{name}: shape {xyz.shape}, expected (n, 3)")
     if len(xyz) == 0:
@@ -34,7 +50,7 @@ def check_points(points: ArrayLike, name: str = "points") -> Floats:
 
 def check_weights(weights: ArrayLike, name: str = "weights") -> Floats:
     """(n,) float64 copy; ``ValueError`` for another shape or weights that are not positive and finite."""
-    w = np.array(weights, dtype=np.float64, order="C")
+    w = numbers(weights, name)
     if w.ndim != 1:
         raise ValueError(f"{name}: shape {w.shape}, expected (n,)")
     good = np.isfinite(w) & (w > 0)
