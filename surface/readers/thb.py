@@ -1,0 +1,198 @@
+"""Hierarchical B-splines as control points with local knots, exactly.
+
+A hierarchy is a sequence of nested tensor-product spline spaces with nested regions: region l is where level l or
+finer is wanted. A function of level l is active where its support lies in region l but not in region l + 1
+(Vuong, Giannelli, Jüttler and Simeon 2011). A truncated function (Giannelli, Jüttler and Speleers 2012) is its
+sum of finer B-splines without those that lie in the finer region, level after level. Every such sum is finite with
+positive coefficients a_k, so a control point (c, 1) over a truncated function is the control points (c, a_k)
+over plain B-splines, and these are DCPs. The truncated functions sum to 1, so Eq. (1)'s division changes nothing.
+Pieces over equal knots are joined at their weighted mean; functions that no finer region cuts stay whole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from surface.basis import Floats, Ints
+
+Pieces = dict[tuple[int, int], Floats]
+"""By function (i, j): its weight, and its position times that weight; (4,) each."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """One tensor-product basis.
+
+    Attributes
+    ----------
+    degrees : of u and v
+    knots : (nu + pu + 1,), (nv + pv + 1,) float64
+    """
+
+    degrees: tuple[int, int]
+    knots: tuple[Floats, Floats]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many functions along u and v."""
+        nu, nv = (len(t) - p - 1 for t, p in zip(self.knots, self.degrees, strict=True))
+        return nu, nv
+
+    def window(self, axis: int, index: int) -> Floats:
+        """The degree + 2 knots of a function."""
+        return self.knots[axis][index : index + self.degrees[axis] + 2]
+
+
+def halved(level: Level) -> Level:
+    """The next level of a dyadic hierarchy: one knot more in the middle of every span."""
+    parts = []
+    for t in level.knots:
+        distinct = np.unique(t)
+        parts.append(np.sort(np.concatenate([t, (distinct[1:] + distinct[:-1]) / 2])))
+    return Level(level.degrees, (parts[0], parts[1]))
+
+
+def insertion(coarse: Floats, fine: Floats, degree: int) -> Floats:
+    """Coefficients of coarse B-splines in finer ones.
+
+    Parameters
+    ----------
+    coarse, fine : knots; the fine ones hold all coarse ones
+
+    Returns
+    -------
+    (nc, nf) float64: B_i = sum over j of a_ij b_j, all a_ij >= 0 (Cohen, Lyche and Riesenfeld 1980, "Oslo")
+    """
+    nf = len(fine) - degree - 1
+    here = fine[:nf]
+    a = ((coarse[:-1, None] <= here) & (here < coarse[1:, None])).astype(np.float64)
+    for k in range(1, degree + 1):
+        x = fine[k : k + nf]
+        rise = _ratio(x - coarse[: -k - 1, None], (coarse[k:-1] - coarse[: -k - 1])[:, None])
+        fall = _ratio(coarse[k + 1 :, None] - x, (coarse[k + 1 :] - coarse[1:-k])[:, None])
+        a = rise * a[:-1] + fall * a[1:]
+    return a
+
+
+def _ratio(part: Floats, whole: Floats) -> Floats:
+    """part / whole, 0 where whole is 0."""
+    return np.where(whole > 0, part / np.where(whole > 0, whole, 1.0), 0.0)
+
+
+class Hierarchy:
+    """Nested levels, and how fine each place is.
+
+    Parameters
+    ----------
+    levels : coarse to fine
+    depth : (a, b) int, the level wanted in every cell of the finest level
+
+    Attributes
+    ----------
+    active : (n, 3) int64: level, i and j of all active functions; coarse levels first, i runs fastest
+    """
+
+    def __init__(self, levels: list[Level], depth: Ints) -> None:
+        self.levels, self.depth = levels, depth
+        self._lines = [np.unique(t) for t in levels[-1].knots]
+        self._steps = [
+            [insertion(c, f, p) for c, f, p in zip(a.knots, b.knots, a.degrees, strict=True)]
+            for a, b in pairwise(levels)
+        ]
+        self._known: dict[tuple[int, int, int], bool] = {}
+        found = [self._active(number) for number in range(len(levels))]
+        self.active = np.concatenate(found)
+
+    def _active(self, number: int) -> Ints:
+        nu, nv = self.levels[number].shape
+        rows = [(number, i, j) for j in range(nv) for i in range(nu) if self._least(number, i, j) == number]
+        return np.array(rows, dtype=np.int64).reshape(-1, 3)
+
+    def _cells(self, number: int, i: int, j: int) -> Ints:
+        """Levels wanted in the support of a function."""
+        slices = []
+        for axis, index in enumerate((i, j)):
+            window = self.levels[number].window(axis, index)
+            ends = np.searchsorted(self._lines[axis], [window[0], window[-1]])
+            slices.append(slice(int(ends[0]), int(ends[1])))
+        return self.depth[slices[0], slices[1]]
+
+    def _least(self, number: int, i: int, j: int) -> int:
+        cells = self._cells(number, i, j)
+        return int(cells.min()) if cells.size else -1
+
+    def plain(self, coefficients: Floats) -> Floats:
+        """Coefficients for the truncated basis that give what ``coefficients (n, 3)`` give for the plain one.
+
+        They are those of the sum so far in each level's own basis (Giannelli, Jüttler and Speleers 2014,
+        preservation of coefficients).
+        """
+        out = np.empty_like(coefficients)
+        total = np.zeros((*self.levels[0].shape, 3))
+        for number in range(len(self.levels)):
+            if number:
+                total = np.einsum("ia,ijk,jb->abk", self._steps[number - 1][0], total, self._steps[number - 1][1])
+            mine = self.active[:, 0] == number
+            i, j = self.active[mine, 1], self.active[mine, 2]
+            total[i, j] += coefficients[mine]
+            out[mine] = total[i, j]
+        return out
+
+    def control_points(self, coefficients: Floats) -> tuple[Floats, Floats, list[Floats], list[Floats]]:
+        """DCPs of the surface with ``coefficients (n, 3)`` over the truncated basis.
+
+        Returns
+        -------
+        points (m, 3), weights (m,), and m knot vectors for u and for v
+        """
+        pieces: Pieces = {}
+        rows: list[Floats] = []
+        knots: tuple[list[Floats], list[Floats]] = ([], [])
+        for number, level in enumerate(self.levels):
+            mine = self.active[:, 0] == number
+            for (i, j), c in zip(self.active[mine, 1:], coefficients[mine], strict=True):
+                _add(pieces, (int(i), int(j)), np.append(1.0, c))
+            finer: Pieces = {}
+            for (i, j), value in pieces.items():
+                if self._cut(number, i, j, value, finer):
+                    continue
+                rows.append(value)
+                for axis, index in enumerate((i, j)):
+                    knots[axis].append(level.window(axis, index))
+            pieces = finer
+        table = np.array(rows)
+        return table[:, 1:] / table[:, :1], table[:, 0], knots[0], knots[1]
+
+    def _cut(self, number: int, i: int, j: int, value: Floats, finer: Pieces) -> bool:
+        """Where finer functions replace part of a function, pass on what is left of it."""
+        if not self._loses(number, i, j):
+            return False
+        for a, b in self._children(number, i, j):
+            if self._least(number + 1, a, b) <= number:
+                share = self._steps[number][0][i, a] * self._steps[number][1][j, b]
+                _add(finer, (a, b), share * value)
+        return True
+
+    def _loses(self, number: int, i: int, j: int) -> bool:
+        """Does a finer region take something from a function, at the next level or at any after it?"""
+        key = number, i, j
+        if key not in self._known:
+            lost = False
+            if number + 1 < len(self.levels) and self._cells(number, i, j).max() > number:
+                children = self._children(number, i, j)
+                lost = any(self._least(number + 1, *child) > number for child in children)
+                lost = lost or any(self._loses(number + 1, *child) for child in children)
+            self._known[key] = lost
+        return self._known[key]
+
+    def _children(self, number: int, i: int, j: int) -> list[tuple[int, int]]:
+        """The next level's functions that a function is a sum of."""
+        u, v = (step[index].nonzero()[0] for step, index in zip(self._steps[number], (i, j), strict=True))
+        return [(int(a), int(b)) for a in u for b in v]
+
+
+def _add(pieces: Pieces, key: tuple[int, int], value: Floats) -> None:
+    pieces[key] = pieces[key] + value if key in pieces else value
