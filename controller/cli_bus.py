@@ -20,6 +20,9 @@ def register(app: typer.Typer) -> None:
     app.command()(scan)
     simulators = typer.Typer(no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
     simulators.command("dynamixel")(simulate_dynamixel)
+    simulators.command("feetech")(simulate_feetech)
+    simulators.command("maestro")(simulate_maestro)
+    simulators.command("ssc32")(simulate_ssc32)
     simulators.command("robot")(simulate_robot)
     simulators.command("host")(simulate_host)
     app.add_typer(simulators, name="simulate")
@@ -96,6 +99,8 @@ Faults = Annotated[
     list[str] | None, typer.Option("--fault", metavar="SPEC", help="Fault to inject, for example mute:7; repeatable.")
 ]
 
+Control = Annotated[Path | None, typer.Option("--control", help="Socket that takes faults while it runs.")]
+
 
 def simulate_dynamixel(
     ids: Annotated[str, typer.Option("--ids", help="Ids of the servos: 1-24 or 1,3,7-9.")] = "1-24",
@@ -104,14 +109,53 @@ def simulate_dynamixel(
     link: Link = None,
     wire: Wire = False,
     fault: Faults = None,
+    control: Control = None,
 ) -> None:
-    """Serve simulated Dynamixel servos (Protocol 2.0) until interrupted; prints `ready PATH`.
+    """Serve simulated Dynamixel servos until interrupted; prints `ready PATH`. AX and MX models speak Protocol 1.0.
 
     Example: omote simulate dynamixel --ids 1-24 --model xl330-m288 --link /tmp/head
     """
     from controller.simulating import SimulatedId, serve_servos
 
-    serve_servos([SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console)
+    serve_servos([SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console, control)
+
+
+def simulate_feetech(
+    ids: Annotated[str, typer.Option("--ids", help="Ids of the servos: 1-24 or 1,3,7-9.")] = "1-6",
+    model: Annotated[str, typer.Option(help="Model of the servos.")] = "sts3215",
+    baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
+    link: Link = None,
+    wire: Wire = False,
+    fault: Faults = None,
+    control: Control = None,
+) -> None:
+    """Serve simulated Feetech STS or SCS servos until interrupted; prints `ready PATH`.
+
+    Example: omote simulate feetech --ids 1-6 --model sts3215 --link /tmp/arm
+    """
+    from controller.simulating import SimulatedId, serve_servos
+
+    serve_servos([SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console, control)
+
+
+def simulate_maestro(link: Link = None, fault: Faults = None) -> None:
+    """Serve a simulated Pololu Maestro until interrupted; prints `ready PATH`.
+
+    Example: omote simulate maestro --link /tmp/maestro
+    """
+    from controller.simulating import serve_board
+
+    serve_board("maestro", link, fault or [], console)
+
+
+def simulate_ssc32(link: Link = None, fault: Faults = None) -> None:
+    """Serve a simulated Lynxmotion SSC-32 until interrupted; prints `ready PATH`.
+
+    Example: omote simulate ssc32 --link /tmp/ssc32
+    """
+    from controller.simulating import serve_board
+
+    serve_board("ssc32", link, fault or [], console)
 
 
 def simulate_robot(

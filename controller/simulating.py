@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,17 +27,47 @@ class SimulatedId:
 
 
 def serve_servos(
-    servos: list[SimulatedId], baud: int, link: Path | None, wire: bool, faults: list[str], console: Console
+    servos: list[SimulatedId],
+    baud: int,
+    link: Path | None,
+    wire: bool,
+    faults: list[str],
+    console: Console,
+    control: Path | None = None,
 ) -> None:
-    """Serve simulated Dynamixel servos; prints ``ready PATH`` and returns when interrupted."""
+    """Serve simulated servos; prints ``ready PATH`` and returns when interrupted.
+
+    Parameters
+    ----------
+    servos : ids and models; the model decides the protocol.
+    baud : rate the servos listen at.
+    link : path that becomes a link to the pseudo-terminal.
+    wire : bytes take the time they take at ``baud``.
+    faults : faults to inject, see docs/simulated-buses.md.
+    control : path of a socket that takes faults while it runs.
+    """
     from drivers.sim import serve_dynamixel
 
     def ready(path: str) -> None:
         console.print(f"ready {link or path}", soft_wrap=True)
 
     _until_stopped(
-        lambda stop: serve_dynamixel(servos, baud=baud, link=link, wire=wire, faults=faults, on_ready=ready, stop=stop)
+        lambda stop: serve_dynamixel(
+            servos, baud=baud, link=link, wire=wire, faults=faults, on_ready=ready, commands=control, stop=stop
+        )
     )
+
+
+def serve_board(board: str, link: Path | None, faults: list[str], console: Console) -> None:
+    """Serve a simulated servo board, ``maestro`` or ``ssc32``; prints ``ready PATH`` and returns when interrupted."""
+    from drivers.sim import Maestro, Ssc32, serve
+
+    made = {"maestro": Maestro, "ssc32": Ssc32}[board](now_s=time.monotonic(), faults=faults)
+
+    def ready(path: str) -> None:
+        console.print(f"ready {link or path}", soft_wrap=True)
+
+    _until_stopped(lambda stop: serve(made, link=link, on_ready=ready, stop=stop))
 
 
 def robot_servos(name: str, bus: str | None) -> tuple[list[SimulatedId], int]:

@@ -21,6 +21,9 @@ COMMANDS = [
     ("check",),
     ("bench",),
     ("simulate", "dynamixel"),
+    ("simulate", "feetech"),
+    ("simulate", "maestro"),
+    ("simulate", "ssc32"),
     ("simulate", "robot"),
     ("simulate", "host"),
 ]

@@ -42,6 +42,22 @@ def test_any_program_can_open_the_servos(tmp_path: Path) -> None:
     assert not link.exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "asked", "answer"),
+    [
+        (("feetech", "--ids", "1"), "FFFF010201FB", "FFFF010200FC"),  # ping, Protocol 1.0 framing
+        (("dynamixel", "--ids", "1", "--model", "ax-12a"), "FFFF010201FB", "FFFF010200FC"),
+        (("maestro",), "A1", "0000"),  # get errors: none
+        (("ssc32",), "510D", "2E"),  # Q: nothing moves
+    ],
+)
+def test_every_family_answers(tmp_path: Path, words: tuple[str, ...], asked: str, answer: str) -> None:
+    link = tmp_path / "port"
+    with served(*words, "--link", str(link)), serial.Serial(str(link), 1_000_000, timeout=2) as port:
+        port.write(bytes.fromhex(asked))
+        assert port.read(len(answer) // 2) == bytes.fromhex(answer)
+
+
 def test_the_host_plays_its_script_to_whoever_opens_it(tmp_path: Path) -> None:
     link = tmp_path / "robot"
     with served("host", "tour", "--link", str(link)), serial.Serial(str(link), 115_200, timeout=5) as port:
