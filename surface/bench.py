@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,14 +146,30 @@ def large_table(vertices: int = 1_000_000, seconds: float = 0.5, tell: Tell = la
     one = surface.deformation(mesh, normals=False)
     two = surface.deformation(mesh, normals=False, threads=2)
     alone, together = least(one.refresh, seconds), least(two.refresh, seconds)
-    read = least(one._lists.value.sum, seconds)
+    weights = one._lists.value
+    read, shared = least(weights.sum, seconds), _shared_read(weights, seconds)
     ideal = 4 * one._lists.value.size
+    bound = max(0.7, 1.15 * shared / read)  # where two readers gain little, two threads cannot gain more
     name = f"all positions, {len(mesh.vertices)} vertices"
     return [
         Measure(name, alone, alone / read, "one read of the weights", "<= 1.8"),
-        Measure(f"{name}, two threads", together, together / alone, "one thread", "<= 0.7"),
+        Measure(f"{name}, two threads", together, together / alone, "one thread", f"<= {bound:.2f}"),
+        Measure("one read of the weights, two threads", shared, shared / read, "one thread"),
         Measure("memory of weights and lists", 0.0, one.nbytes / ideal, "bytes of the weights alone", "<= 1.3"),
     ]
+
+
+def _shared_read(weights: np.ndarray, seconds: float) -> float:
+    """Least time of summing an array, half by half in two threads."""
+    half = len(weights) // 2
+    with ThreadPoolExecutor(1) as pool:
+
+        def call() -> None:
+            other = pool.submit(weights[half:].sum)
+            weights[:half].sum()
+            other.result()
+
+        return least(call, seconds)
 
 
 def shaker(deformation: Deformation, ids: np.ndarray) -> Callable[[], object]:

@@ -94,7 +94,7 @@ def _lattice(
         return Lattice(_divide(lines_u, (u1 - u0) / roots[0]), _divide(lines_v, (v1 - v0) / roots[1]), depth, joined)
     extent = (u1 - u0) * scale[0], (v1 - v0) * scale[1]
     least = min(float(np.diff(lines_u).min()) * scale[0], float(np.diff(lines_v).min()) * scale[1])
-    edge = max(min(*extent, 2.0 * least), max(extent) / MOST_ROOTS)
+    edge = max(min(*extent, 1.2 * least), max(extent) / MOST_ROOTS)
     edge_u = min(edge, extent[0] / 3) if joined[0] else edge  # a ring of fewer than three cells would fold flat
     edge_v = min(edge, extent[1] / 3) if joined[1] else edge
     return Lattice(_divide(lines_u, edge_u / scale[0]), _divide(lines_v, edge_v / scale[1]), depth, joined)
