@@ -87,7 +87,7 @@ def fit_mesh(mesh: FitMesh, recipe: Recipe, name: str, progress: Progress) -> tu
 def _body(mesh: FitMesh, recipe: Recipe) -> Body:
     sources = sources_of(mesh.names)
     jaw = find_jaw(mesh, sources, np.arange(*recipe.jaw_teeth), np.array(recipe.hinge or (0.0, 0.0, 0.0)))
-    return Body(sources, jaw, *_eyes(recipe), np.array(recipe.tongue))
+    return Body(sources, jaw, *_eyes(mesh, recipe), np.array(recipe.tongue))
 
 
 def _still(mesh: FitMesh) -> FitMesh:
@@ -97,9 +97,8 @@ def _still(mesh: FitMesh) -> FitMesh:
 
 def _prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
     mesh = strengthen(close_lips(mesh, recipe.lips_close), "eyeBlink", recipe.blink)
-    if recipe.lids_on is not None and recipe.eyes is not None:
-        mesh = seat_lids(mesh, recipe.lids_on, recipe.eyes, recipe.seated)
-    return mesh
+    balls = recipe.eyeballs(mesh)
+    return mesh if balls is None else seat_lids(mesh, *balls, recipe.seated)
 
 
 def _islands_of(mesh: FitMesh, recipe: Recipe) -> list[tuple[PartRecipe, list[Island]]]:
@@ -141,12 +140,13 @@ def _with_mesh(part: PartData, head: HeadData) -> PartData:
     return replace(part, mesh=pack(tessellate(part, surface), part.budget))
 
 
-def _eyes(recipe: Recipe) -> tuple[Floats, float]:
+def _eyes(mesh: FitMesh, recipe: Recipe) -> tuple[Floats, float]:
     """Centres (2, 3) and radius; a head without known eyes gets none (radius 0)."""
-    if recipe.eyes is None:
+    balls = recipe.eyeballs(mesh)
+    if balls is None:
         return np.zeros((2, 3)), 0.0
-    centre = np.array(recipe.eyes.centre)
-    return np.stack([centre, centre * [-1.0, 1.0, 1.0]]), recipe.eyes.radius
+    centre = np.array(balls[1].centre)
+    return np.stack([centre, centre * [-1.0, 1.0, 1.0]]), balls[1].radius
 
 
 def _neck(mesh: FitMesh, recipe: Recipe) -> Neck:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 TILE = 2.0  # distance between the tiles of two islands: supports of one cannot reach the next
 NARROW = 0.7  # a hole lower than this part of its width is a slit
-BORDER_WEIGHT = 4.0  # samples on a border hold the surface to its neighbour
+BORDER_WEIGHT = 8.0  # samples on a border hold the surface to its neighbour
 CLUTTER = (4.5, 7.0)  # stretch, in medians, where a fold of the mesh begins and where it is only held loosely
 CLUTTER_WEIGHT = 0.05
 SLOPE_WEIGHT = 2.0  # of a face's slope, beside a sample's position

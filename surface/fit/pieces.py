@@ -79,7 +79,7 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], bod
     skin = Skin(fitted)
     left = np.array(brow)
     brows, lashes = [], []
-    for ids, eye, is_left in zip((left, mirrored(mesh, left)), body.eyes, (True, False), strict=True):
+    for ids, eye, is_left in zip((left, mirrored(chart, mesh, left)), body.eyes, (True, False), strict=True):
         brows.append(brow_strip(skin, _brow_patch(chart, mesh, ids), hairs=40))
         rim = _rim_near(chart, mesh, eye)
         for upper in (True, False):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from surface.fit.mesh import FitMesh
 from surface.fit.refine import Wish
-from surface.fit.seat import Eyeball
+from surface.fit.seat import Eyeball, fit_sphere
 
 RECIPES = Path(__file__).parent / "recipes"
 
@@ -42,8 +42,10 @@ class Recipe:
     neck: tuple[float, float, float] | None = None
     hinge: tuple[float, float, float] | None = None
     jaw_teeth: tuple[int, int] = (0, 0)
-    lids_on: Eyeball | None = None
-    eyes: Eyeball | None = None
+    ball: tuple[int, int] | None = None
+    ball_inset: float = 0.0
+    eye_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    eye_radius: float = 0.0
     seat: list[tuple[int, int]] = field(default_factory=list)
     lips_close: float = 0.0
     blink: float = 1.0
@@ -56,6 +58,14 @@ class Recipe:
     def seated(self) -> NDArray[np.int64]:
         """Vertices that are moved with the lids."""
         return np.concatenate([np.arange(a, b) for a, b in self.seat]) if self.seat else np.zeros(0, np.int64)
+
+    def eyeballs(self, mesh: FitMesh) -> tuple[Eyeball, Eyeball] | None:
+        """The left eyeball that the lids were made on, and the one they shall lie on; None for a head without."""
+        if self.ball is None:
+            return None
+        centre, radius = fit_sphere(mesh.vertices[slice(*self.ball)])
+        x, y, z = (centre + np.array(self.eye_shift)).tolist()
+        return Eyeball(tuple(centre.tolist()), radius - self.ball_inset), Eyeball((x, y, z), self.eye_radius)
 
 
 def recipe_for(mesh: FitMesh) -> Recipe:
@@ -76,8 +86,10 @@ def _read(table: dict[str, Any]) -> Recipe:
         neck=tuple(pivots["neck"]),
         hinge=tuple(pivots["hinge"]),
         jaw_teeth=tuple(pivots["jaw_teeth"]),
-        lids_on=Eyeball(tuple(eyes["lids_on"]["centre"]), eyes["lids_on"]["radius"]),
-        eyes=Eyeball(tuple(eyes["centre"]), eyes["radius"]),
+        ball=tuple(eyes["ball"]),
+        ball_inset=eyes["inset"],
+        eye_shift=tuple(eyes["shift"]),
+        eye_radius=eyes["radius"],
         seat=[tuple(r) for r in eyes["seat"]],
         lips_close=table["lips"]["close"],
         blink=table["eyes"]["blink"],

@@ -25,6 +25,13 @@ class Eyeball:
     radius: float
 
 
+def fit_sphere(points: Floats) -> tuple[Floats, float]:
+    """Centre (3,) and radius of the sphere nearest to points (m, 3), by linear least squares."""
+    system = np.column_stack([2.0 * points, np.ones(len(points))])
+    x = np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)[0]
+    return x[:3], float(np.sqrt(x[3] + x[:3] @ x[:3]))
+
+
 def seat_lids(mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: NDArray[np.int64]) -> FitMesh:
     """Move the chosen vertices so that what touched the old eyeballs touches the new ones."""
     rest = mesh.vertices.copy()

@@ -29,15 +29,16 @@ def _layer(layer: dict[str, Any], chart: Chart, mesh: FitMesh) -> dict[str, Any]
     else:
         ids = [np.array(line) for line in layer["lines"]]
         if layer.get("mirror"):
-            ids += [mirrored(mesh, line) for line in ids]
+            ids += [mirrored(chart, mesh, line) for line in ids]
         lines = [vertex_line(chart, mesh, line, closed=layer["kind"] == "region") for line in ids]
     return out | {"lines": [np.round(line, 5).tolist() for line in lines]}
 
 
-def mirrored(mesh: FitMesh, ids: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The vertices on the other side of the face."""
+def mirrored(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The chart's vertices on the other side of the face."""
+    own = np.unique(chart.mix.indices)
     flipped = mesh.vertices[ids] * [-1.0, 1.0, 1.0]
-    return np.array([int(np.argmin(((mesh.vertices - p) ** 2).sum(axis=1))) for p in flipped])
+    return np.array([own[np.argmin(((mesh.vertices[own] - p) ** 2).sum(axis=1))] for p in flipped])
 
 
 def vertex_line(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64], *, closed: bool) -> Floats:

@@ -25,7 +25,7 @@ def test_points_on_the_mesh_are_found_in_uv():
 
 
 def test_the_mirror_image_of_a_vertex():
-    assert mirrored(MESH, np.array([at(3, 5)])).tolist() == [at(N - 3, 5)]
+    assert mirrored(CHART, MESH, np.array([at(3, 5)])).tolist() == [at(N - 3, 5)]
 
 
 def test_smooth_lines_pass_through_their_points():
