@@ -42,10 +42,10 @@ class Place:
         return SurfaceFileError(f"{place}: {why}", hint=hint or "export the file again, or take it from a copy")
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, errors: str = "strict") -> str:
     """The file as UTF-8; ``SurfaceFileError`` where it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8", errors=errors)
     except UnicodeDecodeError as error:
         raise Place(path).error(f"is not text (byte {error.start}: {error.reason})") from error
     except OSError as error:

@@ -224,7 +224,7 @@ BAD = {
     "repeated": (FLAT.replace("0.25 0.5 0.75", "0 0.5 0.75", 1), "more than 3 times"),
     "short": (FLAT.replace(OPEN, "0 0 1", 1), "holds 3 knots"),
     "degree": (FLAT.replace('degree="2"', 'degree="9"', 1), 'degree="9"'),
-    "sides": (FLAT.replace("TensorBSplineBasis2", "B", 1).replace(SIDE, "<B>").replace("</Basis>", "</B>", 1), "has 1 dir"),
+    "sides": (FLAT.replace(SIDE, "<B>").replace("</Basis>", "</B>", 1), "has 1 directions"),
     "weights": (quarter().replace("<weights>1", "<weights>-1"), r"<weights>: weights\[0\]: must be positive"),
     "box": (THB.replace(">2 2 6 6", ">2 2 6 9"), "line 11 <box>: reaches from 2 to 9"),
     "box level": (THB.replace('level="1"', 'level="99"'), 'level="99"'),
