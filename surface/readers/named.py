@@ -45,8 +45,14 @@ class Place:
 def read_text(path: Path, errors: str = "strict") -> str:
     """The file as UTF-8; ``SurfaceFileError`` where it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8", errors=errors)
+        return read_bytes(path).decode("utf-8", errors)
     except UnicodeDecodeError as error:
         raise Place(path).error(f"is not text (byte {error.start}: {error.reason})") from error
+
+
+def read_bytes(path: Path) -> bytes:
+    """The file; ``SurfaceFileError`` where it cannot be read."""
+    try:
+        return path.read_bytes()
     except OSError as error:
         raise Place(path).error(f"cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error

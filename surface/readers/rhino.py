@@ -1,0 +1,154 @@
+"""openNURBS files (``.3dm``) through the optional package rhino3dm.
+
+Read are surfaces, the faces of polysurfaces (breps), and extrusions, each as its NURBS surface. openNURBS leaves out
+the first and the last knot of every knot vector, which no point inside the domain feels; they are put back. Periodic
+directions become closed ones. rhino3dm does not give the trim curves in (u, v), so loops are made from the edges in
+space: points of each edge, brought back to (u, v), joined by straight lines that stray from the edge by less than
+1/10000 of the face's size. Curves, meshes and points are left out; subdivision surfaces are refused.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from surface.basis import Floats
+from surface.dcp import DCPSurface
+from surface.domain import Domain
+from surface.errors import SurfaceError
+from surface.nurbs import nurbs_arrays
+
+from .named import NamedSurface, Place, read_bytes
+from .trims import invert, polyline
+
+STRAY = 1e-4  # of the face's size: chords of a trim loop from the edge
+APART = 1e-3  # of the face's size: an edge from its face; modelling tolerances are smaller
+
+
+def read(path: Path) -> list[NamedSurface]:
+    """The surfaces of a file; ``SurfaceFileError`` names the object, ``SurfaceError`` says rhino3dm is missing."""
+    try:
+        rhino3dm: Any = import_module("rhino3dm")
+    except ImportError as error:
+        raise SurfaceError(f"{path}: .3dm needs the package rhino3dm", hint="pip install rhino3dm") from error
+    place = Place(path)
+    file = rhino3dm.File3dm.FromByteArray(read_bytes(path))
+    if file is None:
+        raise place.error("is no openNURBS file, or a damaged one")
+    out: list[NamedSurface] = []
+    for number, item in enumerate(file.Objects):
+        name = item.Attributes.Name or f"object {number}"
+        out += _object(place.at(f"object {number} ({item.Attributes.Id})"), rhino3dm, item.Geometry, name)
+    return out
+
+
+def _object(place: Place, rhino3dm: Any, shape: Any, name: str) -> list[NamedSurface]:
+    """The surfaces of one object; none for curves, points and meshes."""
+    if type(shape).__name__ == "SubD":
+        raise place.error("is a subdivision surface, which is no DCP surface", hint="convert it to NURBS in Rhino")
+    if isinstance(shape, rhino3dm.Extrusion):
+        shape = shape.ToBrep(True)
+    if isinstance(shape, rhino3dm.Brep):
+        faces = [_face(place.at(f"{place.where}, face {k}"), shape, shape.Faces[k]) for k in range(len(shape.Faces))]
+        single = len(faces) == 1
+        return [NamedSurface(name if single else f"{name} face {k}", *face) for k, face in enumerate(faces)]
+    if isinstance(shape, rhino3dm.Surface):
+        return [NamedSurface(name, *_nurbs(place, shape))]
+    return []
+
+
+def _nurbs(place: Place, shape: Any) -> tuple[DCPSurface, Domain | None]:
+    """A surface of openNURBS, and its domain if that is less than its points reach."""
+    if not shape.IsValid or (form := shape.ToNurbsSurface()) is None:
+        raise place.error("is not valid, or has no NURBS form", hint="repair it in Rhino: _SelBadObjects")
+    count = form.Points.CountU, form.Points.CountV
+    corners = [form.Points.GetControlPoint(i, j) for i in range(count[0]) for j in range(count[1])]
+    table = np.array([(p.X, p.Y, p.Z, p.W) for p in corners]).reshape(*count, 4)
+    if not form.IsRational:
+        table[..., 3] = 1.0
+    degrees = form.Degree(0), form.Degree(1)
+    sides = [_Side(p, knots.ToList()) for p, knots in zip(degrees, (form.KnotsU, form.KnotsV), strict=True)]
+    if not (np.isfinite(table).all() and (table[..., 3] > 0).all()):
+        raise place.error("has control points that are not finite, or weights that are not positive")
+    net, weights = table[..., :3] / table[..., 3:], table[..., 3]
+    try:
+        points, w, ku, kv = nurbs_arrays(*degrees, sides[0].full, sides[1].full, net, weights)
+        closed = [side.ends if form.IsPeriodic(axis) else None for axis, side in enumerate(sides)]
+        keep = np.ones(count, dtype=bool)
+        for axis, ends in enumerate(closed):
+            if ends is not None:  # the last points repeat the first
+                keep[(slice(None),) * axis + (slice(count[axis] - degrees[axis], None),)] = False
+        kept = keep.ravel()
+        surface = DCPSurface(points[kept], w[kept], ku[kept], kv[kept], closed_u=closed[0], closed_v=closed[1])
+    except ValueError as error:
+        raise place.error(str(error)) from error
+    rect = (*sides[0].ends, *sides[1].ends)
+    return surface, None if rect == surface.rect else Domain(rect)
+
+
+class _Side:
+    """Knots of one direction."""
+
+    def __init__(self, degree: int, knots: list[float]) -> None:
+        k = np.array(knots, dtype=np.float64)
+        self.ends = float(k[degree - 1]), float(k[len(k) - degree])
+        first = k[0] if k[0] == self.ends[0] else 2 * k[0] - k[1]
+        last = k[-1] if k[-1] == self.ends[1] else 2 * k[-1] - k[-2]
+        self.full = np.concatenate([[first], k, [last]])
+
+
+def _face(place: Place, brep: Any, face: Any) -> tuple[DCPSurface, Domain | None]:
+    """A face's surface, trimmed where the face is."""
+    surface, domain = _nurbs(place, face.UnderlyingSurface())
+    rect = domain.rect if domain is not None else surface.rect
+    size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    loops, whole = [], False
+    for k in range(len(face.Loops)):
+        loop = _loop(place.at(f"{place.where}, loop {k}"), brep, face.Loops[k], surface, size)
+        if _along_border(loop, rect):
+            whole = True
+            continue
+        if (np.abs(np.diff(loop, axis=0)) > [(rect[1] - rect[0]) / 2, (rect[3] - rect[2]) / 2]).any():
+            hint = "split the face at its seam in Rhino: _Split"
+            raise place.at(f"{place.where}, loop {k}").error(
+                "crosses the seam of its face, which is not read", hint=hint
+            )
+        loops.append(loop)
+    if not loops:
+        return surface, domain
+    u0, u1, v0, v1 = rect
+    border = [np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])] if whole else []
+    return surface, Domain(rect, [*border, *loops])
+
+
+def _loop(place: Place, brep: Any, loop: Any, surface: DCPSurface, size: float) -> Floats:
+    """(k, 2): corners of a loop in (u, v)."""
+    parts = []
+    for k in range(loop.TrimCount):
+        trim = loop.Trims[k]
+        if trim.EdgeIndex < 0:
+            continue  # a pole: no curve in space
+        edge = brep.Edges[trim.EdgeIndex]
+        ends = edge.Domain.T0, edge.Domain.T1
+        curve = polyline(lambda t, e=edge: _xyz(e.PointAt(t)), *ends, STRAY * size)  # type: ignore[misc]
+        parts.append((curve[::-1] if trim.IsReversed else curve)[:-1])
+    if not parts:
+        raise place.error("has no edge in space")
+    uv, distance = invert(surface, np.concatenate(parts))
+    if not (distance < APART * size).all():
+        raise place.error(f"strays {np.nanmax(distance):.3g} from its face", hint="repair it in Rhino: _SelBadObjects")
+    return uv
+
+
+def _xyz(point: Any) -> Floats:
+    return np.array([point.X, point.Y, point.Z])
+
+
+def _along_border(loop: Floats, rect: tuple[float, float, float, float]) -> bool:
+    """Does a loop keep to the border of the rectangle, so that it trims nothing?"""
+    near = 1e-7 * max(rect[1] - rect[0], rect[3] - rect[2])
+    gaps = [np.abs(loop[:, side // 2] - rect[side]) for side in range(4)]
+    return bool((np.min(gaps, axis=0) <= near).all())
