@@ -27,6 +27,7 @@ from controller.links import open_links
 from controller.livelink import Take, TakePlayer
 from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS, Parameters
+from controller.robot import RobotSettings
 from controller.speech import layer_of, load_take
 from controller.stage import Stage, load_stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
@@ -61,11 +62,7 @@ class Body:
         self.state.live(stage.settings.liveliness, time.monotonic_ns())
         self.player = TakePlayer(take, self.state, layer) if take is not None else None
         self.links: list[LineLink] = []
-        self.buses = [
-            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules)
-            for robot in stage.robots
-            for bus in robot.buses
-        ]
+        self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters)]
         self._mailbox = mailbox
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping = threading.Event()
@@ -73,6 +70,16 @@ class Body:
         self._error: Exception | None = None
         self._closers = ExitStack()
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
+
+    def _loops(self, robot: RobotSettings, parameters: Parameters) -> list[BusLoop]:
+        anchors = None
+        if any(channel.anchor is not None for channel in robot.channels):
+            from controller.anchors import load_anchors
+
+            anchors = load_anchors(robot, self.stage.head, parameters)
+        return [
+            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors) for bus in robot.buses
+        ]
 
     def newest(self) -> tuple[Floats, int]:
         """The newest parameters and the arrival time (monotonic ns) of the command behind them."""

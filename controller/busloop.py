@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ from drivers import open_bus
 from drivers.bus import Bus, BusState
 from drivers.errors import DriverError, PortLost
 from drivers.priority import take_priority
+
+if TYPE_CHECKING:
+    from controller.anchors import AnchorMap
 
 log = logging.getLogger(__name__)
 
@@ -47,6 +51,7 @@ class BusLoop:
     newest : gives the newest parameter vector ``(p,) float64`` and the time (monotonic ns) at which the command
         behind it arrived, 0 for none.
     rules : what no servo does, whoever asks.
+    anchors : solves the channels that pull at the skin; those of other buses may be among them.
     """
 
     def __init__(
@@ -56,9 +61,11 @@ class BusLoop:
         parameters: Parameters,
         newest: Newest,
         rules: RuleSettings = RuleSettings(),
+        anchors: AnchorMap | None = None,
     ) -> None:
         self.settings = settings
-        self.table = build_table(channels, parameters)
+        own = [channel.name for channel in channels]
+        self.table = build_table(channels, parameters, anchors.on(own) if anchors is not None else None)
         self.bus: Bus = open_bus(
             kind=settings.kind,
             port=settings.port,

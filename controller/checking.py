@@ -13,9 +13,11 @@ from controller.parameters import PARAMETERS, Parameters
 from controller.paths import find_config
 
 if TYPE_CHECKING:
+    from controller.robot import RobotSettings
     from surface.head import Head
 
 
+DEFAULT_HEAD = "ict"
 TAKE_SUFFIXES = (".csv", ".tsv", ".json", ".wav")
 
 
@@ -91,7 +93,23 @@ def _check_robot(path: Path, parameters: Parameters) -> list[str]:
     from controller.robot import load_robot
 
     robot = load_robot(path, parameters)
-    return [f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels: good"]
+    lines = [f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels: good"]
+    return lines + _what_it_cannot_show(path, robot, parameters)
+
+
+def _what_it_cannot_show(path: Path, robot: RobotSettings, parameters: Parameters) -> list[str]:
+    """For a robot with anchors: the emotions' motion by region, and how much of it is left over (rms, mm)."""
+    if all(channel.anchor is None for channel in robot.channels):
+        return []
+    from controller.anchors import load_anchors, residual_rows
+    from controller.expression import Vocabulary
+
+    anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), parameters, where=str(path))
+    vocabulary = Vocabulary.load(parameters)
+    emotions = {n: vocabulary[n].weights for n in vocabulary.names if vocabulary[n].kind == "emotion"}
+    found = residual_rows(anchors, emotions, parameters) if anchors is not None else ()
+    return [f"  {region}: emotions move it {wanted:.1f} mm, the servos stay {left:.1f} mm behind (rms)"
+            for region, wanted, left in found]  # fmt: skip
 
 
 def _check_stage(path: Path, parameters: Parameters) -> list[str]:

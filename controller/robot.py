@@ -57,7 +57,7 @@ class AnchorSettings(Settings):
 
     ``point`` is (u, v) of the part, a place [x, y, z] in mm, of which the nearest point of the skin is taken, or the
     name of one of the robot's landmarks. Skin within ``reach_mm`` goes with it, less with distance; with ``like`` it
-    goes as that parameter moves it (a jaw on its hinge, a lid on its axle).
+    goes as that parameter moves it (a jaw on its hinge, a lid on its axle). ``both`` pulls at the mirrored point too.
     """
 
     point: str | Annotated[list[Finite], Field(min_length=2, max_length=3)]
@@ -65,6 +65,7 @@ class AnchorSettings(Settings):
     part: str = "face"
     reach_mm: Positive = 15.0
     like: str | None = None
+    both: bool = False
 
     @field_validator("direction")
     @classmethod
@@ -72,6 +73,12 @@ class AnchorSettings(Settings):
         if not any(value):
             raise ValueError("a direction must not be zero")
         return value
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> AnchorSettings:
+        if self.both and self.like is not None:
+            raise ValueError("both and like do not go together")
+        return self
 
 
 class ChannelSettings(Settings):
