@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 
 DEFAULT_HEAD = "ict"
 TAKE_SUFFIXES = (".csv", ".tsv", ".json", ".wav")
+SURFACE_SUFFIXES = (".3dm", ".xml", ".tsm")
 
 
 def check_anything(name: str) -> list[str]:
-    """Check a stage, robot, head or take; returns what it is, in a line or two.
+    """Check a stage, robot, head, take or surface file; returns what it is, in a line or two.
 
     Parameters
     ----------
@@ -36,6 +37,8 @@ def check_anything(name: str) -> list[str]:
     path = _find(name)
     if path.is_dir() or path.name == "head.toml":
         return _check_head(path if path.is_dir() else path.parent)
+    if _is_surface(path):
+        return _check_surface(path)
     if path.suffix.lower() in TAKE_SUFFIXES:
         return _check_take(path)
     return _check_toml(path)
@@ -70,6 +73,22 @@ def _check_poses(head: Head, folder: Path) -> None:
         bad = [part.name for part in head.parts if not np.isfinite(part.vertices).all()]
         if bad:
             raise ConfigError(f"{folder}: {name} = 1 throws vertices of {', '.join(bad)} out of space")
+
+
+def _is_surface(path: Path) -> bool:
+    """By suffix; .json is speech, too, and says by its keys which it is."""
+    kind = path.suffix.lower()
+    if kind == ".json":
+        from surface.readers import is_plain
+
+        return is_plain(path)
+    return kind in SURFACE_SUFFIXES
+
+
+def _check_surface(path: Path) -> list[str]:
+    from surface.readers import read_surface, summary
+
+    return [f"surface {summary(item)}: good" for item in read_surface(path)]
 
 
 def _check_take(path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""``omote check``: read a configuration, a head or a take and say everything that is wrong with it."""
+"""``omote check``: read a configuration, a head, a take or a surface and say everything that is wrong with it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ def register(app: typer.Typer) -> None:
 
 
 def check(
-    file: Annotated[str, typer.Argument(help="A stage, robot, head folder or take: a path or a shipped name.")],
+    file: Annotated[
+        str, typer.Argument(help="A stage, robot, head folder, take or surface file: a path or a shipped name.")
+    ],
 ) -> None:
-    """Check a stage, a robot, a head or a take without running it; lists every fault with its place.
+    """Check a stage, a robot, a head, a take or a surface without running it; lists every fault with its place.
 
     Example: omote check configs/robots/head24.toml
     """

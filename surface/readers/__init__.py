@@ -15,10 +15,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .named import NamedSurface, Place
+from .named import NamedSurface, Place, summary
 from .plain import is_plain, write_surfaces
 
-__all__ = ["SUFFIXES", "NamedSurface", "is_plain", "read_surface", "write_surfaces"]
+__all__ = ["SUFFIXES", "NamedSurface", "is_plain", "read_surface", "summary", "write_surfaces"]
 
 SUFFIXES = (".json", ".3dm", ".xml", ".tsm")
 

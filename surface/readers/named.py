@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from surface.dcp import DCPSurface
 from surface.domain import Domain
 from surface.errors import SurfaceFileError
@@ -24,6 +26,22 @@ class NamedSurface:
     name: str
     surface: DCPSurface
     domain: Domain | None = None
+
+
+def summary(item: NamedSurface) -> str:
+    """What a surface is, in a line."""
+    surface, domain = item.surface, item.domain
+    degrees = " x ".join("/".join(map(str, np.unique(p))) for p in surface.degrees)
+    u0, u1, v0, v1 = surface.rect if domain is None else domain.rect
+    parts = [f"{surface.n} control points", f"degree {degrees}", f"u {u0:g} to {u1:g}", f"v {v0:g} to {v1:g}"]
+    parts += [f"closed in {axis}" for axis, ends in zip("uv", surface.closed, strict=True) if ends is not None]
+    if domain is not None:
+        parts += [
+            f"{len(x)} {word}{'s' * (len(x) > 1)}"
+            for word, x in (("trim loop", domain.loops), ("slit", domain.slits))
+            if len(x)
+        ]
+    return f"{item.name}: {', '.join(parts)}"
 
 
 class Place:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -121,12 +121,13 @@ def _other(out: TsmFile, line: int, kind: str, rest: list[str]) -> None:
 
 def _check(out: TsmFile, grips: int) -> None:
     """Everything that is referred to must be there."""
+    there: dict[str, Collection[int]] = {"l": out.links, "v": out.vertices, "e": out.edges}
     for link in out.links.values():
         if link.turn not in (0, 1, 2):
             raise out.error(link.line, f"turn must be 0, 1 or 2, not {link.turn}")
-        kinds = (("l", out.links), ("l", out.links), ("v", out.vertices), ("e", out.edges))
-        for number, (kind, there) in zip((link.next, link.opposite, link.vertex, link.edge), kinds, strict=True):
-            if number not in there:
+        ends = (("l", link.next), ("l", link.opposite), ("v", link.vertex), ("e", link.edge))
+        for kind, number in ends:
+            if number not in there[kind]:
                 raise out.error(link.line, f'refers to "{kind}" {number}, which the file does not have')
     _check_owners(out)
     if len(out.owners) != grips:
@@ -134,7 +135,8 @@ def _check(out: TsmFile, grips: int) -> None:
 
 
 def _check_owners(out: TsmFile) -> None:
-    wanted = [(line, vertex, []) for line, own, vertex in out.owners if own or vertex >= 0]
+    none: list[int] = []
+    wanted = [(line, vertex, none) for line, own, vertex in out.owners if own or vertex >= 0]
     wanted += [(line, vertex, grips) for line, vertex, _, grips in out.extras]
     for line, vertex, grips in wanted:
         if vertex not in out.vertices:
