@@ -94,7 +94,8 @@ def test_one_anchor_is_pulled_as_far_as_the_skin_goes(tmp_path: Path, head: Head
     for amount in (0.3, 0.8):
         moved = one.skin.displacement(one.shapes(face(mouthSmileLeft=amount)))[:, 1]
         near = np.linalg.norm(one.skin.rest - one.skin.rest[0], axis=1) < 8.0
-        assert moved[near].min() < one.pulls(face(mouthSmileLeft=amount))[0] < moved[near].max() * 1.05
+        mean = moved[near].mean()  # the field falls off with distance and across the mouth, so it takes a little more
+        assert mean < one.pulls(face(mouthSmileLeft=amount))[0] < 1.35 * mean
     assert one.pulls(face(mouthFrownLeft=1.0))[0] < -3.0
     assert one.pulls(face(mouthSmileLeft=1.0, mouthUpperUpLeft=1.0, noseSneerLeft=1.0))[0] == pytest.approx(10.0)
     angle = build_table(robot.channels, P, one).angles(face(mouthSmileLeft=0.8))[0]
