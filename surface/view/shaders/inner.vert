@@ -32,7 +32,9 @@ void main() {
     vec3 n = dot(normal, v) < 0.0 ? -normal : normal;
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
         + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
-    float reach = clamp(daylight(n) * occlusion, 0.0, 1.0);
+    // A tongue past the lips is in the open.
+    float past = dot(position - opening_centre, opening_area / (length(opening_area) + 1e-3));
+    float reach = mix(clamp(daylight(n) * occlusion, 0.0, 1.0), 1.0, smoothstep(-2.0, 6.0, past));
     // What light has bounced about the mouth is red.
     vec3 tint = mix(vec3(1.0, 0.55, 0.45), vec3(1.0), reach);
     float nh = dot(n, normalize(key_direction + v));
