@@ -317,8 +317,8 @@ def update(
         first, last = cell_start[c], cell_start[c + 1]
         finish_cell(first, last, tile_start[c], ox, oy, oz, sign, below, bend, state, vertices, normals, spare)
     apply_cells(
-        anew, 0, fresh, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope, below,
-        bend, state, kept, sign, vertices, normals, local, spare,
+        anew, np.int64(0), fresh, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope,
+        below, bend, state, kept, sign, vertices, normals, local, spare,
     )  # fmt: skip
     return total
 

@@ -102,7 +102,7 @@ def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool) -> Lists:
     ids = ids[:entries].copy()
     back = back_lists(ids, rows, len(arrays[4]))
     return Lists(
-        mesh.cell_start,
+        mesh.cell_start.copy(),  # not the read-only one: kernels are compiled for one kind of array only
         np.concatenate([[0], np.cumsum(tiles)]),
         rows,
         rows.copy(),
