@@ -1,0 +1,55 @@
+"""How long the picture's inverse takes: tracked points to parameters, and dragged points to control points.
+
+Run ``python benchmarks/dragging.py [--points N]``. Times are from one run on one machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+from rich.console import Console
+
+from controller.anchors import skin_points
+from controller.dragging import Dragger, Reshaper
+from controller.parameters import PARAMETERS as P
+from controller.paths import find_config
+from surface.head import Head
+
+FRAMES = 400
+MOVES = ("jawOpen", "mouthSmileLeft", "mouthSmileRight", "browInnerUp", "eyeBlinkLeft", "mouthPucker")
+
+
+def main() -> None:
+    """Print median and p99 of solves that follow a moving face, and of cold ones."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--points", type=int, default=68, help="points of the skin that are tracked")
+    count, console = parser.parse_args().points, Console(highlight=False)
+    head = Head.load(find_config("heads", "ict"))
+    dragger = Dragger(head, skin_points(head, "face", count, 3), P)
+    at = [head.parameters.index(name) for name in MOVES]
+    rng = np.random.default_rng(0)
+    took, missed = np.zeros(FRAMES), np.zeros(FRAMES)
+    for i in range(FRAMES):
+        shapes = np.zeros(dragger.skin.moves.shape[2])
+        shapes[at] = 0.5 + 0.5 * np.sin(i / 15 + np.arange(len(at)))
+        places = dragger.skin.rest + dragger.skin.displacement(shapes) + rng.normal(0, 0.1, dragger.skin.rest.shape)
+        began = time.perf_counter_ns()
+        values = dragger.solve(places)
+        took[i] = (time.perf_counter_ns() - began) / 1e6
+        missed[i] = np.abs(values[[P.index(name) for name in MOVES]] - shapes[at]).max()
+    median, late = np.percentile(took[5:], [50, 99])
+    console.print(f"{count} tracked points, 52 parameters: median {median:.2f} ms, p99 {late:.2f} ms (reach 2 ms)")
+    console.print(f"worst value off by {missed.max():.2f}")
+    reshaper = Reshaper(head)
+    uv = skin_points(head, "face", 5, 8)
+    began = time.perf_counter_ns()
+    shape = reshaper.solve(uv, rng.normal(0, 3, (5, 3)))
+    console.print(
+        f"5 dragged points: {len(shape.ids)} control points in {(time.perf_counter_ns() - began) / 1e6:.1f} ms"
+    )
+
+
+if __name__ == "__main__":
+    main()
