@@ -33,7 +33,7 @@ _LOOK = np.array([[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] f
 _BLINK = np.array([_AT[f"eyeBlink{s}"] for s in SIDES])
 _OPENERS = np.array([[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES])
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
-TONGUE_NEEDS = 0.25  # how far the jaw opens at least to let the whole tongue out
+TONGUE_NEEDS = 0.31  # how far the jaw opens at least to let the whole tongue out
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
 
 

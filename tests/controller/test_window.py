@@ -19,7 +19,19 @@ pytestmark = pytest.mark.skipif(
 def test_a_run_with_a_window_draws_and_reports(tmp_path: Path) -> None:
     report = tmp_path / "r.json"
     program = "from controller.cli import main; main()"
-    command = ["xvfb-run", "-a", sys.executable, "-c", program, "run", "demo", "--seconds", "3", "--report", str(report)]
+    command = [
+        "xvfb-run",
+        "-a",
+        sys.executable,
+        "-c",
+        program,
+        "run",
+        "demo",
+        "--seconds",
+        "3",
+        "--report",
+        str(report),
+    ]
     environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
     result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=90, check=False)
     assert result.returncode == 0, result.stderr

@@ -34,7 +34,7 @@ void main() {
         + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
     // A tongue past the lips is in the open.
     float past = dot(position - opening_centre, opening_area / (length(opening_area) + 1e-3));
-    float reach = mix(clamp(daylight(n) * occlusion, 0.0, 1.0), 1.0, smoothstep(-2.0, 6.0, past));
+    float reach = mix(clamp(daylight(n) * occlusion, 0.0, 1.0), 1.0, smoothstep(-8.0, 3.0, past));
     // What light has bounced about the mouth is red.
     vec3 tint = mix(vec3(1.0, 0.55, 0.45), vec3(1.0), reach);
     float nh = dot(n, normalize(key_direction + v));
