@@ -22,6 +22,7 @@ from controller.busloop import BusLoop
 from controller.clock import Clock
 from controller.commands import CommandState
 from controller.errors import OMOTE_ERRORS
+from controller.following import Puppet
 from controller.linelink import LineLink
 from controller.links import open_links
 from controller.livelink import Take, TakePlayer
@@ -46,6 +47,7 @@ class Body:
     parameters : the vocabulary.
     mailbox : where the parameters are published, one per entry of ``parameters.names``.
     take, layer : a recorded take and the layer it is played into; None for none.
+    mirror : leave the servos limp; the face shows where somebody moves them.
     """
 
     def __init__(
@@ -55,14 +57,17 @@ class Body:
         mailbox: Mailbox,
         take: Take | None = None,
         layer: str = "capture",
+        *,
+        mirror: bool = False,
     ) -> None:
         self.stage = stage
         self.state = CommandState(parameters)
         self.clock = Clock(stage.settings.control_hz)
-        self.state.live(stage.settings.liveliness, time.monotonic_ns())
+        self.state.live(0.0 if mirror else stage.settings.liveliness, time.monotonic_ns())
         self.player = TakePlayer(take, self.state, layer) if take is not None else None
         self.links: list[LineLink] = []
-        self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters)]
+        self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
+        self.puppet = self._puppet(parameters) if mirror else None
         self._mailbox = mailbox
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping = threading.Event()
@@ -71,14 +76,18 @@ class Body:
         self._closers = ExitStack()
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
 
-    def _loops(self, robot: RobotSettings, parameters: Parameters) -> list[BusLoop]:
+    def _puppet(self, parameters: Parameters) -> Puppet:
+        return Puppet([bus.table for bus in self.buses], [bus.measured for bus in self.buses], parameters)
+
+    def _loops(self, robot: RobotSettings, parameters: Parameters, limp: bool) -> list[BusLoop]:
         anchors = None
         if any(channel.anchor is not None for channel in robot.channels):
             from controller.anchors import load_anchors
 
             anchors = load_anchors(robot, self.stage.head, parameters)
         return [
-            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors) for bus in robot.buses
+            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors, limp=limp)
+            for bus in robot.buses
         ]
 
     def newest(self) -> tuple[Floats, int]:
@@ -144,6 +153,8 @@ class Body:
         for now in self.clock.run(lambda: not self._stopping.is_set()):
             if self.player is not None and self._begun.is_set():
                 self.player.tick(now)
+            if self.puppet is not None:
+                self.puppet.tick(self.state, now)
             stamp = self.state.tick(now, (now - last) / 1e9, values)
             last = now
             self._newest = (values.copy(), stamp)
@@ -198,7 +209,7 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
         path = Path(orders.take)
         body = Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path))
     else:
-        body = Body(stage, parameters, mailbox)
+        body = Body(stage, parameters, mailbox, mirror=orders.mirror)
     body.start()
     try:
         _tell(pipe, Ready())

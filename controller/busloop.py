@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from controller.channels import build_table, limiter_of, play, servo_specs
 from controller.clock import Clock, Samples
+from controller.following import Following
 from controller.parameters import Parameters
 from controller.robot import BusSettings, ChannelSettings
 from controller.rules import RuleSettings
@@ -52,6 +53,7 @@ class BusLoop:
         behind it arrived, 0 for none.
     rules : what no servo does, whoever asks.
     anchors : solves the channels that pull at the skin; those of other buses may be among them.
+    limp : switch the motors off and only read where the servos are.
     """
 
     def __init__(
@@ -62,6 +64,8 @@ class BusLoop:
         newest: Newest,
         rules: RuleSettings = RuleSettings(),
         anchors: AnchorMap | None = None,
+        *,
+        limp: bool = False,
     ) -> None:
         self.settings = settings
         own = [channel.name for channel in channels]
@@ -76,7 +80,9 @@ class BusLoop:
         )
         self.clock = Clock(settings.rate_hz)
         self.latency_ms = Samples()
+        self.following = Following(own)
         self.held = 0
+        self.limp = limp
         self.realtime = False
         self.error: Exception | None = None
         self._newest = newest
@@ -100,6 +106,8 @@ class BusLoop:
         try:
             self.bus.open()
             self.bus.start()
+            if self.limp:
+                self.bus.stop()
             self._resume()
         except BaseException:
             self.bus.close()
@@ -137,21 +145,29 @@ class BusLoop:
                     self._cycle()
                 elif now >= self._retry_ns:
                     self._reconnect(now)
-            self._come_to_rest()
+            if not self.limp:
+                self._come_to_rest()
         except Exception as error:  # noqa: BLE001  the body has to hear of it and stop the servos
             self.error = error
 
     def _cycle(self) -> None:
-        values, stamp = self._newest()
-        angles, held = self.table.angles(values)
-        self.held += held
         try:
-            self._send(angles)
-            self._note_latency(stamp)
-            self._state = self.bus.read()
+            if self.limp:
+                self._state = self.bus.read()
+            else:
+                self._drive()
         except PortLost as error:
             log.warning("%s; trying again every %g s", error, _RETRY_NS / 1e9)
             self._retry_ns = 0
+
+    def _drive(self) -> None:
+        values, stamp = self._newest()
+        angles, held = self.table.angles(values)
+        self.held += held
+        self._send(angles)
+        self._note_latency(stamp)
+        self._state = self.bus.read()
+        self.following.note(angles, self._state)
 
     def _send(self, angles: Floats) -> None:
         """One step towards ``angles`` (n,) rad, as far as the rules and the limits of motion allow."""
@@ -197,6 +213,7 @@ class BusLoop:
             "command_to_wire_ms": self.latency_ms.summary(),
             "channels_held_at_limit": self.held,
             "rules": self._guard.report(),
+            "face_difference": self.following.report(),
             "bus": self.bus.report().as_dict(),
             "fault": str(self.error) if self.error else None,
         }

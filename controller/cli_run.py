@@ -56,6 +56,9 @@ def run(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Open no port and move nothing; show what would be sent.")
     ] = False,
+    mirror: Annotated[
+        bool, typer.Option("--mirror", help="Motors off: the face follows a head that is moved by hand.")
+    ] = False,
 ) -> None:
     """Run a stage until it is stopped (Ctrl-C) or its time is up.
 
@@ -66,7 +69,7 @@ def run(
 
         show_plan(Session.load(stage).plan())
     else:
-        _run(stage, None, seconds, headless, no_face, pictures, report)
+        _run(stage, None, seconds, headless, no_face, pictures, report, mirror=mirror)
 
 
 def play(
@@ -93,11 +96,13 @@ def _run(
     no_face: bool,
     pictures: Path | None,
     report: Path | None,
+    *,
+    mirror: bool = False,
 ) -> None:
     from controller.session import Session, has_display, write_report
 
     with console.status("starting") as status:
-        session = Session.load(stage, take, status.update)
+        session = Session.load(stage, take, status.update, mirror=mirror)
         if no_face:
             measured = session.run_without_face(seconds)
         elif headless or not has_display():

@@ -49,6 +49,10 @@ def _buses(buses: list[dict[str, Any]]) -> list[tuple[str, str]]:
             (f"{name}: errors", errors),
             (f"{name}: targets held at a limit", str(bus["channels_held_at_limit"] + bus["bus"]["limits_hit"])),
         ]
+        if away := bus.get("face_difference"):
+            worst = away["worst"][0]
+            text = f"rms {away['rms_deg']:.1f} deg, most at {worst['channel']}: rms {worst['rms_deg']:.1f} deg"
+            found.append((f"{name}: measured face is away from the wanted one by", text))
         found += [(f"{name}: rule", _rule(rule)) for rule in bus.get("rules", [])]
     return found
 

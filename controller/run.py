@@ -27,9 +27,10 @@ class BodyProcess:
     stage : what to run.
     parameters : the vocabulary.
     take : a recorded take to play instead of the links.
+    mirror : leave the servos limp; the face shows where somebody moves them.
     """
 
-    def __init__(self, stage: Stage, parameters: Parameters, take: Path | None = None) -> None:
+    def __init__(self, stage: Stage, parameters: Parameters, take: Path | None = None, *, mirror: bool = False) -> None:
         from controller.body import body_main
 
         self.mailbox = Mailbox.create(len(parameters.names))
@@ -37,7 +38,7 @@ class BodyProcess:
         self.report: dict[str, object] = {}
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        orders = BodyOrders(str(stage.path), self.mailbox.path, str(take) if take else None)
+        orders = BodyOrders(str(stage.path), self.mailbox.path, str(take) if take else None, mirror)
         self._process = context.Process(target=body_main, args=(orders, theirs), name="omote body")
         self._process.start()
         theirs.close()

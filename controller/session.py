@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from controller.errors import ConfigError
 from controller.face import HeadlessFace, HeadValues, Recorder
 from controller.files import replacing
 from controller.parameters import PARAMETERS
@@ -45,21 +46,30 @@ class Session:
     stage : what to run.
     take : a recorded take to play instead of the stage's links.
     tell : hears in a few words what is being done.
+    mirror : leave the servos limp; the face shows where somebody moves them.
     """
 
-    def __init__(self, stage: Stage, take: Path | None = None, tell: Tell = lambda _: None) -> None:
+    def __init__(
+        self, stage: Stage, take: Path | None = None, tell: Tell = lambda _: None, *, mirror: bool = False
+    ) -> None:
         self.stage = stage
         self.take = take
         self.tell = tell
+        self.mirror = mirror
 
     @classmethod
-    def load(cls, stage: str, take: Path | None = None, tell: Tell = lambda _: None) -> Session:
+    def load(
+        cls, stage: str, take: Path | None = None, tell: Tell = lambda _: None, *, mirror: bool = False
+    ) -> Session:  # fmt: skip
         """Find and check a stage and, where given, a take; raises before anything is opened."""
         if take is not None:
             from controller.speech import load_take
 
             load_take(take, PARAMETERS)
-        return cls(load_stage(stage, PARAMETERS), take, tell)
+        found = load_stage(stage, PARAMETERS)
+        if mirror and not found.robots:
+            raise ConfigError(f"{found.path}: robots: a stage without a robot has nothing to mirror")
+        return cls(found, take, tell, mirror=mirror)
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display; returns the report.
@@ -103,7 +113,7 @@ class Session:
 
     def _body(self) -> BodyProcess:
         self.tell("starting")
-        return BodyProcess(self.stage, PARAMETERS, self.take)
+        return BodyProcess(self.stage, PARAMETERS, self.take, mirror=self.mirror)
 
     def _head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
         """The head and its values; the servos come up meanwhile in the body's process."""
@@ -122,7 +132,7 @@ class Session:
         return lambda: not flag.is_set() and deadline() and body.alive()
 
     def _end(self, body: BodyProcess, face: dict[str, object] | None) -> dict[str, Any]:
-        self.tell("bringing the servos to rest")
+        self.tell("stopping" if self.mirror else "bringing the servos to rest")
         body.stop()
         return {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}
 

@@ -14,11 +14,13 @@ class BodyOrders:
     stage : path of the stage's file.
     mailbox : path of the mailbox the parameters are published in.
     take : a recorded take to play instead of the links; None for none.
+    mirror : leave the servos limp; the face shows where somebody moves them.
     """
 
     stage: str
     mailbox: str
     take: str | None = None
+    mirror: bool = False
 
 
 @dataclass(frozen=True)
