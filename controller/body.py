@@ -125,7 +125,8 @@ class Body:
             when a link does not come up.
         """
         if self.player is None:
-            self.links = open_links(self.stage.settings.links, self.state, self._closers)
+            links = [link for link in self.stage.settings.links if self.puppet is None or link.port != "simulated"]
+            self.links = open_links(links, self.state, self._closers)
         self._begun.set()
 
     def check(self) -> None:

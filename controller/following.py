@@ -65,6 +65,8 @@ class Puppet:
     ) -> None:
         self._mirrors = [(Mirror(table, parameters), read) for table, read in zip(tables, measured, strict=True)]
         self._touched = [np.abs(m.linear).sum(axis=0) > 0.0 for m in tables]
+        for mirror, _ in self._mirrors:  # the solver is made ready before the clock runs
+            mirror.read(np.zeros(len(mirror.readable)))
         self._values, self._mask = parameters.neutral(), np.zeros(len(parameters), dtype=bool)
 
     def tick(self, state: CommandState, now_ns: int) -> None:
