@@ -63,7 +63,7 @@ class Body:
         self.stage = stage
         self.state = CommandState(parameters)
         self.clock = Clock(stage.settings.control_hz)
-        self.state.live(0.0 if mirror else stage.settings.liveliness, time.monotonic_ns())
+        self.state.live(0.0 if mirror else stage.settings.liveliness, 0)  # no command: it has no time of arrival
         self.player = TakePlayer(take, self.state, layer) if take is not None else None
         self.links: list[LineLink] = []
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
