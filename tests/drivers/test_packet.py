@@ -193,11 +193,7 @@ def test_unstuff_inverts_stuff_and_no_header_survives(data: bytes):
 
 
 def no_header_in(stuffed: bytes) -> bool:
-    return all(
-        stuffed[i + 3 : i + 4] == b"\xfd"
-        for i in range(len(stuffed))
-        if stuffed[i : i + 3] == b"\xff\xff\xfd"
-    )
+    return all(stuffed[i + 3 : i + 4] == b"\xfd" for i in range(len(stuffed)) if stuffed[i : i + 3] == b"\xff\xff\xfd")
 
 
 @given(PACKETS, st.randoms(use_true_random=False))
@@ -253,9 +249,7 @@ def test_impossible_heads_are_dropped_at_once(bad: str):
 
 def test_a_stuffed_header_starts_nothing():
     reader = InstructionReader()
-    assert reader.feed(raw("FF FF FD FD") + encode_instruction(3, I.PING)) == [
-        InstructionPacket(3, I.PING, b"")
-    ]
+    assert reader.feed(raw("FF FF FD FD") + encode_instruction(3, I.PING)) == [InstructionPacket(3, I.PING, b"")]
     assert reader.noise_bytes == 4
 
 

@@ -172,7 +172,7 @@ def test_lids_stay_at_the_eyeball_at_every_gaze(head, holes):
     [
         ("jawOpen", [0, -75, 104], 1, -1, 20), ("mouthSmileLeft", [25, -35, 102], 1, 1, 4),
         ("mouthFrownLeft", [25, -35, 102], 1, -1, 2.5), ("browInnerUp", [12, 59, 107], 1, 1, 3),
-        ("browDownRight", [-12, 59, 107], 1, -1, 1.5), ("cheekPuff", [45, -30, 85], 0, 1, 4),
+        ("browDownRight", [-12, 59, 107], 1, -1, 1.5), ("cheekPuff", [45, -30, 85], 2, 1, 8),
         ("mouthPucker", [0, -28, 117], 2, 1, 3), ("noseSneerLeft", [14, -3, 110], 1, 1, 2),
         ("jawForward", [0, -75, 104], 2, 1, 6), ("jawLeft", [0, -75, 104], 0, 1, 4),
         ("mouthRight", [0, -40, 114], 0, -1, 4), ("eyeWideLeft", [31, 43, 95], 1, 1, 1.5),
