@@ -26,6 +26,8 @@ from .xmltree import Element
 KINDS = ("TensorBSpline2", "TensorNurbs2", "HBSpline2", "THBSpline2")
 MOST_LEVELS = 16
 MOST_CELLS = 1 << 24
+LARGEST = 1e100  # of knots: their products stay numbers
+CLOSE = 1e-14  # of the range of the knots
 
 
 def read(path: Path) -> list[NamedSurface]:
@@ -84,12 +86,18 @@ def _knots(element: Element) -> tuple[int, Floats]:
     knots = element.numbers()
     if len(knots) < 2 * p + 2:
         raise element.place.error(f"holds {len(knots)} knots, degree {p} needs {2 * p + 2} at least")
+    if (np.abs(knots) > LARGEST).any():
+        raise element.place.error(f"holds knots beyond {LARGEST:g}")
     if (np.diff(knots) < 0).any():
         k = int(np.argmax(np.diff(knots) < 0)) + 1
         raise element.place.error(f"knots decrease at knot {k} ({knots[k]} after {knots[k - 1]})")
     if not (knots[p + 1 :] > knots[: -p - 1]).all():
         k = int(np.argmin(knots[p + 1 :] > knots[: -p - 1]))
         raise element.place.error(f"knot {knots[k]} stands more than {p + 1} times")
+    steps = np.diff(knots)
+    if (steps[steps > 0] < CLOSE * np.ptp(knots)).any():
+        k = int(np.argmax((steps > 0) & (steps < CLOSE * np.ptp(knots))))
+        raise element.place.error(f"knots {k} and {k + 1} are too close to tell apart")
     if element.attributes.get("periodic", "-1") not in ("-1", "false"):
         raise element.place.error("is periodic, which is not read", hint="unclamp it into an open knot vector")
     return p, knots
@@ -163,7 +171,7 @@ def _depth(basis: Element, boxes: list[Element], levels: list[Level]) -> Ints:
     depth = np.zeros([len(x) - 1 for x in lines], dtype=np.int64)
     for box in boxes:
         number = box.integer("level", 0, MOST_LEVELS)
-        corners = box.numbers(4).astype(np.int64)
+        corners = [int(x) for x in box.numbers(4)]
         slices = []
         for axis in range(2):
             own = np.unique(levels[number].knots[axis])

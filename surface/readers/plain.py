@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -32,6 +33,7 @@ from surface.domain import Domain, Slit
 from .named import NamedSurface, Place, read_text
 
 FORMAT, VERSION = "omote surface", 1
+LARGEST = sys.float_info.max
 
 
 def is_plain(path: Path) -> bool:
@@ -148,7 +150,7 @@ def _items(place: Place, value: Any, where: str) -> list:
 def _numbers(place: Place, value: Any, where: str, count: int | None = None) -> list[float]:
     """A list of finite numbers, ``count`` of them if given."""
     row = _items(place, value, where)
-    good = all(isinstance(x, (int, float)) and not isinstance(x, bool) and np.isfinite(x) for x in row)
+    good = all(isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) <= LARGEST for x in row)
     if not good or (count is not None and len(row) != count):
         raise place.at(where).error(f"must be {count or 'degree + 2'} finite numbers, not {value!r:.60}")
     return [float(x) for x in row]

@@ -30,9 +30,8 @@ from surface.basis import Floats
 from surface.dcp import DCPSurface
 
 from .named import NamedSurface, Place, read_text
-from .tsmfile import TsmFile, parse
+from .tsmfile import COMPASS, TsmFile, parse
 
-COMPASS = {"EAST": 0, "NORTH": 1, "WEST": 2, "SOUTH": 3}
 STEP = ((1, 0), (0, 1), (-1, 0), (0, -1))
 SIDES = (1, 2, 3, 0)  # the order of counts in "0m cg"
 HINT = "convert it to NURBS in the program that made it, and export .3dm"
@@ -125,8 +124,6 @@ class TMesh:
         first = min(file.links)
         start = file.links[first].vertex
         link, word = file.vertices[start]
-        if word not in COMPASS or link not in file.links or file.links[link].vertex != start:
-            raise file.place.error(f'"v" {start} must name a link that leaves it and a compass point')
         self._direction[link], self.uv[start] = COMPASS[word], (0.0, 0.0)
         queue = [link]
         while queue:

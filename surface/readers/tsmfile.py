@@ -12,6 +12,7 @@ from surface.errors import SurfaceFileError
 from .named import Place
 
 HEADER = "#TS0200"
+COMPASS = {"EAST": 0, "NORTH": 1, "WEST": 2, "SOUTH": 3}
 FIELDS = {"f": 2, "e": 2, "v": 2, "l": 7, "0g": 4}
 
 
@@ -92,6 +93,8 @@ def _entity(out: TsmFile, line: int, kind: str, number: int, rest: list[str]) ->
         if out.edges[number] <= 0:
             raise out.error(line, f"the knot interval must be positive, not {rest[1]}")
     elif kind == "v":
+        if rest[1] not in COMPASS:
+            raise out.error(line, f"{rest[1]!r} is no compass point ({', '.join(COMPASS)})")
         out.vertices[number] = _integers(out, line, rest[:1])[0], rest[1]
     elif kind == "0g":
         out.grips[number] = line, _floats(out, line, rest)
@@ -110,8 +113,10 @@ def _other(out: TsmFile, line: int, kind: str, rest: list[str]) -> None:
         if len(values) < 2 or values[1] != 4:
             raise out.error(line, "a vertex with extra grips must have 4 sides; star points are not read")
         counts, grips = values[2:6], values[6:]
-        if len(counts) != 4 or len(grips) != sum(
-            a + a * b for a, b in zip(counts, counts[1:] + counts[:1], strict=True)
+        if (
+            len(counts) != 4
+            or min(counts) < 0
+            or len(grips) != sum(a + a * b for a, b in zip(counts, counts[1:] + counts[:1], strict=True))
         ):
             raise out.error(line, f"lists {len(grips)} grips, which does not fit its counts {counts}")
         out.extras.append((line, values[0], counts, grips))
@@ -129,6 +134,9 @@ def _check(out: TsmFile, grips: int) -> None:
         for kind, number in ends:
             if number not in there[kind]:
                 raise out.error(link.line, f'refers to "{kind}" {number}, which the file does not have')
+    for vertex, (leaving, _) in out.vertices.items():
+        if leaving not in out.links or out.links[leaving].vertex != vertex:
+            raise out.place.error(f'"v" {vertex} names link {leaving}, which does not leave it')
     _check_owners(out)
     if len(out.owners) != grips:
         raise out.place.error(f'has {grips} grips ("0g") and {len(out.owners)} owners ("0m gv", "0m gvp")')

@@ -201,7 +201,7 @@ def test_open_ends_are_cut_off_by_the_domain(tmp_path: Path) -> None:
     assert item.domain.rect == (2, 4, 2, 4)
 
 
-THB = geometry("THBSpline2", hierarchy("THBSpline", [(1, 2, 2, 6, 6)]), np.zeros((45, 3)))
+THB = geometry("THBSpline2", hierarchy("THBSpline", [(1, 2, 2, 6, 6)]), np.zeros((40, 3)))
 SIDE = '<Basis type="BSplineBasis" index="0">'
 FLAT = geometry("TensorBSpline2", tensor(), np.zeros((36, 3)))
 BAD = {
@@ -229,7 +229,7 @@ BAD = {
     "box": (THB.replace(">2 2 6 6", ">2 2 6 9"), "line 11 <box>: reaches from 2 to 9"),
     "box level": (THB.replace('level="1"', 'level="99"'), 'level="99"'),
     "box numbers": (THB.replace(">2 2 6 6", ">2 2 6"), "<box>: holds 3 numbers, needs 4"),
-    "functions": (THB.replace(">2 2 6 6", ">2 2 7 6"), "<coefs>: holds 135 numbers"),
+    "functions": (THB.replace(">2 2 6 6", ">2 2 7 6"), "<coefs>: holds 120 numbers"),
     "level missing": (THB.replace('Basis2" >\n<Basis', 'Basis2" manualLevels="true">\n<Basis', 1), "gives 1 levels"),
 }  # fmt: skip
 
