@@ -180,12 +180,18 @@ def wav_take(path: Path, parameters: Parameters, visemes: Visemes) -> Take:
     bright = np.percentile(high, _LOUD_PERCENTILE) or 1.0
     voice = _follow(np.clip(low / loud - _GATE, 0.0, 1.0))
     hiss = _follow(np.clip(high / bright - _GATE, 0.0, 1.0)) * (1.0 - 0.7 * voice)
-    faults: list[str] = []
-    jaw = spread(parameters, "jaw", {"jawOpen": 0.55, "mouthLowerDown": 0.2, "mouthUpperUp": 0.1}, 0.0, faults)
-    lips = spread(parameters, "lips", {"mouthStretch": 0.3, "mouthLowerDown": 0.25, "jawOpen": 0.06}, 0.0, faults)
+    jaw, lips = voice_shapes(parameters)
     values = np.minimum(voice[:, None] * jaw + hiss[:, None] * lips, 1.0)
     times = np.arange(len(values)) / RATE_HZ
     return Take(path.name, times, values, (jaw + lips) > 0, parameters.low, parameters.high, visemes.through)
+
+
+def voice_shapes(parameters: Parameters) -> tuple[Floats, Floats]:
+    """(P,) each: the mouth at full voice, and at full hiss."""
+    faults: list[str] = []
+    jaw = spread(parameters, "jaw", {"jawOpen": 0.55, "mouthLowerDown": 0.2, "mouthUpperUp": 0.1}, 0.0, faults)
+    lips = spread(parameters, "lips", {"mouthStretch": 0.3, "mouthLowerDown": 0.25, "jawOpen": 0.06}, 0.0, faults)
+    return jaw, lips
 
 
 def _read_wav(path: Path) -> tuple[Floats, int]:
