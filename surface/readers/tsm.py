@@ -30,11 +30,10 @@ from surface.basis import Floats
 from surface.dcp import DCPSurface
 
 from .named import NamedSurface, Place, read_text
-from .tsmfile import COMPASS, TsmFile, parse
+from .tsmfile import COMPASS, HINT, TsmFile, parse
 
 STEP = ((1, 0), (0, 1), (-1, 0), (0, -1))
 SIDES = (1, 2, 3, 0)  # the order of counts in "0m cg"
-HINT = "convert it to NURBS in the program that made it, and export .3dm"
 NEAR = 1e-9  # of the outline's size: knot intervals are sums of decimal numbers
 
 

@@ -12,6 +12,7 @@ from surface.errors import SurfaceFileError
 from .named import Place
 
 HEADER = "#TS0200"
+HINT = "convert it to NURBS in the program that made it, and export .3dm"
 COMPASS = {"EAST": 0, "NORTH": 1, "WEST": 2, "SOUTH": 3}
 FIELDS = {"f": 2, "e": 2, "v": 2, "l": 7, "0g": 4}
 
@@ -111,7 +112,7 @@ def _other(out: TsmFile, line: int, kind: str, rest: list[str]) -> None:
     elif kind == "0m" and rest[:1] == ["cg"]:
         values = _integers(out, line, rest[1:])
         if len(values) < 2 or values[1] != 4:
-            raise out.error(line, "a vertex with extra grips must have 4 sides; star points are not read")
+            raise out.error(line, "a vertex with extra grips must have 4 sides; star points are not read", HINT)
         counts, grips = values[2:6], values[6:]
         if (
             len(counts) != 4
@@ -150,7 +151,7 @@ def _check_owners(out: TsmFile) -> None:
         if vertex not in out.vertices:
             raise out.error(line, f'refers to "v" {vertex}, which the file does not have')
         if -1 in grips:
-            raise out.error(line, "leaves grips out (-1), as at star points and holes; these are not read")
+            raise out.error(line, "leaves grips out (-1), as at star points and holes; these are not read", HINT)
         if any(grip not in out.grips for grip in grips):
             raise out.error(line, f'refers to a "0g" that the file does not have: {grips}')
 
