@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -20,6 +21,7 @@ class Subject(StrEnum):
 
     head = "head"
     surface = "surface"
+    quadtree = "quadtree"
 
 
 def register(app: typer.Typer) -> None:
@@ -28,22 +30,32 @@ def register(app: typer.Typer) -> None:
 
 
 def bench(
-    what: Annotated[Subject, typer.Argument(help="A head's own engine, or the engine at its limit.")] = Subject.head,
+    what: Annotated[Subject, typer.Argument(help="A head, the engine at its limit, or quad trees.")] = Subject.head,
     head: Annotated[str, typer.Option(help="Head: a name from configs/heads or a folder.")] = "ict",
     seconds: Annotated[float, typer.Option(help="Time for each measurement.", min=0.01)] = 0.3,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture of the meshes (quadtree only).")] = None,
 ) -> None:
     """Measure full evaluation and incremental updates on this machine, and peers in the same run.
 
     Example: omote bench surface
     """
-    from controller.benching import bench_head, bench_surface
+    from controller.benching import bench_head, bench_quadtree, bench_surface
 
     with console.status("measuring") as status:
 
         def tell(text: str) -> None:
             status.update(f"measuring {text}")
 
-        tables = bench_head(head, seconds, tell) if what is Subject.head else bench_surface(seconds, tell)
+        if what is Subject.head:
+            tables = bench_head(head, seconds, tell)
+        elif what is Subject.surface:
+            tables = bench_surface(seconds, tell)
+        else:
+            tables, variants = bench_quadtree(head, tell)
+            if out is not None:
+                from surface.comparison import draw
+
+                draw(variants, out)
     for title, rows in tables:
         console.print(measure_table(title, rows))
 
