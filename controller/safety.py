@@ -51,6 +51,8 @@ class Window:
 
     def narrow(self, at: Indices, sign: Floats, bound: Floats, where: Flags) -> None:
         """Keep servos ``at`` : (k,) on the near side of ``bound`` : (k,), seen along ``sign`` : (k,) +1 or -1."""
+        if not where.any():
+            return
         up, down = where & (sign > 0), where & (sign < 0)
         np.minimum.at(self.high, at[up], bound[up])
         np.maximum.at(self.low, at[down], bound[down])
@@ -71,6 +73,8 @@ class Tally:
 
     def note(self, acting: Flags, dt: float) -> None:
         """Count what acts now."""
+        if not (acting.any() or self.acting.any()):
+            return
         self.times += acting & ~self.acting
         self.seconds += acting * dt
         np.copyto(self.acting, acting)
@@ -150,7 +154,8 @@ class Timing:
         self._phase = np.where(idle, np.where(self._spent > self._hold, 0.0, -1.0), self._phase + now.dt)
         self._phase[self._phase >= self._until[:, 2]] = -1.0
         acting = self._phase >= 0
-        window.narrow(self._ends.at, self._ends.sign, self._ends.at_share(self._level()), acting)
+        if acting.any():
+            window.narrow(self._ends.at, self._ends.sign, self._ends.at_share(self._level()), acting)
         self.tally.note(acting, now.dt)
 
     def _level(self) -> Floats:
@@ -184,6 +189,8 @@ class Load:
         if now.state is not None:
             self._measure(now, now.state)
         acting = self._push != 0.0
+        if not (acting.any() or self.tally.acting.any()):
+            return
         window.narrow(self._at, self._push, self._from - self._push * self._given, acting)
         self.tally.note(acting, now.dt)
 
