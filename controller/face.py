@@ -200,10 +200,9 @@ class HeadlessFace:
             self._log.add(values, now, time.monotonic_ns())
 
     def _draw(self, values: Floats, time_s: float) -> None:
+        self._screen.draw(values, self._camera)
         if self._recorder is not None and self._recorder.wants(time_s):
-            self._recorder.keep(self._screen.render(values, self._camera), time_s)
-        else:
-            self._screen.draw(values, self._camera)
+            self._recorder.keep(self._screen.read(), time_s)
 
     def close(self) -> None:
         """Give the graphics memory back."""
