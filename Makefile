@@ -48,7 +48,7 @@ endif
 
 # Drawing without a display needs EGL and, without a graphics processor, Mesa's software renderer (Linux).
 OPENGL_PROBE := $(PY) -c 'import moderngl; moderngl.create_context(standalone=True, backend="egl", require=310)'
-OPENGL_INSTALL := apt-get install -y --no-install-recommends libegl1 libgl1-mesa-dri
+OPENGL_INSTALL := apt-get install -y --no-install-recommends libegl1 libgl1 libgl1-mesa-dri
 
 $(VENV)/.opengl: $(VENV)/.installed
 	@if [ "$$(uname)" = Linux ] && ! $(OPENGL_PROBE) >/dev/null 2>&1; then \

@@ -29,6 +29,7 @@ from controller.livelink import Take, TakePlayer
 from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS, Parameters
 from controller.robot import RobotSettings
+from controller.signals import ENDINGS, let_interrupts_through
 from controller.speech import layer_of, load_take
 from controller.stage import Stage, load_stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
@@ -117,7 +118,7 @@ class Body:
             raise
 
     def begin(self) -> None:
-        """Open the links, or start the take.
+        """Let the servos follow; open the links, or start the take.
 
         Raises
         ------
@@ -127,6 +128,8 @@ class Body:
         if self.player is None:
             links = [link for link in self.stage.settings.links if self.puppet is None or link.port != "simulated"]
             self.links = open_links(links, self.state, self._closers)
+        for bus in self.buses:
+            bus.begin()
         self._begun.set()
 
     def check(self) -> None:
@@ -191,7 +194,9 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
     """
     stop = threading.Event()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
-    signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    let_interrupts_through()
+    for ending in ENDINGS:
+        signal.signal(ending, lambda *_: stop.set())
     try:
         _serve(orders, pipe, stop)
     except OMOTE_ERRORS as error:

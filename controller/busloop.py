@@ -25,7 +25,7 @@ from controller.rules import RuleSettings
 from controller.safety import Guard
 from drivers import open_bus
 from drivers.bus import Bus, BusState
-from drivers.errors import DriverError, PortLost
+from drivers.errors import DriverError, NoReply, PortLost
 from drivers.priority import take_priority
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ Floats = NDArray[np.float64]
 Newest = Callable[[], tuple[Floats, int]]
 
 _RETRY_NS = 1_000_000_000
+_READS = 10
 _REST_LIMIT_NS = 2_000_000_000
 _AT_REST_RAD = 0.02
 
@@ -93,6 +94,8 @@ class BusLoop:
         self._retry_ns: int | None = None
         self._state: BusState | None = None
         self._stopping = threading.Event()
+        self._begun = threading.Event()
+        self._last_reason = ""
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
@@ -115,14 +118,17 @@ class BusLoop:
         self._thread = threading.Thread(target=self._run, name=f"bus {self.settings.name}", daemon=True)
         self._thread.start()
 
+    def begin(self) -> None:
+        """Follow the parameters from now on; until then the servos are held where they stood."""
+        self._begun.set()
+
     def stop(self) -> None:
         """Stop driving, switch torque off on every reachable servo and close the port."""
         self._stopping.set()
         if self._thread is not None:
             self._thread.join()
         try:
-            with suppress(PortLost):
-                self.bus.stop()
+            self.bus.stop()
         finally:
             self.bus.close()
 
@@ -132,10 +138,27 @@ class BusLoop:
 
     def _resume(self) -> None:
         """Begin from where the servos are, so that the first goals are a ramp from there."""
-        state = self._state = self.bus.read()
-        known = np.isfinite(state.position_rad)
-        self._sent[known] = np.clip(state.position_rad, self.table.low_rad, self.table.high_rad)[known]
+        state = self._all_fresh()
+        self._sent[:] = np.clip(state.position_rad, self.table.low_rad, self.table.high_rad)
         self._limiter.reset(self._sent)
+
+    def _all_fresh(self) -> BusState:
+        """A measurement in which every servo answered.
+
+        Raises
+        ------
+        NoReply
+            when some keep silent: a pose that was missed or is old is none to begin from.
+        """
+        for _ in range(_READS):
+            state = self._state = self.bus.read()
+            if state.fresh.all():
+                return state
+        names = [name for name, fresh in zip(self.table.names, state.fresh, strict=True) if not fresh]
+        raise NoReply(
+            f"bus {self.settings.name}: where {', '.join(names)} stands is not known, for no answer came",
+            hint="look at its cable, then start again",
+        )
 
     def _run(self) -> None:
         self.realtime = take_priority()
@@ -161,6 +184,10 @@ class BusLoop:
             self._retry_ns = 0
 
     def _drive(self) -> None:
+        if not self._begun.is_set():
+            self.bus.write(self._sent)
+            self._state = self.bus.read()
+            return
         values, stamp = self._newest()
         angles, held = self.table.angles(values)
         self.held += held
@@ -183,8 +210,9 @@ class BusLoop:
         with suppress(DriverError):  # a bus that does not work is stopped as it is
             for now in Clock(self.settings.rate_hz).run(lambda: self._retry_ns is None):
                 self._send(rest)
-                away = np.abs(self.bus.read().position_rad - rest)
-                if now > end_ns or np.nanmax(away, initial=0.0) < _AT_REST_RAD:
+                state = self._state = self.bus.read()
+                away = np.where(state.fresh, np.abs(state.position_rad - rest), np.inf)
+                if now > end_ns or away.max() < _AT_REST_RAD:
                     return
 
     def _reconnect(self, now: int) -> None:
@@ -192,7 +220,10 @@ class BusLoop:
         try:
             self.bus.reconnect()
             self._resume()
-        except DriverError:
+        except DriverError as error:
+            if str(error) != self._last_reason:
+                self._last_reason = str(error)
+                log.warning("bus %s is not back: %s", self.settings.name, error)
             self._retry_ns = now + _RETRY_NS
         else:
             log.warning("bus %s is back", self.settings.name)

@@ -25,6 +25,7 @@ from controller.lineprotocol import MAX_REPLY, LineDecoder, LineError, Reply, fo
 from controller.parameters import Parameters, standard
 from controller.paths import find_config
 from controller.script import Script, Wave
+from controller.signals import ENDINGS
 
 _ANSWER_LIMIT_S = 1.0
 _HELLO_EVERY_S = 0.1
@@ -177,7 +178,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--script", default="tour", help="a path, or a name in configs/scripts")
     parser.add_argument("--link", type=Path, default=None, help="make this path a link to the port")
     options = parser.parse_args(arguments)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the end of stdin ends this
+    for ending in (signal.SIGINT, *ENDINGS):  # they reach the whole group; the end of stdin ends this
+        signal.signal(ending, signal.SIG_IGN)
     try:
         parameters = standard()
         script = load_script(options.script, parameters)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Protocol
@@ -13,6 +14,7 @@ from controller.commands import CommandSink
 from controller.errors import LinkError
 from controller.linelink import LineLink
 
+_START_LIMIT_S = 20.0
 _END_LIMIT_S = 3.0
 
 
@@ -72,7 +74,10 @@ class HostProcess:
         command = [sys.executable, "-m", "controller.host", "--script", script]
         self.counts: dict[str, object] = {}
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        patience = threading.Timer(_START_LIMIT_S, self._process.kill)
+        patience.start()
         word, _, rest = self._line().partition(" ")
+        patience.cancel()
         if word != "ready":
             self.stop()
             raise _failure(word, rest, script)

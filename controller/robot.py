@@ -36,6 +36,10 @@ class BusSettings(Settings):
     def _needs_port(self) -> BusSettings:
         if self.kind != "simulated" and not self.port:
             raise ValueError("port is needed for a real bus; omote ports lists them")
+        if self.kind == "simulated" and self.port:
+            raise ValueError('port is for a real bus: set kind = "dynamixel", or leave the port out')
+        if 0 < self.watchdog_ms < 2000 / self.rate_hz:
+            raise ValueError(f"watchdog_ms must be 0 or span two cycles, {2000 / self.rate_hz:g} at this rate_hz")
         return self
 
 
@@ -179,11 +183,27 @@ def _doubled(robot: RobotSettings) -> list[str]:
     return faults
 
 
+def _models(robot: RobotSettings) -> list[str]:
+    """Servo models the drivers have no table of."""
+    from drivers.dynamixel.tables import load_table, model_number
+    from drivers.errors import DriverError
+
+    faults = []
+    for i, channel in enumerate(robot.channels):
+        try:
+            load_table(model_number(channel.model))
+        except DriverError as error:
+            faults.append(f"channels[{i}].model: {error}" + (f" ({error.hint})" if error.hint else ""))
+    return faults
+
+
 def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
     from controller.errors import ParameterError
 
     buses = {bus.name for bus in robot.buses}
-    faults = []
+    used = {channel.bus for channel in robot.channels}
+    faults = [f"buses[{i}]: no channel is on {b.name!r}" for i, b in enumerate(robot.buses) if b.name not in used]
+    faults += _models(robot)
     for i, channel in enumerate(robot.channels):
         if channel.bus not in buses:
             faults.append(f"channels[{i}].bus: no bus called {channel.bus!r} (buses: {', '.join(sorted(buses))})")

@@ -12,11 +12,13 @@ from types import TracebackType
 from controller.errors import ControllerError
 from controller.mailbox import Mailbox
 from controller.parameters import Parameters
+from controller.signals import interrupts_held
 from controller.stage import Stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show, Stop
 
 _START_TIMEOUT_S = 60.0
 _STOP_TIMEOUT_S = 30.0
+_TERMINATE_TIMEOUT_S = 5.0
 
 
 class BodyProcess:
@@ -40,7 +42,8 @@ class BodyProcess:
         self._pipe, theirs = context.Pipe()
         orders = BodyOrders(str(stage.path), self.mailbox.path, str(take) if take else None, mirror)
         self._process = context.Process(target=body_main, args=(orders, theirs), name="omote body")
-        self._process.start()
+        with interrupts_held():
+            self._process.start()
         theirs.close()
 
     def wait_ready(self) -> Ready:
@@ -121,7 +124,10 @@ class BodyProcess:
         self._process.join(_STOP_TIMEOUT_S)
         if self._process.is_alive():
             self._process.terminate()
-            self._process.join(5.0)
+            self._process.join(_TERMINATE_TIMEOUT_S)
+        if self._process.is_alive():  # its servos are left to their bus watchdog, which is better than a hang
+            self._process.kill()
+            self._process.join()
 
     def __enter__(self) -> BodyProcess:
         return self

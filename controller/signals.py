@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM as a flag, so that every way out is the ordinary one."""
+"""SIGINT, SIGTERM and SIGHUP as a flag, so that every way out is the ordinary one."""
 
 from __future__ import annotations
 
@@ -7,12 +7,34 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+ENDINGS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Signals that ask a process to end: from a service manager, and from a terminal that was closed."""
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Keep SIGINT waiting, also for a process started meanwhile, which lets it through when it is ready."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def let_interrupts_through() -> None:
+    """End what :func:`interrupts_held` left a new process with."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
 
 @contextmanager
 def stop_flag() -> Iterator[threading.Event]:
-    """An event that SIGINT or SIGTERM sets; a second SIGINT interrupts at once. Main thread only."""
+    """An event that SIGINT or any of :data:`ENDINGS` sets; a second SIGINT interrupts at once. Main thread only."""
     flag = threading.Event()
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *ENDINGS)}
 
     def note(number: int, _frame: object) -> None:
         if flag.is_set() and number == signal.SIGINT:

@@ -217,10 +217,22 @@ class DynamixelBus(Bus):
         if not self._running:
             return
         self._running = False
-        if self._lost:  # the adapter may be back; if it is not, this says so
-            self.reconnect()
+        if self._lost:  # the adapter may be back
+            self._reconnect_to_stop()
         with self._losing():
             startup.switch_off(self._registers, self.ids)
+
+    def _reconnect_to_stop(self) -> None:
+        """Take the port again; without it nothing can be said of the servos, and that is what a user must hear."""
+        try:
+            self.reconnect()
+        except DriverError as error:
+            raise PortLost(
+                f"servos not confirmed off, for their port is gone: {error}",
+                hint="switch the servos' power off",
+                port=self.path,
+                servo_ids=self.ids,
+            ) from error
 
     def _tables(self, tables: list) -> None:
         self._registers.tables = dict(zip(self.ids, tables, strict=True))
@@ -305,6 +317,7 @@ class DynamixelBus(Bus):
                 raise
             except BusError as error:
                 log.warning("watchdog not cleared yet: %s", error)
+                self._telemetry.retry_tripped(servo)  # its register may read 0 now: it would never be seen again
                 continue
             self._hold(self.ids.index(servo), goal)
 

@@ -94,7 +94,7 @@ def identify(registers: Registers, servos: Sequence[ServoSpec]) -> None:
             registers.tables[servo.id] = load_table(number, firmware)
             continue
         message = f"servo {registers.label(servo.id)} is {model_name(number)}, configured is {servo.model}"
-        hint = "correct the configuration, or the servo's id with `omote set-id`"
+        hint = "correct the configuration, or the servo's id with `omote scan PORT`"
         wrong[servo.id] = WrongModel(message, hint=hint, port=registers.port.port_name, servo_ids=(servo.id,))
     if wrong:
         raise together(wrong)

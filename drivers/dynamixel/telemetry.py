@@ -110,6 +110,8 @@ class Telemetry:
             )
             for places in members.values()
         ]
+        self._ticks[:] = np.nan  # the servos may have been moved since
+        self._seen_s[:] = -np.inf
         self._missed.clear()
         self._silent.clear()
         self._tripped.clear()
@@ -128,6 +130,10 @@ class Telemetry:
         """Servos whose watchdog was found tripped since the last call."""
         found, self._tripped = sorted(self._tripped), set()
         return found
+
+    def retry_tripped(self, servo: int) -> None:
+        """Hand a servo out once more at the next :meth:`take_tripped`."""
+        self._tripped.add(servo)
 
     def send_goals(self, ticks: Ticks) -> None:
         """One sync write per group. ``(n,)`` steps."""

@@ -44,8 +44,10 @@ def build(settings: dict[str, Any]) -> PtyServer:
 
 
 def main() -> int:
-    """Serve until standard input ends. An interrupt of the terminal is the parent's business."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Serve until standard input ends. Signals to the whole group are the parent's business."""
+    for ending in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, ending):
+            signal.signal(getattr(signal, ending), signal.SIG_IGN)
     take_priority()  # a real servo is not kept waiting by a program that draws
     first = _first_line(sys.stdin.fileno())
     if not first:

@@ -19,7 +19,7 @@ from surface.view.theme import Theme
 if TYPE_CHECKING:
     import moderngl
 
-NO_OPENGL_HINT = "apt-get install libegl1 libgl1-mesa-dri"
+NO_OPENGL_HINT = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 
 
 def open_context() -> moderngl.Context:

@@ -85,6 +85,10 @@ def test_neutral_is_inside_the_travel(root: Path) -> None:
         ("max_speed_deg_s = 300", "max_speed_deg_s = nan", "channels[0].max_speed_deg_s"),
         ("max_speed_deg_s", "max_sped_deg_s", "unknown key, did you mean 'max_speed_deg_s'?"),
         ('kind = "simulated"', 'kind = "dynamixel"', "buses[0]: port is needed for a real bus"),
+        ('kind = "simulated"', 'kind = "simulated"\nport = "/dev/x"', "buses[0]: port is for a real bus"),
+        ('kind = "simulated"', 'kind = "simulated"\nrate_hz = 5', "buses[0]: watchdog_ms must be 0 or span"),
+        ("xl330-m288", "xl999", "channels[0].model: "),
+        ("[[channels]]", '[[buses]]\nname = "c"\nkind = "simulated"\n[[channels]]', "buses[1]: no channel is on 'c'"),
     ],
 )
 def test_a_fault_is_named_with_its_key(tmp_path: Path, old: str, new: str, fault: str) -> None:

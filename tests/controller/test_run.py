@@ -61,6 +61,7 @@ def test_the_panel_moves_servos_and_they_are_limp_afterwards(stage: Stage, servo
     jaw = PARAMETERS.index("jawOpen")
     with BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
+        body.begin()
         assert powered(servos) == list(range(1, 25))
         rest = servos.servo(JAW_ID).position_ticks
         body.tell(Hold(jaw, 1.0))

@@ -9,7 +9,7 @@ import pytest
 from controller.signals import stop_flag
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_sets_the_flag(number: signal.Signals) -> None:
     before = signal.getsignal(number)
     with stop_flag() as flag:

@@ -95,8 +95,10 @@ def test_stop_while_unplugged_names_everybody(wire: SimulatedBus, bus: Bus) -> N
     wire.fault("unplug")
     with pytest.raises(PortLost):
         bus.read()
-    with pytest.raises(PortMissing):
+    with pytest.raises(PortLost, match="not confirmed off") as caught:
         bus.stop()
+    assert caught.value.servo_ids == bus.ids
+    assert "power off" in caught.value.hint
     assert not bus.running
     wire.clear("unplug")
 
