@@ -80,9 +80,10 @@ class BodyProcess:
         with suppress(OSError):  # a body that is gone is told by alive()
             self._pipe.send(wish)
 
-    def terminate(self) -> None:
-        """Send the body SIGTERM: it stops its servos by itself and ends."""
-        self._process.terminate()
+    @property
+    def pid(self) -> int:
+        """The body's process; SIGTERM and SIGHUP let it stop its servos by itself."""
+        return self._process.pid or 0
 
     def kill(self) -> None:
         """Send the body SIGKILL: the servos are left to their bus watchdog."""

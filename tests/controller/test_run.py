@@ -85,6 +85,19 @@ def test_the_panel_moves_servos_and_they_are_limp_afterwards(stage: Stage, servo
     assert bus["ticks"] > 10
 
 
+def test_servos_stand_still_until_commands_may_come(stage: Stage, servos: SimulatedBus) -> None:
+    places = [2048 + 10 * i for i in range(1, 25)]
+    for i, place in enumerate(places, 1):
+        servos.servo(i).place(place)
+    with BodyProcess(stage, PARAMETERS) as body:
+        body.wait_ready()
+        body.tell(Hold(PARAMETERS.index("jawOpen"), 1.0))
+        assert until(lambda: newest(body, "jawOpen") > 0.999)
+        assert [servos.servo(i).position_ticks for i in range(1, 25)] == pytest.approx(places, abs=2)
+        body.begin()
+        assert until(lambda: servos.servo(JAW_ID).position_ticks > places[JAW_ID - 1] + 200)
+
+
 def test_an_error_on_the_way_out_of_main_still_stops_the_servos(stage: Stage, servos: SimulatedBus) -> None:
     with pytest.raises(RuntimeError, match="mine"), BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
@@ -92,10 +105,13 @@ def test_an_error_on_the_way_out_of_main_still_stops_the_servos(stage: Stage, se
     assert powered(servos) == []
 
 
-def test_a_body_that_is_terminated_stops_the_servos_first(stage: Stage, servos: SimulatedBus) -> None:
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGHUP])
+def test_a_body_that_is_told_to_end_stops_the_servos_first(
+    stage: Stage, servos: SimulatedBus, ending: signal.Signals
+) -> None:
     with BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
-        body.terminate()
+        os.kill(body.pid, ending)
         assert until(lambda: powered(servos) == [])
 
 
