@@ -95,11 +95,12 @@ def _middle_square(picture: Image) -> Image:
 
 def _shrink(picture: Image, step: int) -> Image:
     """Mean of ``step`` x ``step`` pixels."""
-    if step == 1:
-        return picture.copy()
     h, w = picture.shape[0] // step * step, picture.shape[1] // step * step
-    blocks = picture[:h, :w].reshape(h // step, step, w // step, step, 3)
-    return blocks.mean(axis=(1, 3)).astype(np.uint8)
+    total = np.zeros((h // step, w // step, 3), dtype=np.uint16)
+    for row in range(step):
+        for column in range(step):
+            total += picture[row:h:step, column:w:step]
+    return (total // (step * step)).astype(np.uint8)
 
 
 class FrameLog:
