@@ -27,7 +27,7 @@ def as_image(pixels: np.ndarray) -> Image:
     try:
         from PIL import Image as pillow
     except ImportError as error:
-        raise ViewError(f"image files need Pillow ({error})", hint="pip install 'omote[view]'") from error
+        raise ViewError(f"image files need Pillow ({error})", hint="pip install '.[view]' in the checkout") from error
     return pillow.fromarray(np.ascontiguousarray(pixels))
 
 

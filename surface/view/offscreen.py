@@ -32,7 +32,7 @@ def open_context() -> moderngl.Context:
     try:
         import moderngl
     except ImportError as error:
-        raise ViewError(f"pictures need moderngl ({error})", hint="pip install 'omote[view]'") from error
+        raise ViewError(f"pictures need moderngl ({error})", hint="pip install '.[view]' in the checkout") from error
     reasons = []
     for settings in ({"backend": "egl"}, {}):
         try:
