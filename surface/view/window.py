@@ -115,7 +115,9 @@ def _imgui() -> Any:
     try:
         from imgui_bundle import hello_imgui
     except ImportError as error:
-        raise ViewError(f"the window needs imgui-bundle ({error})", hint="pip install '.[view]' in the checkout") from error
+        raise ViewError(
+            f"the window needs imgui-bundle ({error})", hint="pip install '.[view]' in the checkout"
+        ) from error
     return hello_imgui
 
 

@@ -52,4 +52,4 @@ def test_without_pillow_the_message_says_what_to_install(monkeypatch: pytest.Mon
     monkeypatch.setitem(sys.modules, "PIL", None)
     with pytest.raises(ViewError, match="Pillow") as caught:
         as_image(np.zeros((2, 2, 3), np.uint8))
-    assert "omote[view]" in caught.value.hint
+    assert ".[view]" in caught.value.hint

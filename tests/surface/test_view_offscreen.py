@@ -92,4 +92,4 @@ def test_without_moderngl_the_message_says_what_to_install(monkeypatch: pytest.M
     monkeypatch.setitem(sys.modules, "moderngl", None)
     with pytest.raises(ViewError, match="moderngl") as caught:
         open_context()
-    assert "omote[view]" in caught.value.hint
+    assert ".[view]" in caught.value.hint
