@@ -8,17 +8,13 @@ on again behind the user's back.
 
 from __future__ import annotations
 
-import copy
 import logging
 import time
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from drivers.bus import Bus, BusReport, BusState, Floats, ServoInfo, ServoSpec, frozen
+from drivers.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec
 from drivers.dynamixel import startup
 from drivers.dynamixel.layout import Scale
 from drivers.dynamixel.port import Port
@@ -28,15 +24,12 @@ from drivers.dynamixel.startup import Policy
 from drivers.dynamixel.tables import load_table, model_name, model_number
 from drivers.dynamixel.telemetry import Telemetry
 from drivers.errors import BusError, DriverError, PortLost
-from drivers.guard import SpeedGuard
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from drivers.wirebus import WireBus
 
 log = logging.getLogger(__name__)
 
 
-class DynamixelBus(Bus):
+class DynamixelBus(WireBus):
     """Dynamixel servos on one serial port. See :class:`~drivers.bus.Bus` for the contract.
 
     Parameters
@@ -72,22 +65,14 @@ class DynamixelBus(Bus):
         clock: Callable[[], float] = time.monotonic,
         **policy: object,
     ) -> None:
-        super().__init__(servos)
+        super().__init__(servos, clock=clock)
         if faults and type(self) is DynamixelBus:
             raise DriverError("faults can only be given to a simulated bus", hint='set kind = "simulated"')
         self.policy = Policy(**policy)  # type: ignore[arg-type]
-        self._clock = clock
         self._port = Port(port, baud, margin_s)
         self._registers = Registers(Packets(), self._port, self.servos)
         self._tables([load_table(model_number(servo.model)) for servo in self.servos])
-        self._report = BusReport()
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, fast, slow_group)
-        self._guard = SpeedGuard(np.array([servo.max_speed_rad_s for servo in self.servos]))
-        self._low = np.array([servo.min_rad for servo in self.servos])
-        self._high = np.array([servo.max_rad for servo in self.servos])
-        self._target: Floats = np.zeros(len(self.servos))
-        self._running = False
-        self._lost = False
         self._heard_s = 0.0
 
     # ------------------------------------------------------------------ the port
@@ -98,57 +83,15 @@ class DynamixelBus(Bus):
         return bool(self._port.is_open)
 
     @property
-    def running(self) -> bool:
-        """True between ``start`` and ``stop``."""
-        return self._running
-
-    @property
     def path(self) -> str:
         """Device path in use."""
         return self._port.link.path
 
-    def open(self) -> None:
-        """Take the port; see :meth:`drivers.bus.Bus.open`."""
+    def _open_link(self) -> None:
         self._port.openPort()
-        self._lost = False
 
-    def reconnect(self) -> None:
-        """Take the port again and, if the bus was running, start from where the servos are now.
-
-        When that fails the bus counts as lost still, so that no goal goes out; call again later.
-        """
+    def _close_link(self) -> None:
         self._port.closePort()
-        self.open()
-        if not self._running:
-            return
-        try:
-            self._start()
-        except BaseException:
-            self._lost = True
-            self._port.closePort()
-            raise
-
-    def _release(self) -> None:
-        self._port.closePort()
-
-    @contextmanager
-    def _losing(self) -> Iterator[None]:
-        """Close the port and count once when it goes away."""
-        if self._lost or not self.is_open:
-            raise PortLost(
-                f"port {self.path} is {'lost' if self._lost else 'not open'}",
-                hint="plug it in again and call reconnect()" if self._lost else "call open()",
-                port=self.path,
-                servo_ids=self.ids,
-            )
-        try:
-            yield
-        except PortLost:
-            self._lost = True
-            self._port.closePort()
-            self._report.count("port_lost")
-            log.error("port %s went away", self.path)
-            raise
 
     # ------------------------------------------------------------------ looking, starting, stopping
 
@@ -176,25 +119,19 @@ class DynamixelBus(Bus):
             return info
         return ServoInfo(*info_head(info), volts / 10.0, float(temperature), hardware, bool(torque))
 
-    def start(self) -> None:
-        """Check every servo and switch it on where it stands; see :meth:`drivers.bus.Bus.start`."""
-        if not self._running:
-            self._start()
-
-    def _start(self) -> None:
-        with self._losing():
-            self._port.suspects.clear()
-            startup.identify(self._registers, self.servos)
-            self._tables([self._registers.tables[servo] for servo in self.ids])
-            self._telemetry.rebuild()
-            started = startup.bring_up(self._registers, self.servos, self.policy)
-            self._report.eeprom_writes += started.eeprom
-            for index, servo in enumerate(self.ids):
-                if servo in started.limits:
-                    self.scale.narrow(index, *started.limits[servo])
-            self._begin_at(np.array([started.ticks[servo] for servo in self.ids]))
-            self._telemetry.started(self.ids)
-            self._running = True
+    def _bring_up(self) -> Floats:
+        self._port.suspects.clear()
+        startup.identify(self._registers, self.servos)
+        self._tables([self._registers.tables[servo] for servo in self.ids])
+        self._telemetry.rebuild()
+        started = startup.bring_up(self._registers, self.servos, self.policy)
+        self._report.eeprom_writes += started.eeprom
+        for index, servo in enumerate(self.ids):
+            if servo in started.limits:
+                self.scale.narrow(index, *started.limits[servo])
+        self._telemetry.started(self.ids)
+        self._heard_s = self._clock()
+        return self.scale.radians(np.array([started.ticks[servo] for servo in self.ids]))
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that let go or were rebooted, where they stand; ``ids`` None means all of them.
@@ -212,82 +149,28 @@ class DynamixelBus(Bus):
                 self._hold(self.ids.index(servo), ticks)
             self._telemetry.started(list(started.ticks))
 
-    def stop(self) -> None:
-        """Torque off for every reachable servo; see :meth:`drivers.bus.Bus.stop`."""
-        if not self._running:
-            return
-        self._running = False
-        if self._lost:  # the adapter may be back
-            self._reconnect_to_stop()
-        with self._losing():
-            startup.switch_off(self._registers, self.ids)
-
-    def _reconnect_to_stop(self) -> None:
-        """Take the port again; without it nothing can be said of the servos, and that is what a user must hear."""
-        try:
-            self.reconnect()
-        except DriverError as error:
-            raise PortLost(
-                f"servos not confirmed off, for their port is gone: {error}",
-                hint="switch the servos' power off",
-                port=self.path,
-                servo_ids=self.ids,
-            ) from error
+    def _switch_off(self) -> None:
+        startup.switch_off(self._registers, self.ids)
 
     def _tables(self, tables: list) -> None:
         self._registers.tables = dict(zip(self.ids, tables, strict=True))
         self.scale = Scale(self.servos, tables)
 
-    def _begin_at(self, ticks: np.ndarray) -> None:
-        position = self.scale.radians(ticks)
-        self._target = position
-        self._heard_s = self._clock()
-        self._guard.reset(position, self._heard_s)
-
     def _hold(self, index: int, ticks: int) -> None:
         """One servo begins again from a position."""
         full = np.zeros(len(self.ids))
         full[index] = ticks
-        position = float(self.scale.radians(full)[index])
-        self._target[index] = position
-        self._guard.reset_one(index, position)
+        self._limits.begin_one(index, float(self.scale.radians(full)[index]))
 
     # ------------------------------------------------------------------ every cycle
 
-    def write(self, angle_rad: ArrayLike) -> Floats:
-        """One sync write of all goals; see :meth:`drivers.bus.Bus.write`.
+    def _send(self, angle_rad: Floats) -> Floats:
+        """One sync write of all goals, inside the servos' own limits too."""
+        ticks = np.minimum(np.maximum(self.scale.ticks(angle_rad), self.scale.low), self.scale.high)
+        self._telemetry.send_goals(ticks)
+        return self.scale.radians(ticks)
 
-        Raises
-        ------
-        ValueError : not n angles.
-        BusError : the bus was not started.
-        """
-        wanted = np.asarray(angle_rad, dtype=np.float64)
-        if wanted.shape != self._target.shape:
-            raise ValueError(f"angle_rad: shape {wanted.shape}, expected {self._target.shape}")
-        if not self._running:
-            raise BusError(f"the bus on {self.path} is not started", hint="call start()", port=self.path)
-        with self._losing():
-            now = self._clock()
-            self._after_a_pause(now)
-            ticks = self._limited(wanted, now)
-            self._telemetry.send_goals(ticks)
-            self._report.writes += 1
-            return frozen(self.scale.radians(ticks))
-
-    def _limited(self, wanted: Floats, now: float) -> np.ndarray:
-        """Goals in steps: angle limits, then top speed, then the servos' own limits."""
-        known = np.isfinite(wanted)
-        self._report.refused_targets += int(np.count_nonzero(~known))
-        target = np.where(known, wanted, self._target)
-        clipped = np.minimum(np.maximum(target, self._low), self._high)
-        self._report.limits_hit += int(np.count_nonzero(clipped != target))
-        self._target = clipped
-        allowed = self._guard.step(clipped, now)
-        self._report.speed_limited += int(np.count_nonzero(np.abs(allowed - clipped) > 1e-9))
-        return np.minimum(np.maximum(self.scale.ticks(allowed), self.scale.low), self.scale.high)
-
-    def _after_a_pause(self, now: float) -> None:
+    def _settle(self, now: float) -> None:
         """Look at all watchdogs when the caller was away for so long that they may have tripped."""
         pause, self._heard_s = now - self._heard_s, now
         limit = self.policy.watchdog_ms / 1000.0
@@ -295,15 +178,12 @@ class DynamixelBus(Bus):
             self._telemetry.ask_watchdogs()
             self._clear_watchdogs()
 
-    def read(self) -> BusState:
-        """One sync read of all servos and one slow value of some; see :meth:`drivers.bus.Bus.read`."""
-        with self._losing():
-            self._after_a_pause(self._clock())
-            self._telemetry.cycle(self._clock, self._running)
-            if self._running:
-                self._clear_watchdogs()
-            self._report.cycles += 1
-            return self._telemetry.state(self.scale, self._clock())
+    def _ask(self) -> BusState:
+        """One sync read of all servos and one slow value of some."""
+        self._telemetry.cycle(self._clock, self._running)
+        if self._running:
+            self._clear_watchdogs()
+        return self._telemetry.state(self.scale, self._clock())
 
     def _clear_watchdogs(self) -> None:
         """Clear tripped watchdogs with the goal where the servo stands, so that nothing jumps."""
@@ -325,7 +205,7 @@ class DynamixelBus(Bus):
         """A copy of the counters."""
         self._report.stray = self._port.stray
         self._report.silent = self._telemetry.silent_ids()
-        return copy.deepcopy(self._report)
+        return super().report()
 
 
 def info_head(info: ServoInfo) -> tuple[int, int, str, int]:

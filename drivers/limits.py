@@ -1,0 +1,63 @@
+"""What may be asked of servos: finite, inside the angle limits, and no faster than they can follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drivers.bus import BusReport, Floats, ServoSpec
+from drivers.guard import SpeedGuard
+
+
+class TargetLimits:
+    """Carries targets through the limits of their servos and counts what it changed.
+
+    Parameters
+    ----------
+    servos : n of them, in the order of all arrays.
+    report : where it counts.
+
+    Attributes
+    ----------
+    target : (n,) what was last asked for, inside the angle limits.
+    """
+
+    def __init__(self, servos: Sequence[ServoSpec], report: BusReport) -> None:
+        self.target: Floats = np.zeros(len(servos))
+        self._low = np.array([servo.min_rad for servo in servos])
+        self._high = np.array([servo.max_rad for servo in servos])
+        self._guard = SpeedGuard(np.array([servo.max_speed_rad_s for servo in servos]))
+        self._report = report
+
+    def begin(self, position_rad: Floats, now_s: float) -> None:
+        """Begin from where the servos (n,) are."""
+        self.target = np.array(position_rad, dtype=np.float64)
+        self._guard.reset(self.target, now_s)
+
+    def begin_one(self, index: int, position_rad: float) -> None:
+        """One servo begins again from a position."""
+        self.target[index] = position_rad
+        self._guard.reset_one(index, position_rad)
+
+    def apply(self, wanted_rad: Floats, now_s: float) -> Floats:
+        """What may be asked for now.
+
+        Parameters
+        ----------
+        wanted_rad : (n,) targets; one that is no finite number keeps the last one.
+        now_s : monotonic time.
+
+        Returns
+        -------
+        (n,) float64 : inside the angle limits, and no further from the last call's than top speed allows.
+        """
+        known = np.isfinite(wanted_rad)
+        self._report.refused_targets += int(np.count_nonzero(~known))
+        target = np.where(known, wanted_rad, self.target)
+        clipped = np.minimum(np.maximum(target, self._low), self._high)
+        self._report.limits_hit += int(np.count_nonzero(clipped != target))
+        self.target = clipped
+        allowed = self._guard.step(clipped, now_s)
+        self._report.speed_limited += int(np.count_nonzero(np.abs(allowed - clipped) > 1e-9))
+        return allowed
