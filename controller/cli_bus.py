@@ -55,19 +55,30 @@ def scan(
     baud: Annotated[
         list[int] | None, typer.Option("--baud", help="Baud rate to try; may be repeated. All without it.")
     ] = None,
+    protocol: Annotated[
+        list[int] | None,
+        typer.Option("--protocol", min=1, max=2, help="2 (Dynamixel X, XL-320) or 1 (AX, MX, Feetech). Both without."),
+    ] = None,
 ) -> None:
-    """Look for Dynamixel servos on a port; nothing moves.
+    """Look for Dynamixel and Feetech servos on a port, at all rates and in both protocols; nothing moves.
 
     Example: omote scan /dev/ttyUSB0 --baud 1000000
     """
-    from controller.scanning import scan_port
+    from rich.progress import Progress
 
-    table = Table("baud", "id", "model", "firmware", "voltage", "temperature", "error")
-    with console.status("scanning") as status:
-        rows = list(scan_port(port, baud, lambda text: status.update(f"scanning {text}")))
-    for row in rows:
-        table.add_row(*row)
-    if rows:
+    from controller.scanning import STEPS, plan_scan, scan_port
+
+    plan = plan_scan(baud, protocol or (2, 1))
+    table = Table("baud", "protocol", "id", "model", "firmware", "voltage", "temperature", "error", "torque")
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task(f"scanning {port}", total=len(plan) * STEPS)
+
+        def tell(text: str, step: int) -> None:
+            progress.update(task, description=text, completed=step)
+
+        for found in scan_port(port, plan, tell):
+            table.add_row(*found.row)
+    if table.row_count:
         console.print(table)
     else:
         console.print(f"No servo answered on {port}. Check its power, the wiring and the adapter's direction switch.")

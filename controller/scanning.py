@@ -1,48 +1,103 @@
-"""Looking for servos on a port at every rate they may listen at; nothing moves."""
+"""Looking for servos on a port, at every rate and in both protocols they may speak; nothing moves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 from drivers.bus import ServoInfo, ServoSpec
 
-BAUDS = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600)
-"""Rates of the Dynamixel baud register, the usual ones first."""
+BAUDS = {
+    2: (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600),
+    1: (1_000_000, 500_000, 57_600, 115_200, 250_000, 128_000, 76_800, 38_400, 400_000, 200_000, 19_200, 9_600),
+}
+"""Rates by protocol, the usual ones first: Dynamixel's baud register, and those of AX, MX and Feetech."""
+
+STEPS = 254
+"""Progress steps of one rate and protocol."""
 
 # A bus is made for servos; looking around uses none of this one's settings.
 _ANY = ServoSpec(0, "any", "xl330-m288", -1.0, 1.0, 1.0, 1.0)
 
 
-def scan_port(port: str, bauds: Sequence[int] | None, tell: Callable[[str], None]) -> Iterator[tuple[str, ...]]:
-    """Rows of what answers: baud, id, model, firmware, voltage, temperature, hardware error.
+@dataclass(frozen=True)
+class Found:
+    """What answered at a rate in a protocol: a servo, or None for bytes that are no answer."""
+
+    baud: int
+    protocol: int
+    servo: ServoInfo | None
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """Rate, protocol, id, model, firmware, voltage, temperature, error, torque, as words."""
+        head = (str(self.baud), f"{self.protocol}.0")
+        info = self.servo
+        if info is None:
+            return (*head, "?", "answers are damaged: two servos with one id, or noise", "", "", "", "", "")
+        return (
+            *head,
+            str(info.id),
+            info.model or f"number {info.model_number}",
+            str(info.firmware),
+            "" if info.voltage_v is None else f"{info.voltage_v:.1f} V",
+            "" if info.temperature_c is None else f"{info.temperature_c:.0f} C",
+            "" if not info.hardware_error else f"0x{info.hardware_error:02x}",
+            "" if info.torque is None else "on" if info.torque else "off",
+        )
+
+
+def plan_scan(bauds: Sequence[int] | None, protocols: Sequence[int]) -> list[tuple[int, int]]:
+    """(protocol, rate) in the order in which they are tried; ``bauds`` None tries :data:`BAUDS`."""
+    return [(protocol, baud) for protocol in protocols for baud in bauds or BAUDS[protocol]]
+
+
+def scan_port(
+    port: str, plan: Sequence[tuple[int, int]], tell: Callable[[str, int], None] = lambda text, step: None
+) -> Iterator[Found]:
+    """What answers on a port.
 
     Parameters
     ----------
     port : device path.
-    bauds : rates to try; None tries :data:`BAUDS`.
-    tell : called with the rate being tried.
+    plan : what to try, see :func:`plan_scan`.
+    tell : called with what is being tried and how far it is, in :data:`STEPS` for each entry of the plan.
 
     Raises
     ------
     PortError
-        when the port cannot be opened.
+        when the port cannot be opened or goes away.
     """
+    for done, (protocol, baud) in enumerate(plan):
+        text = f"{baud} baud, Protocol {protocol}.0"
+
+        def step(servo: int, text: str = text, done: int = done) -> None:
+            tell(text, done * STEPS + servo)
+
+        step(0)
+        yield from (_protocol_1 if protocol == 1 else _protocol_2)(port, baud, step)
+    tell("done", len(plan) * STEPS)
+
+
+def _protocol_2(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
     from drivers import open_bus
 
-    for baud in bauds or BAUDS:
-        tell(f"{port} at {baud} baud")
-        with open_bus("dynamixel", [_ANY], port=port, baud=baud) as bus:
-            for info in bus.discover():
-                yield _row(baud, info)
+    with open_bus("dynamixel", [_ANY], port=port, baud=baud) as bus:
+        for info in bus.discover():
+            yield Found(baud, 2, info)
 
 
-def _row(baud: int, info: ServoInfo) -> tuple[str, ...]:
-    return (
-        str(baud),
-        str(info.id),
-        info.model or f"number {info.model_number}",
-        str(info.firmware),
-        "" if info.voltage_v is None else f"{info.voltage_v:.1f} V",
-        "" if info.temperature_c is None else f"{info.temperature_c:.0f} C",
-        "" if not info.hardware_error else f"0x{info.hardware_error:02x}",
-    )
+def _protocol_1(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
+    from drivers.probe1 import describe, ping_all
+    from drivers.serialport import SerialPort
+
+    link = SerialPort(port, baud)
+    link.open()
+    try:
+        heard = ping_all(link, step)
+        for servo in heard.ids:
+            yield Found(baud, 1, describe(link, servo))
+        if heard.noise and not heard.ids:
+            yield Found(baud, 1, None)
+    finally:
+        link.close()
