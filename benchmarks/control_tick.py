@@ -60,7 +60,7 @@ class Line:
         self.now_ns += STEP_NS
         self.state.tick(self.now_ns, DT, self.values)
         angles, _ = self.table.angles(self.values)
-        allowed = self.guard.apply(angles, self.sent, self.limiter.velocity, None, DT)
+        allowed = self.guard.apply(angles, self.sent, self.limiter.rest(DT), None, DT)
         return self.limiter.step(DT, allowed, self.sent)
 
 

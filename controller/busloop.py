@@ -199,7 +199,7 @@ class BusLoop:
     def _send(self, angles: Floats) -> None:
         """One step towards ``angles`` (n,) rad, as far as the rules and the limits of motion allow."""
         dt = self.clock.period_ns / 1e9
-        allowed = self._guard.apply(angles, self._sent, self._limiter.velocity, self._state, dt)
+        allowed = self._guard.apply(angles, self._sent, self._limiter.rest(dt), self._state, dt)
         self._limiter.step(dt, allowed, self._sent)
         self.bus.write(self._sent)
 

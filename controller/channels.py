@@ -88,7 +88,7 @@ class ChannelTable:
     widths : (n, k) length of each piece; 0 where a channel has fewer pieces.
     slopes : (n, k) radians per unit of mix on each piece.
     low_rad, high_rad : (n,) limits.
-    max_speed_rad_s, max_accel_rad_s2 : (n,) limits of the motion.
+    max_speed_rad_s, max_accel_rad_s2, max_jerk_rad_s3 : (n,) limits of the motion; infinite jerk for no limit.
     terms : terms that are more than a weight. anchors, anchored : what solves channels (k,) that pull at the skin.
     """
 
@@ -102,6 +102,7 @@ class ChannelTable:
     high_rad: Floats
     max_speed_rad_s: Floats
     max_accel_rad_s2: Floats
+    max_jerk_rad_s3: Floats
     terms: Terms | None = None
     anchors: Anchors | None = None
     anchored: Indices | None = None
@@ -144,9 +145,15 @@ class ChannelTable:
 
 
 def limiter_of(table: ChannelTable, period_s: float) -> MotionLimiter:
-    """Keeps the table's limits of position (rad), speed and acceleration at a bus that cycles every ``period_s``."""
+    """Keeps the table's limits of position (rad) and motion at a bus that cycles every ``period_s``."""
     return MotionLimiter(
-        table.max_speed_rad_s, table.max_accel_rad_s2, table.low_rad, table.high_rad, response_s=period_s
+        table.max_speed_rad_s,
+        table.max_accel_rad_s2,
+        table.low_rad,
+        table.high_rad,
+        response_s=period_s,
+        max_jerk=table.max_jerk_rad_s3,
+        period_s=period_s,
     )
 
 
@@ -178,6 +185,7 @@ def build_table(
         high_rad=np.radians([channel.limit_deg[1] for channel in channels]),
         max_speed_rad_s=np.radians([channel.max_speed_deg_s for channel in channels]),
         max_accel_rad_s2=np.radians([channel.max_accel_deg_s2 for channel in channels]),
+        max_jerk_rad_s3=np.radians([channel.max_jerk_deg_s3 or np.inf for channel in channels]),
         terms=_terms(channels, parameters),
         anchors=anchors,
         anchored=None if anchors is None else np.array([names.index(name) for name in anchors.names], dtype=np.intp),

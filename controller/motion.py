@@ -7,7 +7,8 @@ The limiter follows its target along the square-root braking curve with a linear
 
 so it brakes at no more than ``a`` and arrives like a critically damped spring of time constant ``r``. Each
 step chooses one constant acceleration for its whole length, so that speed and acceleration stay inside their
-limits whatever the length of the steps, and braking from any speed ends inside the range.
+limits whatever the length of the steps, and braking from any speed ends inside the range. Where a limit of jerk is
+given, :class:`controller.jerk.JerkFilter` follows.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.jerk import JerkFilter
 from controller.parameters import Floats, Parameters
 
 _LONGEST_STEP_S = 0.1
@@ -69,7 +71,8 @@ class MotionLimiter:
     max_speed : (n,) units/s. max_acceleration : (n,) units/s^2.
     low, high : (n,) range.
     response_s : (n,) or one number, time constant of the approach.
-    smooth_s : (n,) or one number, time constant of the jerk filter; 0 is off.
+    max_jerk : (n,) or one number, units/s^3; infinity for no limit.
+    period_s : length of the steps it will be given; longer ones are divided where there is a limit of jerk.
 
     Attributes
     ----------
@@ -88,13 +91,15 @@ class MotionLimiter:
         high: Floats,
         *,
         response_s: Floats | float = 0.02,
-        smooth_s: Floats | float = 0.0,
+        max_jerk: Floats | float = np.inf,
+        period_s: float = 0.01,
     ) -> None:
         n = len(low)
         self._low, self._high = _vector(low, n), _vector(high, n)
         self._speed, self._accel = _vector(max_speed, n), _vector(max_acceleration, n)
-        self._response, self._smooth = _vector(response_s, n), _vector(smooth_s, n)
-        _check_limits(self._speed, self._accel, self._response, self._high - self._low)
+        self._response, jerk = _vector(response_s, n), _vector(max_jerk, n)
+        _check_limits(self._speed, self._accel, self._response, jerk, self._high - self._low)
+        self._filter, self._period_s = JerkFilter(self._accel, jerk), period_s
         self._half_knee = 0.5 * self._accel * self._response**2
         self._position = np.clip(np.zeros(n), self._low, self._high)
         self._velocity = np.zeros(n)
@@ -102,9 +107,10 @@ class MotionLimiter:
         self.limited: NDArray[np.bool_] = np.zeros(n, dtype=bool)
         self._work = [np.zeros(n) for _ in range(6)]
         self._flags = [np.zeros(n, dtype=bool) for _ in range(2)]
+        self._filter.reset(self._position)
 
     @classmethod
-    def of(cls, parameters: Parameters) -> MotionLimiter:
+    def of(cls, parameters: Parameters, period_s: float = 0.01) -> MotionLimiter:
         """A limiter with the limits of ``parameters``."""
         return cls(
             parameters.max_speed,
@@ -112,7 +118,8 @@ class MotionLimiter:
             parameters.low,
             parameters.high,
             response_s=parameters.response_s,
-            smooth_s=parameters.smooth_s,
+            max_jerk=parameters.max_jerk,
+            period_s=period_s,
         )
 
     @property
@@ -120,12 +127,18 @@ class MotionLimiter:
         """(n,) float64, present speed in units/s, before the jerk filter."""
         return self._velocity
 
+    def rest(self, dt: float) -> Floats:
+        """(n,) where the values would come to rest if they braked from the next step of ``dt`` s on."""
+        braking = np.abs(self._velocity) / (2.0 * self._accel) + dt
+        return self._position + self._velocity * braking
+
     def reset(self, values: Floats) -> None:
         """Be at ``values`` : (n,), at rest."""
         np.clip(values, self._low, self._high, out=self._position)
         self._velocity[:] = 0.0
         self._output[:] = self._position
         self._target[:] = self._position
+        self._filter.reset(self._position)
 
     def step(self, dt: float, targets: Floats, out: Floats) -> Floats:
         """Move for ``dt`` seconds towards ``targets`` : (n,) and write the values to ``out`` : (n,).
@@ -137,9 +150,20 @@ class MotionLimiter:
         np.clip(self._target, self._low, self._high, out=self._target)
         dt = min(dt, _LONGEST_STEP_S)
         if dt > 0.0:
-            self._move(dt)
+            self._steps(dt)
         out[:] = self._output
         return out
+
+    def _steps(self, dt: float) -> None:
+        if not self._filter.active:
+            self._move(dt)
+            np.copyto(self._output, self._position)
+            return
+        count = max(1, round(dt / self._period_s))
+        for _ in range(count):
+            self._move(dt / count)
+            self._filter.step(dt / count, self._position, self._output)
+        np.clip(self._output, self._low, self._high, out=self._output)  # rounding of the mean
 
     def _move(self, dt: float) -> None:
         error, sign, speed, wanted, free, reach = self._work
@@ -157,7 +181,6 @@ class MotionLimiter:
         np.subtract(free, wanted, out=free)
         np.greater(free, 1e-9, out=self.limited)
         self._advance(dt, error, sign, speed, wanted, free)
-        self._filter(dt, free)
 
     def _braking_speed(self, dt: float, error: Floats, speed: Floats, out: Floats, work: Floats) -> None:
         """Speed at the end of the step from which the rest of the way is just enough to brake."""
@@ -195,22 +218,15 @@ class MotionLimiter:
         np.multiply(wanted, sign, out=self._velocity)
         np.clip(self._position, self._low, self._high, out=self._position)
 
-    def _filter(self, dt: float, work: Floats) -> None:
-        """Jerk filter: a weighted mean with the earlier output keeps range, speed and acceleration."""
-        np.add(self._smooth, dt, out=work)
-        np.divide(dt, work, out=work)
-        np.subtract(self._position, self._output, out=self._work[5])
-        self._work[5] *= work
-        self._output += self._work[5]
-
 
 def _vector(values: Floats | float, n: int) -> Floats:
     """A private (n,) float64 copy of one number or of (n,) numbers."""
     return np.array(np.broadcast_to(np.asarray(values, dtype=np.float64), n))
 
 
-def _check_limits(speed: Floats, accel: Floats, response: Floats, span: Floats) -> None:
-    for name, limit in (("max_speed", speed), ("max_acceleration", accel), ("response_s", response)):
+def _check_limits(speed: Floats, accel: Floats, response: Floats, jerk: Floats, span: Floats) -> None:
+    limits = {"max_speed": speed, "max_acceleration": accel, "response_s": response, "max_jerk": jerk}
+    for name, limit in limits.items():
         if not np.all(limit > 0):
             raise ValueError(f"{name}[{int(np.argmin(limit > 0))}] must be positive")
     if not np.all(span >= 0):

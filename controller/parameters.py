@@ -27,10 +27,10 @@ REGIONS = ("brows", "lids", "eyes", "cheeks", "nose", "jaw", "mouth", "tongue", 
 """Regions of the face, in the order reports list them."""
 
 _KEYS = {
-    "range", "region", "profile", "max_speed", "max_acceleration", "response_s", "smooth_s",
-    "full_scale_deg", "max_speed_deg_s", "max_acceleration_deg_s2",
+    "range", "region", "profile", "max_speed", "max_acceleration", "max_jerk", "response_s",
+    "full_scale_deg", "max_speed_deg_s", "max_acceleration_deg_s2", "max_jerk_deg_s3",
 }  # fmt: skip
-_ARRAYS = ("low", "high", "full_scale_rad", "max_speed", "max_acceleration", "response_s", "smooth_s")
+_ARRAYS = ("low", "high", "full_scale_rad", "max_speed", "max_acceleration", "max_jerk", "response_s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Parameters:
     low, high : range of each parameter.
     full_scale_rad : angle (rad) the value 1 stands for; NaN where the parameter is not an angle.
     max_speed : largest speed (units/s). max_acceleration : largest acceleration (units/s^2).
-    response_s : time constant (s) of the approach to a target. smooth_s : the same of the jerk filter.
+    max_jerk : largest jerk (units/s^3); infinity for none. response_s : time constant (s) of the approach to a target.
     aliases : other spellings, folded, to canonical names.
     """
 
@@ -55,8 +55,8 @@ class Parameters:
     full_scale_rad: Floats
     max_speed: Floats
     max_acceleration: Floats
+    max_jerk: Floats
     response_s: Floats
-    smooth_s: Floats
     aliases: dict[str, str] = field(default_factory=dict)
 
     @classmethod
@@ -216,6 +216,7 @@ def _numbers(where: str, merged: dict[str, Any], faults: list[str]) -> dict[str,
     full = _positive(where, "full_scale_deg", merged, faults) if "full_scale_deg" in merged else math.nan
     angular = not math.isnan(full)
     names = ("max_speed_deg_s", "max_acceleration_deg_s2") if angular else ("max_speed", "max_acceleration")
+    jerk = "max_jerk_deg_s3" if angular else "max_jerk"
     speed, acceleration = (_positive(where, key, merged, faults) for key in names)
     low, high = _range(where, merged, faults)
     scale = full if angular else 1.0
@@ -226,16 +227,15 @@ def _numbers(where: str, merged: dict[str, Any], faults: list[str]) -> dict[str,
         "full_scale_rad": math.radians(full),
         "max_speed": speed / scale,
         "max_acceleration": acceleration / scale,
+        "max_jerk": _positive(where, jerk, merged, faults) / scale if jerk in merged else math.inf,
         "response_s": _positive(where, "response_s", merged, faults),
-        "smooth_s": _positive(where, "smooth_s", merged, faults, zero=True),
     }
 
 
-def _positive(where: str, key: str, merged: dict[str, Any], faults: list[str], *, zero: bool = False) -> float:
+def _positive(where: str, key: str, merged: dict[str, Any], faults: list[str]) -> float:
     value: Any = merged.get(key)
-    good = _finite(value) and (value > 0 or (zero and value == 0))
-    if not good:
-        faults.append(f"{where}.{key}: must be a {'number not below 0' if zero else 'positive number'} (is {value!r})")
+    if not (_finite(value) and value > 0):
+        faults.append(f"{where}.{key}: must be a positive number (is {value!r})")
         return 1.0
     return float(value)
 

@@ -99,6 +99,7 @@ class ChannelSettings(Settings):
     limit_deg: tuple[Degrees, Degrees]
     max_speed_deg_s: Positive
     max_accel_deg_s2: Positive
+    max_jerk_deg_s3: Positive | None = None
     reverse: bool = False
     zero_deg: Degrees = 0.0
     trim_deg: Degrees = 0.0

@@ -268,15 +268,14 @@ class Guard:
         self._rules = [rule for rule in every if rule.tally.labels]
         self._window = Window(table.low_rad.copy(), table.high_rad.copy())
 
-    def apply(
-        self, target: Floats, position: Floats, velocity: Floats, state: BusState | None, dt: float
-    ) -> Floats:  # fmt: skip
+    def apply(self, target: Floats, position: Floats, stop: Floats, state: BusState | None, dt: float) -> Floats:
         """What the servos may be asked for.
 
         Parameters
         ----------
         target : (n,) rad, what the face asks for. position : (n,) rad, where the servos were last told to be.
-        velocity : (n,) rad/s, how fast they were told to move. state : the newest measurement. dt : s.
+        stop : (n,) rad, where they would come to rest; see :meth:`controller.motion.MotionLimiter.rest`.
+        state : the newest measurement. dt : s.
 
         Returns
         -------
@@ -288,7 +287,6 @@ class Guard:
         np.clip(wanted, table.low_rad, table.high_rad, out=wanted)
         np.copyto(window.low, table.low_rad)
         np.copyto(window.high, table.high_rad)
-        stop = position + velocity * (np.abs(velocity) / (2.0 * table.max_accel_rad_s2) + dt)
         now = Moment(wanted, position, stop, state, dt)
         for rule in self._rules:
             rule.narrow(now, window)

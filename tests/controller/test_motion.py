@@ -40,7 +40,33 @@ def test_no_limit_is_ever_exceeded(seed: int, share: float, dt: float) -> None:
     speed = np.diff(path, axis=0) / dt
     assert np.all(path >= P.low) and np.all(path <= P.high)
     assert np.all(np.abs(speed) <= P.max_speed * TIGHT)
-    assert np.all(np.abs(np.diff(speed, axis=0)) / dt <= P.max_acceleration * TIGHT + 1e-9)
+    push = np.diff(speed, axis=0) / dt
+    assert np.all(np.abs(push) <= P.max_acceleration * TIGHT + 1e-9)
+    assert np.all(np.abs(np.diff(push, axis=0)) / dt <= P.max_jerk * TIGHT + 1e-6)
+
+
+def test_a_late_step_keeps_the_limit_of_jerk_on_its_way() -> None:
+    """Steps of several periods are divided: what comes out is what steps of one period would have given."""
+    long, short = MotionLimiter.of(P), MotionLimiter.of(P)
+    out, each = P.neutral(), P.neutral()
+    for steps in (1, 3, 2, 5, 1, 1, 4):
+        long.step(steps * 0.01, P.high, out)
+        for _ in range(steps):
+            short.step(0.01, P.high, each)
+        np.testing.assert_allclose(out, each, atol=1e-12)
+
+
+def test_where_it_would_come_to_rest() -> None:
+    limiter = MotionLimiter.of(P)
+    out = P.neutral()
+    for _ in range(4):
+        limiter.step(0.01, P.high, out)
+    rest = limiter.rest(0.01)
+    path = np.array([limiter.step(0.01, P.low, out).copy() for _ in range(200)])
+    turned = path.max(axis=0)
+    assert np.all(turned <= np.minimum(rest, P.high) + 1e-9)
+    moving = rest < 0.9 * P.high
+    assert moving.any() and np.all(turned[moving] > 0.6 * rest[moving])
 
 
 def test_limits_hold_when_steps_differ_in_length() -> None:
@@ -112,11 +138,12 @@ def test_reset_puts_it_at_rest() -> None:
     np.testing.assert_array_equal(limiter.step(0.01, np.full(59, 0.5), P.neutral()), np.full(59, 0.5))
 
 
-@pytest.mark.parametrize("name", ["max_speed", "max_acceleration", "response_s", "low"])
+@pytest.mark.parametrize("name", ["max_speed", "max_acceleration", "max_jerk", "response_s", "low"])
 def test_wrong_limits_are_named(name: str) -> None:
     one = np.ones(3)
     given_: dict[str, np.ndarray] = {
-        "max_speed": one, "max_acceleration": one, "low": 0 * one, "high": one, "response_s": one
+        "max_speed": one, "max_acceleration": one, "low": 0 * one, "high": one, "response_s": one,
+        "max_jerk": one,
     }  # fmt: skip
     given_[name] = np.array([0.5, 2.0, 0.5]) if name == "low" else np.array([1.0, 0.0, 1.0])
     with pytest.raises(ValueError, match=rf"{name}\[1\]"):

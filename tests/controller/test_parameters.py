@@ -119,7 +119,6 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         max_speed = 1.0
         max_acceleration = 1.0
         response_s = 0.1
-        smooth_s = 0.0
         [parameters]
         good = { region = "mouth", profile = "a" }
         wide = { region = "moth", profile = "a", range = [1.0, 0.0] }
