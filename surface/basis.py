@@ -34,7 +34,7 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
     ValueError
         For bad knots, an unknown derivative or an unknown side.
     """
-    from . import kernels
+    from . import blends
 
     row, _ = pad_knots([np.asarray(knots, dtype=np.float64)], "knots", 1)
     if derivative not in (0, 1, 2):
@@ -43,7 +43,7 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
         raise ValueError(f'side: must be "left" or "right", not {side!r}')
     samples = np.ascontiguousarray(np.atleast_1d(np.asarray(x, dtype=np.float64)))
     out = np.zeros((len(samples), 3))
-    kernels.blend_samples(row, row.shape[1] - 2, samples, side == "left", out)
+    blends.blend_samples(row, row.shape[1] - 2, samples, side == "left", out)
     return out[:, derivative].copy()
 
 

@@ -18,13 +18,38 @@ PER_POINT = 10.0  # cost of reading a control point, in weights
 MOST = 4096  # vertices of the largest cell, so that a block's sums stay in the cache
 
 
-def morton(x: Ints, y: Ints) -> Ints:
+@kernel
+def morton(x, y):
     """(m,) int64: bits of x and y in turn, for 0 <= x, y < 2**24."""
-    out = np.zeros(len(x), dtype=np.int64)
-    for bit in range(24):
-        out |= ((x >> bit) & 1) << (2 * bit)
-        out |= ((y >> bit) & 1) << (2 * bit + 1)
+    out = np.zeros(x.shape[0], dtype=np.int64)
+    for s in range(x.shape[0]):
+        for bit in range(24):
+            out[s] |= ((x[s] >> bit) & 1) << (2 * bit)
+            out[s] |= ((y[s] >> bit) & 1) << (2 * bit + 1)
     return out
+
+
+@kernel
+def least_codes(triangles, owner, leaf_code, code):
+    """Lower ``code (m,)`` to the least code of the leaves whose triangles use a vertex."""
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            vertex = triangles[t, k]
+            code[vertex] = min(code[vertex], leaf_code[owner[t]])
+
+
+@kernel
+def unit_cross(a, b, out, bad):
+    """Unit vectors along a x b; ``bad`` says where the product is too short to have a direction."""
+    for s in range(a.shape[0]):
+        x = a[s, 1] * b[s, 2] - a[s, 2] * b[s, 1]
+        y = a[s, 2] * b[s, 0] - a[s, 0] * b[s, 2]
+        z = a[s, 0] * b[s, 1] - a[s, 1] * b[s, 0]
+        length = np.sqrt(x * x + y * y + z * z)
+        size = np.sqrt(a[s, 0] ** 2 + a[s, 1] ** 2 + a[s, 2] ** 2) * np.sqrt(b[s, 0] ** 2 + b[s, 1] ** 2 + b[s, 2] ** 2)
+        bad[s] = not length > 1e-12 * max(size, 1e-300)
+        if not bad[s]:
+            out[s, 0], out[s, 1], out[s, 2] = x / length, y / length, z / length
 
 
 def group(code: Ints, depth: int, uv: Floats, supports: Floats, bins: Bins) -> Ints:

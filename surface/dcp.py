@@ -18,6 +18,7 @@ from .basis import Floats, Ints, check_knots, pad_knots
 from .bins import Bins, build_bins
 from .checks import check_points, check_sides, check_uv, check_weights
 from .closed import Interval, check_closed, shifts_of, wrap
+from .progress import Progress, silent
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -330,6 +331,7 @@ class DCPSurface:
         loop_error: float | None = None,
         roots: tuple[int, int] | None = None,
         flip: bool = False,
+        progress: Progress = silent,
     ) -> Mesh:
         """A watertight mesh by quad tree (paper, 2.3).
 
@@ -343,6 +345,7 @@ class DCPSurface:
         loop_error : how near the mesh's border follows the loops; ``chord_error`` if left out
         roots : cells along u and v before any quartering; chosen roughly square if left out
         flip : turn normals and triangles against S_u x S_v
+        progress : is called with what is being done and which part of the whole is done, 0 to 1
 
         Raises
         ------
@@ -361,9 +364,12 @@ class DCPSurface:
             loop_error=loop_error,
             roots=roots,
             flip=flip,
+            progress=progress,
         )
 
-    def deformation(self, mesh: Mesh, *, normals: bool = True, threads: int = 1) -> Deformation:
+    def deformation(
+        self, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = silent
+    ) -> Deformation:
         """A mesh that follows moves of control points, changes of weights and of knots (Eq. 2).
 
         Parameters
@@ -371,10 +377,11 @@ class DCPSurface:
         mesh : from :meth:`tessellate`
         normals : also keep exact normals
         threads : how many threads compute everything anew
+        progress : as for :meth:`tessellate`
         """
         from .deformation import Deformation
 
-        return Deformation(self, mesh, normals=normals, threads=threads)
+        return Deformation(self, mesh, normals=normals, threads=threads, progress=progress)
 
     def sample_derivatives(
         self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from .basis import pad_knots
 from .lists import build_lists
 from .mesh import Mesh
+from .progress import Progress, silent
 
 if TYPE_CHECKING:
     from .bins import Bins
@@ -37,6 +38,7 @@ class Deformation:
     mesh : from :meth:`surface.DCPSurface.tessellate`
     normals : also keep normals; without them an update costs a third
     threads : how many threads compute everything anew; updates of parts use one
+    progress : is called with a stage and the part that is done, 0 to 1
 
     Notes
     -----
@@ -44,13 +46,21 @@ class Deformation:
     but the copy of arguments that are not already int64 and float64 arrays.
     """
 
-    def __init__(self, surface: DCPSurface, mesh: Mesh, *, normals: bool = True, threads: int = 1) -> None:
+    def __init__(
+        self,
+        surface: DCPSurface,
+        mesh: Mesh,
+        *,
+        normals: bool = True,
+        threads: int = 1,
+        progress: Progress = silent,
+    ) -> None:
         if threads < 1:
             raise ValueError(f"threads: must be at least 1, not {threads}")
         self.mesh = mesh
         self._threads = threads
         self._pool: ThreadPoolExecutor | None = None
-        self._lists = build_lists(surface, mesh, normals)
+        self._lists = build_lists(surface, mesh, normals, progress)
         arrays = [array.copy() for array in surface.arrays()]
         self._knots, self._degrees = arrays[:2], arrays[2:4]
         self._points, self._weights = arrays[4:]
@@ -245,14 +255,14 @@ class Deformation:
 
     def _rewrite(self, i: int) -> np.ndarray:
         """Compute the rows of point i anew; returns the cells it stands in."""
-        from . import kernels
+        from . import weighing
 
         lists = self._lists
         entries = slice(lists.back_start[i], lists.back_start[i] + lists.back_count[i])
         cells = lists.back_cell[entries].astype(np.int64)
         places = lists.back_row[entries].astype(np.int64)
         nonzero = np.zeros(len(cells), dtype=np.bool_)
-        kernels.rewrite_rows(
+        weighing.rewrite_rows(
             *self._knots, *self._degrees, self._weights, self.mesh.uv, self.mesh.side, lists.cell_start, i,
             cells, places, lists.value, lists.slope, lists.at, lists.room, nonzero,
         )  # fmt: skip

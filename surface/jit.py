@@ -1,27 +1,44 @@
 """How the compiled kernels are compiled; importing this imports numba, so do it only when a kernel is needed.
 
-Compiled code is kept on disk beside the source. Numba's cache watches only the file a kernel stands in, so a
-kernel may call kernels of its own file only.
+Compiled code is kept on disk beside the source. Numba keeps it until the file a kernel stands in changes; here it
+also watches the files in ``SHARED``, whose kernels are called from other files.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from numba import njit
 
+SHARED = ("apply.py", "blends.py", "kernels.py", "lanes.py")
+
 
 def kernel(function: Callable) -> Any:
     """Compile at the first call for each set of argument types, cache on disk, release the GIL."""
-    return njit(cache=True, nogil=True)(function)
-
-
-def fast_kernel(function: Callable) -> Any:
-    """As :func:`kernel`, and sums may be reordered for vector units; for float32 output only."""
-    return njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"}, error_model="numpy")(function)
+    return _watching(njit(cache=True, nogil=True)(function))
 
 
 def inlined(function: Callable) -> Any:
     """As :func:`kernel`, and its code is put into the caller's."""
-    return njit(cache=True, nogil=True, inline="always")(function)
+    return _watching(njit(cache=True, nogil=True, inline="always")(function))
+
+
+def _watching(dispatcher: Any) -> Any:
+    """Add the shared files to what makes the code kept on disk stale."""
+    file = getattr(dispatcher._cache, "_cache_file", None)
+    if file is not None:
+        file._source_stamp = (file._source_stamp, shared_stamp())
+    return dispatcher
+
+
+@cache
+def shared_stamp() -> str:
+    """Digest of the files in ``SHARED``."""
+    digest = hashlib.sha256()
+    for name in SHARED:
+        digest.update(Path(__file__).with_name(name).read_bytes())
+    return digest.hexdigest()

@@ -8,17 +8,20 @@ holds, in the same order, the eight b_u w and the eight b_v w. So applying a cel
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .basis import Ints
 from .mesh import Mesh
+from .progress import Progress, silent
 
 if TYPE_CHECKING:
     from .dcp import DCPSurface
 
 LANES = 8
+STEP = 100_000  # vertices whose weights are computed between two reports of progress
 
 
 @dataclass
@@ -62,7 +65,7 @@ class Lists:
         return sum(value.nbytes for value in vars(self).values() if isinstance(value, np.ndarray))
 
 
-def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool) -> Lists:
+def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool, progress: Progress = silent) -> Lists:
     """Weights of ``surface`` for the vertices of ``mesh``, from float64 blending functions.
 
     Parameters
@@ -70,8 +73,9 @@ def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool) -> Lists:
     surface : the surface the mesh was made from
     mesh : its cells and candidate lists
     normals : also derivative weights
+    progress : is called with a stage and the part that is done
     """
-    from . import kernels
+    from . import weighing
 
     count = np.diff(mesh.cell_start)
     tiles = (count + LANES - 1) // LANES
@@ -83,21 +87,14 @@ def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool) -> Lists:
     at, ids_at = np.zeros(len(count) + 1, dtype=np.int64), np.zeros(len(count) + 1, dtype=np.int64)
     rows = np.zeros(len(count), dtype=np.int64)
     arrays = surface.arrays()
-    kernels.fill_blocks(
-        *arrays[:4],
-        arrays[5],
-        mesh.uv,
-        mesh.side,
-        mesh.cell_start,
-        mesh.list_start,
-        mesh.list_ids,
-        value,
-        slope,
-        at,
-        rows,
-        ids,
-        ids_at,
-    )
+    steps = np.linspace(0, len(count), max(1, len(mesh.uv) // STEP) + 1).astype(np.int64)
+    for begin, end in pairwise(steps):
+        progress("weights", float(begin) / max(len(count), 1))
+        weighing.fill_blocks(
+            *arrays[:4], arrays[5], mesh.uv, mesh.side, mesh.cell_start, mesh.list_start, mesh.list_ids, begin, end,
+            value, slope, at, rows, ids, ids_at,
+        )  # fmt: skip
+    progress("weights", 1.0)
     used, entries = int(at[-1]), int(ids_at[-1])
     ids = ids[:entries].copy()
     back = back_lists(ids, rows, len(arrays[4]))

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .basis import Floats, Ints
+from .jit import kernel
+from .progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -76,13 +78,14 @@ SplitTest = Callable[[int, Ints], np.ndarray]
 NEIGHBOURS = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])  # below, right, above, left: the order of edges
 
 
-def grow(lattice: Lattice, split: SplitTest) -> tuple[Leaves, list[Ints]]:
+def grow(lattice: Lattice, split: SplitTest, progress: Progress = silent) -> tuple[Leaves, list[Ints]]:
     """Quarter cells until none wants to be, then balance 2:1 over edges.
 
     Parameters
     ----------
     lattice : roots and greatest depth
     split : ``split(level, cells (n, 2)) -> (n,) bool``
+    progress : is told the level; every level is taken for twice the work of the one before
 
     Returns
     -------
@@ -92,6 +95,7 @@ def grow(lattice: Lattice, split: SplitTest) -> tuple[Leaves, list[Ints]]:
     cells = np.stack(np.meshgrid(*map(np.arange, lattice.shape), indexing="ij"), axis=-1).reshape(-1, 2)
     inner: list[Ints] = []
     for level in range(lattice.depth):
+        progress("quad tree", 0.5 ** (lattice.depth - level))
         chosen = cells[split(level, cells)] if len(cells) else cells
         inner.append(chosen)
         cells = children(chosen)
@@ -137,8 +141,8 @@ def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
         around = (cells[:, None, :] + NEIGHBOURS).reshape(-1, 2)
         code = codes(lattice, level, around)
         around = _decode(lattice, level, code[code >= 0])
-        parents = np.concatenate([cells, around]) // 2
-        split[level - 1] = np.union1d(split[level - 1], codes(lattice, level - 1, parents))
+        parents = codes(lattice, level - 1, around // 2)
+        split[level - 1] = np.union1d(split[level - 1], parents[~contains(split[level - 1], parents)])
     levels, found = [], []
     cells = np.stack(np.meshgrid(*map(np.arange, lattice.shape), indexing="ij"), axis=-1).reshape(-1, 2)
     for level in range(len(split) + 1):
@@ -168,24 +172,27 @@ def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[In
             pattern[at] |= contains(inner[level], code).astype(np.int64) << edge
     flat = pattern == 0
     pattern[flat] = 16 * (leaves.cell[flat].sum(axis=1) % 2)
-    nodes = TEMPLATES[pattern]
-    owner = np.repeat(np.arange(len(leaves)), (nodes[:, :, 0] >= 0).sum(axis=1))
-    keys = np.take_along_axis(_node_keys(lattice, leaves), nodes.reshape(len(leaves), -1), axis=1)
-    keys = keys.reshape(len(leaves), -1, 3)[nodes[:, :, 0] >= 0]
-    return keys, owner
+    count = (TEMPLATES[:, :, 0] >= 0).sum(axis=1)[pattern]
+    keys = np.zeros((int(count.sum()), 3), dtype=np.int64)
+    _emit(leaves.level, leaves.cell, pattern, lattice.depth, (lattice.shape[0] << lattice.depth) + 1, TEMPLATES, keys)
+    return keys, np.repeat(np.arange(len(leaves)), count)
 
 
-def _node_keys(lattice: Lattice, leaves: Leaves) -> Ints:
-    """(n, 8): keys of four corners and four edge middles (the latter only real where a neighbour is smaller)."""
-    half = (1 << (lattice.depth - leaves.level)) // 2
-    offsets = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 0], [2, 1], [1, 2], [0, 1]])
-    corner = leaves.cell * (1 << (lattice.depth - leaves.level))[:, None]
-    x = corner[:, :1] + half[:, None] * offsets[:, 0]
-    y = corner[:, 1:] + half[:, None] * offsets[:, 1]
-    full = half == 0  # deepest level: corners are one lattice step apart and there are no middles
-    x[full] = corner[full, :1] + offsets[:, 0] // 2
-    y[full] = corner[full, 1:] + offsets[:, 1] // 2
-    return lattice.key(x, y)
+@kernel
+def _emit(level, cell, pattern, depth, width, templates, keys):  # type: ignore[no-untyped-def]
+    """Lattice keys of the triangles of every leaf; corners 0-3 and edge middles 4-7, see :func:`_templates`."""
+    x, y = np.array([0, 2, 2, 0, 1, 2, 1, 0]), np.array([0, 0, 2, 2, 0, 1, 2, 1])
+    row = 0
+    for leaf in range(level.shape[0]):
+        step = 1 << (depth - level[leaf])
+        for t in range(templates.shape[1]):
+            for k in range(3):
+                node = templates[pattern[leaf], t, k]
+                if node < 0:
+                    break
+                across, up = cell[leaf, 0] * step + x[node] * step // 2, cell[leaf, 1] * step + y[node] * step // 2
+                keys[row, k] = up * width + across
+                row += k == 2
 
 
 def _templates() -> Ints:

@@ -101,10 +101,10 @@ def _reached(deformation: Deformation, knots: list[Floats]) -> Ints:
 
 def _weigh(deformation: Deformation, i: int, cells: Ints, places: Ints) -> np.ndarray:
     """Write point i's rows (none where the place is -1); which are not all zero?"""
-    from . import kernels
+    from . import weighing
 
     lists, nonzero = deformation._lists, np.zeros(len(cells), dtype=np.bool_)
-    kernels.rewrite_rows(
+    weighing.rewrite_rows(
         *deformation._knots, *deformation._degrees, deformation._weights, deformation.mesh.uv,
         deformation.mesh.side, lists.cell_start, i, cells, places, lists.value, lists.slope, lists.at,
         lists.room, nonzero,

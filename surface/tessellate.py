@@ -6,19 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import blocks, loops, quadtree
+from . import blocks, keys, quadtree
 from .basis import Floats, Ints
 from .domain import Domain
 from .mesh import Mesh
+from .progress import Progress, between, silent
 from .quadtree import Lattice, Leaves
+from .splitting import SplitTests, inner_side
 from .trim import Flat, trim
 
 if TYPE_CHECKING:
     from .dcp import DCPSurface
 
-MOST_CELLS = 4_000_000
 MOST_ROOTS = 24  # along the longer side
-RIM = 64  # cells along a side where the border of what is covered is followed
+CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
 
 
 def tessellate(
@@ -32,6 +33,7 @@ def tessellate(
     loop_error: float | None = None,
     roots: tuple[int, int] | None = None,
     flip: bool = False,
+    progress: Progress = silent,
 ) -> Mesh:
     """See :meth:`surface.DCPSurface.tessellate`."""
     _check_limits(max_points, chord_error, max_depth, min_depth)
@@ -42,17 +44,19 @@ def tessellate(
     scale = _lengths(surface, where)
     joined = _joined(surface, where)
     lattice = _lattice(where, scale, max_depth, roots, joined)
-    tests = _Tests(surface, where, lattice, scale)
+    tests = SplitTests(surface, where, lattice, scale)
     tests.max_points, tests.chord_error, tests.min_depth = max_points, chord_error, min_depth
     if len(where.segments):
         tests.follow_loops(loop_error if loop_error is not None else chord_error or 5e-4 * size)
-    leaves, inner = quadtree.grow(lattice, tests.split)
-    keys, owner = quadtree.triangulate(lattice, leaves, inner)
-    unique, triangles = np.unique(keys, return_inverse=True)
-    flat = Flat(lattice.uv(*lattice.point(unique)), triangles.reshape(-1, 3), owner)
+    leaves, inner = quadtree.grow(lattice, tests.split, between(progress, 0.0, 0.45))
+    progress("triangles", 0.45)
+    corners, owner = quadtree.triangulate(lattice, leaves, inner)
+    nodes, _, triangles = keys.unique(corners)
+    flat = Flat(lattice.uv(*lattice.point(nodes)), triangles, owner)
     if len(where.segments):
+        progress("trimming", 0.55)
         flat = trim(flat, where, scale)
-    return _finish(surface, flat, where, lattice, leaves, flip)
+    return _finish(surface, flat, where, lattice, leaves, flip, between(progress, 0.6, 1.0))
 
 
 def _check_limits(max_points: int | None, chord_error: float | None, max_depth: int, min_depth: int) -> None:
@@ -113,195 +117,33 @@ def _divide(borders: Floats, edge: float) -> Floats:
     return np.concatenate([*parts, borders[-1:]])
 
 
-class _Tests:
-    """Which cells are to be quartered."""
-
-    max_points: int | None = None
-    chord_error: float | None = None
-    min_depth = 0
-
-    def __init__(self, surface: DCPSurface, domain: Domain, lattice: Lattice, scale: tuple[float, float]) -> None:
-        self.surface, self.domain, self.lattice, self.scale = surface, domain, lattice, scale
-        self.rings: list[tuple[Floats, Floats]] = []
-        self.anchors: tuple[Floats, Floats] | None = None
-
-    def follow_loops(self, error: float) -> None:
-        """Ask for cells small enough that edges follow the loops within ``error``."""
-        for loop in self.domain.loops:
-            ring = np.asarray(loop)
-            around = np.linalg.norm((np.roll(ring, -1, axis=0) - ring) * self.scale, axis=1).sum()
-            step = max(2.0 * error, float(around) / 2000)
-            points, sharp = loops.resample(ring, self.scale, step)
-            size = np.zeros(len(points))
-            loops.wanted_size(points * np.asarray(self.scale), sharp, error, 3.0 * error, size)
-            self.rings.append((points, size))
-
-    def split(self, level: int, cells: Ints) -> np.ndarray:
-        """(n,) bool: which cells of a level to quarter."""
-        if len(cells) > MOST_CELLS:
-            raise ValueError(
-                f"max_depth: {len(cells)} cells at level {level}; ask for a larger chord_error or max_points"
-            )
-        rect = self._rects(level, cells)
-        active, along_loop = self._active(rect, cells, level)
-        chosen = along_loop | (active & (level < self.min_depth))
-        left = np.flatnonzero(active & ~chosen)
-        if self.max_points is not None and len(left):
-            chosen[left] = self._counts(rect[left]) > self.max_points
-            left = np.flatnonzero(active & ~chosen)
-        if self.chord_error is not None and len(left):
-            chosen[left] = self._errors(level, cells[left]) > self.chord_error
-        return chosen
-
-    def _rects(self, level: int, cells: Ints) -> Floats:
-        """(n, 4): u0, u1, v0, v1."""
-        shift = self.lattice.depth - level
-        low = self.lattice.uv(cells[:, 0] << shift, cells[:, 1] << shift)
-        high = self.lattice.uv((cells[:, 0] + 1) << shift, (cells[:, 1] + 1) << shift)
-        return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
-
-    def _active(self, rect: Floats, cells: Ints, level: int) -> tuple[np.ndarray, np.ndarray]:
-        """Which cells have a part in the domain, and which are too large for a loop that runs through them."""
-        coarse = np.zeros(len(cells), dtype=bool)
-        if not self.rings:
-            return np.ones(len(cells), dtype=bool), coarse
-        middle = np.stack([rect[:, :2].mean(axis=1), rect[:, 2:].mean(axis=1)], axis=1)
-        active = self.domain.inside(middle)
-        size = np.maximum((rect[:, 1] - rect[:, 0]) * self.scale[0], (rect[:, 3] - rect[:, 2]) * self.scale[1])
-        code = quadtree.codes(self.lattice, level, cells)
-        order = np.argsort(code)
-        for ring, wanted in self.rings:
-            at = self._find(level, ring)
-            place = np.minimum(np.searchsorted(code[order], at), len(code) - 1)
-            hit = code[order][place] == at
-            cell, limit = order[place[hit]], wanted[hit]
-            active[cell] = True
-            coarse[cell[size[cell] > limit]] = True
-        return active, coarse
-
-    def _find(self, level: int, uv: Floats) -> Ints:
-        """Codes of the cells that hold ``uv``; -1 outside the rectangle."""
-        index = []
-        for k, lines in enumerate((self.lattice.lines_u, self.lattice.lines_v)):
-            root = np.searchsorted(lines, uv[:, k], side="right") - 1
-            inner = np.clip(root, 0, len(lines) - 2)
-            part = (uv[:, k] - lines[inner]) / (lines[inner + 1] - lines[inner])
-            index.append(np.where(root == inner, (inner << level) + (part * (1 << level)).astype(np.int64), -1))
-        return quadtree.codes(self.lattice, level, np.stack(index, axis=1))
-
-    def _counts(self, rect: Floats) -> Ints:
-        bins = self.surface.bins
-        out = np.zeros(len(rect), dtype=np.int64)
-        blocks.count_open(rect, self.surface.all_supports, bins.grid, bins.shape, bins.start, bins.ids, out)
-        return out
-
-    def _errors(self, level: int, cells: Ints) -> Floats:
-        """Greatest distance of the surface from the cell's chords, at edge middles and the centre; 0 if uncovered."""
-        shift = self.lattice.depth - level
-        step = 1 << shift
-        corner = cells << shift
-        grid = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0, 2], [1, 2], [2, 2]]) * (step // 2)
-        x, y = corner[:, :1] + grid[:, 0], corner[:, 1:] + grid[:, 1]
-        uv = self.lattice.uv(x, y)
-        side = _inner_side(uv, uv[:, 4], self.domain)
-        key = self.lattice.key(x, y) * 4 + side
-        unique, first, back = np.unique(key, return_index=True, return_inverse=True)
-        points = self.surface.evaluate(uv.reshape(-1, 2)[first], side=unique & 3)
-        corners = points[back.reshape(key.shape)]
-        worst = _chord_errors(corners)
-        self._add_anchors(level, cells, corners, worst)
-        held = np.isfinite(corners[:, :, 0])
-        partly = held.any(axis=1) & ~held.all(axis=1)
-        worst[partly & (self.lattice.shape[0] << level < RIM) & (self.lattice.shape[1] << level < RIM)] = np.inf
-        return worst
-
-    def _add_anchors(self, level: int, cells: Ints, p: Floats, worst: Floats) -> None:
-        """Raise ``worst`` to how far the surface is from its cell where control points stand.
-
-        So a feature between the samples of a large cell is not overlooked: where there is detail there are points.
-        """
-        if self.anchors is None:
-            self.anchors = _anchors(self.surface, self.domain)
-        uv, points = self.anchors
-        code, at = quadtree.codes(self.lattice, level, cells), self._find(level, uv)
-        order = np.argsort(code)
-        place = np.minimum(np.searchsorted(code[order], at), len(code) - 1)
-        hit = np.flatnonzero(code[order][place] == at)
-        cell = order[place[hit]]
-        rect = self._rects(level, cells[cell])
-        s = ((uv[hit, 0] - rect[:, 0]) / (rect[:, 1] - rect[:, 0]))[:, None]
-        t = ((uv[hit, 1] - rect[:, 2]) / (rect[:, 3] - rect[:, 2]))[:, None]
-        a, b, c, d = (p[cell, k] for k in (0, 2, 6, 8))
-        normal = np.cross(d - a, c - b)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-        offset = points[hit] - (1 - t) * ((1 - s) * a + s * b) - t * ((1 - s) * c + s * d)
-        np.fmax.at(worst, cell, np.abs((offset * normal).sum(axis=1)))
-
-
-def _anchors(surface: DCPSurface, domain: Domain) -> tuple[Floats, Floats]:
-    """(k, 2) and (k, 3): the surface where the blending functions of its points are near their greatest."""
-    knots, degrees = surface.padded, surface.degrees
-    uv = np.zeros((surface.n, 2))
-    for k in range(2):
-        column = np.arange(knots[k].shape[1])
-        inner = (column >= 1) & (column <= degrees[k][:, None])
-        total = np.where(inner, knots[k], 0).sum(axis=1)
-        middle = (knots[k][:, 0] + knots[k][:, -1]) / 2
-        uv[:, k] = np.where(degrees[k] > 0, total / np.maximum(degrees[k], 1), middle)  # Greville abscissa
-    uv = uv[domain.inside(uv)]
-    points = surface.evaluate(uv)
-    covered = np.isfinite(points[:, 0])
-    return uv[covered], points[covered]
-
-
-def _inner_side(uv: Floats, centre: Floats, domain: Domain) -> Ints:
-    """(n, k): limits that points of cells (n, k, 2) take so that they belong to their cell's side of every slit."""
-    side = np.zeros(uv.shape[:-1], dtype=np.int64)
-    for slit in domain.slits:
-        axis, bit = (1, 2) if slit.axis == "u" else (0, 1)
-        on = slit.holds(uv.reshape(-1, 2)).reshape(side.shape)
-        side[on & (centre[:, None, axis] < slit.at)] |= bit
-    return side
-
-
-def _chord_errors(p: Floats) -> Floats:
-    """(n,): distances for the nine points ``p (n, 9, 3)`` of cells, rows of three from the low corner up."""
-    worst = np.zeros(len(p))
-    for a, middle, b in ((0, 1, 2), (0, 3, 6), (2, 5, 8), (6, 7, 8)):
-        worst = np.fmax(worst, _off_line(p[:, a], p[:, middle], p[:, b]))
-    bow = np.fmin(_off_line(p[:, 0], p[:, 4], p[:, 8]), _off_line(p[:, 2], p[:, 4], p[:, 6]))
-    return np.fmax(worst, bow)
-
-
-def _off_line(a: Floats, middle: Floats, b: Floats) -> Floats:
-    """Distance of ``middle`` from the line a-b."""
-    along, offset = b - a, middle - a
-    length = np.maximum((along * along).sum(axis=1), 1e-300)
-    part = np.clip((offset * along).sum(axis=1) / length, 0, 1)
-    return np.linalg.norm(offset - part[:, None] * along, axis=1)
-
-
-def _finish(surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool) -> Mesh:
+def _finish(
+    surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool, progress: Progress
+) -> Mesh:
     """Split vertices on slits, evaluate, drop uncovered triangles, order by cell, make the lists."""
     flat, side = _open_slits(flat, domain)
-    side, out = surface.sample_derivatives(flat.uv, side)
-    points, su, sv = out[:, 0], out[:, 1], out[:, 2]
-    keep = (side >= 0)[flat.triangles].all(axis=1)
-    flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])
     code = _codes(flat, lattice, leaves)
+    place, out = _evaluated(surface, flat.uv, side, code, between(progress, 0.1, 0.7))
+    keep = (side >= 0)[flat.triangles].all(axis=1)
+    if not keep.all():
+        flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])
+        code = _codes(flat, lattice, leaves)
     if any(lattice.joined):
         flat = _weld(flat, side, domain, lattice.joined)
+    progress("cells", 0.7)
     order = _used_in_order(flat, code)
-    code = code[order]
+    code, out = code[order], out[place[order]]
     rank = np.zeros(len(flat.uv), dtype=np.int32)
     rank[order] = np.arange(len(order))
     triangles = rank[flat.triangles]
     uv, supports = np.ascontiguousarray(flat.uv[order]), surface.all_supports
     start = blocks.group(code, lattice.depth, uv, supports, surface.bins) if len(order) else np.zeros(1, np.int64)
     list_start, list_ids = blocks.point_lists(start, uv, supports, surface.bins)
-    normals = unit_normals(points[order], su[order], sv[order], triangles)
+    vertices = out[:, 0].copy()
+    normals = unit_normals(vertices, out[:, 1], out[:, 2], triangles)
+    progress("cells", 1.0)
     return Mesh(
-        vertices=points[order],
+        vertices=vertices,
         normals=-normals if flip else normals,
         triangles=np.ascontiguousarray(triangles[:, ::-1]) if flip else triangles,
         uv=uv,
@@ -317,11 +159,26 @@ def _finish(surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, l
 
 def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
     """Give the vertices on an open slit one copy per side; returns the limit each vertex takes."""
-    side = np.zeros(flat.triangles.shape, dtype=np.int64)
-    if domain.slits:
-        side = _inner_side(flat.uv[flat.triangles], flat.uv[flat.triangles].mean(axis=1), domain)
-    unique, triangles = np.unique(flat.triangles * 4 + side, return_inverse=True)
-    return Flat(flat.uv[unique // 4], triangles.reshape(-1, 3), flat.owner), unique % 4
+    if not domain.slits:
+        return flat, np.zeros(len(flat.uv), dtype=np.int64)
+    side = inner_side(flat.uv[flat.triangles], flat.uv[flat.triangles].mean(axis=1), domain)
+    copies, _, triangles = keys.unique(flat.triangles * 4 + side)
+    return Flat(flat.uv[copies // 4], triangles, flat.owner), copies % 4
+
+
+def _evaluated(surface: DCPSurface, uv: Floats, side: Ints, code: Ints, progress: Progress) -> tuple[Ints, Floats]:
+    """S, S_u and S_v ``(m, 3, 3)``, neighbours after each other, and where each vertex stands in that.
+
+    ``side`` gets the limits that were taken.
+    """
+    order, out = np.argsort(code, kind="stable"), np.zeros((len(uv), 3, 3))
+    for first in range(0, len(order), CHUNK):
+        progress("vertices", first / len(order))
+        part = order[first : first + CHUNK]
+        side[part], out[first : first + CHUNK] = surface.sample_derivatives(uv[part], side[part])
+    place = np.zeros(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    return place, out
 
 
 def _weld(flat: Flat, side: Ints, domain: Domain, joined: tuple[bool, bool]) -> Flat:
@@ -354,7 +211,7 @@ def _codes(flat: Flat, lattice: Lattice, leaves: Leaves) -> Ints:
     root = (y >> lattice.depth) * lattice.shape[0] + (x >> lattice.depth)
     leaf_code = (root << (2 * lattice.depth)) | blocks.morton(x % unit, y % unit)
     code = np.full(len(flat.uv), np.iinfo(np.int64).max)
-    np.minimum.at(code, flat.triangles.ravel(), np.repeat(leaf_code[flat.owner], 3))
+    blocks.least_codes(flat.triangles, flat.owner, leaf_code, code)
     return code
 
 
@@ -368,17 +225,13 @@ def _used_in_order(flat: Flat, code: Ints) -> Ints:
 
 def unit_normals(points: Floats, su: Floats, sv: Floats, triangles: np.ndarray) -> Floats:
     """(m, 3) unit vectors along S_u x S_v; where that vanishes, the mean of the triangles around."""
-    normal = np.cross(su, sv)
-    length = np.linalg.norm(normal, axis=1)
-    size = np.linalg.norm(su, axis=1) * np.linalg.norm(sv, axis=1)
-    bad = ~(length > 1e-12 * np.maximum(size, 1e-300))
+    normal, bad = np.zeros(su.shape), np.zeros(len(su), dtype=np.bool_)
+    blocks.unit_cross(su, sv, normal, bad)
     if bad.any():
         a, b, c = (points[triangles[:, k]] for k in range(3))
         face = np.cross(b - a, c - a)
         total = np.zeros_like(points)
         for k in range(3):
             np.add.at(total, triangles[:, k], face)
-        normal[bad] = total[bad]
-        length[bad] = np.linalg.norm(normal[bad], axis=1)
-    normal /= np.maximum(length, 1e-300)[:, None]
+        normal[bad] = total[bad] / np.maximum(np.linalg.norm(total[bad], axis=1), 1e-300)[:, None]
     return normal
