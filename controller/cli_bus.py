@@ -18,6 +18,7 @@ def register(app: typer.Typer) -> None:
     """Add this module's commands to ``app``."""
     app.command()(ports)
     app.command()(scan)
+    app.command("set-id")(set_id)
     simulators = typer.Typer(no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
     simulators.command("dynamixel")(simulate_dynamixel)
     simulators.command("feetech")(simulate_feetech)
@@ -82,6 +83,28 @@ def scan(
         console.print(table)
     else:
         console.print(f"No servo answered on {port}. Check its power, the wiring and the adapter's direction switch.")
+
+
+def set_id(
+    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    old: Annotated[int, typer.Argument(min=0, max=252, help="Id that the servo has.")],
+    new: Annotated[int, typer.Argument(min=0, max=252, help="Id that it shall have.")],
+    baud: Annotated[int, typer.Option(help="Baud rate it listens at; omote scan finds it.")] = 1_000_000,
+    protocol: Annotated[
+        int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")
+    ] = 2,
+    release: Annotated[
+        bool, typer.Option("--release", help="Switch its motor off first; support what it holds.")
+    ] = False,
+) -> None:
+    """Give a servo another id. It is checked that nobody else has it, and that the change was kept.
+
+    Example: omote set-id /dev/ttyUSB0 1 12
+    """
+    from drivers.rename import set_id as change
+
+    info = change(port, baud, protocol, old, new, release=release)
+    console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}")
 
 
 def parse_ids(text: str) -> list[int]:

@@ -78,9 +78,9 @@ def describe(link: SerialPort, servo: int) -> ServoInfo | None:
         table = load_table(number)
     except DriverError:
         return ServoInfo(servo, number, name, firmware)
-    volts = _item(link, servo, table, "Present Voltage")
-    warm = _item(link, servo, table, "Present Temperature")
-    torque = _item(link, servo, table, "Torque Enable")
+    volts = read_item(link, servo, table, "Present Voltage")
+    warm = read_item(link, servo, table, "Present Temperature")
+    torque = read_item(link, servo, table, "Torque Enable")
     return ServoInfo(
         servo,
         number,
@@ -110,7 +110,8 @@ def _error(link: SerialPort, servo: int) -> int | None:
     return None if answer is None else answer.code
 
 
-def _item(link: SerialPort, servo: int, table: ControlTable, name: str) -> int | None:
+def read_item(link: SerialPort, servo: int, table: ControlTable, name: str) -> int | None:
+    """One register of a servo; None where its model has none of that name, or no good answer comes."""
     item: Item | None = table.get(name)
     data = None if item is None else _read(link, servo, item.address, item.size)
     return None if item is None or data is None else item.decode(data)

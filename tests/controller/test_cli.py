@@ -18,6 +18,7 @@ COMMANDS = [
     ("fit",),
     ("ports",),
     ("scan",),
+    ("set-id",),
     ("check",),
     ("bench",),
     ("simulate", "dynamixel"),
