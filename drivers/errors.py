@@ -18,6 +18,8 @@ The tree::
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 
 class DriverError(Exception):
     """Something the drivers room cannot do.
@@ -81,3 +83,13 @@ class ServoRefused(BusError):
 
 class ServoFault(BusError):
     """A servo latched a hardware error and needs a reboot."""
+
+
+def together(failed: Mapping[int, BusError]) -> BusError:
+    """One error for many servos: the first one's kind and hint, every servo's id, and how many there are."""
+    first, *others = failed.values()
+    if not others:
+        return first
+    ids = ", ".join(map(str, sorted(failed)))
+    message = f"{first}; the same or worse for {len(failed)} servos: ids {ids}"
+    return type(first)(message, hint=first.hint, port=first.port, servo_ids=tuple(sorted(failed)))

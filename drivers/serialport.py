@@ -37,6 +37,12 @@ _BUSY = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
 _CHUNK = 4096
 _WRITE_LIMIT_S = 0.5
 
+HOST_MARGIN_S = 0.010
+"""Time a busy host may need to notice a reply, beyond the wire and the adapter."""
+UNKNOWN_LATENCY_S = 0.002
+PSEUDO_MARGIN_S = 0.05
+"""Behind a pseudo-terminal sits a program, which competes for the processor with everything else."""
+
 
 class SerialPort:
     """One serial device, held by this process alone while it is open.
@@ -239,3 +245,11 @@ def latency_s(path: str | os.PathLike[str], sys_root: str | os.PathLike[str] = "
         return int(text) / 1000.0
     except (OSError, ValueError):
         return None
+
+
+def reply_margin_s(path: str | os.PathLike[str]) -> float:
+    """Longest wait for a reply beyond its time on the wire, for what a device path leads to, in seconds."""
+    if str(Path(path).resolve()).startswith("/dev/pts/"):
+        return PSEUDO_MARGIN_S
+    latency = latency_s(path)
+    return 2 * (UNKNOWN_LATENCY_S if latency is None else latency) + HOST_MARGIN_S

@@ -13,7 +13,7 @@ from drivers.dynamixel.packet import ErrorNumber, Instruction, StatusPacket, enc
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.sdk import Exchange, Packets
 from drivers.dynamixel.tables import ControlTable, Item
-from drivers.errors import BusError, CorruptReply, NoReply, ServoRefused
+from drivers.errors import BusError, CorruptReply, NoReply, ServoRefused, together
 
 TRIES = 4
 T = TypeVar("T")
@@ -185,13 +185,3 @@ class Registers:
 
     def _error(self, kind: type[BusError], message: str, hint: str, servo: int) -> BusError:
         return kind(message, hint=hint, port=self.port.port_name, servo_ids=(servo,))
-
-
-def together(failed: Mapping[int, BusError]) -> BusError:
-    """One error for many servos: the first one's kind and hint, every servo's id, and how many there are."""
-    first, *others = failed.values()
-    if not others:
-        return first
-    ids = ", ".join(map(str, sorted(failed)))
-    message = f"{first}; the same or worse for {len(failed)} servos: ids {ids}"
-    return type(first)(message, hint=first.hint, port=first.port, servo_ids=tuple(sorted(failed)))
