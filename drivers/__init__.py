@@ -7,42 +7,75 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivers.errors import DriverError
 
 if TYPE_CHECKING:
     from drivers.bus import Bus, ServoSpec
 
+SIMULATED = "simulated"
+
+
+class Kind(NamedTuple):
+    """Where a family lives: its driver, and what raises DriverError for a model that it does not drive."""
+
+    driver: str
+    check: str
+
+
 KINDS = {
-    "dynamixel": ("drivers.dynamixel.bus", "DynamixelBus"),
-    "simulated": ("drivers.dynamixel.simulated", "SimulatedDynamixelBus"),
+    "dynamixel": Kind("drivers.dynamixel.bus:DynamixelBus", "drivers.models:check_dynamixel"),
 }
 
 
-def open_bus(kind: str, servos: Iterable[ServoSpec], **options: Any) -> Bus:
+def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynamixel", **options: Any) -> Bus:
     """Make the bus of a kind; it opens its port when it is entered or when ``open`` is called.
 
     Parameters
     ----------
-    kind : ``"dynamixel"`` (a real port, or a pseudo-terminal that something serves) or ``"simulated"``
-        (the same driver over a bus simulated in a child process).
+    kind : a family of :data:`KINDS` (a real port, or one that something serves), or ``"simulated"`` (the same driver
+        over a bus simulated in a child process).
     servos : the servos in the order of all arrays.
-    options : what the driver takes, for example ``port`` and ``baud``.
+    simulates : the family that ``"simulated"`` stands in for.
+    options : what the driver takes, for example ``port`` and ``baud``; see docs/drivers.md.
 
     Raises
     ------
-    DriverError : unknown kind, or the vendor's package is not installed.
+    DriverError : unknown kind, or a package is not installed.
     """
+    if kind == SIMULATED:
+        from drivers.simulated import simulated
+
+        driver = simulated(_load(simulates, "driver"), simulates)
+    else:
+        driver = _load(kind, "driver")
+        if options.pop("faults", ()):
+            raise DriverError("faults can only be given to a simulated bus", hint='set kind = "simulated"')
+    bus: Bus = driver(servos, **options)
+    return bus
+
+
+def check_model(kind: str, model: str, simulates: str = "dynamixel") -> None:
+    """Whether a kind of bus drives a servo model.
+
+    Raises
+    ------
+    DriverError : it does not; the hint lists names that look like it.
+    """
+    _load(simulates if kind == SIMULATED else kind, "check")(model)
+
+
+def _load(kind: str, what: str) -> Any:
+    """A family's driver or check."""
     if kind not in KINDS:
-        raise DriverError(f"unknown bus kind {kind!r}", hint=f"use one of: {', '.join(sorted(KINDS))}")
-    module, name = KINDS[kind]
+        names = ", ".join(sorted((*KINDS, SIMULATED)))
+        raise DriverError(f"unknown bus kind {kind!r}", hint=f"use one of: {names}")
+    module, _, name = getattr(KINDS[kind], what).partition(":")
     try:
-        driver = getattr(import_module(module), name)
+        return getattr(import_module(module), name)
     except ModuleNotFoundError as error:
         raise DriverError(
             f"bus kind {kind!r} needs the package {error.name!r}, which is not installed",
             hint="pip install dynamixel-sdk pyserial",
         ) from error
-    bus: Bus = driver(servos, **options)
-    return bus

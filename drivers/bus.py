@@ -19,7 +19,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +46,9 @@ class ServoSpec:
     max_speed_rad_s, max_accel_rad_s2 : limits of the motion, above zero.
     reverse : the angle grows where ticks fall.
     zero_rad : shaft angle from the middle of the range at which the angle is zero.
+    rest_rad : angle at which a servo begins that cannot tell where it is; kept inside the limits.
+    pulse_us : calibrated (angle rad, pulse us) of a hobby servo, two or more; empty takes the model's.
+    wire_name : what it is called on a wire that sends names; empty takes ``name``.
 
     Raises
     ------
@@ -61,11 +64,14 @@ class ServoSpec:
     max_accel_rad_s2: float
     reverse: bool = False
     zero_rad: float = 0.0
+    rest_rad: float = 0.0
+    pulse_us: tuple[tuple[float, float], ...] = ()
+    wire_name: str = ""
 
     def __post_init__(self) -> None:
         if not 0 <= self.id <= 252:
             raise ValueError(f"servo {self.name!r}: id must be 0 to 252, got {self.id}")
-        for key in ("min_rad", "max_rad", "max_speed_rad_s", "max_accel_rad_s2", "zero_rad"):
+        for key in ("min_rad", "max_rad", "max_speed_rad_s", "max_accel_rad_s2", "zero_rad", "rest_rad"):
             if not math.isfinite(getattr(self, key)):
                 raise ValueError(f"servo {self.name!r} (id {self.id}): {key} must be a finite number")
         if self.min_rad >= self.max_rad:
@@ -100,8 +106,9 @@ class BusState:
     time_s : monotonic clock when the read ended.
     position_rad : last good position; NaN before the first one.
     velocity_rad_s, current_a : from the same reply; NaN where the model does not measure it.
-    fresh : True where this cycle brought the position. Never use a position that is not fresh as a pose.
-    age_s : seconds since the position arrived; inf before the first one.
+    fresh : True where this cycle brought the position. Never use a position that is not fresh as a pose. On a bus
+        that does not measure it is always False, and the position is what the board says it puts out, or was told.
+    age_s : seconds since the position arrived; inf before the first one, and where nothing can be asked.
     error : error byte of the last reply (bit 7: alert, a hardware error is latched; bits 0-6: a number).
     silent : True where the servo stopped answering and is only probed now and then.
     voltage_v, temperature_c : polled in turn; NaN before the first poll.
@@ -176,7 +183,13 @@ class Bus(ABC):
     Raises
     ------
     ValueError : no servo, or two with one id.
+
+    Attributes
+    ----------
+    measures : positions are measured at the shafts. Where they are not (hobby servos) no state is ever fresh.
     """
+
+    measures: ClassVar[bool] = True
 
     def __init__(self, servos: Iterable[ServoSpec]) -> None:
         self.servos: tuple[ServoSpec, ...] = tuple(servos)

@@ -47,6 +47,10 @@ class WireBus(Bus):
         """Device path in use."""
 
     @abstractmethod
+    def _use_path(self, path: str) -> None:
+        """Another device path, from the next opening on."""
+
+    @abstractmethod
     def _open_link(self) -> None:
         """Take the port; raises PortMissing, PortBusy or PortPermission."""
 

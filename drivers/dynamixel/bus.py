@@ -42,7 +42,6 @@ class DynamixelBus(WireBus):
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
     slow_group : servos asked for one slow value (torque, error, watchdog, supply) each cycle; 0 asks only about
         servos that raise an alert.
-    faults : only a simulated bus takes any.
     clock : monotonic seconds.
     policy : fields of :class:`~drivers.dynamixel.startup.Policy`, such as ``watchdog_ms``.
 
@@ -61,13 +60,10 @@ class DynamixelBus(WireBus):
         fast: bool = False,
         margin_s: float | None = None,
         slow_group: int = 4,
-        faults: Sequence[str] = (),
         clock: Callable[[], float] = time.monotonic,
         **policy: object,
     ) -> None:
         super().__init__(servos, clock=clock)
-        if faults and type(self) is DynamixelBus:
-            raise DriverError("faults can only be given to a simulated bus", hint='set kind = "simulated"')
         self.policy = Policy(**policy)  # type: ignore[arg-type]
         self._port = Port(port, baud, margin_s)
         self._registers = Registers(Packets(), self._port, self.servos)
@@ -86,6 +82,9 @@ class DynamixelBus(WireBus):
     def path(self) -> str:
         """Device path in use."""
         return self._port.link.path
+
+    def _use_path(self, path: str) -> None:
+        self._port.setPortName(path)
 
     def _open_link(self) -> None:
         self._port.openPort()

@@ -1,21 +1,22 @@
-"""The same driver over a bus that is simulated beside it."""
+"""kind = "simulated": any family's own driver over a bus that is simulated beside it."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from drivers.bus import ServoSpec
-from drivers.dynamixel.bus import DynamixelBus
+from drivers.wirebus import WireBus
 
 if TYPE_CHECKING:
     from drivers.sim import SimulatedBus
 
 
-class SimulatedDynamixelBus(DynamixelBus):
-    """A :class:`~drivers.dynamixel.bus.DynamixelBus` that brings its own simulated servos.
+class SimulatedWire(WireBus):
+    """What a driver gets from :func:`simulated`: simulated servos of its own.
 
     They live in a child process from ``open`` to ``close`` and keep their state over ``reconnect``.
 
@@ -24,8 +25,10 @@ class SimulatedDynamixelBus(DynamixelBus):
     servos : the servos in the order of all arrays; the simulated ones have the same ids and models.
     port : path that shall point at the simulated port, so that other programs can find it; empty for a private one.
     faults, wire, latency_s, seed, process : see :class:`drivers.sim.SimulatedBus`.
-    options : see :class:`~drivers.dynamixel.bus.DynamixelBus`.
+    options : see the driver.
     """
+
+    family: ClassVar[str]
 
     def __init__(
         self,
@@ -40,7 +43,7 @@ class SimulatedDynamixelBus(DynamixelBus):
         process: bool = True,
         **options: Any,
     ) -> None:
-        super().__init__(servos, port=port, baud=baud, faults=faults, **options)
+        super().__init__(servos, port=port, baud=baud, **options)  # type: ignore[call-arg]
         self.simulation: SimulatedBus | None = None
         self._link = port
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -74,7 +77,7 @@ class SimulatedDynamixelBus(DynamixelBus):
         simulation = SimulatedBus(self.servos, link=link, **self._settings)
         simulation.__enter__()
         self.simulation = simulation
-        self._port.setPortName(link)
+        self._use_path(link)
 
     def _release(self) -> None:
         super()._release()
@@ -84,3 +87,9 @@ class SimulatedDynamixelBus(DynamixelBus):
         folder, self._folder = self._folder, None
         if folder is not None:
             folder.cleanup()
+
+
+@cache
+def simulated(driver: type[WireBus], family: str) -> type[WireBus]:
+    """The driver of a family, with simulated servos of its own."""
+    return type(f"Simulated{driver.__name__}", (SimulatedWire, driver), {"family": family})
