@@ -70,7 +70,7 @@ def scan(
     from controller.scanning import STEPS, plan_scan, scan_port
 
     plan = plan_scan(baud, protocol or (2, 1))
-    table = Table("baud", "protocol", "id", "model", "firmware", "voltage", "temperature", "error", "torque")
+    table = Table("baud", "prot.", "id", "model", "fw", "supply", "temp.", "error", "torque")
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task(f"scanning {port}", total=len(plan) * STEPS)
 
@@ -133,6 +133,7 @@ Faults = Annotated[
     list[str] | None, typer.Option("--fault", metavar="SPEC", help="Fault to inject, for example mute:7; repeatable.")
 ]
 
+Look = Annotated[bool, typer.Option("--watch", help="Show the servos and the decoded traffic while it runs.")]
 Control = Annotated[Path | None, typer.Option("--control", help="Socket that takes faults while it runs.")]
 
 
@@ -144,6 +145,7 @@ def simulate_dynamixel(
     wire: Wire = False,
     fault: Faults = None,
     control: Control = None,
+    watch: Look = False,
 ) -> None:
     """Serve simulated Dynamixel servos until interrupted; prints `ready PATH`. AX and MX models speak Protocol 1.0.
 
@@ -151,7 +153,9 @@ def simulate_dynamixel(
     """
     from controller.simulating import SimulatedId, serve_servos
 
-    serve_servos([SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console, control)
+    serve_servos(
+        [SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console, control, watch
+    )
 
 
 def simulate_feetech(
@@ -162,6 +166,7 @@ def simulate_feetech(
     wire: Wire = False,
     fault: Faults = None,
     control: Control = None,
+    watch: Look = False,
 ) -> None:
     """Serve simulated Feetech STS or SCS servos until interrupted; prints `ready PATH`.
 
@@ -169,27 +174,29 @@ def simulate_feetech(
     """
     from controller.simulating import SimulatedId, serve_servos
 
-    serve_servos([SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console, control)
+    serve_servos(
+        [SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console, control, watch
+    )
 
 
-def simulate_maestro(link: Link = None, fault: Faults = None) -> None:
+def simulate_maestro(link: Link = None, fault: Faults = None, watch: Look = False) -> None:
     """Serve a simulated Pololu Maestro until interrupted; prints `ready PATH`.
 
     Example: omote simulate maestro --link /tmp/maestro
     """
     from controller.simulating import serve_board
 
-    serve_board("maestro", link, fault or [], console)
+    serve_board("maestro", link, fault or [], console, watch)
 
 
-def simulate_ssc32(link: Link = None, fault: Faults = None) -> None:
+def simulate_ssc32(link: Link = None, fault: Faults = None, watch: Look = False) -> None:
     """Serve a simulated Lynxmotion SSC-32 until interrupted; prints `ready PATH`.
 
     Example: omote simulate ssc32 --link /tmp/ssc32
     """
     from controller.simulating import serve_board
 
-    serve_board("ssc32", link, fault or [], console)
+    serve_board("ssc32", link, fault or [], console, watch)
 
 
 def simulate_robot(
@@ -198,6 +205,7 @@ def simulate_robot(
     link: Link = None,
     wire: Wire = False,
     fault: Faults = None,
+    watch: Look = False,
 ) -> None:
     """Serve the simulated servos a robot file describes, until interrupted; prints `ready PATH`.
 
@@ -206,7 +214,7 @@ def simulate_robot(
     from controller.simulating import robot_servos, serve_servos
 
     models, baud = robot_servos(robot, bus)
-    serve_servos(models, baud, link, wire, fault or [], console)
+    serve_servos(models, baud, link, wire, fault or [], console, watch=watch)
 
 
 def simulate_host(

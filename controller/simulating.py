@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
@@ -16,6 +19,11 @@ from controller.parameters import PARAMETERS
 from controller.paths import find_config
 from controller.robot import load_robot
 from controller.signals import stop_flag
+from controller.watching import Watch
+from drivers.traffic import Decoder
+
+if TYPE_CHECKING:
+    from drivers.sim.serve import PtyServer
 
 
 @dataclass(frozen=True)
@@ -34,6 +42,7 @@ def serve_servos(
     faults: list[str],
     console: Console,
     control: Path | None = None,
+    watch: bool = False,
 ) -> None:
     """Serve simulated servos; prints ``ready PATH`` and returns when interrupted.
 
@@ -45,29 +54,74 @@ def serve_servos(
     wire : bytes take the time they take at ``baud``.
     faults : faults to inject, see docs/simulated-buses.md.
     control : path of a socket that takes faults while it runs.
+    watch : show the servos and the traffic while it runs.
     """
+    from drivers.dynamixel.tables import load_table
     from drivers.sim import serve_dynamixel
+    from drivers.traffic import Decoder1, Decoder2
+
+    tables = {servo.id: load_table(servo.model) for servo in servos}
+    decoder = (Decoder1 if any(table.protocol == 1 for table in tables.values()) else Decoder2)(tables)
 
     def ready(path: str) -> None:
         console.print(f"ready {link or path}", soft_wrap=True)
 
-    _until_stopped(
-        lambda stop: serve_dynamixel(
-            servos, baud=baud, link=link, wire=wire, faults=faults, on_ready=ready, commands=control, stop=stop
+    with _watching(decoder if watch else None, console) as look:
+        _until_stopped(
+            lambda stop: serve_dynamixel(
+                servos,
+                baud=baud,
+                link=link,
+                wire=wire,
+                faults=faults,
+                on_ready=ready,
+                commands=control,
+                stop=stop,
+                on_server=look,
+            )
         )
-    )
 
 
-def serve_board(board: str, link: Path | None, faults: list[str], console: Console) -> None:
+@contextmanager
+def _watching(decoder: Decoder | None, console: Console) -> Iterator[Callable[[PtyServer], None]]:
+    """Gives what begins to watch a server; the view ends with the block. Without a decoder nobody watches."""
+    over = threading.Event()
+    threads: list[threading.Thread] = []
+
+    def look(server: PtyServer) -> None:
+        if decoder is None:
+            return
+
+        def rows() -> list[dict[str, Any]]:
+            with server.chain.lock:
+                return server.chain.describe(time.monotonic())
+
+        watch = Watch(f"simulated bus on {server.port.path}", rows, decoder, console)
+        server.tap = watch.tap
+        threads.append(threading.Thread(target=watch.run, args=(lambda: not over.is_set(),)))
+        threads[-1].start()
+
+    try:
+        yield look
+    finally:
+        over.set()
+        for thread in threads:
+            thread.join()
+
+
+def serve_board(board: str, link: Path | None, faults: list[str], console: Console, watch: bool = False) -> None:
     """Serve a simulated servo board, ``maestro`` or ``ssc32``; prints ``ready PATH`` and returns when interrupted."""
     from drivers.sim import Maestro, Ssc32, serve
+    from drivers.traffic import HexDecoder, TextDecoder
 
+    decoder = HexDecoder() if board == "maestro" else TextDecoder()
     made = {"maestro": Maestro, "ssc32": Ssc32}[board](now_s=time.monotonic(), faults=faults)
 
     def ready(path: str) -> None:
         console.print(f"ready {link or path}", soft_wrap=True)
 
-    _until_stopped(lambda stop: serve(made, link=link, on_ready=ready, stop=stop))
+    with _watching(decoder if watch else None, console) as look:
+        _until_stopped(lambda stop: serve(made, link=link, on_ready=ready, stop=stop, on_server=look))
 
 
 def robot_servos(name: str, bus: str | None) -> tuple[list[SimulatedId], int]:

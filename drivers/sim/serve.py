@@ -40,6 +40,7 @@ class PtyServer:
     Attributes
     ----------
     port : the terminal; its ``path`` is what a client opens.
+    tap : called with (sent by the client, bytes) for everything that passes, or None.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class PtyServer:
         on_line: Callable[[str], object] | None = None,
     ) -> None:
         self.chain, self.baud = chain, baud
+        self.tap: Callable[[bool, bytes], None] | None = None
         self._socket = ControlSocket(commands, Commands(chain).obey) if commands else None
         try:
             self.port = PtyPort(link)
@@ -115,6 +117,8 @@ class PtyServer:
         data = self.port.read()
         if not data:
             return
+        if self.tap is not None:
+            self.tap(True, data)
         now_s = self._read_s = time.monotonic()
         chain = self.chain
         chain.set_line_baud(self.port.baud())
@@ -133,16 +137,20 @@ class PtyServer:
         for time_s, data in timed:
             if self._queue or time_s > time.monotonic():
                 self._queue.append((time_s, data))
-            elif self.port.is_open:
-                self.port.write(data)
+            else:
+                self._write(data)
+
+    def _write(self, data: bytes) -> None:
+        if self.port.is_open:
+            self.port.write(data)
+            if self.tap is not None:
+                self.tap(False, data)
 
     def _work_off(self) -> None:
         """Replies, faults and broken packets whose time has come."""
         now_s = time.monotonic()
         while self._queue and self._queue[0][0] <= now_s:
-            _, data = self._queue.popleft()
-            if self.port.is_open:
-                self.port.write(data)
+            self._write(self._queue.popleft()[1])
         if self.chain.reader.pending and now_s >= self._read_s + PAUSE_S:
             for packet in self.chain.reader.flush():
                 self._send(without_timing(self.chain.handle(packet, now_s), now_s))
@@ -204,6 +212,7 @@ def serve_dynamixel(
     commands: str | os.PathLike[str] | None = None,
     stop: int | None = None,
     seed: int = 0,
+    on_server: Callable[[PtyServer], None] = lambda server: None,
 ) -> None:
     """Serve a simulated bus of Dynamixel or Feetech servos until it is interrupted. Prints nothing.
 
@@ -220,6 +229,7 @@ def serve_dynamixel(
     commands : path of a socket that takes commands while it runs, see ``drivers.sim.control``.
     stop : descriptor; the end of it (or any byte) ends the service. None = until KeyboardInterrupt.
     seed : of random faults.
+    on_server : called with the server before it serves, for who wants to look inside.
 
     Raises
     ------
@@ -228,7 +238,17 @@ def serve_dynamixel(
     now_s = time.monotonic()
     chain = make_chain(make_servos(ids, model, baud, now_s), now_s, seed)
     chain.faults.add(faults, now_s)
-    serve(chain, link, on_ready, baud=baud, wire=wire, latency_s=latency_s, commands=commands, stop=stop)
+    serve(
+        chain,
+        link,
+        on_ready,
+        baud=baud,
+        wire=wire,
+        latency_s=latency_s,
+        commands=commands,
+        stop=stop,
+        on_server=on_server,
+    )
 
 
 def serve(
@@ -241,6 +261,7 @@ def serve(
     latency_s: float = 0.0,
     commands: str | os.PathLike[str] | None = None,
     stop: int | None = None,
+    on_server: Callable[[PtyServer], None] = lambda server: None,
 ) -> None:
     """Serve any simulated bus, for example ``Maestro()`` or ``Ssc32()``; parameters as for `serve_dynamixel`.
 
@@ -251,6 +272,7 @@ def serve(
     server = PtyServer(line, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
     reading, writing = os.pipe()
     try:
+        on_server(server)
         on_ready(server.port.path)
         server.run(reading if stop is None else stop)
     finally:
