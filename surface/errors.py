@@ -5,6 +5,7 @@ The tree::
     SurfaceError
     ├── HeadFileError     a head's files are missing, damaged or of another version
     ├── FitError          a mesh cannot be turned into a head (no UVs, NaN, mismatched shapes)
+    ├── ExportError       a head cannot be written for other programs
     ├── SurfaceFileError  a surface file is damaged, or holds what no DCP surface can be exactly
     └── ViewError         no picture can be drawn (no OpenGL, no display, context too old)
 
@@ -34,6 +35,10 @@ class HeadFileError(SurfaceError):
 
 class FitError(SurfaceError):
     """A mesh cannot be turned into a head."""
+
+
+class ExportError(SurfaceError):
+    """A head cannot be written for other programs."""
 
 
 class SurfaceFileError(SurfaceError):

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.fit.chart import make_chart
+from surface.fit.chart import Chart, make_chart
+from surface.fit.generic import Plan, make_plan
 from surface.fit.islands import Island, find_islands
 from surface.fit.joins import find_seams
-from surface.fit.mesh import FitMesh, load_mesh
-from surface.fit.names import sources_of
+from surface.fit.load import Loaded, LoadOptions, load_mesh
+from surface.fit.mesh import FitMesh, check_manifold
+from surface.fit.names import sources_of, to_arkit
 from surface.fit.pieces import Body, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.recipe import PartRecipe, Recipe, recipe_for
-from surface.fit.refine import fit_chart
+from surface.fit.refine import Fitted, fit_chart
 from surface.fit.relax import open_flat_holes
-from surface.fit.report import FitReport, measure
+from surface.fit.report import FitReport, PartReport, measure
 from surface.fit.rigging import find_jaw
 from surface.fit.seat import close_lips, seat_lids, strengthen
 from surface.fit.strokes import make_paint
@@ -35,39 +37,91 @@ Progress = Callable[[str, float], None]
 LIVELY = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
 
 
-def fit_head(mesh_path: str | Path, out_dir: str | Path, *, name: str, progress: Progress | None = None) -> FitReport:
+@dataclass(frozen=True)
+class FittedPart:
+    """One fitted chart of a head, for reports and for what is fitted on top of it."""
+
+    name: str
+    chart: Chart
+    fitted: Fitted
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """A fitted head: its data, the report, and the charts it was fitted in."""
+
+    head: HeadData
+    report: FitReport
+    parts: list[FittedPart]
+
+
+def fit_head(
+    mesh_path: str | Path, out_dir: str | Path, *, name: str, progress: Progress | None = None,
+    options: LoadOptions = LoadOptions(), report_dir: str | Path | None = None,
+) -> FitReport:  # fmt: skip
     """Fit a head to a mesh and write it.
 
     Parameters
     ----------
-    mesh_path : .npz in the layout of :mod:`surface.fit.mesh`.
+    mesh_path : .glb or .gltf with morph targets, .obj with a folder of shapes, or .npz.
     out_dir : folder that gets head.toml and head.npz.
     name : the head's short name.
     progress : called with the part being fitted and the fraction done, 0..1.
+    options : how the mesh is to be understood. report_dir : folder that gets the report (see
+        :func:`surface.fit.reportfile.write_report`).
 
     Raises
     ------
-    FitError : the mesh cannot be read, has no texture coordinates or faces, holds NaN, or does not fit together.
-        Nothing is written then.
+    FitError : the mesh cannot be read, has no texture coordinates or faces, holds NaN, is no manifold, or does not
+        fit together. Nothing is written then.
     """
-    mesh = load_mesh(mesh_path)
-    data, report = fit_mesh(mesh, recipe_for(mesh), name, progress or (lambda part, done: None))
-    save_data(out_dir, data)
-    return report
+    tell = progress or (lambda part, done: None)
+    loaded = load_mesh(mesh_path, options)
+    result = fit_mesh(loaded, name, tell, str(mesh_path))
+    if report_dir is not None:
+        from surface.fit.reportfile import write_report
+
+        write_report(result, report_dir, tell)
+    save_data(out_dir, result.head)
+    return result.report
 
 
-def fit_mesh(mesh: FitMesh, recipe: Recipe, name: str, progress: Progress) -> tuple[HeadData, FitReport]:
-    """Fit all parts of a mesh in memory."""
-    mesh = _prepare(mesh, recipe)
-    body = _body(mesh, recipe)
-    steps = _Steps(recipe, progress)
-    parts, reports, charts = [], [], {}
-    for part, islands in _islands_of(mesh, recipe):
-        chart = make_chart(mesh, islands, normalise=len(islands) > 1 or not _unit_square(islands[0]))
+def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh") -> FitResult:
+    """Fit all parts of a mesh in memory; ``where`` names it in messages."""
+    recipe = recipe_for(loaded.mesh)
+    if recipe is not None:
+        mesh = prepare(loaded.mesh, recipe)
+        plan = recipe_plan(mesh, recipe)
+    else:
+        check_manifold(loaded.mesh, where)
+        recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
+        plan = make_plan(mesh)
+    sources = sources_of(mesh.names)
+    body = Body(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
+    parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, body, progress)
+    charts = {p.name: p.chart for p in fitted_parts}
+    head = HeadData(
+        name, _provenance(recipe), _neck(mesh, recipe), body.eyes, body.radius, body.jaw,
+        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
+    )  # fmt: skip
+    head = replace(head, parts=[_with_mesh(p, head) for p in parts])
+    left_out = loaded.named.left_out
+    report = FitReport(name, reports, sorted(sources), loaded.named.missing, left_out, [*loaded.notes, *plan.notes])
+    return FitResult(head, report, fitted_parts)
+
+
+def _fit_parts(
+    mesh: FitMesh, recipe: Recipe, plan: Plan, body: Body, progress: Progress
+) -> tuple[list[PartData], list[PartReport], list[FittedPart]]:  # fmt: skip
+    """Every chart of the plan, teeth, hair and eyeballs."""
+    parts, reports, fitted_parts = [], [], []
+    steps = _Steps([p for p, _ in plan.parts], progress)
+    for part, islands in plan.parts:
+        chart = make_chart(mesh, islands, normalise=part.tiled)
         fitted = fit_chart(mesh if part.follows == "skin" else _still(mesh), chart, part.wish, steps.of(part))
         parts.append(skin_part(part, chart, fitted, body))
         reports.append(measure(part.name, chart, fitted, mesh.names))
-        charts[part.name] = chart
+        fitted_parts.append(FittedPart(part.name, chart, fitted))
         if recipe.hair and recipe.hair["face"] == part.name:
             parts += hair_parts(mesh, chart, fitted, recipe.hair["brow"], body)
     for part in recipe.teeth:
@@ -76,18 +130,7 @@ def fit_mesh(mesh: FitMesh, recipe: Recipe, name: str, progress: Progress) -> tu
         reports.append(report)
     if body.radius > 0:
         parts += [eyeball_part(side, e, body.radius) for side, e in zip(("left", "right"), body.eyes, strict=True)]
-    head = HeadData(
-        name, _provenance(recipe), _neck(mesh, recipe), body.eyes, body.radius, body.jaw,
-        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
-    )  # fmt: skip
-    head = replace(head, parts=[_with_mesh(p, head) for p in parts])
-    return head, FitReport(name, reports, sorted(body.sources))
-
-
-def _body(mesh: FitMesh, recipe: Recipe) -> Body:
-    sources = sources_of(mesh.names)
-    jaw = find_jaw(mesh, sources, np.arange(*recipe.jaw_teeth), np.array(recipe.hinge or (0.0, 0.0, 0.0)))
-    return Body(sources, jaw, *_eyes(mesh, recipe), np.array(recipe.tongue))
+    return parts, reports, fitted_parts
 
 
 def _still(mesh: FitMesh) -> FitMesh:
@@ -95,21 +138,24 @@ def _still(mesh: FitMesh) -> FitMesh:
     return replace(mesh, names=(), deltas=mesh.deltas[:0])
 
 
-def _prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
+def prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
+    """The mesh as the recipe wants it: lips closed, blinks strengthened, lids seated on anatomical eyeballs."""
     mesh = strengthen(close_lips(mesh, recipe.lips_close), "eyeBlink", recipe.blink)
     balls = recipe.eyeballs(mesh)
     return mesh if balls is None else seat_lids(mesh, *balls, recipe.seated)
 
 
-def _islands_of(mesh: FitMesh, recipe: Recipe) -> list[tuple[PartRecipe, list[Island]]]:
-    """Every part with its islands, flat holes opened; parts without an island are left out."""
+def recipe_plan(mesh: FitMesh, recipe: Recipe) -> Plan:
+    """Every part of a recipe with its islands, flat holes opened; parts without an island are left out."""
     islands = find_islands(mesh)
-    out = []
+    parts = []
     for part in recipe.parts:
         own = [open_flat_holes(i) for i in islands if part.holds(float(np.median(i.vertex)))]
         if own:
-            out.append((part, own))
-    return out
+            tiled = len(own) > 1 or not _unit_square(own[0])
+            parts.append((replace(part, tiled=tiled), own))
+    hinge = np.array(recipe.hinge or (0.0, 0.0, 0.0))
+    return Plan(parts, _eyes(mesh, recipe), hinge, np.arange(*recipe.jaw_teeth))
 
 
 def _unit_square(island: Island) -> bool:
@@ -119,9 +165,9 @@ def _unit_square(island: Island) -> bool:
 class _Steps:
     """Progress over all parts, by their number of points."""
 
-    def __init__(self, recipe: Recipe, progress: Progress) -> None:
+    def __init__(self, parts: list[PartRecipe], progress: Progress) -> None:
         self._progress = progress
-        self._total = float(sum(p.wish.points for p in recipe.parts) or 1)
+        self._total = float(sum(p.wish.points for p in parts) or 1)
         self._before = 0.0
 
     def of(self, part: PartRecipe) -> Callable[[float], None]:

@@ -1,24 +1,13 @@
-"""The mesh a head is fitted to: vertices, faces, texture coordinates and expression shapes.
-
-The NPZ layout read here is the one of ICT-FaceKit (Light)::
-
-    neutral (n, 3)   deltas (k, n, 3)   names (k,)   faces (f, 4), the last index of a triangle is -1
-    uv (t, 2)        face_uv (f, 4), texture coordinates per face corner
-"""
+"""The mesh a head is fitted to: vertices, faces, texture coordinates and expression shapes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from zipfile import BadZipFile
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surface.errors import FitError
-
-KEYS = ("neutral", "deltas", "names", "faces", "uv", "face_uv")
-HEAD_HEIGHT_MM = 250.0  # a head with neck; only tells metres, centimetres and millimetres apart
 
 
 @dataclass(frozen=True)
@@ -31,6 +20,7 @@ class FitMesh:
     faces : (f, 4) int64, -1 fills the last place of a triangle.
     uv : (t, 2) float64; face_uv : (f, 4) int64 into ``uv``, -1 as in ``faces``.
     names : k shape names; deltas : (k, n, 3) float64, millimetres.
+    piece : (f,) int64 into ``pieces``, names of the objects that faces belong to; empty where there are none.
     """
 
     vertices: NDArray[np.float64]
@@ -39,45 +29,20 @@ class FitMesh:
     face_uv: NDArray[np.int64]
     names: tuple[str, ...]
     deltas: NDArray[np.float64]
+    piece: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    pieces: tuple[str, ...] = ()
+
+    def piece_of(self, face: int) -> str:
+        """Name of the object that a face belongs to."""
+        return self.pieces[self.piece[face]] if self.pieces else ""
 
     def moved(self, warp_vertices: NDArray[np.float64], warp_deltas: NDArray[np.float64]) -> FitMesh:
         """The same mesh with other vertices (n, 3) and deltas (k, n, 3)."""
-        return FitMesh(warp_vertices, self.faces, self.uv, self.face_uv, self.names, warp_deltas)
+        return replace(self, vertices=warp_vertices, deltas=warp_deltas)
 
-
-def load_mesh(path: str | Path) -> FitMesh:
-    """Read and check a mesh in the NPZ layout.
-
-    Raises
-    ------
-    FitError : the file is missing or damaged, lacks a key, holds NaN, or its arrays do not fit together.
-    """
-    path = Path(path)
-    raw = _read(path)
-    mesh = FitMesh(
-        np.asarray(raw["neutral"], float), np.asarray(raw["faces"], np.int64),
-        np.asarray(raw["uv"], float), np.asarray(raw["face_uv"], np.int64),
-        tuple(str(n) for n in raw["names"]), np.asarray(raw["deltas"], float),
-    )  # fmt: skip
-    check_mesh(mesh, str(path))
-    scale = unit_scale(mesh.vertices)
-    return mesh.moved(mesh.vertices * scale, mesh.deltas * scale)
-
-
-def _read(path: Path) -> dict[str, NDArray]:
-    if not path.is_file():
-        raise FitError(f"{path}: no such mesh file", hint="give the path of an .npz mesh with UVs and shapes")
-    try:
-        with path.open("rb") as f, np.load(f, allow_pickle=False) as z:
-            missing = [k for k in KEYS if k not in z.files]
-            if missing:
-                raise FitError(
-                    f"{path}: key {missing[0]!r} is missing (found: {', '.join(z.files)})",
-                    hint=f"the layout needs {', '.join(KEYS)}",
-                )
-            return {k: z[k] for k in KEYS}
-    except (OSError, ValueError, EOFError, BadZipFile) as e:
-        raise FitError(f"{path}: cannot be read as .npz ({e})", hint="save the mesh again") from e
+    def with_shapes(self, names: tuple[str, ...], deltas: NDArray[np.float64]) -> FitMesh:
+        """The same mesh with other shapes, (k, n, 3)."""
+        return replace(self, names=names, deltas=deltas)
 
 
 def check_mesh(mesh: FitMesh, where: str) -> None:
@@ -93,11 +58,48 @@ def check_mesh(mesh: FitMesh, where: str) -> None:
             raise FitError(f"{where}: {key} has shape {got}, expected {want}", hint="export all arrays from one mesh")
     if f == 0:
         raise FitError(f"{where}: faces is empty", hint="export the mesh with its polygons")
-    if len(mesh.uv) == 0 or (mesh.face_uv[:, :3] < 0).any():
-        raise FitError(f"{where}: the mesh has no texture coordinates", hint="unwrap it first: omote fits in (u, v)")
+    _check_mapped(where, mesh)
     _check_indices(where, "faces", mesh.faces, n)
     _check_indices(where, "face_uv", mesh.face_uv, len(mesh.uv))
+    if ((mesh.faces < 0) != (mesh.face_uv < 0)).any():
+        raise FitError(f"{where}: faces and face_uv have other corners", hint="export all arrays from one mesh")
     _check_finite(where, mesh)
+
+
+def _check_mapped(where: str, mesh: FitMesh) -> None:
+    bare = np.flatnonzero((mesh.face_uv[:, :3] < 0).any(axis=1)) if len(mesh.uv) else np.arange(len(mesh.faces))
+    if not len(bare):
+        return
+    part = f" (of {mesh.piece_of(bare[0])!r})" if len(mesh.pieces) > 1 else ""
+    what = "the mesh has" if len(bare) == len(mesh.faces) else f"faces[{bare[0]}]{part} has"
+    raise FitError(f"{where}: {what} no texture coordinates",
+                   hint="unwrap it first: omote fits in (u, v); or leave the object out: --without NAME")  # fmt: skip
+
+
+def check_manifold(mesh: FitMesh, where: str) -> None:
+    """Raise FitError, naming the edge, where more than two faces meet or two neighbours run opposite ways round."""
+    used = mesh.faces >= 0
+    following = np.roll(mesh.faces, -1, axis=1)
+    following[mesh.faces[:, 3] < 0, 2] = mesh.faces[mesh.faces[:, 3] < 0, 0]
+    a, b = mesh.faces[used], following[used]
+    n = len(mesh.vertices)
+    face = np.repeat(np.arange(len(mesh.faces)), used.sum(axis=1))
+    edge = np.minimum(a, b) * n + np.maximum(a, b)
+    _, first, inverse, count = np.unique(edge, return_index=True, return_inverse=True, return_counts=True)
+    if count.max() > 2:
+        at = first[np.argmax(count > 2)]
+        why = f"belongs to {count[inverse[at]]} faces, a surface has two at most"
+        raise _edge_error(mesh, where, a[at], b[at], face[at], why, "delete inner and doubled faces")
+    _, first, count = np.unique(a * n + b, return_index=True, return_counts=True)
+    if count.max() > 1:
+        at = first[np.argmax(count > 1)]
+        why = "is run through twice in one direction"
+        raise _edge_error(mesh, where, a[at], b[at], face[at], why, "make all faces look outwards")
+
+
+def _edge_error(mesh: FitMesh, where: str, a: int, b: int, face: int, why: str, hint: str) -> FitError:
+    part = f" of {mesh.piece_of(face)!r}" if mesh.pieces else ""
+    return FitError(f"{where}: not a manifold: the edge between vertices {a} and {b}{part} {why}", hint=hint)
 
 
 def _check_indices(where: str, key: str, index: NDArray, n: int) -> None:
@@ -116,13 +118,6 @@ def _check_finite(where: str, mesh: FitMesh) -> None:
         if len(bad):
             raise FitError(f"{where}: shape {name!r}, vertex {bad[0]} is not a finite number",
                            hint="repair the shape and export again")  # fmt: skip
-
-
-def unit_scale(vertices: NDArray[np.float64]) -> float:
-    """Factor that makes millimetres of metres, centimetres or millimetres, by the height of the mesh."""
-    height = float(np.ptp(vertices[:, 1]))
-    candidates = np.array([1.0, 10.0, 1000.0])
-    return float(candidates[np.argmin(np.abs(np.log(np.maximum(height * candidates, 1e-12) / HEAD_HEIGHT_MM)))])
 
 
 def triangles(faces: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -19,7 +19,10 @@ RECIPES = Path(__file__).parent / "recipes"
 
 @dataclass(frozen=True)
 class PartRecipe:
-    """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted."""
+    """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted.
+
+    ``tiled`` : its islands are still to be laid into tiles of their own.
+    """
 
     name: str
     material: str
@@ -27,6 +30,7 @@ class PartRecipe:
     vertices: list[tuple[int, int]]
     wish: Wish
     budget: tuple[int, float, int]
+    tiled: bool = False
 
     def holds(self, vertex: float) -> bool:
         """Is the vertex in one of the ranges?"""
@@ -68,14 +72,13 @@ class Recipe:
         return Eyeball(tuple(centre.tolist()), radius - self.ball_inset), Eyeball((x, y, z), self.eye_radius)
 
 
-def recipe_for(mesh: FitMesh) -> Recipe:
-    """The recipe made for meshes of this size, or one skin for all of an unknown mesh."""
+def recipe_for(mesh: FitMesh) -> Recipe | None:
+    """The recipe made for meshes of this size; None for an unknown mesh."""
     for path in sorted(RECIPES.glob("*.toml")):
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-        if (table["vertices"], table["faces"]) == (len(mesh.vertices), len(mesh.faces)):
+        if (table.get("vertices"), table.get("faces")) == (len(mesh.vertices), len(mesh.faces)):
             return _read(table)
-    whole = PartRecipe("face", "skin", "skin", [(0, len(mesh.vertices))], Wish(2500), (0, 0.2, 8))
-    return Recipe([whole])
+    return None
 
 
 def _read(table: dict[str, Any]) -> Recipe:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +42,20 @@ class PartReport:
 
 @dataclass(frozen=True)
 class FitReport:
-    """The whole head."""
+    """The whole head.
+
+    Attributes
+    ----------
+    parameters : ARKit's names that the head has shapes for; missing : those it has none for.
+    left_out : shapes of the mesh that mean none of them; notes : what was guessed or left out, in words.
+    """
 
     name: str
     parts: list[PartReport]
     parameters: list[str]
+    missing: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    notes: list[str] = field(default_factory=list)
 
     @property
     def points(self) -> int:

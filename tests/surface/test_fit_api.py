@@ -26,7 +26,7 @@ def test_the_report_has_figures_for_every_part_and_shape(fitted):
     _, report, _ = fitted
     (face,) = report.parts
     assert report.name == "sheet" and report.points == face.points <= 2500
-    assert set(face.shapes) == {"jawOpen", "mouthSmile_L"}
+    assert set(face.shapes) == {"jawOpen", "mouthSmileLeft"}
     assert face.neutral.rms <= face.neutral.p99 <= face.neutral.max < 0.8
     assert face.mean_shape_rms == pytest.approx(np.mean([e.rms for e in face.shapes.values()]))
     assert report.parameters == ["jawOpen", "mouthSmileLeft"]

@@ -5,7 +5,9 @@ import pytest
 from slit_sheet import slit_sheet, write_npz
 
 from surface.errors import FitError
-from surface.fit.mesh import load_mesh, triangles, unit_scale
+from surface.fit.frame import find_frame
+from surface.fit.load import load_mesh
+from surface.fit.mesh import triangles
 
 
 def refused(tmp_path, **other) -> FitError:
@@ -18,7 +20,7 @@ def refused(tmp_path, **other) -> FitError:
 
 def test_a_mesh_comes_back_as_it_was_written(tmp_path):
     want = slit_sheet()
-    got = load_mesh(write_npz(tmp_path / "m.npz", want))
+    got = load_mesh(write_npz(tmp_path / "m.npz", want)).mesh
     assert got.names == want.names
     np.testing.assert_array_equal(got.vertices, want.vertices)
     np.testing.assert_array_equal(got.deltas, want.deltas)
@@ -26,7 +28,7 @@ def test_a_mesh_comes_back_as_it_was_written(tmp_path):
 
 @pytest.mark.parametrize(("unit", "scale"), [(1.0, 1.0), (0.1, 10.0), (0.001, 1000.0)])
 def test_units_are_told_by_height(unit, scale):
-    assert unit_scale(slit_sheet().vertices * unit) == scale
+    assert find_frame(slit_sheet().vertices * unit, {}).scale == scale
 
 
 def test_a_missing_file_says_so(tmp_path):

@@ -1,0 +1,83 @@
+"""Meshes in the NPZ layout of ICT-FaceKit (Light)::
+
+neutral (n, 3)   deltas (k, n, 3)   names (k,)   faces (f, 4), the last index of a triangle is -1
+uv (t, 2)        face_uv (f, 4), texture coordinates per face corner
+"""
+
+from __future__ import annotations
+
+import struct
+import tokenize
+from pathlib import Path
+from zipfile import BadZipFile
+from zlib import error as ZlibError
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.errors import FitError
+from surface.readers.meshdata import MOST_MOVES, MOST_VERTICES, MeshData, check_size
+
+KEYS = ("neutral", "deltas", "names", "faces", "uv", "face_uv")
+DAMAGED = (
+    OSError, ValueError, EOFError, BadZipFile, ZlibError, KeyError, NotImplementedError, RuntimeError, struct.error,
+    MemoryError, OverflowError, SyntaxError, TypeError, tokenize.TokenError, IndexError,
+)  # fmt: skip
+
+
+def read_npz(path: Path) -> MeshData:
+    """A mesh in this layout; its indices are checked later, with those of all other meshes.
+
+    Raises
+    ------
+    FitError : the file is missing or damaged, lacks a key, or holds an array of another kind or shape.
+    """
+    raw = _arrays(path)
+    n, f, k = (len(np.atleast_1d(raw[key])) for key in ("neutral", "faces", "names"))
+    wanted = {
+        "neutral": (n, 3), "faces": (f, 4), "uv": (len(np.atleast_1d(raw["uv"])), 2), "face_uv": (f, 4),
+        "deltas": (k, n, 3), "names": (k,),
+    }  # fmt: skip
+    for key, want in wanted.items():
+        if raw[key].shape != want:
+            raise FitError(f"{path}: {key} has shape {raw[key].shape}, expected {want}",
+                           hint="export all arrays from one mesh")  # fmt: skip
+        kinds = "US" if key == "names" else "iu" if "face" in key else "fiu"
+        if raw[key].dtype.kind not in kinds:
+            raise FitError(f"{path}: {key} holds {raw[key].dtype}", hint="export all arrays from one mesh")
+    check_size(str(path), n, k)
+    with np.errstate(invalid="ignore"):
+        numbers = {key: raw[key].astype(float) for key in ("neutral", "uv", "deltas")}
+    return MeshData(
+        numbers["neutral"], raw["faces"].astype(np.int64), numbers["uv"], raw["face_uv"].astype(np.int64),
+        tuple(_text(x) for x in raw["names"]), numbers["deltas"], np.zeros(f, np.int64), ("mesh",),
+    )  # fmt: skip
+
+
+def _text(name: NDArray | bytes | str) -> str:
+    return name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
+
+
+def _arrays(path: Path) -> dict[str, NDArray]:
+    if not path.is_file():
+        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
+    try:
+        with path.open("rb") as f, np.load(f, allow_pickle=False) as z:
+            missing = [k for k in KEYS if k not in z.files]
+            if missing:
+                raise FitError(
+                    f"{path}: key {missing[0]!r} is missing (found: {', '.join(z.files)})",
+                    hint=f"the layout needs {', '.join(KEYS)}",
+                )
+            _check_declared(path, z)
+            return {k: z[k] for k in KEYS}
+    except DAMAGED as e:
+        raise FitError(f"{path}: cannot be read as .npz ({type(e).__name__}: {e})", hint="save the mesh again") from e
+
+
+def _check_declared(path: Path, archive: np.lib.npyio.NpzFile) -> None:
+    """Refuse arrays that would not fit into memory before they are unpacked."""
+    most = 24 * (MOST_MOVES + MOST_VERTICES)
+    for info in archive.zip.infolist() if archive.zip is not None else []:
+        if info.file_size > most:
+            raise FitError(f"{path}: {info.filename} is {info.file_size / 1e9:.1f} GB", hint="decimate the mesh first")
