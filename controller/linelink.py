@@ -6,15 +6,14 @@ face. A port that vanishes is looked for until it is there again.
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from types import TracebackType
 
 from controller.commands import CommandSink
 from controller.linesession import LineSession
-from drivers.errors import PortError, PortLost
-from drivers.serialport import UNPLUGGED, SerialPort
+from drivers.errors import PortError
+from drivers.serialport import SerialPort
 
 _POLL_S = 0.05
 _RETRY_S = 0.5
@@ -129,12 +128,7 @@ class LineLink:
     def _flush(self) -> None:
         if not self._out:
             return
-        try:
-            sent = os.write(self._serial.serial.fileno(), self._out)
-        except BlockingIOError:
-            return
-        except (*UNPLUGGED, ValueError) as error:
-            raise PortLost(f"port {self.port} went away: {error}", port=self.port) from error
+        sent = self._serial.put(bytes(self._out))
         self._counts["bytes_out"] += sent
         del self._out[:sent]
 

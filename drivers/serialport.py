@@ -8,40 +8,25 @@ from __future__ import annotations
 
 import errno
 import os
-import select
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import serial
-
+from drivers.endpoints import UNPLUGGED, Endpoint, open_endpoint
 from drivers.errors import PortBusy, PortError, PortLost, PortMissing, PortPermission
 
-try:
-    import termios
-    from termios import error as TermiosError
-except ImportError:  # no termios outside POSIX
-    termios = None  # type: ignore[assignment]
-
-    class TermiosError(Exception):  # type: ignore[no-redef]
-        """Stands in where there is no termios."""
-
-
-UNPLUGGED = (OSError, serial.SerialException, TermiosError)
-"""Everything that pyserial and the system raise when a device goes away."""
-
-_MISSING = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR, errno.EIO}
+_MISSING = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR, errno.EIO, errno.ECONNREFUSED, errno.EHOSTUNREACH}
 _DENIED = {errno.EACCES, errno.EPERM}
 _BUSY = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
-_CHUNK = 4096
 _WRITE_LIMIT_S = 0.5
 
 HOST_MARGIN_S = 0.010
 """Time a busy host may need to notice a reply, beyond the wire and the adapter."""
 UNKNOWN_LATENCY_S = 0.002
 PSEUDO_MARGIN_S = 0.05
-"""Behind a pseudo-terminal sits a program, which competes for the processor with everything else."""
+"""Behind a pseudo-terminal or a socket sits a program, which competes for the processor with everything else."""
 
 
 class SerialPort:
@@ -49,26 +34,31 @@ class SerialPort:
 
     Parameters
     ----------
-    path : device path; prefer ``/dev/serial/by-id/...``, which stays the same after a replug.
+    path : device path; prefer ``/dev/serial/by-id/...``, which stays the same after a replug. Or
+        ``socket://HOST:PORT``, ``memory://NAME`` (a bus simulated in this process), or another URL of pyserial.
     baud : any rate the device takes.
+
+    Attributes
+    ----------
+    tap : called with (sent, bytes) for everything that passes, or None.
     """
 
     def __init__(self, path: str | os.PathLike[str], baud: int = 1_000_000) -> None:
         self.path = os.fspath(path)
         self.baud = int(baud)
         self.low_latency = False
-        self._serial: serial.Serial | None = None
-        self._fd = -1
+        self.tap: Callable[[bool, bytes], None] | None = None
+        self._end: Endpoint | None = None
 
     @property
     def is_open(self) -> bool:
         """True while the device is held."""
-        return self._serial is not None
+        return self._end is not None
 
     @property
     def serial(self) -> Any:
-        """The pyserial object underneath, for code that insists on one; None while closed."""
-        return self._serial
+        """The pyserial object (or socket) underneath, for code that insists on one; None while closed."""
+        return None if self._end is None else self._end.device
 
     def open(self) -> None:
         """Take the device for this process, ask for low latency, and throw away what lies in its input.
@@ -82,23 +72,22 @@ class SerialPort:
         """
         self.close()
         try:
-            device = serial.Serial(self.path, self.baud, timeout=0, exclusive=True)
+            end = open_endpoint(self.path, self.baud)
         except UNPLUGGED as error:
             raise self._opening_error(error) from error
         except ValueError as error:
             message = f"port {self.path} does not take {self.baud} baud: {error}"
             raise PortError(message, hint="set a baud rate the adapter has", port=self.path) from error
-        self._serial, self._fd = device, device.fileno()
-        _tell_empty_from_gone(self._fd)
-        self.low_latency = _ask_low_latency(device)
+        self._end = end
+        self.low_latency = end.low_latency
         self.drain()
 
     def close(self) -> None:
         """Give the device back; never raises, may be called any number of times."""
-        device, self._serial, self._fd = self._serial, None, -1
-        if device is not None:
+        end, self._end = self._end, None
+        if end is not None:
             with suppress(*UNPLUGGED):
-                device.close()
+                end.close()
 
     def write(self, data: bytes) -> None:
         """Hand all bytes to the system.
@@ -108,10 +97,12 @@ class SerialPort:
         PortLost : the device went away, or took nothing for half a second.
         """
         deadline = 0.0
+        if self.tap is not None:
+            self.tap(True, data)
         view = memoryview(data)
         while view:
             try:
-                view = view[os.write(self._fd, view) :]
+                view = view[self._opened().put(view) :]
                 continue
             except BlockingIOError:
                 deadline = deadline or time.monotonic() + _WRITE_LIMIT_S
@@ -120,6 +111,23 @@ class SerialPort:
             if time.monotonic() > deadline:
                 raise self._lost("it takes no bytes")
             self._wait(deadline, writing=True)
+
+    def put(self, data: bytes) -> int:
+        """Hand over what there is room for now, without waiting; returns how many bytes that was.
+
+        Raises
+        ------
+        PortLost : the device went away.
+        """
+        try:
+            sent = self._opened().put(memoryview(data))
+        except BlockingIOError:
+            return 0
+        except (*UNPLUGGED, ValueError) as error:
+            raise self._lost(error) from error
+        if self.tap is not None:
+            self.tap(True, data[:sent])
+        return sent
 
     def read(self, deadline_s: float) -> bytes:
         """What has arrived, waiting for the first byte until a deadline.
@@ -165,33 +173,28 @@ class SerialPort:
 
     def _take(self) -> bytes:
         try:
-            data = os.read(self._fd, _CHUNK)
+            data = self._opened().take()
         except BlockingIOError:
             raise
         except (*UNPLUGGED, ValueError) as error:
             raise self._lost(error) from error
-        if not data:
-            raise self._empty()
+        if self.tap is not None:
+            self.tap(False, data)
         return data
 
-    def _empty(self) -> Exception:
-        """What a read of nothing means: no data yet where VMIN is 0, else that the device hung up."""
-        poll = select.poll()
-        poll.register(self._fd, select.POLLIN)
-        gone = any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, event in poll.poll(0))
-        return self._lost("it hung up") if gone else BlockingIOError()
-
-    def _wait(self, deadline_s: float, writing: bool = False) -> bool:
-        timeout = max(0.0, deadline_s - time.monotonic())
-        fds = [self._fd]
+    def _wait(self, deadline_s: float, writing: bool = False) -> None:
         try:
-            ready = select.select([] if writing else fds, fds if writing else [], [], timeout)
+            self._opened().wait(max(0.0, deadline_s - time.monotonic()), writing)
         except (*UNPLUGGED, ValueError) as error:
             raise self._lost(error) from error
-        return bool(ready[0] or ready[1])
+
+    def _opened(self) -> Endpoint:
+        if self._end is None:
+            raise OSError(errno.EBADF, "it is not open")
+        return self._end
 
     def _lost(self, why: object) -> PortLost:
-        reason = why if self.is_open else "it is not open"
+        reason = why.strerror if isinstance(why, OSError) and why.strerror else why
         return PortLost(
             f"port {self.path} went away: {reason}",
             hint="plug it in again and reconnect; `omote ports` shows what is there",
@@ -209,29 +212,16 @@ class SerialPort:
                 hint="sudo usermod -a -G dialout $USER, then log out and in again",
                 port=self.path,
             )
+        if "://" in self.path:
+            return PortMissing(
+                f"no port {self.path}: {getattr(error, 'strerror', None) or error}",
+                hint="start what serves it first, for example: omote simulate dynamixel --tcp HOST:PORT",
+                port=self.path,
+            )
         if code in _MISSING or not Path(self.path).exists():
             message = f"no port {self.path}"
             return PortMissing(message, hint="`omote ports` lists what is plugged in", port=self.path)
         return PortError(f"cannot open port {self.path}: {error}", hint="try `omote ports`", port=self.path)
-
-
-def _ask_low_latency(device: serial.Serial) -> bool:
-    """Ask the driver for its low-latency mode; pseudo-terminals and many adapters have none."""
-    try:
-        device.set_low_latency_mode(True)
-    except (ValueError, NotImplementedError, AttributeError, *UNPLUGGED):
-        return False
-    return True
-
-
-def _tell_empty_from_gone(fd: int) -> None:
-    """Set VMIN to 1: with pyserial's 0 a read without data looks like the end of the file."""
-    if termios is None:
-        return
-    with suppress(*UNPLUGGED):
-        attributes = termios.tcgetattr(fd)
-        attributes[6][termios.VMIN] = 1
-        termios.tcsetattr(fd, termios.TCSANOW, attributes)
 
 
 def latency_s(path: str | os.PathLike[str], sys_root: str | os.PathLike[str] = "/sys") -> float | None:
@@ -249,7 +239,7 @@ def latency_s(path: str | os.PathLike[str], sys_root: str | os.PathLike[str] = "
 
 def reply_margin_s(path: str | os.PathLike[str]) -> float:
     """Longest wait for a reply beyond its time on the wire, for what a device path leads to, in seconds."""
-    if str(Path(path).resolve()).startswith("/dev/pts/"):
+    if str(Path(path).resolve()).startswith("/dev/pts/") or "://" in str(path):
         return PSEUDO_MARGIN_S
     latency = latency_s(path)
     return 2 * (UNKNOWN_LATENCY_S if latency is None else latency) + HOST_MARGIN_S
