@@ -13,8 +13,8 @@ from numba import carray
 from numba.core import types
 from numba.extending import intrinsic
 
-from .apply import place
 from .jit import inlined, kernel
+from .updates import place
 
 NAMES = (
     "changed_ids", "delta", "hits", "touched", "anew", "ranges", "back_start", "back_count", "back_cell", "back_row",
@@ -65,7 +65,7 @@ def _float64_3(table, k):
 
 @kernel
 def place_bound(table, ids, rows, relative, most, limit, bias, gap, sign):
-    """:func:`surface.apply.place` for the arrays of a table."""
+    """:func:`surface.updates.place` for the arrays of a table."""
     found = carray(_pointer(table[10]), (table[11], 2), np.int64)
     local = carray(_pointer(table[54]), (table[55], 3), np.float32)
     return place(

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .refine import Refinement
 
-CHUNK = 8192  # samples per pass of basis_matrix: bounds its scratch memory
-
 
 class DCPSurface:
     """A surface of scattered control points; immutable.
@@ -240,11 +238,11 @@ class DCPSurface:
         -------
         (m, 3) float64, NaN rows where nothing covers (u, v)
         """
-        return self._sample(uv, side)[2]
+        return self.sample(uv, side)[2]
 
     def covered(self, uv: ArrayLike) -> np.ndarray:
         """(m,) bool: does any control point cover (u, v)?"""
-        return self._sample(uv, None)[1] >= 0
+        return self.sample(uv, None)[1] >= 0
 
     def derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
         """S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; as :meth:`evaluate`."""
@@ -303,22 +301,9 @@ class DCPSurface:
         -------
         (m, n) scipy CSR matrix, float64; rows where nothing covers are empty
         """
-        from scipy.sparse import csr_matrix
+        from .matrix import basis_matrix
 
-        if tuple(derivative) not in ((0, 0), (1, 0), (0, 1)):
-            raise ValueError(f"derivative: must be (0, 0), (1, 0) or (0, 1), not {derivative!r}")
-        samples, sides, _ = self._sample(uv, side)
-        data, columns, start = self._rows(samples, sides)
-        columns %= self._n  # shifted copies are the same point
-        rows = np.repeat(np.arange(len(samples)), np.diff(start))
-        total = np.stack([np.bincount(rows, data[:, k], len(samples)) for k in range(3)], axis=1)
-        ratio = data[:, 0] / total[rows, 0]
-        if tuple(derivative) != (0, 0):
-            k = 1 if derivative[0] else 2
-            ratio = (data[:, k] - ratio * total[rows, k]) / total[rows, 0]
-        matrix = csr_matrix((ratio, columns, start), shape=(len(samples), self.n))
-        matrix.sum_duplicates()
-        return matrix
+        return basis_matrix(self, uv, derivative, side)
 
     def tessellate(
         self,
@@ -398,41 +383,23 @@ class DCPSurface:
         samples = wrap(check_uv(uv), self._closed)
         sides = check_sides(samples, side)
         out = np.zeros((len(samples), 6 if second else 3, 3))
-        kernels.sample_derivatives(*self.arrays(), *self._bin_arrays(), samples, sides, out)
+        kernels.sample_derivatives(*self.arrays(), *self.bin_arrays(), samples, sides, out)
         return sides, out
 
-    def _sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
+    def sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
         """Checked samples, the side really used (-1: uncovered) and S."""
         from . import kernels
 
         samples = wrap(check_uv(uv), self._closed)
         sides = check_sides(samples, side)
         out = np.zeros((len(samples), 3))
-        kernels.sample(*self.arrays(), *self._bin_arrays(), samples, sides, out)
+        kernels.sample(*self.arrays(), *self.bin_arrays(), samples, sides, out)
         return samples, sides, out
-
-    def _rows(self, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:
-        """b w and its derivatives (k, 3), columns (k,) and row starts (m + 1,), a chunk at a time."""
-        from . import kernels
-
-        data, columns, counts = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int32)], []
-        for first in range(0, len(samples), CHUNK):
-            part, sub = samples[first : first + CHUNK], sides[first : first + CHUNK]
-            bins = self._bin_arrays()
-            capacity = kernels.row_capacity(*bins[:3], part)
-            chunk, ids = np.zeros((capacity, 3)), np.zeros(capacity, dtype=np.int32)
-            start = np.zeros(len(part) + 1, dtype=np.int64)
-            arrays = self.arrays()
-            used = kernels.fill_rows(*arrays[:4], arrays[5], *bins, part, sub, chunk, ids, start)
-            data.append(chunk[:used].copy())
-            columns.append(ids[:used].copy())
-            counts.append(np.diff(start))
-        starts = np.concatenate([[0], *counts]).cumsum()
-        return np.concatenate(data), np.concatenate(columns), starts
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """Knots in u and v, degrees, points and weights, shifted copies included; what the kernels take."""
         return self._ku, self._kv, self._pu, self._pv, self._points, self._weights
 
-    def _bin_arrays(self) -> tuple[np.ndarray, ...]:
+    def bin_arrays(self) -> tuple[np.ndarray, ...]:
+        """The arrays of :attr:`bins`, as the kernels take them."""
         return self.bins.grid, self.bins.shape, self.bins.start, self.bins.ids

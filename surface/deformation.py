@@ -236,11 +236,8 @@ class Deformation:
         if len(self._shifts) > 1:
             which = self._copies(self._check_ids(which))
             target = np.tile(target, (len(self._shifts), 1))
-        if self._table is None:
-            self._table = binding.address_table(self._arrays())
-        count = binding.place_bound(
-            self._table, which, target, relative, int(MOST_MOVED * len(self._points)), LIMIT, BIAS, GAP, self._sign
-        )
+        most = int(MOST_MOVED * len(self._points))
+        count = binding.place_bound(self._addresses(), which, target, relative, most, LIMIT, BIAS, GAP, self._sign)
         if count == -1:
             self.refresh()
         elif count < 0 or count >= 1 << 60:
@@ -303,6 +300,14 @@ class Deformation:
         own = ["changed_ids", "delta", "hits", "touched", "anew", "ranges", "points", "origin", "below", "bend"]
         own += ["state", "kept", "vertices", "normals", "local", "spare"]
         return vars(self._lists) | {name: getattr(self, f"_{name}") for name in own}
+
+    def _addresses(self) -> np.ndarray:
+        """The table that :mod:`surface.binding` takes, made anew where an array was replaced."""
+        from . import binding
+
+        if self._table is None:
+            self._table = binding.address_table(self._arrays())
+        return self._table
 
     def _copies(self, which: np.ndarray) -> np.ndarray:
         """Points and their shifted copies, block after block."""

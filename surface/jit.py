@@ -14,7 +14,7 @@ from typing import Any
 
 from numba import njit
 
-SHARED = ("apply.py", "blends.py", "kernels.py", "lanes.py")
+SHARED = ("apply.py", "binding.py", "blends.py", "kernels.py", "lanes.py", "updates.py")
 
 
 def kernel(function: Callable) -> Any:

@@ -43,6 +43,25 @@ def torn(n: int = 16) -> DCPSurface:
     )
 
 
+ROUND, ACROSS = 14, 9
+
+
+def uniform(count: int) -> np.ndarray:
+    """(count, 5): cubic knots of points spread evenly over 0..1."""
+    return (np.arange(count)[:, None] + np.arange(-2, 3)) / count
+
+
+def torus() -> DCPSurface:
+    """A ring closed in both directions, 14 by 9 control points."""
+    a, b = 2 * np.pi * np.arange(ROUND) / ROUND, 2 * np.pi * np.arange(ACROSS) / ACROSS
+    ring = 30 + 10 * np.cos(b)[None, :]
+    points = np.stack([ring * np.cos(a)[:, None], ring * np.sin(a)[:, None], 0 * a[:, None] + 10 * np.sin(b)], axis=-1)
+    knots_u, knots_v = np.repeat(uniform(ROUND), ACROSS, axis=0), np.tile(uniform(ACROSS), (ROUND, 1))
+    return DCPSurface(
+        points.reshape(-1, 3), np.ones(ROUND * ACROSS), knots_u, knots_v, closed_u=(0, 1), closed_v=(0, 1)
+    )
+
+
 def sheet(n: int, height: float) -> np.ndarray:
     """(n, n, 3) flat net."""
     x, y = np.meshgrid(np.linspace(0, 100, n), np.linspace(0, 50, n), indexing="ij")

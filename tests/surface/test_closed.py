@@ -8,23 +8,7 @@ import pytest
 from surface import DCPSurface, Domain
 from surface.closed import wrap
 from tests.surface import shapes
-
-ROUND, ACROSS = 14, 9
-
-
-def uniform(count: int) -> np.ndarray:
-    """(count, 5): cubic knots of points spread evenly over 0..1."""
-    return (np.arange(count)[:, None] + np.arange(-2, 3)) / count
-
-
-def torus() -> DCPSurface:
-    a, b = 2 * np.pi * np.arange(ROUND) / ROUND, 2 * np.pi * np.arange(ACROSS) / ACROSS
-    ring = 30 + 10 * np.cos(b)[None, :]
-    points = np.stack([ring * np.cos(a)[:, None], ring * np.sin(a)[:, None], 0 * a[:, None] + 10 * np.sin(b)], axis=-1)
-    knots_u, knots_v = np.repeat(uniform(ROUND), ACROSS, axis=0), np.tile(uniform(ACROSS), (ROUND, 1))
-    return DCPSurface(
-        points.reshape(-1, 3), np.ones(ROUND * ACROSS), knots_u, knots_v, closed_u=(0, 1), closed_v=(0, 1)
-    )
+from tests.surface.shapes import ROUND, torus, uniform
 
 
 def neck() -> DCPSurface:
