@@ -26,6 +26,7 @@ class Kind(NamedTuple):
 
 KINDS = {
     "dynamixel": Kind("drivers.dynamixel.bus:DynamixelBus", "drivers.models:check_dynamixel"),
+    "feetech": Kind("drivers.feetech.bus:FeetechBus", "drivers.models:check_feetech"),
 }
 
 
@@ -44,12 +45,13 @@ def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynami
     ------
     DriverError : unknown kind, or a package is not installed.
     """
+    servos = tuple(servos)
     if kind == SIMULATED:
         from drivers.simulated import simulated
 
-        driver = simulated(_load(simulates, "driver"), simulates)
+        driver = simulated(_load(simulates, "driver").fitting(servos), simulates)
     else:
-        driver = _load(kind, "driver")
+        driver = _load(kind, "driver").fitting(servos)
         if options.pop("faults", ()):
             raise DriverError("faults can only be given to a simulated bus", hint='set kind = "simulated"')
     bus: Bus = driver(servos, **options)

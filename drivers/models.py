@@ -4,14 +4,31 @@ from __future__ import annotations
 
 from drivers.errors import DriverError
 
+FEETECH = ("sts", "sms", "scs")
+"""What the names of Feetech's models begin with."""
+
 
 def check_dynamixel(model: str) -> None:
-    """A Dynamixel model that speaks Protocol 2.0; raises DriverError for any other."""
+    """A Dynamixel model of either protocol; raises DriverError for any other."""
     from drivers.dynamixel.tables import load_table, model_number
 
     table = load_table(model_number(model))
-    if table.protocol != 2:
+    if table.model.startswith(FEETECH):
         raise DriverError(
-            f"servo model {model!r} does not speak Dynamixel Protocol 2.0",
+            f"servo model {model!r} is no Dynamixel",
             hint='set the kind of its bus to the family it is of, as "feetech"; docs/drivers.md lists them',
         )
+
+
+def check_feetech(model: str) -> None:
+    """A Feetech model; raises DriverError for any other."""
+    from drivers.dynamixel.tables import known_models, model_number
+
+    known = known_models()
+    ours = sorted(name for name in known.values() if name.startswith(FEETECH))
+    try:
+        name = known[model_number(model)]
+    except DriverError:
+        name = ""
+    if name not in ours:
+        raise DriverError(f"servo model {model!r} is no Feetech known here", hint=f"use one of {', '.join(ours)}")

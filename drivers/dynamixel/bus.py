@@ -71,6 +71,17 @@ class DynamixelBus(WireBus):
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, fast, slow_group)
         self._heard_s = 0.0
 
+    @classmethod
+    def fitting(cls, servos: Sequence[ServoSpec]) -> type[WireBus]:
+        """The driver for the servos' protocols; that of Protocol 1.0 is only loaded where there are any."""
+        protocols = {load_table(model_number(servo.model)).protocol for servo in servos}
+        if 1 not in protocols:
+            return cls
+        from drivers.dynamixel.legacy import LegacyBus
+        from drivers.dynamixel.mixed import MixedBus
+
+        return LegacyBus if protocols == {1} else MixedBus
+
     # ------------------------------------------------------------------ the port
 
     @property

@@ -93,6 +93,8 @@ class ControlTable(Mapping[str, Item]):
     ----------
     model, number, firmware : ``"xl330-m288"``, 1200, 52.
     protocol : 1 or 2: the framing it speaks.
+    group_read : how many servos are read at once with Protocol 1.0 framing: ``"sync"``, ``"bulk"``, or ``""`` for
+        one by one.
     lock : what closes the EEPROM to writes: ``"torque"``, or ``"Lock"`` for the register of that name.
     top_speed : no-load speed in steps of its speed register; 0 = the initial Velocity Limit.
     items : by name, in order of address.
@@ -117,6 +119,7 @@ class ControlTable(Mapping[str, Item]):
         self.turn_rad: float = spec["turn_rad"]
         self.center: int = spec["center"]
         self.protocol: int = spec.get("protocol", 2)
+        self.group_read: str = spec.get("group_read", "")
         self.lock: str = spec.get("lock", "torque")
         self.top_speed: int = spec.get("top_speed", 0)
         self.baud = _bit_rates(spec)

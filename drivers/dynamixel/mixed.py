@@ -1,0 +1,167 @@
+"""Dynamixel servos of both protocols on one wire: two drivers that share a port and take turns.
+
+Neither protocol's servos understand the other's packets: to Protocol 1.0 a Protocol 2.0 header reads ``FF FF``, id
+253, length 0, which is no packet.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec, frozen
+from drivers.dynamixel.bus import DynamixelBus
+from drivers.dynamixel.legacy import LegacyBus
+from drivers.dynamixel.tables import load_table
+from drivers.errors import DriverError, NoReply, PortLost
+from drivers.wirebus import WireBus
+
+ONLY_LEGACY = ("singles", "torque_limit")
+"""Options that mean nothing to Protocol 2.0."""
+LEGACY = (
+    *ONLY_LEGACY,
+    *("feedback", "slow_group", "watchdog_ms", "takeover", "reboot_faulted", "min_voltage_v", "voltage_wait_s"),
+)
+
+
+class MixedBus(WireBus):
+    """Servos of Protocol 1.0 and 2.0 on one serial port.
+
+    Parameters
+    ----------
+    servos : the servos in the order of all arrays; their models decide who is spoken to how.
+    options : see :class:`~drivers.dynamixel.bus.DynamixelBus` and :class:`~drivers.dynamixel.legacy.LegacyBus`.
+    """
+
+    def __init__(
+        self,
+        servos: Iterable[ServoSpec],
+        *,
+        port: str,
+        clock: Callable[[], float] = time.monotonic,
+        **options: Any,
+    ) -> None:
+        super().__init__(servos, clock=clock)
+        new = [servo for servo in self.servos if load_table(servo.model).protocol == 2]
+        old = [servo for servo in self.servos if servo not in new]
+        mine = {key: value for key, value in options.items() if key not in ONLY_LEGACY}
+        theirs = {key: value for key, value in options.items() if key in LEGACY}
+        self._new = DynamixelBus(new, port=port, clock=clock, **mine)
+        self._old = LegacyBus(old, port=self._new._port, clock=clock, **theirs)
+        self._halves: tuple[DynamixelBus | LegacyBus, ...] = (self._new, self._old)
+        self._index = [np.array([self.ids.index(servo) for servo in half.ids]) for half in self._halves]
+
+    # ------------------------------------------------------------------ the port
+
+    @property
+    def is_open(self) -> bool:
+        """True while the port is held."""
+        return self._new.is_open
+
+    @property
+    def path(self) -> str:
+        """Device path in use."""
+        return self._new.path
+
+    def _use_path(self, path: str) -> None:
+        self._new._use_path(path)
+
+    def _open_link(self) -> None:
+        for half in self._halves:  # the port is one and the same; each half forgets what it knew of it
+            half.open()
+
+    def _close_link(self) -> None:
+        self._new._close_link()
+
+    # ------------------------------------------------------------------ looking, starting, stopping
+
+    def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
+        """Who is there, by id, in either protocol."""
+        with self._losing():
+            return sorted((info for half in self._halves for info in half.discover(ids)), key=lambda info: info.id)
+
+    def _bring_up(self) -> Floats:
+        here = np.zeros(len(self.ids))
+        for half, index in zip(self._halves, self._index, strict=True):
+            try:
+                half._start()
+            except BaseException:
+                self._stop_halves()
+                raise
+            here[index] = half._limits.target
+        return here
+
+    def recover(self, ids: Sequence[int] | None = None) -> None:
+        """Bring servos back that let go; see the halves."""
+        with self._losing():
+            for half in self._halves:
+                chosen = [servo for servo in half.ids if ids is None or servo in ids]
+                if not chosen:
+                    continue
+                half.recover(chosen)
+                for servo in chosen:
+                    self._limits.begin_one(self.ids.index(servo), half._limits.target[half.ids.index(servo)])
+
+    def _switch_off(self) -> None:
+        failed = self._stop_halves()
+        if not failed:
+            return
+        left = tuple(servo for error in failed for servo in error.servo_ids)
+        kind = PortLost if any(isinstance(error, PortLost) for error in failed) else NoReply
+        raise kind("; ".join(map(str, failed)), hint=failed[0].hint, port=self.path, servo_ids=left) from failed[0]
+
+    def _stop_halves(self) -> list[DriverError]:
+        """Stop both, whatever becomes of the first and whatever they believe of themselves; what they raised."""
+        failed = []
+        for half in self._halves:
+            half._running = False
+            try:
+                with half._losing():
+                    half._switch_off()
+            except DriverError as error:
+                failed.append(error)
+        return failed
+
+    # ------------------------------------------------------------------ every cycle
+
+    def _send(self, angle_rad: Floats) -> Floats:
+        sent = np.empty(len(self.ids))
+        for half, index in zip(self._halves, self._index, strict=True):
+            sent[index] = half.write(angle_rad[index])
+        return sent
+
+    def _ask(self) -> BusState:
+        states = [half.read() for half in self._halves]
+        return BusState(states[-1].time_s, *(self._joined(states, field.name) for field in fields(BusState)[1:]))
+
+    def _joined(self, states: Sequence[BusState], name: str) -> NDArray[Any]:
+        parts = [getattr(state, name) for state in states]
+        whole = np.empty(len(self.ids), parts[0].dtype)
+        for part, index in zip(parts, self._index, strict=True):
+            whole[index] = part
+        return frozen(whole, whole.dtype)
+
+    def report(self) -> BusReport:
+        """Counters of both halves together."""
+        report = super().report()
+        for half in self._halves:
+            part = half.report()
+            part.errors.pop("port_lost", None)  # this bus has counted it
+            _add(report.errors, part.errors)
+            report.errors_by_servo |= part.errors_by_servo
+            report.limits_hit += part.limits_hit
+            report.speed_limited += part.speed_limited
+            report.eeprom_writes += part.eeprom_writes
+            report.silent = tuple(sorted((*report.silent, *part.silent)))
+            report.stray = part.stray  # both count it in the port
+        return report
+
+
+def _add(total: dict[str, int], more: Mapping[str, int]) -> None:
+    for key, count in more.items():
+        total[key] = total.get(key, 0) + count

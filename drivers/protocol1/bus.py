@@ -1,0 +1,209 @@
+"""A wire of servos with Protocol 1.0 framing: sync writes out, the families' ways of reading back.
+
+What keeps it alive is what keeps every driver here alive: a servo that misses its time is left out until it has
+answered a greeting (once a second at most while it is silent), so the others go on; every goal is limited in angle
+and in speed, and carries its speed, so that a servo that lost its memory in a brown-out is no quicker; and a motor
+that let go by itself is told, never switched on again behind the user's back. There is no bus watchdog.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from drivers.bus import BusReport, BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
+from drivers.dynamixel.layout import Scale
+from drivers.dynamixel.packet1 import Packet1
+from drivers.dynamixel.tables import ControlTable, load_table, model_name
+from drivers.errors import DriverError, PortLost
+from drivers.protocol1 import startup
+from drivers.protocol1.exchange import Exchanges
+from drivers.protocol1.registers import Registers
+from drivers.protocol1.startup import Policy, Started
+from drivers.protocol1.telemetry import Telemetry
+from drivers.wirebus import WireBus
+
+log = logging.getLogger(__name__)
+
+LAST_ID = 252
+
+
+class Protocol1Bus(WireBus):
+    """Servos with Protocol 1.0 framing on one serial port. See :class:`~drivers.bus.Bus` for the contract.
+
+    Parameters
+    ----------
+    servos : the servos in the order of all arrays.
+    port : device path; ``/dev/serial/by-id/...`` survives a replug.
+    baud : rate on the wire.
+    feedback : ``"full"`` reads everything that is measured with every position, ``"position"`` position and speed.
+    singles : of servos that must be read one by one, how many are read a cycle, in turn.
+    slow_group : servos asked for one slow value (torque) each cycle; 0 asks only those that raise an alert.
+    margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
+    watchdog_ms : these servos have none; a time given is only warned about.
+    clock : monotonic seconds.
+    policy : fields of :class:`~drivers.protocol1.startup.Policy`, such as ``torque_limit``.
+
+    Raises
+    ------
+    DriverError : unknown model, or an option that does not fit.
+    """
+
+    MODELS: ClassVar[tuple[str, ...]]
+    """A model of each series that the family has, for what a servo says of itself."""
+
+    def __init__(
+        self,
+        servos: Iterable[ServoSpec],
+        *,
+        port: Any,
+        packets: Exchanges,
+        feedback: str = "full",
+        singles: int = 6,
+        slow_group: int = 4,
+        watchdog_ms: int = 0,
+        clock: Callable[[], float] = time.monotonic,
+        **policy: Any,
+    ) -> None:
+        super().__init__(servos, clock=clock)
+        self.policy = Policy(**policy)
+        self._port, self._watchdog_ms = port, watchdog_ms
+        self._registers = Registers(packets, port, self.servos)
+        self._tables([load_table(servo.model) for servo in self.servos])
+        self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, singles, slow_group)
+        self._group()
+
+    # ------------------------------------------------------------------ the port
+
+    @property
+    def is_open(self) -> bool:
+        """True while the port is held."""
+        return bool(self._port.is_open)
+
+    @property
+    def path(self) -> str:
+        """Device path in use."""
+        return str(self._port.link.path)
+
+    def _use_path(self, path: str) -> None:
+        self._port.setPortName(path)
+
+    def _open_link(self) -> None:
+        self._port.openPort()
+
+    def _close_link(self) -> None:
+        self._port.closePort()
+
+    # ------------------------------------------------------------------ looking, starting, stopping
+
+    def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
+        """Who is there; ``ids`` None asks every id by itself, which takes a while (nothing better is safe)."""
+        with self._losing():
+            found = []
+            for servo in range(LAST_ID + 1) if ids is None else ids:
+                reply = self._registers.packets.hello(self._port, servo).replies.get(servo)
+                if reply is None:
+                    self._port.suspects.discard(servo)  # it is nobody, or a configured one that is asked again anyway
+                else:
+                    found.append(self._info(servo, reply))
+            return found
+
+    def _info(self, servo: int, reply: Packet1) -> ServoInfo:
+        number, firmware = startup.identity(reply, map(load_table, self.MODELS))
+        probe = Registers(self._registers.packets, self._port, self.servos)
+        try:
+            probe.tables[servo] = self._table_of(servo, number)
+            volts, celsius = probe.get(servo, "voltage"), probe.get(servo, "temperature")
+            torque = probe.get(servo, "torque") == 1
+            bits = probe.causes(servo, probe.flags[servo])
+        except PortLost:
+            raise
+        except DriverError:  # an unknown model or a servo that keeps quiet is still found
+            return ServoInfo(servo, number, model_name(number), firmware)
+        model = probe.tables[servo].model
+        return ServoInfo(servo, number, model, firmware, volts / 10.0, float(celsius), bits, torque)
+
+    def _table_of(self, servo: int, number: int) -> ControlTable:
+        """Table of a model number; that of the configured model where it has none that is known."""
+        configured = self._registers.tables.get(servo)
+        if configured is not None and configured.number >= startup.UNNUMBERED:
+            return configured
+        return load_table(number)
+
+    def _bring_up(self) -> Floats:
+        self._port.suspects.clear()
+        started = Started()
+        startup.identify(self._registers, self.servos, started)
+        self._tables([self._registers.tables[servo] for servo in self.ids])
+        self._group()
+        if self._watchdog_ms:
+            log.warning("servos on %s have no bus watchdog: if this program is killed, they hold on", self.path)
+        self._started(startup.bring_up(self._registers, self.servos, self.policy, started))
+        return self.scale.radians(np.array([started.ticks[servo] for servo in self.ids]))
+
+    def _started(self, started: Started) -> None:
+        self._report.eeprom_writes += started.eeprom
+        for servo, limits in started.limits.items():
+            self.scale.narrow(self.ids.index(servo), *limits)
+        self._telemetry.started(list(started.ticks))
+
+    def recover(self, ids: Sequence[int] | None = None) -> None:
+        """Switch servos on again that let go, where they stand; ``ids`` None means all of them.
+
+        Raises
+        ------
+        BusError : one does not come back; see :class:`~drivers.protocol1.startup.Policy` for what is allowed.
+        """
+        chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
+        with self._losing():
+            started = Started()
+            startup.identify(self._registers, chosen, started)
+            self._started(startup.bring_up(self._registers, chosen, self.policy, started))
+            here = np.zeros(len(self.ids))
+            for servo, ticks in started.ticks.items():
+                here[self.ids.index(servo)] = ticks
+            here = self.scale.radians(here)
+            for servo in started.ticks:
+                self._limits.begin_one(self.ids.index(servo), float(here[self.ids.index(servo)]))
+
+    def _switch_off(self) -> None:
+        startup.switch_off(self._registers, self.ids)
+
+    def _tables(self, tables: list[ControlTable]) -> None:
+        self._registers.tables = dict(zip(self.ids, tables, strict=True))
+        self.scale = Scale(self.servos, tables)
+
+    def _group(self) -> None:
+        self._telemetry.rebuild({servo.id: startup.speed_steps(servo, self._registers) for servo in self.servos})
+
+    # ------------------------------------------------------------------ every cycle
+
+    def _send(self, angle_rad: Floats) -> Floats:
+        """Sync writes of all goals, inside the servos' own limits too."""
+        ticks = np.minimum(np.maximum(self.scale.ticks(angle_rad), self.scale.low), self.scale.high)
+        self._telemetry.send_goals(ticks)
+        return self.scale.radians(ticks)
+
+    def _ask(self) -> BusState:
+        self._telemetry.cycle(self._clock, self._running)
+        return self._telemetry.state(self.scale, self._clock())
+
+    @property
+    def load(self) -> Floats:
+        """(n,) share of its stall torque that each motor gave when last read, positive towards greater angles."""
+        return frozen(self.scale.sign * self._telemetry.load)
+
+    @property
+    def moving(self) -> Flags:
+        """(n,) whether each servo said it was moving when last read; False where its model does not say."""
+        return frozen(self._telemetry.moving, bool)
+
+    def report(self) -> BusReport:
+        """A copy of the counters."""
+        self._report.stray = self._port.stray
+        self._report.silent = self._telemetry.silent_ids()
+        return super().report()

@@ -1,0 +1,80 @@
+"""A serial port for servos with Protocol 1.0 framing that need no maker's package."""
+
+from __future__ import annotations
+
+import threading
+
+from drivers.errors import DriverError
+from drivers.serialport import SerialPort, reply_margin_s
+
+
+class Port:
+    """An exclusive, blocking :class:`~drivers.serialport.SerialPort` with the state of a conversation.
+
+    Parameters
+    ----------
+    path : device path.
+    baud : any rate the adapter takes.
+    margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
+    """
+
+    def __init__(self, path: str, baud: int = 1_000_000, margin_s: float | None = None) -> None:
+        self.link = SerialPort(path, baud)
+        self.baudrate = baud
+        self.suspects: set[int] = set()
+        self.stray = 0
+        self._margin_s = margin_s
+        self.margin_s = reply_margin_s(path) if margin_s is None else margin_s
+        self._busy = threading.Lock()
+
+    @property
+    def port_name(self) -> str:
+        """Device path."""
+        return self.link.path
+
+    def setPortName(self, path: str) -> None:
+        """Another device path for the next opening."""
+        self.link.path = path
+
+    @property
+    def is_open(self) -> bool:
+        """True while the device is held."""
+        return self.link.is_open
+
+    def openPort(self) -> None:
+        """Open exclusively; raises PortMissing, PortBusy or PortPermission."""
+        self.link.open()
+        self.suspects.clear()
+        self.is_using = False
+        self.margin_s = reply_margin_s(self.link.path) if self._margin_s is None else self._margin_s
+
+    def closePort(self) -> None:
+        """Close; never raises."""
+        self.link.close()
+        self.is_using = False
+
+    def clearPort(self) -> None:
+        """Throw away all input."""
+        self.link.drain()
+
+    @property
+    def is_using(self) -> bool:
+        """True in the middle of a transaction. Setting it begins or ends one.
+
+        Raises
+        ------
+        DriverError : another thread is in the middle of a transaction.
+        """
+        return self._busy.locked()
+
+    @is_using.setter
+    def is_using(self, value: bool) -> None:
+        if not value:
+            if self._busy.locked():
+                self._busy.release()
+        elif not self._busy.acquire(blocking=False):
+            raise DriverError(
+                f"port {self.port_name} is used from two threads at once",
+                hint="let one thread do all reads and writes of a bus",
+                port=self.port_name,
+            )
