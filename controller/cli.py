@@ -12,7 +12,7 @@ import sys
 import typer
 from rich.console import Console
 
-from controller import cli_bench, cli_bus, cli_check, cli_picture, cli_run
+from controller import cli_bench, cli_bus, cli_calibrate, cli_check, cli_fit, cli_picture, cli_run
 from controller.errors import OMOTE_ERRORS
 
 app = typer.Typer(
@@ -24,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (cli_run, cli_picture, cli_bus, cli_check, cli_bench):
+for module in (cli_run, cli_picture, cli_fit, cli_bus, cli_calibrate, cli_check, cli_bench):
     module.register(app)
 
 

@@ -1,4 +1,4 @@
-"""``omote render`` and ``fit``."""
+"""``omote render``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ console = Console(highlight=False)
 def register(app: typer.Typer) -> None:
     """Add this module's commands to ``app``."""
     app.command()(render)
-    app.command()(fit)
 
 
 def render(
@@ -47,17 +46,3 @@ def render(
     else:
         draw_still(still, out)
     console.print(f"wrote {out}", soft_wrap=True)
-
-
-def fit(
-    mesh: Annotated[Path, typer.Argument(help="Mesh with UVs and expression shapes (.npz).")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the head to write.")],
-    name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
-) -> None:
-    """Turn a mesh with UVs and expression shapes into a head of control points.
-
-    Example: omote fit ict_neutral_and_expressions.npz -o heads/mine
-    """
-    from controller.fitting import fit_with_progress
-
-    fit_with_progress(mesh, out, name or out.name, console)

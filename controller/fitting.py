@@ -10,11 +10,18 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from surface.fit.load import LoadOptions
     from surface.fit.report import FitReport
 
 
-def fit_with_progress(mesh: Path, out: Path, name: str, console: Console) -> None:
+def fit_with_progress(
+    mesh: Path, out: Path, name: str, console: Console, options: LoadOptions, report_dir: Path | None = None
+) -> None:
     """Fit a head to ``mesh`` and write it to the folder ``out``; shows progress, then the errors of every part.
+
+    Parameters
+    ----------
+    options : how the mesh is to be understood. report_dir : folder for a report, if one is wanted.
 
     Raises
     ------
@@ -28,11 +35,14 @@ def fit_with_progress(mesh: Path, out: Path, name: str, console: Console) -> Non
         task = bar.add_task("reading", total=1.0)
 
         def tell(part: str, done: float) -> None:
-            bar.update(task, description=f"fitting {part}", completed=done)
+            doing = "writing the report" if part == "report" else f"fitting {part}"
+            bar.update(task, description=doing, completed=done)
 
-        report = fit_head(mesh, out, name=name, progress=tell)
+        report = fit_head(mesh, out, name=name, progress=tell, options=options, report_dir=report_dir)
     shaded = _shade(out, console)
     console.print(report_table(report))
+    for line in remarks(report):
+        console.print(line, soft_wrap=True, markup=False)
     if not shaded:
         console.print("no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture")
     console.print(f"wrote {out}", soft_wrap=True)
@@ -49,6 +59,16 @@ def _shade(out: Path, console: Console) -> bool:
     except ViewError:
         return False
     return True
+
+
+def remarks(report: FitReport) -> list[str]:
+    """What was guessed and what is missing, a line each."""
+    out = list(report.notes)
+    if report.missing:
+        out.append(f"no shape for {', '.join(report.missing)}: these parameters will not move this head")
+    if report.left_out:
+        out.append(f"left out, not ARKit's: {', '.join(report.left_out)}")
+    return out
 
 
 def report_table(report: FitReport) -> Table:

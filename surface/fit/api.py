@@ -39,11 +39,12 @@ LIVELY = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBli
 
 @dataclass(frozen=True)
 class FittedPart:
-    """One fitted chart of a head, for reports and for what is fitted on top of it."""
+    """One fitted chart of a head, for reports; ``targets`` (m, 3) is where the mesh is at the chart's samples."""
 
     name: str
     chart: Chart
     fitted: Fitted
+    targets: Floats
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def _fit_parts(
         fitted = fit_chart(mesh if part.follows == "skin" else _still(mesh), chart, part.wish, steps.of(part))
         parts.append(skin_part(part, chart, fitted, body))
         reports.append(measure(part.name, chart, fitted, mesh.names))
-        fitted_parts.append(FittedPart(part.name, chart, fitted))
+        fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))
         if recipe.hair and recipe.hair["face"] == part.name:
             parts += hair_parts(mesh, chart, fitted, recipe.hair["brow"], body)
     for part in recipe.teeth:

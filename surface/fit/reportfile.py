@@ -1,0 +1,188 @@
+"""Write a fit's report: report.json, report.md, and pictures of the error on the face."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.errors import FitError, ViewError
+from surface.fit.chart import TILE
+from surface.fit.nurbsnet import UniformNet, uniform_nets
+from surface.fit.report import Errors, FitReport
+
+if TYPE_CHECKING:
+    from surface.fit.api import FitResult, FittedPart
+
+Floats = NDArray[np.float64]
+FULL_MM = 1.0  # error at the end of the colour scale
+SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0.75, 0.24, 0.04], [0.55, 0.02, 0.02]])
+EXCLUDED = np.array([0.45, 0.05, 0.50])
+LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more; violet: inside folds, not counted"
+
+
+def write_report(result: FitResult, folder: str | Path, tell: Callable[[str, float], None]) -> None:
+    """Write the report of a fit, complete or not at all.
+
+    Raises
+    ------
+    FitError : the folder cannot be written to.
+    """
+    folder = Path(folder)
+    nets = _nets(result)
+    tell("report", 0.5)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
+            new = Path(made)
+            pictures = _draw(result, new)
+            (new / "report.json").write_text(json.dumps(as_table(result.report, nets), indent=1), encoding="utf-8")
+            (new / "report.md").write_text(as_markdown(result.report, nets, pictures), encoding="utf-8")
+            folder.mkdir(exist_ok=True)
+            for file in new.iterdir():
+                shutil.move(file, folder / file.name)
+    except OSError as e:
+        raise FitError(f"{folder}: the report cannot be written ({e})", hint="choose another --report folder") from e
+    tell("report", 1.0)
+
+
+def _nets(result: FitResult) -> list[UniformNet]:
+    """Uniform nets beside the face's own, on its first and largest tile."""
+    face = result.parts[0]
+    own = face.chart.uv[:, 0] < TILE / 2
+    counted = own & ~face.chart.folded
+    rms = float(np.sqrt((face.fitted.error[counted] ** 2).mean()))
+    points = int((face.fitted.net.centres[:, 0] < TILE / 2).sum())
+    return [UniformNet(points, rms), *uniform_nets(face.chart, face.targets, points, rms)]
+
+
+def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
+    """The report as plain values."""
+    return {
+        "head": report.name,
+        "control_points": report.points,
+        "parameters": report.parameters,
+        "missing": list(report.missing),
+        "left_out": list(report.left_out),
+        "notes": list(report.notes),
+        "parts": [
+            {
+                "name": p.name, "control_points": p.points, "samples": p.samples, "excluded_samples": p.folded,
+                "neutral_mm": asdict(p.neutral), "mean_shape_rms_mm": p.mean_shape_rms,
+                "shapes_mm": {n: asdict(e) for n, e in p.shapes.items()},
+            }
+            for p in report.parts
+        ],
+        "nurbs": {
+            "control_points": nets[0].points, "rms_mm": nets[0].rms, "uniform_nets": [asdict(n) for n in nets[1:]],
+        },
+    }  # fmt: skip
+
+
+def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) -> str:
+    """The report to read: tables of errors, and what was guessed."""
+    lines = [f"# {report.name}: {report.points} control points, {len(report.parameters)} shapes", ""]
+    lines += [f"- {note}" for note in report.notes]
+    lines += [f"- no shape for: {', '.join(report.missing)}"] if report.missing else []
+    lines += [f"- left out, not ARKit's: {', '.join(report.left_out)}"] if report.left_out else []
+    lines += ["", "Distances between mesh and surface at the same (u, v), mm.", ""]
+    lines += [
+        "| part | control points | samples | excluded | RMS | 99 % | max | mean RMS of shapes |",
+        "|---|---|---|---|---|---|---|---|",
+        *(
+            f"| {p.name} | {p.points} | {p.samples} | {p.folded} | {_figures(p.neutral)} | {p.mean_shape_rms:.3f} |"
+            for p in report.parts
+        ),
+    ]
+    lines += ["", *(f"![error]({name})" for name in pictures)]
+    lines += [LEGEND] if pictures else ["No OpenGL was there to draw the error."]
+    lines += ["", "## A uniform cubic NURBS net beside the face", "", *_net_lines(nets)]
+    for p in report.parts:
+        if p.shapes:
+            lines += ["", f"## Shapes of {p.name}", "", "| shape | RMS | 99 % | max |", "|---|---|---|---|"]
+            lines += [f"| {n} | {_figures(e)} |" for n, e in p.shapes.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _figures(errors: Errors) -> str:
+    return f"{errors.rms:.3f} | {errors.p99:.3f} | {errors.max:.3f}"
+
+
+def _net_lines(nets: list[UniformNet]) -> list[str]:
+    own, uniform = nets[0], nets[1:]
+    reached = [n for n in uniform if n.rms <= own.rms]
+    most = uniform[-1]
+    verdict = (
+        f"As good a uniform net needs {reached[0].points / own.points:.1f} times the points."
+        if reached
+        else f"With {most.points / own.points:.1f} times the points it is still not as good."
+    )
+    return [
+        "| net | control points | RMS |", "|---|---|---|", f"| this head's | {own.points} | {own.rms:.3f} |",
+        *(f"| uniform | {n.points} | {n.rms:.3f} |" for n in uniform), "", verdict,
+    ]  # fmt: skip
+
+
+def _draw(result: FitResult, folder: Path) -> list[str]:
+    """Pictures of the error at rest and of each sample's worst shape; none without OpenGL."""
+    from surface.head import Head
+
+    head = Head(result.head)
+    chosen = {"error_neutral.png": _neutral, "error_shapes.png": _worst_shape}
+    names = []
+    for name, values in chosen.items():
+        for part in head.parts:
+            part.attributes = {"albedo": np.full((len(part.vertices), 3), 0.35, np.float32)} | {
+                k: v for k, v in part.attributes.items() if k == "eye_local"
+            }
+        for fitted in result.parts:
+            part = head.part(fitted.name)
+            part.attributes["albedo"] = _colours(part.uv.astype(float), fitted, values(fitted))
+        try:
+            _picture(head, folder / name)
+        except ViewError:
+            return []
+        names.append(name)
+    return names
+
+
+def _neutral(part: FittedPart) -> Floats:
+    return part.fitted.error
+
+
+def _worst_shape(part: FittedPart) -> Floats:
+    return part.fitted.shape_error.max(axis=0) if len(part.fitted.shape_error) else np.zeros(len(part.fitted.error))
+
+
+def _colours(uv: Floats, part: FittedPart, error: Floats) -> NDArray[np.float32]:
+    """(m, 3) linear RGB of the error at vertices: the mean of the nearest samples; excluded ones violet."""
+    from scipy.spatial import cKDTree
+
+    nearest = cKDTree(part.chart.uv).query(uv, k=min(4, len(part.chart.uv)))[1].reshape(len(uv), -1)
+    at = np.clip(error[nearest].mean(axis=1) / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)
+    out = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=1)
+    out[part.chart.folded[nearest].mean(axis=1) > 0.5] = EXCLUDED
+    return out.astype(np.float32)
+
+
+def _picture(head: Any, path: Path) -> None:
+    """Front, three-quarter, profile, and from below into the nostrils."""
+    from surface.view.camera import Camera
+    from surface.view.offscreen import Offscreen
+    from surface.view.sheet import compose, write_png
+
+    views = {
+        "front": Camera.front(), "three-quarter": Camera.three_quarter(), "profile": Camera.profile(),
+        "from below": Camera.front().orbit(0.0, -55.0),
+    }  # fmt: skip
+    rest = head.values({})
+    with Offscreen(head, (420, 480), quality="fast") as screen:
+        pictures = [screen.render(rest, camera) for camera in views.values()]
+    write_png(compose(pictures, list(views), columns=4), path)
