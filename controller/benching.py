@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.paths import find_config
-from surface.bench import Measure, least, measure, speed_table
+from surface.bench import Measure, build_table, large_table, least, measure, speed_table
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from surface.comparison import Variant
     from surface.head import Head
+    from surface.progress import Progress
 
 Tell = Callable[[str], None]
 Tables = list[tuple[str, list[Measure]]]
@@ -46,6 +49,41 @@ def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
 def bench_surface(seconds: float, tell: Tell) -> Tables:
     """The engine at its memory limit, on a plain sheet."""
     return [("about 100,000 vertices, 16 influences, one thread", speed_table(seconds=seconds, tell=tell))]
+
+
+def bench_large(seconds: float, tell: Tell, progress: Progress) -> Tables:
+    """Building trees and lists for 100,000 control points, and two threads against one, for a million vertices."""
+    built = build_table(progress=progress)
+    return [("a million vertices", built + large_table(seconds=seconds, tell=tell))]
+
+
+def bench_growth(seconds: float, tell: Tell, out: Path) -> Tables:
+    """Slopes of time and memory against size on logarithmic scales; draws them as SVG, too."""
+    from surface.growth import growth, plot, slopes
+
+    series = growth(seconds=seconds, tell=tell)
+    plot(series, out)
+    return [("growth, from 10,000 to a million vertices and from 100 to 100,000 control points", slopes(series))]
+
+
+def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
+    """Random updates of every kind on a head's largest surface, against a fresh evaluation."""
+    from surface.drift import drift
+    from surface.head import Head
+
+    tell("loading")
+    head = Head.load(find_config("heads", name))
+    part = max(head.parts, key=lambda part: part.surface.n)
+    found = drift(part.surface, part.mesh, updates, tell=tell)
+    title = (
+        f"{part.name} of {name} after {found.moves} moves of one point, {found.groups} of a group, "
+        f"{found.weights} changes of a weight and {found.knots} of knots"
+    )
+    rows = [
+        Measure("greatest error of a vertex, in millionths of the size", 0.0, 1e6 * found.error, "", "<= 1"),
+        Measure("greatest error of a normal, in millionths", 0.0, 1e6 * found.normal_error),
+    ]
+    return [(title, rows)]
 
 
 def bench_quadtree(name: str, tell: Tell) -> tuple[Tables, list[Variant]]:

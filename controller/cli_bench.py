@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from controller.benching import Tables
     from surface.bench import Measure
 
 console = Console(highlight=False)
@@ -22,6 +24,23 @@ class Subject(StrEnum):
     head = "head"
     surface = "surface"
     quadtree = "quadtree"
+    drift = "drift"
+
+
+class Bar:
+    """A line that says what is measured, and how far a long step is."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._task = progress.add_task("measuring", total=None)
+
+    def tell(self, text: str) -> None:
+        """A step of unknown length."""
+        self._progress.reset(self._task, total=None, description=f"measuring {text}")
+
+    def advance(self, stage: str, part: float) -> None:
+        """A step of which a part is done."""
+        self._progress.update(self._task, description=f"building: {stage}", total=1.0, completed=part)
 
 
 def register(app: typer.Typer) -> None:
@@ -30,34 +49,57 @@ def register(app: typer.Typer) -> None:
 
 
 def bench(
-    what: Annotated[Subject, typer.Argument(help="A head, the engine at its limit, or quad trees.")] = Subject.head,
+    what: Annotated[
+        Subject, typer.Argument(help="A head, the engine at its limit, quad trees, or drift of many updates.")
+    ] = Subject.head,
     head: Annotated[str, typer.Option(help="Head: a name from configs/heads or a folder.")] = "ict",
     seconds: Annotated[float, typer.Option(help="Time for each measurement.", min=0.01)] = 0.3,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture of the meshes (quadtree only).")] = None,
+    large: Annotated[bool, typer.Option("--large", help="Also a million vertices (surface only).")] = False,
+    growth: Annotated[
+        Path | None, typer.Option(help="Also growth with size, drawn as this SVG (surface only).")
+    ] = None,
+    updates: Annotated[int, typer.Option(help="How many (drift only).", min=1)] = 1_000_000,
 ) -> None:
     """Measure full evaluation and incremental updates on this machine, and peers in the same run.
 
-    Example: omote bench surface
+    Example: omote bench surface --large --growth growth.svg
     """
-    from controller.benching import bench_head, bench_quadtree, bench_surface
-
-    with console.status("measuring") as status:
-
-        def tell(text: str) -> None:
-            status.update(f"measuring {text}")
-
-        if what is Subject.head:
-            tables = bench_head(head, seconds, tell)
-        elif what is Subject.surface:
-            tables = bench_surface(seconds, tell)
+    columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = Bar(progress)
+        if what is Subject.surface:
+            tables = _surface(seconds, bar, large, growth)
         else:
-            tables, variants = bench_quadtree(head, tell)
-            if out is not None:
-                from surface.comparison import draw
-
-                draw(variants, out)
+            tables = _head(what, head, seconds, bar, out, updates)
     for title, rows in tables:
         console.print(measure_table(title, rows))
+
+
+def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None) -> Tables:
+    from controller.benching import bench_growth, bench_large, bench_surface
+
+    tables = bench_surface(seconds, bar.tell)
+    if large:
+        tables += bench_large(seconds, bar.tell, bar.advance)
+    if growth is not None:
+        tables += bench_growth(seconds, bar.tell, growth)
+    return tables
+
+
+def _head(what: Subject, head: str, seconds: float, bar: Bar, out: Path | None, updates: int) -> Tables:
+    from controller.benching import bench_drift, bench_head, bench_quadtree
+
+    if what is Subject.head:
+        return bench_head(head, seconds, bar.tell)
+    if what is Subject.drift:
+        return bench_drift(head, updates, bar.tell)
+    tables, variants = bench_quadtree(head, bar.tell)
+    if out is not None:
+        from surface.comparison import draw
+
+        draw(variants, out)
+    return tables
 
 
 def measure_table(title: str, rows: list[Measure]) -> Table:

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import peers
 from .basis import Floats
 from .dcp import DCPSurface
 from .deformation import Deformation
 from .mesh import Mesh
+from .progress import Progress, between, silent
 
-BLENDSHAPES = 52
+BUILD_SECONDS = 10.0  # what building a large tree and its lists may take
 Tell = Callable[[str], None]
 
 
@@ -31,7 +33,7 @@ class Measure:
     milliseconds : least time of one call; 0 for rows that are a ratio of sizes
     ratio : against what ``against`` names, or None
     against : the other side of the ratio
-    reach : the bound the ratio shall keep, as text (``"<= 1.8"``), or empty
+    reach : the bound the ratio shall keep, as text (``"<= 1.8"``, ``"0.9 to 1.1"``), or empty
     kept : does it keep the bound? None without one
     """
 
@@ -46,8 +48,10 @@ class Measure:
         """Whether the ratio keeps its bound; None without one."""
         if not self.reach or self.ratio is None:
             return None
-        sign, bound = self.reach.split()
-        return self.ratio <= float(bound) if sign == "<=" else self.ratio >= float(bound)
+        first, *_, bound = self.reach.split()
+        if first == "<=":
+            return self.ratio <= float(bound)
+        return self.ratio >= float(bound) if first == ">=" else float(first) <= self.ratio <= float(bound)
 
 
 def least(call: Callable[[], object], seconds: float = 0.3) -> float:
@@ -60,6 +64,20 @@ def least(call: Callable[[], object], seconds: float = 0.3) -> float:
         best = min(best, time.perf_counter() - begin)
         count += 1
     return 1e3 * float(best)
+
+
+def least_of(calls: list[Callable[[], object]], seconds: float = 0.3) -> list[float]:
+    """As :func:`least` for several calls in turn, so that what disturbs one disturbs the others as well."""
+    for call in calls:
+        call()
+    best, count, end = np.full(len(calls), np.inf), 0, time.perf_counter() + seconds * len(calls)
+    while count < 5 or time.perf_counter() < end:
+        for k, call in enumerate(calls):
+            begin = time.perf_counter()
+            call()
+            best[k] = min(best[k], time.perf_counter() - begin)
+        count += 1
+    return [1e3 * float(x) for x in best]
 
 
 def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, tell: Tell = lambda text: None) -> list[Measure]:
@@ -92,24 +110,31 @@ def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, tell: Tell
         ids, reached = _group(surface, bare, share)
         name = f"group that reaches {100 * reached:.1f} % moved"
         add(name, shaker(bare, ids), "its part of all positions", "<= 1.5", reached * full)
-    rows += peers(surface, mesh, full, seconds, tell)
+    return rows + peer_rows(surface, mesh, full, seconds, tell)
+
+
+def peer_rows(surface: DCPSurface, mesh: Mesh, full: float, seconds: float, tell: Tell) -> list[Measure]:
+    """Other ways to the same vertices; their ratios say how many times longer they take than ``full``."""
+    rows = []
+    for name, prepare, reach in (
+        ("scipy CSR @ dense", peers.sparse_matrix, ">= 12"),
+        (f"numpy {peers.BLENDSHAPES} blendshapes", peers.blendshapes, ">= 3"),
+        ("stencil table, row by row", peers.stencils, ""),
+    ):
+        tell(name)
+        took = least(prepare(surface, mesh), seconds)
+        rows.append(Measure(f"{name}, positions", took, took / full, "all positions", reach))
     return rows
 
 
-def peers(surface: DCPSurface, mesh: Mesh, full: float, seconds: float, tell: Tell) -> list[Measure]:
-    """Other ways to the same vertices; their ratios say how many times longer they take than ``full``."""
-    tell("scipy CSR @ dense")
-    matrix = surface.basis_matrix(mesh.uv, side=mesh.side).astype(np.float32)
-    points = surface.points.astype(np.float32)
-    csr = least(lambda: matrix @ points, seconds)
-    tell(f"numpy {BLENDSHAPES} blendshapes")
-    shapes = np.ones((BLENDSHAPES, 3 * len(mesh.vertices)), dtype=np.float32)
-    amounts = np.ones(BLENDSHAPES, dtype=np.float32)
-    blend = least(lambda: amounts @ shapes, seconds)
-    return [
-        Measure("scipy CSR @ dense, positions", csr, csr / full, "all positions", ">= 12"),
-        Measure(f"numpy {BLENDSHAPES} blendshapes, positions", blend, blend / full, "all positions", ">= 3"),
-    ]
+def library_rows(surface: DCPSurface, mesh: Mesh, full: float, seconds: float, tell: Tell) -> list[Measure]:
+    """Spline libraries that are installed, on a sheet from :func:`sheet`; they evaluate basis functions each time."""
+    rows = []
+    for name, prepare, share in peers.libraries(mesh):
+        tell(name)
+        took = share * least(prepare(surface, mesh), seconds)
+        rows.append(Measure(f"{name}, positions", took, took / full, "all positions"))
+    return rows
 
 
 def sheet(vertices: int = 100_000, points: int | None = None) -> tuple[DCPSurface, Mesh]:
@@ -125,18 +150,25 @@ def sheet(vertices: int = 100_000, points: int | None = None) -> tuple[DCPSurfac
     level = max(0, round(np.log2(np.sqrt(vertices) / spans)))
     if points is None:
         spans = max(2, round(np.sqrt(vertices) / 2**level))
-    knots = np.concatenate([[0.0] * 3, np.linspace(0, 1, spans + 1), [1.0] * 3])
-    x, y = np.meshgrid(np.linspace(0, 200, spans + 3), np.linspace(0, 200, spans + 3), indexing="ij")
-    net = np.stack([x, y, 20 * np.sin(x / 20) * np.cos(y / 25)], axis=-1)
-    surface = DCPSurface.from_nurbs(3, 3, knots, knots, net)
+    surface = bumpy((spans + 3) ** 2)
     mesh = surface.tessellate(max_points=surface.n + 1, min_depth=level, max_depth=level, roots=(spans, spans))
     return surface, mesh
+
+
+def bumpy(points: int) -> DCPSurface:
+    """A bumpy bicubic sheet, 200 long and wide, over the unit square, of about so many control points."""
+    side = max(5, round(np.sqrt(points)))
+    knots = np.concatenate([[0.0] * 3, np.linspace(0, 1, side - 2), [1.0] * 3])
+    x, y = np.meshgrid(np.linspace(0, 200, side), np.linspace(0, 200, side), indexing="ij")
+    return DCPSurface.from_nurbs(3, 3, knots, knots, np.stack([x, y, 20 * np.sin(x / 20) * np.cos(y / 25)], axis=-1))
 
 
 def speed_table(vertices: int = 100_000, seconds: float = 0.3, tell: Tell = lambda text: None) -> list[Measure]:
     """The engine at its memory limit: about 100,000 vertices, 16 influences, one thread, float32."""
     surface, mesh = sheet(vertices)
-    return measure(surface, mesh, seconds=seconds, tell=tell)
+    rows = measure(surface, mesh, seconds=seconds, tell=tell)
+    full = next(row.milliseconds for row in rows if row.name == "all positions")
+    return rows + library_rows(surface, mesh, full, seconds, tell)
 
 
 def large_table(vertices: int = 1_000_000, seconds: float = 0.5, tell: Tell = lambda text: None) -> list[Measure]:
@@ -145,31 +177,52 @@ def large_table(vertices: int = 1_000_000, seconds: float = 0.5, tell: Tell = la
     surface, mesh = sheet(vertices)
     one = surface.deformation(mesh, normals=False)
     two = surface.deformation(mesh, normals=False, threads=2)
-    alone, together = least(one.refresh, seconds), least(two.refresh, seconds)
     weights = one._lists.value
-    read, shared = least(weights.sum, seconds), _shared_read(weights, seconds)
-    ideal = 4 * one._lists.value.size
+    tell("two threads")
+    with ThreadPoolExecutor(1) as pool:
+        calls: list[Callable[[], object]] = [one.refresh, two.refresh, weights.sum, _shared_read(weights, pool)]
+        alone, together, read, shared = least_of(calls, seconds)
     bound = max(0.7, 1.15 * shared / read)  # where two readers gain little, two threads cannot gain more
     name = f"all positions, {len(mesh.vertices)} vertices"
     return [
         Measure(name, alone, alone / read, "one read of the weights", "<= 1.8"),
         Measure(f"{name}, two threads", together, together / alone, "one thread", f"<= {bound:.2f}"),
         Measure("one read of the weights, two threads", shared, shared / read, "one thread"),
-        Measure("memory of weights and lists", 0.0, one.nbytes / ideal, "bytes of the weights alone", "<= 1.3"),
+        Measure("memory of weights and lists", 0.0, one.nbytes / weights.nbytes, "the weights alone", "<= 1.3"),
     ]
 
 
-def _shared_read(weights: np.ndarray, seconds: float) -> float:
-    """Least time of summing an array, half by half in two threads."""
+def build_table(points: int = 100_000, level: int = 7, progress: Progress = silent) -> list[Measure]:
+    """Time of building quad tree and lists by either rule, for 100,000 control points and a million vertices.
+
+    Parameters
+    ----------
+    points : about how many
+    level : deepest level of the tree under 8 x 8 roots, which bounds the vertices
+    progress : is called with a stage and the part that is done
+    """
+    bumpy(300).tessellate(max_points=16, chord_error=1.0)  # compiled now, not measured
+    surface, rows = bumpy(points), []
+    for title, limits in (("16 points a cell", {"max_points": 16}), ("chord error", {"chord_error": 1e-9})):
+        begin = time.perf_counter()
+        mesh = surface.tessellate(roots=(8, 8), max_depth=level, **limits, progress=between(progress, 0.0, 0.85))
+        surface.deformation(mesh, progress=between(progress, 0.85, 1.0))
+        took = time.perf_counter() - begin
+        name = f"tree and lists by {title}: {surface.n} points, {len(mesh.vertices)} vertices"
+        rows.append(Measure(name, 1e3 * took, took / BUILD_SECONDS, f"{BUILD_SECONDS:.0f} s", "<= 1"))
+    return rows
+
+
+def _shared_read(weights: np.ndarray, pool: ThreadPoolExecutor) -> Callable[[], object]:
+    """A call that sums an array half by half in two threads."""
     half = len(weights) // 2
-    with ThreadPoolExecutor(1) as pool:
 
-        def call() -> None:
-            other = pool.submit(weights[half:].sum)
-            weights[:half].sum()
-            other.result()
+    def call() -> None:
+        other = pool.submit(weights[half:].sum)
+        weights[:half].sum()
+        other.result()
 
-        return least(call, seconds)
+    return call
 
 
 def shaker(deformation: Deformation, ids: np.ndarray) -> Callable[[], object]:
