@@ -1,20 +1,26 @@
 """Anchor mapping against a naive table: how much of the emotions' motion each leaves over on the 24-servo head.
 
 Run ``python benchmarks/anchors.py``. Both mappings drive the same model of the servo head's skin; what is left is
-measured at points of the skin that the solve never saw: close to each anchor along its pull, and everywhere in space.
-The naive table gives each servo the one parameter it is named after, 1 for its whole travel.
+measured at points of the skin that the solve never saw. An anchor is a point with a direction, so the residual at
+anchors that were not used is what is missing along each servo's pull at other points close to it. Two harder measures
+stand beside it: the same points in all directions, and the whole skin. "best" is the least that any pulls within the
+servos' travel leave at the very points of the measure, "free" the least with endless travel: no mapping can do better
+on this head. The naive table gives each servo the one parameter it is named after, 1 for its whole travel.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from scipy.optimize import lsq_linear
 
-from controller.anchors import AnchorMap, Rows, anchored, first, load_anchors, point_regions, sample_skin, servo_field
+from controller.anchors import AnchorMap, Rows, anchored, first, load_anchors, sample_skin, servo_field, travel
 from controller.expression import Vocabulary
 from controller.parameters import PARAMETERS, Floats
 from controller.paths import find_config
@@ -49,11 +55,6 @@ def naive_pulls(channels: list[ChannelSettings], values: Floats) -> Floats:
     return out
 
 
-def rms(values: Floats) -> float:
-    """Root mean square."""
-    return float(np.sqrt((values**2).mean()))
-
-
 class Unseen:
     """The same servos at points around the anchors that the solve did not have."""
 
@@ -75,48 +76,75 @@ class Unseen:
         return self.skin.displacement(shapes) - self.field @ pulls
 
 
+@dataclass(frozen=True)
+class Measure:
+    """One way to measure: rows (r, k) of what each pull moves, and what picks the same of a displacement (m, 3)."""
+
+    name: str
+    field: Floats
+    pick: Callable[[Floats], Floats]
+
+
+def measures(unseen: Unseen) -> list[Measure]:
+    """From the anchors' own sense to the whole skin."""
+    near = np.unique(unseen.rows.point)
+    k = unseen.field.shape[2]
+    return [
+        Measure(
+            f"along the pulls, {len(unseen.rows.point)} anchors", unseen.rows.along(unseen.field), unseen.rows.along
+        ),
+        Measure(
+            f"all directions, {len(near)} points there", unseen.field[near].reshape(-1, k), lambda d: d[near].ravel()
+        ),
+        Measure(f"all directions, {len(unseen.field)} points", unseen.field.reshape(-1, k), np.ravel),
+    ]
+
+
+def compare(measure: Measure, solved: AnchorMap, unseen: Unseen, channels: list[ChannelSettings]) -> dict[str, Floats]:
+    """(e,) root sums of squares by mapping, one for each emotion."""
+    vocabulary, ends = Vocabulary.load(PARAMETERS), np.array([travel(channel) for channel in channels]).T
+    rows: dict[str, list[float]] = {}
+    for name in EMOTIONS:
+        values = vocabulary[name].weights
+        wanted = measure.pick(unseen.skin.displacement(solved.shapes(values)))
+        pulls = {
+            "moves": np.zeros(len(channels)),
+            "naive": naive_pulls(channels, values),
+            "anchors": solved.pulls(values),
+            "best": lsq_linear(measure.field, wanted, ends).x,
+            "free": np.linalg.lstsq(measure.field, wanted, rcond=None)[0],
+        }
+        for key, each in pulls.items():
+            rows.setdefault(key, []).append(float(np.linalg.norm(wanted - measure.field @ each)))
+    return {key: np.array(each) for key, each in rows.items()}
+
+
+def show(measure: Measure, left: dict[str, Floats]) -> Table:
+    """A row an emotion, and one for the set."""
+    table = Table("emotion", *left, "anchors / naive", "of squares", "best / naive", title=measure.name)
+    size = np.sqrt(len(measure.field) / (1 if "along" in measure.name else 3))
+    every = {key: np.append(each, np.sqrt((each**2).mean())) for key, each in left.items()}
+    for i, name in enumerate((*EMOTIONS, "all")):
+        share, best = (every[key][i] / every["naive"][i] for key in ("anchors", "best"))
+        table.add_row(name, *(f"{each[i] / size:.2f} mm" for each in every.values()), f"{share:.1%}", f"{share**2:.1%}",
+                      f"{best:.1%}")  # fmt: skip
+    return table
+
+
 def main() -> None:
     """Print the residuals."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.parse_args()
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    console = Console()
     head = Head.load(find_config("heads", "ict"))
     robot = load_robot(find_config("robots", "head24-anchors"), PARAMETERS)
     solved = load_anchors(robot, head, PARAMETERS)
     if solved is None:
         raise SystemExit("the robot has no anchors")
     channels = anchored(robot)
-    show(solved, Unseen(head, solved, channels), channels)
-
-
-def show(solved: AnchorMap, unseen: Unseen, channels: list[ChannelSettings]) -> None:
-    """Tables by emotion and by region."""
-    vocabulary, console = Vocabulary.load(PARAMETERS), Console()
-    along, whole = [], []
-    for name in EMOTIONS:
-        values = vocabulary[name].weights
-        shapes = solved.shapes(values)
-        left = [
-            unseen.left(shapes, p)
-            for p in (np.zeros(len(channels)), naive_pulls(channels, values), solved.pulls(values))
-        ]
-        along.append([unseen.rows.along(points) for points in left])
-        whole.append([np.linalg.norm(points, axis=1) for points in left])
-    title = f"along the pulls, {len(unseen.rows.point)} points not in the solve"
-    table = Table("emotion", "moves", "naive", "anchors", "rms of naive", "squares of naive", title=title)
-    for name, row in [
-        *zip(EMOTIONS, along, strict=True),
-        ("all", [np.concatenate(x) for x in zip(*along, strict=True)]),
-    ]:
-        a, b, c = (rms(x) for x in row)
-        table.add_row(name, f"{a:.2f} mm", f"{b:.2f} mm", f"{c:.2f} mm", f"{c / b:.0%}", f"{c * c / b / b:.0%}")
-    console.print(table)
-    regions = point_regions(unseen.skin, PARAMETERS)
-    table = Table("region", "moves", "naive", "anchors", title="in space, the whole skin")
-    for region in sorted(set(regions)):
-        numbers = [rms(np.array(x)[:, regions == region]) for x in zip(*whole, strict=True)]
-        table.add_row(region, *(f"{x:.2f} mm" for x in numbers))
-    console.print(table)
-    values, began = vocabulary["surprise"].weights.copy(), time.perf_counter()
+    unseen = Unseen(head, solved, channels)
+    for measure in measures(unseen):
+        console.print(show(measure, compare(measure, solved, unseen, channels)))
+    values, began = Vocabulary.load(PARAMETERS)["surprise"].weights.copy(), time.perf_counter()
     for i in range(2000):
         solved.pulls(values * (0.5 + 0.5 * np.sin(i / 20)))
     console.print(f"one solve: {(time.perf_counter() - began) / 2:.3f} ms")

@@ -216,7 +216,7 @@ class AnchorMap:
         self.skin, self.field, self._order = skin, servo_field(anchors, own, skin), order
         rows = Rows.around(anchors, own, skin, _NEAR_MM)
         self._moves = rows.along(skin.moves).reshape(len(rows.point), -1)
-        low, high = np.array([_travel(channel) for channel in channels]).T
+        low, high = np.array([travel(channel) for channel in channels]).T
         field = rows.along(self.field.reshape(-1, 3, k))
         self._solver = BoundedSolver(field, low, high, weights=rows.share, ridge=_RIDGE, tolerance=1e-5)
         self._last, self._give = np.zeros(k), np.arange(k)
@@ -260,7 +260,7 @@ class AnchorMap:
         return rows
 
 
-def _travel(channel: ChannelSettings) -> tuple[float, float]:
+def travel(channel: ChannelSettings) -> tuple[float, float]:
     """Pull (mm) at the ends of a channel's map, as far as its limits let it go."""
     at, deg = np.array(channel.map.at), np.array(channel.map.deg) + channel.trim_deg
     inside = at[(deg >= channel.limit_deg[0]) & (deg <= channel.limit_deg[1])]

@@ -30,7 +30,8 @@ class JerkFilter:
         self._longest_s = float(self.window_s.max(initial=0.0))
         self._kept = np.zeros((2, len(self.window_s)))  # newest first
         self._took = np.full(2, np.inf)  # how long it took from the row behind
-        self._share = np.zeros_like(self._kept)
+        self._share, self._work = np.zeros_like(self._kept), np.zeros_like(self._kept)
+        self._even = False
 
     @property
     def active(self) -> bool:
@@ -41,18 +42,22 @@ class JerkFilter:
         """Be at rest at ``values`` : (n,)."""
         self._kept[:] = values
         self._took.fill(np.inf)
+        self._even = False
 
     def step(self, dt: float, values: Floats, out: Floats) -> Floats:
         """Take ``values`` : (n,) that were reached in ``dt`` s; write their mean to ``out`` : (n,)."""
-        if self._took[:-2].sum() < self._longest_s - dt:
+        steady = self._even and self._took[0] == dt
+        if not steady and self._took[:-2].sum() < self._longest_s - dt:
             self._grow()
         self._kept[1:] = self._kept[:-1]
         self._kept[0] = values
-        if (self._took != dt).any():  # while steps keep their length, so do the shares
+        if not steady:
             self._took[1:] = self._took[:-1]
             self._took[0] = dt
+            self._even = bool((self._took == dt).all())  # while steps keep their length, so do the shares
             self._weigh()
-        return np.einsum("kn,kn->n", self._share, self._kept, out=out)
+        np.multiply(self._share, self._kept, out=self._work)
+        return np.add.reduce(self._work, axis=0, out=out)
 
     def _weigh(self) -> None:
         """Share of each kept row in the mean of the straight lines between them, over the window; the last fills up."""
@@ -73,4 +78,4 @@ class JerkFilter:
         more = len(self._took)
         self._kept = np.concatenate([self._kept, np.repeat(self._kept[-1:], more, axis=0)])
         self._took = np.concatenate([self._took, np.full(more, self._took[-1])])
-        self._share = np.zeros_like(self._kept)
+        self._share, self._work = np.zeros_like(self._kept), np.zeros_like(self._kept)

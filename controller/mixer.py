@@ -21,6 +21,8 @@ from controller.parameters import Floats, Parameters, did_you_mean
 Mode = Literal["set", "add", "max"]
 Indices = NDArray[np.intp] | Sequence[int] | slice
 
+_SHORTEST_S = 1e-9
+
 
 @dataclass(frozen=True)
 class LayerSettings:
@@ -62,24 +64,23 @@ DEFAULT_LAYERS = (
 
 
 class Layer:
-    """One source's place in a :class:`Mixer`; all arrays are views into the mixer's, (P,) each.
+    """One source's place in a :class:`Mixer`; all arrays are rows of the mixer's, (P,) each.
 
     Attributes
     ----------
     values : latest values. held : which parameters the source has given and not released.
     gain : factor on the values, for instance per region.
     share : factor on the weight, for what blocks or fades the layer.
-    weight : 0..1. settings : what it was made from.
+    applied : share it had in the last mix. settings : what it was made from.
     """
 
-    def __init__(self, settings: LayerSettings, arrays: Sequence[np.ndarray]) -> None:
+    def __init__(self, settings: LayerSettings, table: _Table, row: int) -> None:
         self.settings = settings
         self.name = settings.name
-        self.weight = settings.weight
-        self.fade_in_s, self.fade_out_s = settings.fade_in_s, settings.fade_out_s
-        self.values, self.stamp, self.level, self.gain, self.share, self.applied, self.held = arrays
+        self.values, self.gain, self.share = table.values[row], table.gain[row], table.share[row]
+        self.applied, self.held, self._stamp = table.applied[row], table.held[row], table.stamp[row]
+        self._fade_out = table.fade_out_s[row]
         self._fresh = np.zeros(len(self.values), dtype=bool)
-        self._rate = np.zeros(len(self.values))
 
     def write(self, indices: Indices, values: Floats | Sequence[float] | float, now_s: float) -> None:
         """Hold some parameters at ``values`` from ``now_s`` on; what is not finite changes nothing."""
@@ -87,7 +88,7 @@ class Layer:
         if not np.isfinite(given).all():
             indices, given = _only_finite(indices, given, len(self.values))
         self.values[indices] = given
-        self.stamp[indices] = now_s
+        self._stamp[indices] = now_s
         self.held[indices] = True
 
     def write_masked(self, values: Floats, mask: NDArray[np.bool_], now_s: float) -> None:
@@ -95,35 +96,52 @@ class Layer:
         np.isfinite(values, out=self._fresh)
         self._fresh &= mask
         np.copyto(self.values, values, where=self._fresh)
-        np.copyto(self.stamp, now_s, where=self._fresh)
+        np.copyto(self._stamp, now_s, where=self._fresh)
         np.copyto(self.held, mask)
 
     def release(self, indices: Indices = slice(None), *, fade_s: float | None = None) -> None:
         """Give parameters back to the layers below, over ``fade_s`` or the layer's own fade."""
         self.held[indices] = False
-        self.fade_out_s = self.settings.fade_out_s if fade_s is None else fade_s
+        self._fade_out[:] = self.settings.fade_out_s if fade_s is None else fade_s
 
     @property
     def holding(self) -> int:
         """How many parameters the layer holds."""
         return int(np.count_nonzero(self.held))
 
-    def advance(self, now_s: float, dt: float) -> bool:
-        """Let fades and time-outs pass; True while the layer has any say."""
-        if math.isfinite(self.settings.timeout_s) and self.held.any():
-            np.greater(self.stamp, now_s - self.settings.timeout_s, out=self._fresh)
-            self.held &= self._fresh
-        rise = dt / self.fade_in_s if self.fade_in_s > dt else 1.0
-        fall = dt / self.fade_out_s if self.fade_out_s > dt else 1.0
-        self._rate.fill(-fall)
+
+class _Table:
+    """What ``n`` layers hold of ``p`` parameters, and how they come and go; (n, p) or (n, 1) each."""
+
+    def __init__(self, settings: Sequence[LayerSettings], p: int) -> None:
+        shape = (len(settings), p)
+        self.values, self.stamp, self.level, self.applied, self.given = (np.zeros(shape) for _ in range(5))
+        self.gain, self.share = np.ones(shape), np.ones(shape)
+        self.held, self._fresh = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        columns = ("weight", "fade_in_s", "fade_out_s", "timeout_s")
+        self._weight, self._fade_in_s, self.fade_out_s, self._timeout_s = (
+            np.array([[getattr(each, name)] for each in settings]) for name in columns
+        )
+        self._rate = np.zeros(shape)
+
+    def advance(self, now_s: float, dt: float) -> NDArray[np.bool_]:
+        """Let fades and time-outs pass; (n,) which layers have any say."""
+        np.greater(self.stamp, now_s - self._timeout_s, out=self._fresh)
+        self.held &= self._fresh
+        rise, fall = (dt / np.maximum(fade, max(dt, _SHORTEST_S)) for fade in (self._fade_in_s, self.fade_out_s))
+        np.copyto(self._rate, -fall)
         np.copyto(self._rate, rise, where=self.held)
         self.level += self._rate
-        np.clip(self.level, 0.0, 1.0, out=self.level)
-        return bool(self.level.any())
+        np.maximum(self.level, 0.0, out=self.level)
+        np.minimum(self.level, 1.0, out=self.level)
+        np.multiply(self.level, self._weight, out=self.applied)
+        self.applied *= self.share
+        np.multiply(self.values, self.gain, out=self.given)
+        return np.logical_or.reduce(self.level != 0.0, axis=1)
 
 
 class Mixer:
-    """Mixes layers into one (P,) vector, without allocating.
+    """Mixes layers into one (P,) vector.
 
     Parameters
     ----------
@@ -138,15 +156,11 @@ class Mixer:
         ordered = sorted(layers, key=lambda layer: layer.priority)
         if len({layer.name for layer in ordered}) < len(ordered):
             raise ValueError("layers must have different names")
-        n, p = len(ordered), len(parameters)
-        zeros = [np.zeros((n, p)) for _ in range(6)]
-        zeros[3][:] = 1.0  # gain
-        zeros[4][:] = 1.0  # share
-        held = np.zeros((n, p), dtype=bool)
-        self.layers = tuple(Layer(s, [a[i] for a in (*zeros, held)]) for i, s in enumerate(ordered))
+        self._table = _Table(ordered, len(parameters))
+        self.layers = tuple(Layer(settings, self._table, i) for i, settings in enumerate(ordered))
         self._by_name = {layer.name: layer for layer in self.layers}
-        self._work = np.zeros(p)
-        self._better = np.zeros(p, dtype=bool)
+        self._work = np.zeros(len(parameters))
+        self._better = np.zeros(len(parameters), dtype=bool)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -163,12 +177,15 @@ class Mixer:
     def mix(self, now_s: float, dt: float, out: Floats) -> Floats:
         """Advance every layer by ``dt`` to ``now_s``; write their mix, not clipped, to ``out`` : (P,)."""
         out.fill(0.0)
-        for layer in self.layers:
-            if layer.advance(now_s, dt):
-                self._apply(layer, out)
-            else:
-                layer.applied.fill(0.0)
+        table = self._table
+        for row in np.flatnonzero(table.advance(now_s, dt)).tolist():
+            self._apply(self.layers[row].settings.mode, table.given[row], table.applied[row], out)
         return out
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Layers that had any say in the last mix, lowest priority first."""
+        return tuple(layer.name for layer in self.layers if layer.applied.any())
 
     def holder(self, index: int) -> str | None:
         """Name of the layer that decides a parameter since the last mix; None when none does.
@@ -187,18 +204,15 @@ class Mixer:
         """:meth:`holder` of every parameter."""
         return [self.holder(i) for i in range(len(self._work))]
 
-    def _apply(self, layer: Layer, out: Floats) -> None:
-        share, work = layer.applied, self._work
-        np.multiply(layer.level, layer.weight, out=share)
-        share *= layer.share
-        np.multiply(layer.values, layer.gain, out=work)
-        if layer.settings.mode == "set":
-            work -= out
+    def _apply(self, mode: Mode, given: Floats, share: Floats, out: Floats) -> None:
+        work = self._work
+        if mode == "set":
+            np.subtract(given, out, out=work)
             work *= share
             out += work
             return
-        work *= share
-        if layer.settings.mode == "add":
+        np.multiply(given, share, out=work)
+        if mode == "add":
             out += work
             return
         np.greater(work, out, out=self._better)

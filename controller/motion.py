@@ -147,7 +147,7 @@ class MotionLimiter:
         after a pause of the machine the face goes on from where it was and does not leap.
         """
         np.copyto(self._target, targets, where=np.isfinite(targets))
-        np.clip(self._target, self._low, self._high, out=self._target)
+        _keep(self._target, self._low, self._high)
         dt = min(dt, _LONGEST_STEP_S)
         if dt > 0.0:
             self._steps(dt)
@@ -163,7 +163,7 @@ class MotionLimiter:
         for _ in range(count):
             self._move(dt / count)
             self._filter.step(dt / count, self._position, self._output)
-        np.clip(self._output, self._low, self._high, out=self._output)  # rounding of the mean
+        _keep(self._output, self._low, self._high)  # rounding of the mean
 
     def _move(self, dt: float) -> None:
         error, sign, speed, wanted, free, reach = self._work
@@ -176,7 +176,9 @@ class MotionLimiter:
         np.minimum(wanted, self._speed, out=wanted)
         np.multiply(self._accel, dt, out=reach)
         np.subtract(wanted, speed, out=wanted)
-        np.clip(wanted, -reach, reach, out=wanted)
+        np.minimum(wanted, reach, out=wanted)
+        np.negative(reach, out=reach)
+        np.maximum(wanted, reach, out=wanted)
         np.add(wanted, speed, out=wanted)
         np.subtract(free, wanted, out=free)
         np.greater(free, 1e-9, out=self.limited)
@@ -216,7 +218,13 @@ class MotionLimiter:
         work *= sign
         self._position += work
         np.multiply(wanted, sign, out=self._velocity)
-        np.clip(self._position, self._low, self._high, out=self._position)
+        _keep(self._position, self._low, self._high)
+
+
+def _keep(values: Floats, low: Floats, high: Floats) -> None:
+    """Keep ``values`` : (n,) inside a range, in place; several times faster than ``np.clip`` on so few numbers."""
+    np.maximum(values, low, out=values)
+    np.minimum(values, high, out=values)
 
 
 def _vector(values: Floats | float, n: int) -> Floats:

@@ -27,19 +27,22 @@ _NEAR_RAD = 1e-3
 
 @dataclass
 class Moment:
-    """What rules look at: all (n,) rad, and what was measured.
+    """What rules look at: angles, and what was measured.
 
     Attributes
     ----------
-    target : where the servos are asked to be. position : where they were last told to be.
-    stop : where they would come to rest if they braked from the next step on. state : the newest measurement. dt : s.
+    angles : (3, n) rad: where the servos are asked to be, where they were last told to be, and where they would come
+        to rest if they braked from the next step on. state : the newest measurement. dt : s.
     """
 
-    target: Floats
-    position: Floats
-    stop: Floats
+    angles: Floats
     state: BusState | None
     dt: float
+
+    @property
+    def position(self) -> Floats:
+        """(n,) rad, where the servos were last told to be."""
+        return self.angles[1]
 
 
 @dataclass
@@ -102,9 +105,13 @@ class _Ends:
         """(k,) rad of relative positions."""
         return self.neutral + share * (self.limit - self.neutral)
 
+    def keep(self, window: Window, where: Flags) -> None:
+        """Keep the channels of ``where`` : (k,) on the near side of their threshold."""
+        window.narrow(self.at, self.sign, self.bound, where)
+
     def past(self, angles: Floats) -> Flags:
-        """(k,) whether the channels' ``angles`` : (n,) lie beyond their threshold."""
-        return self.sign * (angles[self.at] - self.bound) > _NEAR_RAD
+        """(..., k) whether the channels' ``angles`` : (..., n) lie beyond their threshold."""
+        return self.sign * (angles[..., self.at] - self.bound) > _NEAR_RAD
 
 
 class Prevent:
@@ -120,12 +127,11 @@ class Prevent:
 
     def narrow(self, now: Moment, window: Window) -> None:
         """See :class:`Guard`."""
-        own, other = self._own, self._other
-        yields = other.past(now.target) | other.past(now.position) | other.past(now.stop)
-        waits = own.past(now.position) | own.past(now.stop)
-        window.narrow(own.at, own.sign, own.bound, yields)
-        window.narrow(other.at, other.sign, other.bound, waits)
-        self.tally.note((yields & own.past(now.target)) | (waits & other.past(now.target)), now.dt)
+        own, other = self._own.past(now.angles), self._other.past(now.angles)
+        yields, waits = other[0] | other[1] | other[2], own[1] | own[2]
+        self._own.keep(window, yields)
+        self._other.keep(window, waits)
+        self.tally.note((yields & own[0]) | (waits & other[0]), now.dt)
 
 
 class Timing:
@@ -144,16 +150,20 @@ class Timing:
         self._until = np.cumsum(times, axis=1)
         self._fall, self._recover = times[:, 0], times[:, 2]
         self._spent, self._phase = np.zeros(len(each)), np.full(len(each), -1.0)
+        self._rests = True
         self.tally = Tally([f"timing {name} toward {r.toward}" for r, name in each])
 
     def narrow(self, now: Moment, window: Window) -> None:
         """See :class:`Guard`."""
+        if self._rests and not self._ends.past(now.position).any():
+            return
         idle = self._phase < 0
         pace = np.where(self._ends.past(now.position), now.dt, -now.dt)
         self._spent = np.where(idle, np.maximum(self._spent + pace, 0.0), 0.0)
         self._phase = np.where(idle, np.where(self._spent > self._hold, 0.0, -1.0), self._phase + now.dt)
         self._phase[self._phase >= self._until[:, 2]] = -1.0
         acting = self._phase >= 0
+        self._rests = not (acting.any() or self._spent.any() or self.tally.acting.any())
         if acting.any():
             window.narrow(self._ends.at, self._ends.sign, self._ends.at_share(self._level()), acting)
         self.tally.note(acting, now.dt)
@@ -283,11 +293,11 @@ class Guard:
         """
         table, window = self._table, self._window
         sound = np.where(np.isfinite(target), target, position)  # what is no number asks to stay
-        wanted = self._takeup.apply(np.clip(sound, table.low_rad, table.high_rad))
-        np.clip(wanted, table.low_rad, table.high_rad, out=wanted)
+        wanted = self._takeup.apply(np.minimum(np.maximum(sound, table.low_rad), table.high_rad))
+        wanted = np.minimum(np.maximum(wanted, table.low_rad), table.high_rad)
         np.copyto(window.low, table.low_rad)
         np.copyto(window.high, table.high_rad)
-        now = Moment(wanted, position, stop, state, dt)
+        now = Moment(np.array((wanted, position, stop)), state, dt)
         for rule in self._rules:
             rule.narrow(now, window)
         return np.maximum(np.minimum(wanted, window.high), np.minimum(window.low, window.high))
