@@ -7,7 +7,7 @@ from functools import partial
 from typing import TypeVar
 
 from drivers.bus import ServoSpec
-from drivers.dynamixel.packet1 import Error1, Instruction1, Packet1, encode
+from drivers.dynamixel.packet1 import Error1, Instruction1, Packet1
 from drivers.dynamixel.tables import ControlTable, Item
 from drivers.errors import BusError, CorruptReply, NoReply, ServoRefused, together
 from drivers.protocol1 import WINDOW
@@ -120,10 +120,9 @@ class Registers:
         self._insist(servo, f"writing {item.name} = {value}", ask, tries)
 
     def tell(self, servo: int, name: str, value: int) -> None:
-        """Write one register without waiting for an answer."""
-        item = self._known(servo, name)
-        params = bytes((item.address,)) + item.encode(value)
-        self.packets.tell(self.port, encode(servo, Instruction1.WRITE, params))
+        """Write one register by a sync write of one, which is never answered: an answer that nobody waited for
+        would collide with the next question."""
+        self.put_all({servo: value}, name)
 
     def get_all(self, ids: Sequence[int], name: str) -> dict[int, int]:
         """One register of many servos: in groups where they can, then each missing one by itself.

@@ -1,7 +1,7 @@
 """Protocol 1.0 framing on a wire of simulated servos: Dynamixel AX and MX, Feetech STS and SCS.
 
 The two makers differ: Dynamixel reports a refused instruction in its error flags and has a bulk read (MX only);
-Feetech has a sync read, reports hardware errors only and ignores what it refuses.
+Feetech has a sync read (STS only), reports hardware errors only and ignores what it refuses.
 """
 
 from __future__ import annotations
@@ -116,12 +116,12 @@ class LegacyChain(Chain):
 
     # ------------------------------------------------------------ several servos
     def _sync_read(self, packet: Packet1, now_s: float) -> list[Reply]:
-        """Feetech's: address, length, ids; Dynamixel servos stay silent."""
+        """Feetech's: address, length, ids; SCS and Dynamixel servos stay silent."""
         if packet.id != BROADCAST_ID or len(packet.params) < 2:
             return []
         address, length, *ids = packet.params
         asked = [(device_id, address, length) for device_id in ids]
-        return self._read_many(asked, now_s, lambda servo: servo.is_feetech)
+        return self._read_many(asked, now_s, lambda servo: servo.table.group_read == "sync")
 
     def _bulk_read(self, packet: Packet1, now_s: float) -> list[Reply]:
         """MX's: 0, then (length, id, address) repeated; an id named twice is answered once, for the first."""
@@ -132,7 +132,7 @@ class LegacyChain(Chain):
         for at in range(0, len(params), 3):
             length, device_id, address = params[at : at + 3]
             asked.setdefault(device_id, (device_id, address, length))
-        return self._read_many(list(asked.values()), now_s, lambda servo: servo.table.model.startswith("mx"))
+        return self._read_many(list(asked.values()), now_s, lambda servo: servo.table.group_read == "bulk")
 
     def _read_many(
         self, asked: list[tuple[int, int, int]], now_s: float, knows: Callable[[SimulatedServo], bool]

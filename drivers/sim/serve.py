@@ -8,7 +8,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from drivers.errors import DriverError
 from drivers.sim.bus import SimulatedChain
 from drivers.sim.chain import Chain
 from drivers.sim.control import Commands, ControlSocket, Lines
@@ -16,6 +15,7 @@ from drivers.sim.device import SimulatedServo
 from drivers.sim.faults import Fault
 from drivers.sim.legacy import LegacyChain
 from drivers.sim.line import Line
+from drivers.sim.mixed import MixedChain
 from drivers.sim.ptyport import PtyPort
 from drivers.sim.wire import Timed, WireTiming, without_timing
 
@@ -182,19 +182,10 @@ def make_servos(servos: Iterable[object], model: str | int, baud: int, now_s: fl
 
 
 def make_chain(servos: list[SimulatedServo], now_s: float, seed: int = 0) -> Chain:
-    """A wire with these servos, of the protocol they speak.
-
-    Raises
-    ------
-    DriverError : some speak Protocol 1.0 and some 2.0.
-    """
+    """A wire with these servos, of the protocol they speak, or of both."""
     protocols = {servo.table.protocol for servo in servos}
     if len(protocols) > 1:
-        models = ", ".join(sorted({servo.table.model for servo in servos}))
-        raise DriverError(
-            f"cannot simulate servos of Protocol 1.0 and 2.0 on one wire ({models})",
-            hint="give each protocol a bus of its own",
-        )
+        return MixedChain(servos, now_s, seed=seed)
     kind = LegacyChain if protocols == {1} else SimulatedChain
     return kind(servos, now_s, seed=seed)
 

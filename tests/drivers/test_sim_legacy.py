@@ -8,10 +8,10 @@ from dynamixel_sdk import GroupSyncWrite, PacketHandler, PortHandler
 
 from drivers.dynamixel.packet1 import BROADCAST_ID, Error1, Packet1, Reader1, encode
 from drivers.dynamixel.packet1 import Instruction1 as I
-from drivers.errors import DriverError
 from drivers.sim import SimulatedBus
 from drivers.sim.device import SimulatedServo
 from drivers.sim.legacy import LegacyChain
+from drivers.sim.mixed import MixedChain
 from drivers.sim.plant import Skin
 from drivers.sim.serve import make_chain, make_servos
 
@@ -261,11 +261,14 @@ def test_size_on_the_wire(params: bytes):
     assert chain().size(Packet1(1, I.WRITE, params)) == len(encode(1, I.WRITE, params))
 
 
-def test_the_models_decide_the_protocol_and_must_agree():
+def test_scs_knows_no_sync_read():
+    assert ask(chain("scs0009"), BROADCAST_ID, I.SYNC_READ, "38 02 01") == []
+
+
+def test_the_models_decide_the_protocol():
     assert isinstance(make_chain(make_servos([1], "sts3215", 1_000_000, 0.0), 0.0), LegacyChain)
     mixed = make_servos([1], "sts3215", 1_000_000, 0.0) + make_servos([2], "xl320", 1_000_000, 0.0)
-    with pytest.raises(DriverError, match=r"one wire \(sts3215, xl320\)"):
-        make_chain(mixed, 0.0)
+    assert isinstance(make_chain(mixed, 0.0), MixedChain)
 
 
 # ---------------------------------------------------------------- served
