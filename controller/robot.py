@@ -122,10 +122,14 @@ class ChannelSettings(Settings):
 
 
 class RobotSettings(Settings):
-    """The channels of one robot, on one or more buses."""
+    """The channels of one robot, on one or more buses.
+
+    ``calibration`` names a file that ``omote calibrate`` made of this very head (:mod:`controller.calibration`).
+    """
 
     name: str
     description: str = ""
+    calibration: str | None = None
     buses: list[BusSettings] = Field(min_length=1)
     channels: list[ChannelSettings] = Field(min_length=1)
     landmarks: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=3)]] = {}
@@ -168,7 +172,11 @@ def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
     faults = _doubled(robot) + _references(robot, parameters) + _rules(robot)
     if faults:
         raise config_error(path, faults)
-    return robot
+    if robot.calibration is None:
+        return robot
+    from controller.calibration import calibrated, calibration_path
+
+    return calibrated(robot, calibration_path(robot.calibration, path))
 
 
 def _doubled(robot: RobotSettings) -> list[str]:

@@ -19,6 +19,7 @@ COMMANDS = [
     ("ports",),
     ("scan",),
     ("set-id",),
+    ("calibrate",),
     ("check",),
     ("bench",),
     ("simulate", "dynamixel"),

@@ -1,0 +1,149 @@
+"""omote calibrate in a real terminal, with a simulated head that is moved by hand."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from drivers.sim import SimulatedBus
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+
+ROBOT = """
+name = "pair"
+[[buses]]
+name = "head"
+kind = "dynamixel"
+port = "{port}"
+[[channels]]
+name = "jaw"
+bus = "head"
+id = 1
+model = "xl330-m288"
+mix = {{ jawOpen = 1.0 }}
+map = {{ at = [0, 1], deg = [0, 20] }}
+limit_deg = [-30, 30]
+max_speed_deg_s = 300
+max_accel_deg_s2 = 3000
+"""
+
+
+class Terminal:
+    """omote calibrate on a pseudo-terminal of its own."""
+
+    def __init__(self, *words: str) -> None:
+        self.master, slave = os.openpty()
+        command = [sys.executable, "-c", "from controller.cli import main; main()", "calibrate", *words]
+        environment = {**os.environ, "COLUMNS": "140", "LINES": "40", "TERM": "xterm"}
+        self.process = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env=environment)
+        os.close(slave)
+        os.set_blocking(self.master, False)
+        self.shown = ""
+
+    def until(self, text: str) -> None:
+        """Wait until a text was drawn after the last one that was waited for."""
+        end = time.monotonic() + 30
+        while text not in self.shown:
+            assert time.monotonic() < end, self.shown[-2000:]
+            self.drain()
+            time.sleep(0.02)
+        self.shown = self.shown[self.shown.rindex(text) + len(text) :]
+
+    def press(self, keys: str) -> None:
+        os.write(self.master, keys.encode())
+
+    def end(self) -> int:
+        end = time.monotonic() + 20
+        while self.process.poll() is None and time.monotonic() < end:
+            self.drain()  # a terminal that nobody reads would hold it up
+            time.sleep(0.02)
+        self.process.kill()
+        self.process.wait()
+        os.close(self.master)
+        return self.process.returncode
+
+    def drain(self) -> None:
+        """Take what was drawn."""
+        with suppress(BlockingIOError, OSError):
+            self.shown += os.read(self.master, 65536).decode("utf-8", "ignore")
+
+
+def degrees(value: float) -> float:
+    return 2048 + value * 4096 / 360
+
+
+def wait(done: Callable[[], bool]) -> None:
+    end = time.monotonic() + 20
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_a_head_is_calibrated_by_hand_and_by_keys_and_saved(tmp_path: Path) -> None:
+    with SimulatedBus([1], link=tmp_path / "port") as head:
+        robot = tmp_path / "pair.toml"
+        robot.write_text(ROBOT.format(port=head.path))
+        servo, terminal = head.servo(1), Terminal(str(robot), "--name", "desk", "--margin", "0")
+        for angle, shown, key in ((5, "5.0", "n"), (-10, "-10.0", "["), (18, "18.0", "]")):
+            servo.place(degrees(angle))
+            terminal.until(shown)
+            terminal.press(key)
+        terminal.until("18.0")
+        assert not servo.torque
+        terminal.press("h")
+        wait(lambda: servo.torque)
+        terminal.press("\x1b[D\x1b[D")
+        wait(lambda: servo.goal < degrees(17.3))
+        terminal.press("h")
+        wait(lambda: not servo.torque)
+        terminal.press("s")
+        terminal.until("saved 1 channels")
+        terminal.press("q")
+        assert terminal.end() == 0
+        assert not servo.torque
+    captured = tomllib.loads((tmp_path / "pair.desk.calibration.toml").read_text())
+    assert captured["channels"]["jaw"] == pytest.approx({"min_deg": -10, "neutral_deg": 5, "max_deg": 18}, abs=0.1)
+
+
+def test_a_calibration_that_exists_is_not_replaced_without_a_yes(tmp_path: Path) -> None:
+    with SimulatedBus([1], link=tmp_path / "port") as head:
+        robot, old = tmp_path / "pair.toml", tmp_path / "pair.desk.calibration.toml"
+        robot.write_text(ROBOT.format(port=head.path))
+        old.write_text("precious")
+        servo, terminal = head.servo(1), Terminal(str(robot), "--name", "desk")
+        for angle, shown, key in ((5, "5.0", "n"), (-10, "-10.0", "["), (18, "18.0", "]s")):
+            servo.place(degrees(angle))
+            terminal.until(shown)
+            terminal.press(key)
+        terminal.until("replace")
+        terminal.press("n")
+        terminal.until("not saved")
+        assert old.read_text() == "precious"
+        terminal.press("s")
+        terminal.until("replace")
+        terminal.press("y")
+        terminal.until("saved 1 channels")
+        terminal.press("q")
+        assert terminal.end() == 0
+    assert "precious" not in old.read_text()
+
+
+def test_a_killed_calibration_leaves_the_motors_off(tmp_path: Path) -> None:
+    with SimulatedBus([1], link=tmp_path / "port") as head:
+        robot = tmp_path / "pair.toml"
+        robot.write_text(ROBOT.format(port=head.path))
+        terminal = Terminal(str(robot))
+        terminal.until("jaw")
+        terminal.press("h")
+        wait(lambda: head.servo(1).torque)
+        terminal.process.terminate()
+        assert terminal.end() == 143
+        assert not head.servo(1).torque
