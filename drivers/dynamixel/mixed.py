@@ -19,6 +19,7 @@ from drivers.dynamixel.bus import DynamixelBus
 from drivers.dynamixel.legacy import LegacyBus
 from drivers.dynamixel.tables import load_table
 from drivers.errors import DriverError, NoReply, PortLost
+from drivers.protocol1.bus import LAST_ID
 from drivers.wirebus import WireBus
 
 ONLY_LEGACY = ("singles", "torque_limit")
@@ -81,9 +82,24 @@ class MixedBus(WireBus):
     # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
-        """Who is there, by id, in either protocol."""
+        """Who is there, in either protocol: each id first in the one it is configured for, then in the other."""
         with self._losing():
-            return sorted((info for half in self._halves for info in half.discover(ids)), key=lambda info: info.id)
+            found: dict[int, ServoInfo] = {}
+            if ids is None:
+                found = {info.id: info for info in self._new.discover()}
+                ids = range(LAST_ID + 1)
+            for half in self._halves:
+                self._find(half, [servo for servo in ids if servo in half.ids], found)
+            for half in self._halves:
+                self._find(half, list(ids), found)
+            return [info for _, info in sorted(found.items())]
+
+    @staticmethod
+    def _find(half: DynamixelBus | LegacyBus, ids: Sequence[int], found: dict[int, ServoInfo]) -> None:
+        """Add those of the ids that are not found yet and answer a half."""
+        missing = [servo for servo in ids if servo not in found]
+        if missing:
+            found |= {info.id: info for info in half.discover(missing)}
 
     def _bring_up(self) -> Floats:
         here = np.zeros(len(self.ids))
