@@ -26,6 +26,7 @@ class Kind(NamedTuple):
 
 KINDS = {
     "dynamixel": Kind("drivers.dynamixel.bus:DynamixelBus", "drivers.models:check_dynamixel"),
+    "maestro": Kind("drivers.maestro.bus:MaestroBus", "drivers.boards.hobby:check_hobby"),
     "feetech": Kind("drivers.feetech.bus:FeetechBus", "drivers.models:check_feetech"),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -9,10 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from drivers.bus import ServoSpec
+from drivers.errors import DriverError
 from drivers.wirebus import WireBus
 
 if TYPE_CHECKING:
     from drivers.sim import SimulatedBus
+
+
+TRANSPORTS = ("pty", "tcp", "memory")
 
 
 class SimulatedWire(WireBus):
@@ -24,8 +29,14 @@ class SimulatedWire(WireBus):
     ----------
     servos : the servos in the order of all arrays; the simulated ones have the same ids and models.
     port : path that shall point at the simulated port, so that other programs can find it; empty for a private one.
+    transport : ``"pty"`` (a pseudo-terminal), ``"tcp"`` (this machine's loopback) or ``"memory"`` (a thread of this
+        process serves); empty takes a pseudo-terminal where the system has them, else TCP.
     faults, wire, latency_s, seed, process : see :class:`drivers.sim.SimulatedBus`.
     options : see the driver.
+
+    Raises
+    ------
+    DriverError : unknown transport, and what the driver raises.
     """
 
     family: ClassVar[str]
@@ -35,6 +46,7 @@ class SimulatedWire(WireBus):
         servos: Iterable[ServoSpec],
         *,
         port: str = "",
+        transport: str = "",
         baud: int = 1_000_000,
         faults: Sequence[str] = (),
         wire: bool = False,
@@ -45,6 +57,9 @@ class SimulatedWire(WireBus):
     ) -> None:
         super().__init__(servos, port=port, baud=baud, **options)  # type: ignore[call-arg]
         self.simulation: SimulatedBus | None = None
+        self._transport = transport or ("pty" if hasattr(os, "openpty") else "tcp")
+        if self._transport not in TRANSPORTS:
+            raise DriverError(f"there is no transport {transport!r}", hint=f"use one of {', '.join(TRANSPORTS)}")
         self._link = port
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._settings: dict[str, Any] = {
@@ -53,7 +68,9 @@ class SimulatedWire(WireBus):
             "wire": wire,
             "latency_s": latency_s,
             "seed": seed,
-            "process": process,
+            "process": process and self._transport != "memory",
+            "family": self.family,
+            "options": self.far_end(),
         }
 
     def open(self) -> None:
@@ -70,14 +87,18 @@ class SimulatedWire(WireBus):
     def _simulate(self) -> None:
         from drivers.sim import SimulatedBus  # only who simulates pays for it
 
-        link = self._link
-        if not link:
-            self._folder = tempfile.TemporaryDirectory(prefix="omote-")
-            link = str(Path(self._folder.name) / "servos")
-        simulation = SimulatedBus(self.servos, link=link, **self._settings)
+        simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
         simulation.__enter__()
         self.simulation = simulation
-        self._use_path(link)
+        self._use_path(simulation.path)
+
+    def _private_link(self) -> str:
+        if self._transport == "tcp":
+            return "socket://127.0.0.1:0"
+        if self._transport == "memory":
+            return f"memory://omote-{id(self)}"
+        self._folder = tempfile.TemporaryDirectory(prefix="omote-")
+        return str(Path(self._folder.name) / "servos")
 
     def _release(self) -> None:
         super()._release()

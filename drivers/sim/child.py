@@ -9,34 +9,40 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import sys
+import threading
 import time
 from typing import Any
 
 from drivers.errors import DriverError
 from drivers.priority import take_priority
 from drivers.sim.control import Commands
-from drivers.sim.device import SimulatedServo
-from drivers.sim.serve import PtyServer, make_chain
+from drivers.sim.families import make_line
+from drivers.sim.serve import Control, PortServer
 
 
-def build(settings: dict[str, Any]) -> PtyServer:
+def build(settings: dict[str, Any]) -> PortServer:
     """The server that the settings describe."""
     now_s = time.monotonic()
-    servos = [
-        SimulatedServo(device_id, model, now_s=now_s, baud=settings["baud"]) for device_id, model in settings["servos"]
-    ]
-    chain = make_chain(servos, now_s, settings["seed"])
-    server = PtyServer(
-        chain,
+    line = make_line(
+        settings["family"],
+        settings["servos"],
+        now_s,
+        baud=settings["baud"],
+        seed=settings["seed"],
+        options=settings["options"],
+    )
+    server = PortServer(
+        line,
         settings["link"],
         baud=settings["baud"],
         wire=settings["wire"],
         latency_s=settings["latency_s"],
-        on_line=Commands(chain).obey,
+        on_line=Commands(line).obey,
     )
     try:
-        chain.faults.add(settings["faults"], now_s)
+        line.faults.add(settings["faults"], now_s)
     except DriverError:
         server.close()
         raise
@@ -58,8 +64,23 @@ def main() -> int:
         _say(f"error {error}")
         return 1
     _say(f"ready {server.port.path}")
-    server.run(sys.stdin.fileno())
+    server.run(_standard_input())
     return 0
+
+
+def _standard_input() -> Control:
+    """Standard input as something that can be waited for; only sockets can on Windows."""
+    if os.name != "nt":
+        return sys.stdin.fileno()
+    ours, theirs = socket.socketpair()
+
+    def forward() -> None:
+        with theirs:
+            while data := os.read(sys.stdin.fileno(), 4096):
+                theirs.sendall(data)
+
+    threading.Thread(target=forward, daemon=True).start()
+    return ours
 
 
 def _first_line(descriptor: int) -> bytes:

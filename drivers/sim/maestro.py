@@ -6,21 +6,34 @@ Source: Pololu Maestro User's Guide, sections 3, 4.e and 5. Scripts are not run;
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from enum import IntFlag
 from typing import Any, NamedTuple
 
+from drivers.maestro.protocol import (
+    GET_ERRORS,
+    GET_MOVING,
+    GET_POSITION,
+    GO_HOME,
+    MINI_SSC,
+    POLOLU,
+    RESTART_SCRIPT,
+    RESTART_WITH_PARAMETER,
+    SCRIPT_STATUS,
+    SET_ACCELERATION,
+    SET_MULTIPLE,
+    SET_PWM,
+    SET_SPEED,
+    SET_TARGET,
+    STOP_SCRIPT,
+    MaestroError,
+    crc7,
+)
+from drivers.sim.board import Board
 from drivers.sim.faults import Fault
-from drivers.sim.line import Line
 from drivers.sim.rc import RcChannel
-from drivers.sim.replies import Reply
 
-SET_TARGET, SET_SPEED, SET_ACCELERATION, SET_PWM = 0x84, 0x87, 0x89, 0x8A
-GET_POSITION, GET_MOVING, SET_MULTIPLE, GET_ERRORS = 0x90, 0x93, 0x9F, 0xA1
-GO_HOME, STOP_SCRIPT, RESTART_SCRIPT, RESTART_WITH_PARAMETER, SCRIPT_STATUS = 0xA2, 0xA4, 0xA7, 0xA8, 0xAE
-POLOLU, MINI_SSC = 0xAA, 0xFF
-
-MIN_TARGET, MAX_TARGET = 992 * 4, 2000 * 4
-"""Default pulse limits in quarter microseconds."""
+LIMITS_US = (992.0, 2000.0)
+"""Pulse limits of a new board."""
+_MINI_ONLY = (SET_MULTIPLE, GET_MOVING, SET_PWM)
 SPEED_UNIT = 100.0
 """One step of speed, quarter microseconds per second (0.25 us per 10 ms)."""
 ACCELERATION_UNIT = 1250.0
@@ -43,20 +56,6 @@ _LENGTHS = {
 }
 
 
-class MaestroError(IntFlag):
-    """Bits of Get Errors."""
-
-    SIGNAL = 1
-    OVERRUN = 2
-    BUFFER_FULL = 4
-    CRC = 8
-    PROTOCOL = 16
-    TIMEOUT = 32
-    SCRIPT_STACK = 64
-    CALL_STACK = 128
-    PROGRAM_COUNTER = 256
-
-
 class Command(NamedTuple):
     """One command; `error` is set instead of `code` where the bytes make no sense."""
 
@@ -64,16 +63,6 @@ class Command(NamedTuple):
     data: bytes
     size: int
     error: MaestroError | None = None
-
-
-def crc7(data: bytes) -> int:
-    """CRC-7 of a message: polynomial 0x91, least significant bit first."""
-    crc = 0
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc ^ 0x91) >> 1 if crc & 1 else crc >> 1
-    return crc
 
 
 class MaestroReader:
@@ -145,15 +134,17 @@ class MaestroReader:
         return Command(code, message[start : start + length], size)
 
 
-class Maestro(Line):
-    """A Mini Maestro on one port.
+class Maestro(Board):
+    """A Mini Maestro, or with 6 channels a Micro Maestro, on one port.
 
     Parameters
     ----------
     channels : 6, 12, 18 or 24 outputs.
     now_s : time.
-    faults : only ``echo`` and ``unplug``.
+    faults : see :data:`drivers.sim.board.FAULTS`.
     device, crc : see `MaestroReader`.
+    limits_us : pulse limits of every channel, as set in Pololu's Control Center.
+    seed : of random faults.
 
     Attributes
     ----------
@@ -168,12 +159,12 @@ class Maestro(Line):
         faults: Iterable[str | Fault] = (),
         device: int = 12,
         crc: bool = False,
+        limits_us: tuple[float, float] = LIMITS_US,
+        seed: int = 0,
     ) -> None:
         self._settings = device, crc
-        super().__init__(kinds=("echo", "unplug"))
-        self.channels = [RcChannel() for _ in range(channels)]
-        self.speeds, self.accelerations = [0] * channels, [0] * channels
-        self.errors = MaestroError(0)
+        self._count, self._limits = channels, (4 * limits_us[0], 4 * limits_us[1])
+        self.reset(now_s)
         self._handlers: dict[int, Callable[[bytes, float], bytes]] = {
             SET_TARGET: self._set_target,
             SET_MULTIPLE: self._set_multiple,
@@ -186,7 +177,13 @@ class Maestro(Line):
             GO_HOME: self._go_home,
             SCRIPT_STATUS: lambda data, now_s: b"\x01",
         }
-        self.faults.add(faults, now_s)
+        super().__init__(now_s, faults, seed)
+
+    def reset(self, now_s: float) -> None:
+        """Begin as after power-on: no pulses, no limits of speed and acceleration."""
+        self.channels = [RcChannel() for _ in range(self._count)]
+        self.speeds, self.accelerations = [0] * self._count, [0] * self._count
+        self.errors = MaestroError(0)
 
     def make_reader(self) -> MaestroReader:
         """A reader of commands."""
@@ -196,15 +193,18 @@ class Maestro(Line):
         """Bytes of a command on the wire."""
         return packet.size
 
-    def carry_out(self, packet: Command, now_s: float) -> list[Reply]:
+    def obey(self, packet: Command, now_s: float) -> list[tuple[int, bytes]]:
         """Do a command. An error sends every channel home and is kept until it is read."""
-        if packet.error:
-            self.errors |= packet.error
+        error = packet.error
+        if self._count == 6 and packet.code in _MINI_ONLY:
+            error = MaestroError.PROTOCOL
+        if error:
+            self.errors |= error
             self._go_home(b"", now_s)
             return []
         handler = self._handlers.get(packet.code)
         data = handler(packet.data, now_s) if handler else b""
-        return [Reply(data, None)] if data else []
+        return [(packet.data[0] if packet.code == GET_POSITION else 0, data)] if data else []
 
     def describe(self, now_s: float) -> list[dict[str, Any]]:
         """Pulse width in microseconds and target of each channel."""
@@ -216,10 +216,10 @@ class Maestro(Line):
     def _go(self, number: int, target: float, now_s: float) -> None:
         """A target is cut to the channel's limits; one for a channel that is not there is a protocol error."""
         if number >= len(self.channels):
-            self.errors |= MaestroError.PROTOCOL
+            self._refuse(now_s)
             return
         if target:
-            target = min(max(target, MIN_TARGET), MAX_TARGET)
+            target = min(max(target, self._limits[0]), self._limits[1])
         speed, acceleration = self.speeds[number] * SPEED_UNIT, self.accelerations[number] * ACCELERATION_UNIT
         self.channels[number].go(target, now_s, speed, acceleration)
 
@@ -238,24 +238,29 @@ class Maestro(Line):
         return b""
 
     def _set_speed(self, data: bytes, now_s: float) -> bytes:
-        self._limit(self.speeds, data)
+        self._limit(self.speeds, data, now_s)
         return b""
 
     def _set_acceleration(self, data: bytes, now_s: float) -> bytes:
-        self._limit(self.accelerations, data)
+        self._limit(self.accelerations, data, now_s)
         return b""
 
-    def _limit(self, limits: list[int], data: bytes) -> None:
+    def _limit(self, limits: list[int], data: bytes, now_s: float) -> None:
         if data[0] < len(limits):
             limits[data[0]] = _word(data[1:])
         else:
-            self.errors |= MaestroError.PROTOCOL
+            self._refuse(now_s)
+
+    def _refuse(self, now_s: float) -> None:
+        """A channel that is not there is an error as any other."""
+        self.errors |= MaestroError.PROTOCOL
+        self._go_home(b"", now_s)
 
     def _get_position(self, data: bytes, now_s: float) -> bytes:
         """The pulse that is put out, not the shaft: two full bytes, low first."""
         if data[0] >= len(self.channels):
-            self.errors |= MaestroError.PROTOCOL
-            return b"\0\0"
+            self._refuse(now_s)
+            return b""
         return round(self.channels[data[0]].position(now_s)).to_bytes(2, "little")
 
     def _get_moving(self, data: bytes, now_s: float) -> bytes:

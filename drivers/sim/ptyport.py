@@ -55,9 +55,10 @@ class PtyPort:
         """Whether the terminal exists."""
         return self._master >= 0
 
-    def fileno(self) -> int:
-        """Descriptor to wait on."""
-        return self._master
+    @property
+    def descriptors(self) -> list[int]:
+        """What to wait on."""
+        return [self._master] if self.is_open else []
 
     def open(self, link: str | os.PathLike[str] | None = None) -> None:
         """Make the terminal (a new one after `close`) and the link."""

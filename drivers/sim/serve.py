@@ -1,9 +1,10 @@
-"""Serve a simulated bus on a pseudo-terminal: one loop that sleeps until there is something to do."""
+"""Serve a simulated bus on a port: one loop that sleeps until there is something to do."""
 
 from __future__ import annotations
 
 import os
 import select
+import socket
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -12,24 +13,27 @@ from drivers.sim.bus import SimulatedChain
 from drivers.sim.chain import Chain
 from drivers.sim.control import Commands, ControlSocket, Lines
 from drivers.sim.device import SimulatedServo
+from drivers.sim.farports import make_port
 from drivers.sim.faults import Fault
 from drivers.sim.legacy import LegacyChain
 from drivers.sim.line import Line
 from drivers.sim.mixed import MixedChain
-from drivers.sim.ptyport import PtyPort
 from drivers.sim.wire import Timed, WireTiming, without_timing
 
 PAUSE_S = 0.1
 """A packet that is not complete after this pause is given up."""
 
+Control = int | socket.socket
+"""Where commands to the server come from: a descriptor, or (the only thing that Windows can wait for) a socket."""
 
-class PtyServer:
-    """Moves bytes between a chain of servos and a pseudo-terminal.
+
+class PortServer:
+    """Moves bytes between a simulated far end and a port.
 
     Parameters
     ----------
     chain : the servos.
-    link : path that shall point at the terminal, or None.
+    link : path that shall point at a pseudo-terminal, or None; ``socket://HOST:PORT`` or ``memory://NAME`` instead.
     baud : bit rate while no client has set one.
     wire : bytes take their time.
     latency_s : USB latency timer, with `wire`.
@@ -39,7 +43,7 @@ class PtyServer:
 
     Attributes
     ----------
-    port : the terminal; its ``path`` is what a client opens.
+    port : what clients open, by its ``path``.
     tap : called with (sent by the client, bytes) for everything that passes, or None.
     """
 
@@ -58,7 +62,7 @@ class PtyServer:
         self.tap: Callable[[bool, bytes], None] | None = None
         self._socket = ControlSocket(commands, Commands(chain).obey) if commands else None
         try:
-            self.port = PtyPort(link)
+            self.port = make_port(link)
         except BaseException:
             self._close_socket()
             raise
@@ -69,18 +73,17 @@ class PtyServer:
         self._read_s = 0.0
         chain.on_unplug = self._unplug
 
-    def run(self, control: int) -> None:
-        """Serve until the descriptor `control` reaches its end (or says anything, without `on_lines`)."""
+    def run(self, control: Control) -> None:
+        """Serve until `control` reaches its end (or says anything, without `on_lines`)."""
         try:
             while True:
-                watched = [control, *(self._socket.descriptors if self._socket else ())]
-                watched += [self.port.fileno()] if self.port.is_open else []
+                watched = [control, *(self._socket.descriptors if self._socket else ()), *self.port.descriptors]
                 ready, _, _ = select.select(watched, [], [], self._timeout())
                 if control in ready and not self._command(control):
                     return
                 if self._socket:
                     self._socket.serve(ready)
-                if self.port.is_open and self.port.fileno() in ready:
+                if any(descriptor in ready for descriptor in self.port.descriptors):
                     self._receive()
                 self._work_off()
         finally:
@@ -95,9 +98,9 @@ class PtyServer:
         if self._socket:
             self._socket.close()
 
-    def _command(self, control: int) -> bool:
+    def _command(self, control: Control) -> bool:
         """Take commands; False when it is time to go."""
-        data = os.read(control, 65536)
+        data = os.read(control, 65536) if isinstance(control, int) else control.recv(65536)
         if not data or self._on_line is None:
             return False
         for line in self._lines.feed(data):
@@ -201,9 +204,9 @@ def serve_dynamixel(
     *,
     latency_s: float = 0.0,
     commands: str | os.PathLike[str] | None = None,
-    stop: int | None = None,
+    stop: Control | None = None,
     seed: int = 0,
-    on_server: Callable[[PtyServer], None] = lambda server: None,
+    on_server: Callable[[PortServer], None] = lambda server: None,
 ) -> None:
     """Serve a simulated bus of Dynamixel or Feetech servos until it is interrupted. Prints nothing.
 
@@ -213,12 +216,12 @@ def serve_dynamixel(
     model : of the servos given as bare ids, for example ``"xm430-w350"``, ``"ax-12a"``, ``"sts3215"``; it decides
         the protocol.
     baud : bit rate of the servos.
-    link : path that shall point at the terminal.
+    link : path that shall point at the terminal, or ``socket://HOST:PORT`` or ``memory://NAME`` instead of one.
     wire : bytes take their time at the bit rate, with return delay and `latency_s`.
     faults : specs, see ``drivers.sim.faults``.
     on_ready : called with the path to open as soon as clients may come.
     commands : path of a socket that takes commands while it runs, see ``drivers.sim.control``.
-    stop : descriptor; the end of it (or any byte) ends the service. None = until KeyboardInterrupt.
+    stop : descriptor or socket; the end of it (or any byte) ends the service. None = until KeyboardInterrupt.
     seed : of random faults.
     on_server : called with the server before it serves, for who wants to look inside.
 
@@ -251,8 +254,8 @@ def serve(
     wire: bool = False,
     latency_s: float = 0.0,
     commands: str | os.PathLike[str] | None = None,
-    stop: int | None = None,
-    on_server: Callable[[PtyServer], None] = lambda server: None,
+    stop: Control | None = None,
+    on_server: Callable[[PortServer], None] = lambda server: None,
 ) -> None:
     """Serve any simulated bus, for example ``Maestro()`` or ``Ssc32()``; parameters as for `serve_dynamixel`.
 
@@ -260,7 +263,7 @@ def serve(
     ------
     DriverError : the terminal, link or socket cannot be made.
     """
-    server = PtyServer(line, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
+    server = PortServer(line, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
     reading, writing = os.pipe()
     try:
         on_server(server)

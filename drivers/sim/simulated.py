@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -16,8 +17,10 @@ from typing import Any, Self
 from drivers.errors import PortError
 from drivers.sim.chain import Chain
 from drivers.sim.control import Commands
+from drivers.sim.families import make_line
 from drivers.sim.faults import parse_fault
-from drivers.sim.serve import PtyServer, make_chain, make_servos
+from drivers.sim.line import Line
+from drivers.sim.serve import PortServer
 
 START_S = 20.0
 """A child process that is not ready after this time is given up."""
@@ -76,18 +79,20 @@ class ServoView:
 
 
 class SimulatedBus:
-    """A simulated bus of Dynamixel or Feetech servos behind a pseudo-terminal; a context manager.
+    """A simulated bus of any family behind a port; a context manager.
 
     Parameters
     ----------
     servos : ids, or specs with ``id`` and ``model``.
-    link : path that shall point at the terminal.
+    link : path that shall point at the pseudo-terminal, ``socket://HOST:PORT`` to listen there instead (port 0 takes
+        a free one), or ``memory://NAME`` for programs in this process.
     faults : specs, see ``drivers.sim.faults``.
     model : of the servos given as bare ids.
     baud : bit rate of the servos.
     wire, latency_s : bytes take their time.
     process : serve from a child process (which ends with this one, however this one ends) instead of a thread.
     seed : of random faults.
+    family, options : see :func:`drivers.sim.families.make_line`.
 
     Attributes
     ----------
@@ -111,18 +116,21 @@ class SimulatedBus:
         latency_s: float = 0.0,
         process: bool = False,
         seed: int = 0,
+        family: str = "dynamixel",
+        options: Mapping[str, Any] = {},
     ) -> None:
         self.baud = baud
+        self._family, self._options = family, dict(options)
         self._wire, self._latency_s = wire, latency_s
         self._servos = [(int(getattr(s, "id", s)), getattr(s, "model", model)) for s in servos]
         self._link, self._faults, self._seed = link, list(faults), seed
         self._process = process
         self._path = ""
         self._child: subprocess.Popen[bytes] | None = None
-        self._server: PtyServer | None = None
-        self._chain: Chain | None = None
+        self._server: PortServer | None = None
+        self._line: Line | None = None
         self._thread: threading.Thread | None = None
-        self._stop = -1
+        self._stop: socket.socket | None = None
         self._obeyed = threading.Event()
 
     @property
@@ -131,11 +139,18 @@ class SimulatedBus:
         return self._server.port.path if self._server and self._server.port.is_open else self._path
 
     @property
-    def chain(self) -> Chain:
-        """The servos themselves (thread mode only)."""
-        if self._chain is None:
+    def line(self) -> Line:
+        """What is at the far end (thread mode only)."""
+        if self._line is None:
             raise RuntimeError("the servos can be looked at only while the bus runs in a thread of this process")
-        return self._chain
+        return self._line
+
+    @property
+    def chain(self) -> Chain:
+        """The servos themselves (thread mode only; TypeError where it is a board)."""
+        if not isinstance(self.line, Chain):
+            raise TypeError("a board has no servos to look at; see line")
+        return self.line
 
     def servo(self, device_id: int) -> ServoView:
         """One servo (thread mode only); KeyError where nobody has the id."""
@@ -173,18 +188,17 @@ class SimulatedBus:
         if self._child:
             _end_child(self._child)
             self._child = None
-        if self._thread:
-            os.close(self._stop)
+        if self._thread and self._stop:
+            self._stop.close()
             self._thread.join()
-            self._thread = self._server = self._chain = None
+            self._thread = self._server = self._line = self._stop = None
 
     # ------------------------------------------------------------ in a thread
     def _start_thread(self) -> None:
         now_s = time.monotonic()
-        servos = make_servos([_Entry(*entry) for entry in self._servos], 0, self.baud, now_s)
-        chain = make_chain(servos, now_s, self._seed)
-        server = PtyServer(
-            chain,
+        line = make_line(self._family, self._servos, now_s, baud=self.baud, seed=self._seed, options=self._options)
+        server = PortServer(
+            line,
             self._link,
             baud=self.baud,
             wire=self._wire,
@@ -192,13 +206,13 @@ class SimulatedBus:
             on_line=self._obey,
         )
         try:
-            chain.faults.add(self._faults, now_s)
+            line.faults.add(self._faults, now_s)
         except BaseException:
             server.close()
             raise
-        self._commands = Commands(chain)
-        self._server, self._chain, self._path = server, chain, server.port.path
-        reading, self._stop = os.pipe()
+        self._commands = Commands(line)
+        self._server, self._line, self._path = server, line, server.port.path
+        reading, self._stop = socket.socketpair()
         self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
         self._thread.start()
 
@@ -225,6 +239,8 @@ class SimulatedBus:
             "seed": self._seed,
             "wire": self._wire,
             "latency_s": self._latency_s,
+            "family": self._family,
+            "options": self._options,
         }
         self._tell(json.dumps(settings))
         self._path = self._first_line(self._child)
@@ -249,24 +265,15 @@ class SimulatedBus:
         if self._child and self._child.stdin:
             self._child.stdin.write(line)
             self._child.stdin.flush()
-        elif self._thread:
+        elif self._thread and self._stop:
             self._obeyed.clear()
-            os.write(self._stop, line)
+            self._stop.sendall(line)
             self._obeyed.wait(START_S)
 
 
-class _Entry:
-    """An id with a model, as ``make_servos`` takes it."""
-
-    def __init__(self, device_id: int, model: str | int) -> None:
-        self.id, self.model = device_id, model
-
-
-def _serve(server: PtyServer, reading: int) -> None:
-    try:
+def _serve(server: PortServer, reading: socket.socket) -> None:
+    with reading:
         server.run(reading)
-    finally:
-        os.close(reading)
 
 
 def _end_child(child: subprocess.Popen[bytes]) -> None:

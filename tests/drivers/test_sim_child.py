@@ -19,6 +19,8 @@ SETTINGS = {
     "seed": 0,
     "wire": False,
     "latency_s": 0.0,
+    "family": "dynamixel",
+    "options": {},
 }
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from drivers.errors import DriverError
-from drivers.sim.maestro import Maestro, MaestroError, MaestroReader, crc7
+from drivers.maestro.protocol import MaestroError, crc7
+from drivers.sim.maestro import Maestro, MaestroReader
 
 
 def send(board: Maestro, text: str, now_s: float = 0.0) -> str:
@@ -147,5 +148,5 @@ def test_states_for_tools_and_faults():
     assert len(board.describe(0.0)) == 6
     with pytest.raises(ValueError, match="by hand"):
         board.place(1, 5, 0.0)
-    with pytest.raises(DriverError, match="only echo, unplug"):
-        Maestro(faults=("mute:1",))
+    with pytest.raises(DriverError, match="only drop, echo"):
+        Maestro(faults=("crc:1",))
