@@ -70,6 +70,8 @@ class Deformation:
         self.refresh()
 
     def _allocate(self, normals: bool) -> None:
+        from .binding import place_bound  # once: an update of few points takes as long as an import statement
+
         n, m, cells = len(self._points), len(self.mesh.vertices), len(self.mesh.cell_start) - 1
         self._sign = np.float32(-1 if self.mesh.flip else 1)
         starts = self.mesh.cell_start[:-1]
@@ -88,7 +90,8 @@ class Deformation:
         self._cells = np.arange(cells, dtype=np.int32)
         self._ranges = np.zeros((max(cells, 1), 2), dtype=np.int64)
         self._changed_ids, self._delta = np.zeros(n, dtype=np.int64), np.zeros((n, 3))
-        self._all = np.arange(self._n)
+        self._all, self._most = np.arange(self._n), int(MOST_MOVED * n)
+        self._call = place_bound
         self._cell_boxes: tuple[np.ndarray, Bins] | None = None
         self._spare = np.zeros(24, dtype=np.float32)
         self._count = 0
@@ -225,25 +228,23 @@ class Deformation:
             done.result()
 
     def _place(self, ids: ArrayLike, rows: ArrayLike, name: str, relative: bool) -> None:
-        from . import binding
-
         which, target = _integers(ids), np.ascontiguousarray(rows, dtype=np.float64)
-        n = self._n
-        if target.shape != (len(which), 3):
-            raise ValueError(f"{name}: shape {target.shape}, expected {(len(which), 3)}")
-        if len(which) > n:  # ids that stand several times: the last position counts, moves add up
+        n, count = self._n, len(which)
+        if target.shape != (count, 3):
+            raise ValueError(f"{name}: shape {target.shape}, expected {(count, 3)}")
+        if count > n:  # ids that stand several times: the last position counts, moves add up
             which, target = _gathered(which, target, relative, n)
         if len(self._shifts) > 1:
             which = self._copies(self._check_ids(which))
             target = np.tile(target, (len(self._shifts), 1))
-        most = int(MOST_MOVED * len(self._points))
-        count = binding.place_bound(self._addresses(), which, target, relative, most, LIMIT, BIAS, GAP, self._sign)
-        if count == -1:
+        table = self._addresses() if self._table is None else self._table
+        found = self._call(table, which, target, relative, self._most, LIMIT, BIAS, GAP, self._sign)
+        if found == -1:
             self.refresh()
-        elif count < 0 or count >= 1 << 60:
-            self._complain(which, target, count + (1 << 61), name)
+        elif found < 0 or found >= 1 << 60:
+            self._complain(which, target, found + (1 << 61), name)
         else:
-            self._count = count
+            self._count = found
 
     def _complain(self, which: np.ndarray, target: np.ndarray, bad: int, name: str) -> None:
         if bad < 0:
@@ -324,6 +325,8 @@ class Deformation:
 
 def _integers(ids: ArrayLike) -> np.ndarray:
     """(k,) int64."""
+    if type(ids) is np.ndarray and ids.dtype == np.int64 and ids.ndim == 1 and ids.flags.c_contiguous:
+        return ids
     which = np.ascontiguousarray(ids)
     if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
         raise ValueError(f"ids: needs a flat sequence of integers, got shape {which.shape} of {which.dtype}")

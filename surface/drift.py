@@ -11,7 +11,7 @@ from .basis import Floats
 from .bench import Tell
 from .binding import place_bound
 from .dcp import DCPSurface
-from .deformation import BIAS, GAP, LIMIT, MOST_MOVED, Deformation
+from .deformation import BIAS, GAP, LIMIT, Deformation
 from .jit import kernel
 from .mesh import Mesh
 
@@ -95,7 +95,7 @@ def _move(deformation: Deformation, rng: np.random.Generator, count: int, size: 
     ids = np.concatenate([ids + b * deformation._n for b in range(blocks)], axis=1)
     steps = np.ascontiguousarray(np.tile(steps, (1, blocks, 1)))
     _play(
-        deformation._addresses(), ids, steps, int(MOST_MOVED * len(deformation._points)), LIMIT, BIAS, GAP,
+        deformation._addresses(), ids, steps, deformation._most, LIMIT, BIAS, GAP,
         deformation._sign,
     )  # fmt: skip
 
