@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from surface.errors import HeadFileError
 from surface.head.data import Group, HeadData, PartData
 from surface.head.file import load_data
-from surface.head.meshes import tessellate, unpack
+from surface.head.identity import load_identities, with_identities
+from surface.head.meshes import make_surface, tessellate, unpack
 from surface.head.paint import paint_part
 from surface.head.parameters import NAMES, read_pose, rotation
-from surface.head.part import HeadPart, RigidPart, SkinPart, Turn, make_surface
+from surface.head.part import HeadPart, RigidPart, SkinPart, Turn
 from surface.head.seams import Zipper
 from surface.head.shade import apply_shade, read_shade
 
@@ -43,14 +44,22 @@ class Head:
         self._at = {name: i for i, name in enumerate(self.parameters)}
 
     @classmethod
-    def load(cls, path: str | Path) -> Head:
+    def load(cls, path: str | Path, identity: Mapping[str, float] | None = None) -> Head:
         """Read a head from its folder or its head.toml.
+
+        Parameters
+        ----------
+        identity : variations of the head to mix in, by name, each by -1 to 1.
 
         Raises
         ------
-        HeadFileError : a file is missing, damaged, cut short or of another version; names file and key.
+        HeadFileError : a file is missing, damaged, cut short or of another version; names file and key. Or the head
+            has no identity of that name.
         """
-        head = cls(load_data(path), str(path))
+        data = load_data(path)
+        if identity:
+            data = with_identities(data, load_identities(path), identity, str(path))
+        head = cls(data, str(path))
         apply_shade(head.parts, read_shade(path))
         return head
 
@@ -65,6 +74,11 @@ class Head:
             if p.name == name:
                 return p
         raise KeyError(f"no part {name!r}; there are {', '.join(p.name for p in self.parts)}")
+
+    @property
+    def zippers(self) -> tuple[Zipper, ...]:
+        """The head's seams, in the order in which they are closed."""
+        return tuple(self._zippers)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -104,6 +118,17 @@ class Head:
             part.pose(pose, turn)
         for zipper in self._zippers:
             zipper.close()
+
+    def place_points(self, values: NDArray[np.float64]) -> tuple[list[NDArray[np.float64]], Turn]:
+        """As :meth:`pose`, but only what vertices are summed from; they and their normals stay.
+
+        Returns
+        -------
+        (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
+        :class:`surface.head.influence.Influence`.
+        """
+        pose = read_pose(values)
+        return [part.place_points(pose) for part in self.parts], Turn(rotation(*pose.head), self.data.neck.pivot)
 
 
 def _make_part(part: PartData, head: HeadData, where: str) -> HeadPart:

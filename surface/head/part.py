@@ -11,6 +11,7 @@ from surface.dcp import DCPSurface
 from surface.deformation import Deformation
 from surface.head.data import HeadData, PartData
 from surface.head.kernels import turn_head
+from surface.head.meshes import make_surface as make_surface
 from surface.head.parameters import Pose, rotation_vector
 from surface.head.rig import SkinRig, rigid_motion
 from surface.mesh import Mesh
@@ -77,6 +78,18 @@ class HeadPart:
         """(n, 3) where the control points stand now, before the head turns."""
         raise NotImplementedError
 
+    def place_points(self, pose: Pose) -> Floats:
+        """What :class:`surface.head.influence.Influence` sums over, (k, 3), before the head turns.
+
+        Vertices and normals stay where they are.
+        """
+        raise NotImplementedError
+
+    @property
+    def share(self) -> Floats32:
+        """(m,) how much of the head's rotation each vertex of the mesh takes, 0..1."""
+        return self._share
+
     def append(self, like: NDArray[np.int64], triangles: NDArray[np.int32]) -> None:
         """Add vertices that look like others, ids ``like (k,)``, and triangles that may use them.
 
@@ -113,6 +126,9 @@ class SkinPart(HeadPart):
     def control_points(self) -> Floats:
         return self.deformation.points
 
+    def place_points(self, pose: Pose) -> Floats:
+        return self.rig.apply(pose)
+
 
 class RigidPart(HeadPart):
     """A part fixed to skull, jaw or eye.
@@ -145,12 +161,9 @@ class RigidPart(HeadPart):
     def control_points(self) -> Floats:
         return self.surface.points @ self._linear.T + self._shift
 
-
-def make_surface(data: PartData) -> DCPSurface:
-    """The part's DCP surface."""
-    return DCPSurface.from_padded(
-        data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1]
-    )
+    def place_points(self, pose: Pose) -> Floats:
+        linear, shift = rigid_motion(self.follows, self._head, pose)
+        return np.vstack([linear.T, shift])
 
 
 def border_edges(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
