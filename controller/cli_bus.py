@@ -19,6 +19,7 @@ def register(app: typer.Typer) -> None:
     app.command()(ports)
     app.command()(scan)
     app.command("set-id")(set_id)
+    app.command()(monitor)
     simulators = typer.Typer(no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
     simulators.command("dynamixel")(simulate_dynamixel)
     simulators.command("feetech")(simulate_feetech)
@@ -105,6 +106,41 @@ def set_id(
 
     info = change(port, baud, protocol, old, new, release=release)
     console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}")
+
+
+def monitor(
+    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    baud: Annotated[int, typer.Option(help="Baud rate of the bus; omote scan finds it.")] = 1_000_000,
+    protocol: Annotated[
+        int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")
+    ] = 2,
+    listen: Annotated[
+        bool, typer.Option("--listen", help="Only listen: for a second adapter on a wire that another program drives.")
+    ] = False,
+    rate: Annotated[float, typer.Option(min=0.1, max=200, help="How often the servos are asked, per second.")] = 10.0,
+    seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
+) -> None:
+    """Show the servos of a bus and the decoded packets that pass, live; nothing is switched on or moved.
+
+    Where the output is no terminal, the packets are printed line by line.
+
+    Example: omote monitor /dev/ttyUSB0 --baud 57600
+    """
+    from controller.monitoring import ask
+    from controller.monitoring import listen as only_listen
+    from controller.run import Deadline
+    from controller.signals import stop_flag
+
+    deadline = Deadline(seconds)
+    with stop_flag() as flag:
+
+        def going() -> bool:
+            return not flag.is_set() and deadline()
+
+        if listen:
+            only_listen(port, baud, protocol, console, going)
+        else:
+            ask(port, baud, protocol, console, going, rate)
 
 
 def parse_ids(text: str) -> list[int]:

@@ -37,7 +37,7 @@ class Watch:
     """
 
     def __init__(self, title: str, rows: Rows, decoder: Decoder, console: Console, lines: int = 16) -> None:
-        self.title, self._rows, self._decoder, self._console = title, rows, decoder, console
+        self.title, self.rows, self._decoder, self._console = title, rows, decoder, console
         self._pieces: deque[tuple[float, bool | None, bytes]] = deque(maxlen=KEPT)
         self._log: deque[str] = deque(maxlen=lines)
         self._begun_s = time.monotonic()
@@ -57,18 +57,22 @@ class Watch:
             new += [f"{time_s - self._begun_s:9.3f}  {line}" for line in self._decoder.feed(sent, data)]
         return new
 
-    def run(self, going: Callable[[], bool]) -> None:
-        """Show until ``going`` says no."""
+    def run(self, going: Callable[[], bool], step: Callable[[], None] = lambda: time.sleep(REFRESH_S)) -> None:
+        """Show until ``going`` says no; ``step`` is called again and again, and takes a moment each time."""
         if self._console.is_terminal:
             with Live(self._picture(), console=self._console, auto_refresh=False, screen=True) as live:
-                while going():
-                    live.update(self._picture(), refresh=True)
-                    time.sleep(REFRESH_S)
-            return
-        while going():
+                self._loop(going, step, lambda: live.update(self._picture(), refresh=True))
+        else:
+            self._loop(going, step, self._print)
             self._print()
-            time.sleep(REFRESH_S)
-        self._print()
+
+    def _loop(self, going: Callable[[], bool], step: Callable[[], None], show: Callable[[], None]) -> None:
+        next_s = 0.0
+        while going():
+            step()
+            if time.monotonic() >= next_s:
+                show()
+                next_s = time.monotonic() + REFRESH_S
 
     def _print(self) -> None:
         for line in self.lines():
@@ -79,7 +83,7 @@ class Watch:
         left_out = self._passed - self._taken - len(self._pieces)
         note = f"  ({left_out} pieces left out)" if left_out > 0 else ""
         traffic = Text("\n".join(self._log), no_wrap=True, overflow="ellipsis")
-        return Group(Text(f"{self.title}   Ctrl-C ends{note}", style="bold"), table_of(self._rows()), traffic)
+        return Group(Text(f"{self.title}   Ctrl-C ends{note}", style="bold"), table_of(self.rows()), traffic)
 
 
 def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:

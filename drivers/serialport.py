@@ -9,8 +9,9 @@ from __future__ import annotations
 import errno
 import os
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,19 @@ HOST_MARGIN_S = 0.010
 UNKNOWN_LATENCY_S = 0.002
 PSEUDO_MARGIN_S = 0.05
 """Behind a pseudo-terminal or a socket sits a program, which competes for the processor with everything else."""
+
+
+_tap: ContextVar[Callable[[bool, bytes], None] | None] = ContextVar("tap", default=None)
+
+
+@contextmanager
+def tapped(tap: Callable[[bool, bytes], None]) -> Iterator[None]:
+    """Ports that are made in this context give ``tap`` (sent, bytes) for all that passes, however deep in a driver."""
+    token = _tap.set(tap)
+    try:
+        yield
+    finally:
+        _tap.reset(token)
 
 
 class SerialPort:
@@ -47,7 +61,7 @@ class SerialPort:
         self.path = os.fspath(path)
         self.baud = int(baud)
         self.low_latency = False
-        self.tap: Callable[[bool, bytes], None] | None = None
+        self.tap: Callable[[bool, bytes], None] | None = _tap.get()
         self._end: Endpoint | None = None
 
     @property

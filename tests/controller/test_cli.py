@@ -20,6 +20,7 @@ COMMANDS = [
     ("scan",),
     ("set-id",),
     ("calibrate",),
+    ("monitor",),
     ("check",),
     ("bench",),
     ("simulate", "dynamixel"),
