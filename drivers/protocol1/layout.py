@@ -103,7 +103,7 @@ def layout_of(table: ControlTable, feedback: str = "full") -> Layout:
     """
     feetech = item_of(table, "hardware") is not None  # Dynamixel tells its state in the error byte
     full: tuple[str, ...] = FULL if feetech else FULL[:5]
-    slow: list[tuple[str, ...]] = [("torque",) if feetech else ("torque", "torque_limit")]
+    slow: list[tuple[str, ...]] = [("torque", "torque_limit")]
     if feedback != "full":
         slow.append(full[2:7])
         full = full[:2]

@@ -7,6 +7,8 @@ from drivers.sim.motion import Motion, Profile, plan_move, plan_speed, plan_time
 from drivers.sim.plant import Plant
 from drivers.sim.registers import Registers
 
+MULTI_TURN = 0x10
+"""Feetech's Phase (18): present positions leave the turn."""
 DIRECTION_BIT = 10
 """AX, MX and XL-320: speeds and loads are magnitudes with the direction in this bit (set = clockwise)."""
 
@@ -65,12 +67,12 @@ class WordDrive(Drive):
         self.sense(now_s)
 
     def _values(self, now_s: float, motion: Motion, load: float) -> dict[str, int]:
-        plant, turn = self.plant, self.registers.table.ticks_per_turn
+        plant = self.plant
         speed = round(motion.velocity / self.ticks_s)
         if self._unsigned_speed():
             speed = _direction(speed)
         return {
-            "Present Position": min(max(self.to_register(motion.position), 0), turn - 1),
+            "Present Position": self._position(motion),
             "Present Speed": speed,
             "Present Velocity": speed,
             "Present Load": _direction(round(1023 * load)) if self._unsigned_speed() else round(1000 * load),
@@ -80,6 +82,10 @@ class WordDrive(Drive):
             "Moving": int(plant.powered and motion.velocity != 0.0),
             "Realtime Tick": int((now_s - self.born_s) * 1000.0) & 0x7FFF,
         }
+
+    def _position(self, motion: Motion) -> int:
+        """Present Position, which ends at the ends of the turn."""
+        return min(max(self.to_register(motion.position), 0), self.registers.table.ticks_per_turn - 1)
 
     def _unsigned_speed(self) -> bool:
         """Whether the table leaves the direction bit to the host (XL-320, as its vendor writes it)."""
@@ -131,6 +137,13 @@ class FeetechDrive(WordDrive):
         if not item or not value:
             return self.plant.top_acceleration
         return min(value * item.scale / self.registers.table.rad_per_tick, self.plant.top_acceleration)
+
+    def _position(self, motion: Motion) -> int:
+        """With multi-turn feedback (STS) it leaves the turn."""
+        registers = self.registers
+        if "Homing Offset" in registers.table and registers.get("Phase") & MULTI_TURN:
+            return self.to_register(motion.position)
+        return super()._position(motion)
 
     def _values(self, now_s: float, motion: Motion, load: float) -> dict[str, int]:
         values = super()._values(now_s, motion, load)
