@@ -117,6 +117,7 @@ def monitor(
     listen: Annotated[
         bool, typer.Option("--listen", help="Only listen: for a second adapter on a wire that another program drives.")
     ] = False,
+    model: Annotated[str, typer.Option(help="With --listen: the servos' model, so that registers have names.")] = "",
     rate: Annotated[float, typer.Option(min=0.1, max=200, help="How often the servos are asked, per second.")] = 10.0,
     seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
 ) -> None:
@@ -138,7 +139,7 @@ def monitor(
             return not flag.is_set() and deadline()
 
         if listen:
-            only_listen(port, baud, protocol, console, going)
+            only_listen(port, baud, protocol, console, going, model)
         else:
             ask(port, baud, protocol, console, going, rate)
 

@@ -24,25 +24,36 @@ SHOWN = ("Present Position", "Goal Position")
 WAIT_S = 0.1
 
 
-def decoder_of(protocol: int, found: Sequence[ServoInfo] = ()) -> Decoder:
-    """A decoder that knows the registers of the servos found."""
+def decoder_of(protocol: int, found: Sequence[ServoInfo] = (), model: str = "") -> Decoder:
+    """A decoder that knows the registers of the servos found, and takes all others for ``model``.
+
+    Raises
+    ------
+    DriverError : there is no such model.
+    """
+    default = load_table(model) if model else None
     tables: dict[int, ControlTable] = {}
     for info in found:
         try:
             tables[info.id] = load_table(info.model_number, info.firmware)
         except DriverError:  # an unknown model is shown by addresses
             continue
-    return Decoder1(tables) if protocol == 1 else Decoder2(tables)
+    return Decoder1(tables, default) if protocol == 1 else Decoder2(tables, default)
 
 
-def listen(port: str, baud: int, protocol: int, console: Console, going: Callable[[], bool]) -> None:
+def listen(port: str, baud: int, protocol: int, console: Console, going: Callable[[], bool], model: str = "") -> None:
     """Show what passes on a wire without a byte of our own: an adapter that only hears it is enough.
+
+    Parameters
+    ----------
+    model : of servos that do not tell theirs while it listens, so that registers have names; may be empty.
 
     Raises
     ------
     PortError
+    DriverError : there is no such model.
     """
-    decoder = decoder_of(protocol)
+    decoder = decoder_of(protocol, model=model)
     watch = Watch(f"listening on {port} at {baud} baud", lambda: _heard_rows(decoder), decoder, console)
     link = SerialPort(port, baud)
     link.open()

@@ -64,11 +64,12 @@ class PacketDecoder(Decoder):
     Parameters
     ----------
     tables : control tables by id, as far as they are known; answers to pings add to them.
+    default : table of all others, or None.
     """
 
-    def __init__(self, tables: Mapping[int, ControlTable] = {}) -> None:
+    def __init__(self, tables: Mapping[int, ControlTable] = {}, default: ControlTable | None = None) -> None:
         super().__init__()
-        self.tables = dict(tables)
+        self.tables, self._default = dict(tables), default
         self._asked: dict[int, tuple[int, int]] = {}
 
     def _said(self, servo: int, error: int) -> None:
@@ -88,7 +89,7 @@ class PacketDecoder(Decoder):
         return first if first == last else f"{first} .. {last}"
 
     def _items(self, servo: int, address: int, size: int) -> list:
-        table = self.tables.get(servo)
+        table = self.tables.get(servo, self._default)
         if table is None:
             return []
         return [item for item in table.values() if address <= item.address and item.end <= address + size]
@@ -113,8 +114,8 @@ class PacketDecoder(Decoder):
 class Decoder2(PacketDecoder):
     """Dynamixel Protocol 2.0."""
 
-    def __init__(self, tables: Mapping[int, ControlTable] = {}) -> None:
-        super().__init__(tables)
+    def __init__(self, tables: Mapping[int, ControlTable] = {}, default: ControlTable | None = None) -> None:
+        super().__init__(tables, default)
         self._readers = {True: v2.PacketReader(), False: v2.PacketReader()}
         self._fast: list[tuple[int, int, int]] = []
         self._pinged = False
@@ -203,8 +204,8 @@ class Decoder2(PacketDecoder):
 class Decoder1(PacketDecoder):
     """Protocol 1.0 framing: Dynamixel AX and MX, Feetech STS and SCS."""
 
-    def __init__(self, tables: Mapping[int, ControlTable] = {}) -> None:
-        super().__init__(tables)
+    def __init__(self, tables: Mapping[int, ControlTable] = {}, default: ControlTable | None = None) -> None:
+        super().__init__(tables, default)
         self._readers = {True: v1.Reader1(), False: v1.Reader1()}
         self._waiting: list[int] = []
 

@@ -52,7 +52,10 @@ def test_nobody_there_is_told() -> None:
     assert "omote scan" in caught.value.hint
 
 
-def test_listening_says_nothing_and_tells_both_ends_apart() -> None:
+@pytest.mark.parametrize(
+    ("model", "told"), [("", "4 bytes at 132: d2 04 00 00"), ("xl330-m288", "Present Position = 1234")]
+)
+def test_listening_says_nothing_and_tells_both_ends_apart(model: str, told: str) -> None:
     out = io.StringIO()
     master, slave = os.openpty()
     os.set_blocking(master, False)
@@ -64,13 +67,13 @@ def test_listening_says_nothing_and_tells_both_ends_apart() -> None:
         os.write(master, encode_status(3, 0, struct.pack("<i", 1234)))
         return steps()
 
-    listen(name, 1_000_000, 2, Console(file=out, width=120), going)
+    listen(name, 1_000_000, 2, Console(file=out, width=120), going, model)
     with pytest.raises(BlockingIOError):
         os.read(master, 1)
     os.close(master)
     os.close(slave)
     assert "-> 3 read" in out.getvalue()
-    assert "<- 3 d2 04 00 00" in out.getvalue()
+    assert f"<- 3 {told}" in out.getvalue()
 
 
 def test_a_missing_port_is_one_error() -> None:
