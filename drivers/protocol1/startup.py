@@ -27,6 +27,8 @@ MULTI_TURN = 0x10
 """Feetech's Phase: present positions leave the turn."""
 EEPROM_TRIES = 10
 OFF_RETRIES = 5
+RELAPSE_S = 0.25
+"""Time in which a servo that was in trouble shows whether it still is."""
 UNNUMBERED = 0x10000
 """Model numbers from here on stand for models whose real number no source gives."""
 
@@ -158,8 +160,9 @@ def bring_up(
     held = [servo for servo, on in registers.get_all(ids, "torque").items() if on]
     held = _take_over(registers, held, policy)
     _wait_for_voltage(registers, ids, policy, sleep)
-    if not policy.reboot_faulted:
-        _refuse_faulted(registers, ids)
+    faulted = _faults(registers, ids)
+    if faulted and not policy.reboot_faulted:
+        raise _fault(registers, faulted)
     for servo in ids:
         _settings(registers, servo, servo in held, started)
     low, high = registers.get_all(ids, "min_ticks"), registers.get_all(ids, "max_ticks")
@@ -167,6 +170,11 @@ def bring_up(
     _prepare(registers, servos, policy)
     try:
         _torque_on(registers, ids, started)
+        if faulted:
+            sleep(RELAPSE_S)  # a cause that is still there shuts it down again
+            registers.get_all(ids, "voltage")
+        if faulted := _faults(registers, ids):
+            raise _fault(registers, faulted)
     except BaseException:
         switch_off(registers, ids)
         raise
@@ -211,7 +219,7 @@ def _wait_for_voltage(registers: Registers, ids: Sequence[int], policy: Policy, 
     )
 
 
-def _refuse_faulted(registers: Registers, ids: Sequence[int]) -> None:
+def _faults(registers: Registers, ids: Sequence[int]) -> dict[int, int]:
     """Hardware errors in the replies just had; input voltage alone is let pass where it switches nothing off."""
     bad = {}
     for servo in ids:
@@ -220,14 +228,17 @@ def _refuse_faulted(registers: Registers, ids: Sequence[int]) -> None:
             continue
         if bits:
             bad[servo] = bits
-    if bad:
-        which = ", ".join(f"{registers.label(servo)} 0x{bits:02X}" for servo, bits in bad.items())
-        raise ServoFault(
-            f"servos report a hardware error: {which}",
-            hint="support the head, then start with reboot_faulted=true, or switch the power off and on",
-            port=registers.port.link.path,
-            servo_ids=tuple(sorted(bad)),
-        )
+    return bad
+
+
+def _fault(registers: Registers, bad: Mapping[int, int]) -> ServoFault:
+    which = ", ".join(f"{registers.label(servo)} 0x{bits:02X}" for servo, bits in bad.items())
+    return ServoFault(
+        f"servos report a hardware error: {which}",
+        hint="support the head, then start with reboot_faulted=true, or switch the power off and on",
+        port=registers.port.link.path,
+        servo_ids=tuple(sorted(bad)),
+    )
 
 
 def _settings(registers: Registers, servo: int, held: bool, started: Started) -> None:
@@ -360,7 +371,6 @@ def _torque_on(registers: Registers, ids: Sequence[int], started: Started) -> No
             servo_ids=tuple(limp),
         )
     started.ticks = registers.get_all(ids, "position")
-    _refuse_faulted(registers, ids)
 
 
 def goals_at_present(registers: Registers, ids: Sequence[int], limits: Mapping[int, tuple[int, int]]) -> dict[int, int]:
