@@ -27,6 +27,8 @@ class Kind(NamedTuple):
 KINDS = {
     "dynamixel": Kind("drivers.dynamixel.bus:DynamixelBus", "drivers.models:check_dynamixel"),
     "maestro": Kind("drivers.maestro.bus:MaestroBus", "drivers.boards.hobby:check_hobby"),
+    "ssc32": Kind("drivers.text.ssc32:Ssc32Bus", "drivers.boards.hobby:check_hobby"),
+    "text": Kind("drivers.text.bus:TextBus", "drivers.boards.hobby:check_hobby"),
     "feetech": Kind("drivers.feetech.bus:FeetechBus", "drivers.models:check_feetech"),
 }
 

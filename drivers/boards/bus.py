@@ -31,7 +31,8 @@ SAY_AGAIN_S = 10.0
 class BoardBus(WireBus):
     """Servos behind a board that does not measure them. See :class:`~drivers.bus.Bus` for the contract.
 
-    ``start`` goes on from the pulses that the board puts out already; a servo without any begins at its ``rest_rad``.
+    ``start`` goes on from the pulses that the board puts out already; a servo without any begins where it was last
+    known to be, or at its ``rest_rad``.
 
     Parameters
     ----------
@@ -44,6 +45,8 @@ class BoardBus(WireBus):
     """
 
     measures: ClassVar[bool] = False
+    tells_torque: ClassVar[bool] = True
+    """Whether the board can be asked which servos get pulses."""
 
     def __init__(
         self,
@@ -132,14 +135,15 @@ class BoardBus(WireBus):
         with self._losing():
             present = self._begin()
         return [
-            ServoInfo(servo.id, 0, servo.model, 0, torque=bool(on))
+            ServoInfo(servo.id, 0, servo.model, 0, torque=bool(on) if self.tells_torque else None)
             for servo, on in zip(self.servos, np.isfinite(present), strict=True)
             if ids is None or servo.id in ids
         ]
 
     def _bring_up(self) -> Floats:
         present = self._begin()
-        rest = np.array([min(max(s.rest_rad, s.min_rad), s.max_rad) for s in self.servos])
+        rest = np.where(np.isnan(self._position), [servo.rest_rad for servo in self.servos], self._position)
+        rest = np.clip(rest, [servo.min_rad for servo in self.servos], [servo.max_rad for servo in self.servos])
         try:
             for index in np.flatnonzero(np.isnan(present)):
                 self._switch_on(int(index), rest)
@@ -225,8 +229,7 @@ class BoardBus(WireBus):
             log.warning("the board on %s answers again", self.path)
         else:
             self._say(f"the board on {self.path} does not answer")
-        if not answered:
-            self._report.silent = self.ids
+        self._report.silent = self.ids if self._silent else ()
 
     def _say(self, message: str) -> None:
         """Log a fault, and the same one not again for a while."""

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.boards.bus import BoardBus
-from drivers.boards.hobby import PulseScale
+from drivers.boards.pulses import PulseBus
 from drivers.boards.unmarked import Conversation
 from drivers.bus import Floats, ServoSpec
 from drivers.errors import DriverError, NoReply, ServoRefused
@@ -23,13 +22,10 @@ from drivers.maestro import protocol as m
 
 log = logging.getLogger(__name__)
 
-GROUP = 8
-"""Channels asked in one batch: the board's input buffer is small."""
-SLACK_US = 2.0
 MINI, MICRO = "mini", "micro"
 
 
-class MaestroBus(BoardBus):
+class MaestroBus(PulseBus):
     """A Maestro on one port. See :class:`~drivers.boards.bus.BoardBus` for what it shares with other boards.
 
     Parameters
@@ -62,15 +58,9 @@ class MaestroBus(BoardBus):
         if device is not None and not 0 <= device <= 127:
             raise DriverError(f"device must be 0 to 127, got {device}", hint="12 is what boards leave the factory with")
         self._board, self._device, self._crc = board, device, crc
-        self._scale = PulseScale(self.servos)
         self._code = m.Encoder(device, crc)
         probe = self._code.command(m.SCRIPT_STATUS)
         self._talk = Conversation(self._port, probe, lambda data: data in (b"\0", b"\1"), lambda: self._margin_s)
-        n = len(self.servos)
-        self._goal_us = np.full(n, math.nan)
-        self._low, self._high = self._goal_us, self._goal_us  # between them lie the pulses that may be put out
-        self._next = 0
-        self._forgot = False
 
     def far_end(self) -> dict[str, Any]:
         """What a simulated board has to be set to."""
@@ -96,10 +86,8 @@ class MaestroBus(BoardBus):
             if answer is None:
                 raise self._no_reply(group)
             present[group] = answer[0]
-        self._low, self._high = np.fmin(present, self._goal_us), np.fmax(present, self._goal_us)
-        present[present == 0.0] = math.nan
         self._limit_motion()
-        return self._scale.radians(present)
+        return self._present(present)
 
     def _bring_up(self) -> Floats:
         start = super()._bring_up()
@@ -117,7 +105,7 @@ class MaestroBus(BoardBus):
     def _kept_back(self, start: Floats) -> Floats:
         """Where the board's own limits let it begin (n,) rad; tells the user where that is not what was asked."""
         present = self._begin()
-        for index in np.flatnonzero(np.abs(present - start) * self._scale.us_per_rad > SLACK_US):
+        for index in np.flatnonzero(np.abs(present - start) * self._scale.us_per_rad > self.SLACK_US):
             servo, here = self.servos[index], self._scale.pulses(present)[index]
             log.warning(
                 "channel %d (%s) on %s stays at %.0f us: the board's own limits, or its speed, hold it back; "
@@ -152,10 +140,9 @@ class MaestroBus(BoardBus):
         known = np.isfinite(angle_rad)
         steps = self._scale.steps(np.where(known, angle_rad, 0.0), m.QUARTER)
         self._port.write(b"".join(self._targets(steps, known)))
-        pulses = steps / m.QUARTER
-        self._goal_us = np.where(known, pulses, self._goal_us)
-        self._low, self._high = np.fmin(self._low, self._goal_us), np.fmax(self._high, self._goal_us)
-        return np.where(known, self._scale.radians(pulses), math.nan)
+        goals = np.where(known, steps / m.QUARTER, math.nan)
+        self._track.go(goals)
+        return self._scale.radians(goals)
 
     def _targets(self, steps: np.ndarray, known: np.ndarray) -> Iterator[bytes]:
         """Commands for the targets; channels in a row share one."""
@@ -169,28 +156,17 @@ class MaestroBus(BoardBus):
 
     def _poll(self) -> None:
         """The pulses of some channels in turn, and the board's errors."""
-        groups = self._groups()
-        group = groups[self._next % len(groups)]
-        self._next += 1
+        group = self._turn()
         answer = self._ask_about(group)
         self._heard(answer is not None)
         if answer is None:
             self._report.count("no_reply")
             return
-        for index, pulse in zip(group, answer[0], strict=True):
-            self._take(index, float(pulse))
+        self._take(group, answer[0].tolist())
         self._tell(answer[1])
 
-    def _take(self, index: int, pulse: float) -> None:
-        """One pulse that the board says it puts out; one that lies beyond all its targets is damage."""
-        if pulse and not self._low[index] - SLACK_US <= pulse <= self._high[index] + SLACK_US:
-            self._report.count("corrupt", self.ids[index])
-            self._talk.doubt()
-            return
-        self._forgot |= bool(self._running and self._on[index] and not pulse)
-        self._note(index, self._scale.radian(index, pulse))
-        if pulse and abs(pulse - self._goal_us[index]) <= SLACK_US:
-            self._low[index] = self._high[index] = pulse
+    def _doubt(self) -> None:
+        self._talk.doubt()
 
     def _tell(self, errors: int) -> None:
         for name in m.error_names(errors):
@@ -208,10 +184,6 @@ class MaestroBus(BoardBus):
             return None
         words = np.frombuffer(data, "<u2")
         return words[:-1] / m.QUARTER, int(words[-1])
-
-    def _groups(self) -> list[list[int]]:
-        indices = list(range(len(self.servos)))
-        return [indices[i : i + GROUP] for i in range(0, len(indices), GROUP)]
 
     def _no_reply(self, group: Sequence[int]) -> NoReply:
         channels = ", ".join(str(self.ids[index]) for index in group)

@@ -9,6 +9,8 @@ from drivers.sim.chain import Chain
 from drivers.sim.line import Line
 from drivers.sim.maestro import Maestro
 from drivers.sim.serve import make_chain, make_servos
+from drivers.sim.ssc32 import Ssc32
+from drivers.sim.textboard import TextBoard
 
 Servos = Sequence[tuple[int, Any]]
 """(id, model) of each servo."""
@@ -57,4 +59,16 @@ def _maestro(servos: Servos, now_s: float, seed: int, options: dict[str, Any]) -
     return Maestro(channels, now_s, seed=seed, **options)
 
 
-_BOARDS: dict[str, Callable[[Servos, float, int, dict[str, Any]], Line]] = {"maestro": _maestro}
+def _ssc32(servos: Servos, now_s: float, seed: int, options: dict[str, Any]) -> Line:
+    return Ssc32(now_s, seed=seed)
+
+
+def _text(servos: Servos, now_s: float, seed: int, options: dict[str, Any]) -> Line:
+    return TextBoard(ids=[device_id for device_id, _ in servos], now_s=now_s, seed=seed, **options)
+
+
+_BOARDS: dict[str, Callable[[Servos, float, int, dict[str, Any]], Line]] = {
+    "maestro": _maestro,
+    "ssc32": _ssc32,
+    "text": _text,
+}

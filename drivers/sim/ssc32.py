@@ -1,6 +1,7 @@
 """A simulated Lynxmotion SSC-32 servo controller: lines of text, one byte of pulse width back.
 
-Source: SSC-32U guide, pages 24-33. `PO`, `STOP` and ESC are not modelled.
+Source: SSC-32U guide, pages 24-33; a pulse of 0 stops the pulses, ``STOP n`` ends a move where it is, ESC forgets the
+line that has begun. `PO` is not modelled.
 """
 
 from __future__ import annotations
@@ -9,10 +10,9 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
+from drivers.sim.board import Board
 from drivers.sim.faults import Fault
-from drivers.sim.line import Line
 from drivers.sim.rc import RcChannel
-from drivers.sim.replies import Reply
 
 CHANNELS = 32
 MIN_US, MAX_US = 500, 2500
@@ -20,6 +20,7 @@ VERSION = b"SSC32-V2.50USB\r"
 MAX_LINE = 2048
 
 _MOVE = re.compile(r"#(\d+)P(\d+)(?:S(\d+))?")
+_ONE = re.compile(r"(QP|STOP)(\d+)")
 _GROUP = re.compile(r"(?:#\d+P\d+(?:S\d+)?)+(?:T(\d+))?")
 
 
@@ -36,7 +37,8 @@ class LineReader:
 
     def feed(self, data: bytes) -> list[str]:
         """Lines completed by these bytes, without blanks and in capitals; empty ones are left out."""
-        self._buffer += bytes(byte for byte in data if byte not in b" \t\n")
+        data = (bytes(self._buffer) + data).rpartition(b"\x1b")[2] if b"\x1b" in data else bytes(self._buffer) + data
+        self._buffer = bytearray(byte for byte in data if byte not in b" \t\n")
         *lines, rest = bytes(self._buffer).split(b"\r")
         self._buffer = bytearray(rest if len(rest) <= MAX_LINE else b"")
         return [line.decode("latin-1").upper() for line in lines if line]
@@ -52,13 +54,13 @@ class LineReader:
         return data
 
 
-class Ssc32(Line):
+class Ssc32(Board):
     """An SSC-32 on one port.
 
     Parameters
     ----------
     now_s : time.
-    faults : only ``echo`` and ``unplug``.
+    faults : see :data:`drivers.sim.board.FAULTS`. seed : of random faults.
 
     Attributes
     ----------
@@ -66,11 +68,14 @@ class Ssc32(Line):
     refused : lines that were not understood; the board passes over them without a word.
     """
 
-    def __init__(self, now_s: float = 0.0, faults: Iterable[str | Fault] = ()) -> None:
-        super().__init__(kinds=("echo", "unplug"))
-        self.channels = [RcChannel() for _ in range(CHANNELS)]
+    def __init__(self, now_s: float = 0.0, faults: Iterable[str | Fault] = (), seed: int = 0) -> None:
         self.refused = 0
-        self.faults.add(faults, now_s)
+        self.reset(now_s)
+        super().__init__(now_s, faults, seed)
+
+    def reset(self, now_s: float) -> None:
+        """Begin as after power-on: no pulses."""
+        self.channels = [RcChannel() for _ in range(CHANNELS)]
 
     def make_reader(self) -> LineReader:
         """A reader of lines."""
@@ -80,17 +85,25 @@ class Ssc32(Line):
         """Bytes of a line on the wire."""
         return len(packet) + 1
 
-    def carry_out(self, packet: str, now_s: float) -> list[Reply]:
+    def obey(self, packet: str, now_s: float) -> list[tuple[int, bytes]]:
         """Do what a line says."""
         if packet == "Q":
-            return [Reply(b"+" if any(channel.moving(now_s) for channel in self.channels) else b".", None)]
+            return [(0, b"+" if any(channel.moving(now_s) for channel in self.channels) else b".")]
         if packet == "VER":
-            return [Reply(VERSION, None)]
-        if packet.startswith("QP") and packet[2:].isdecimal() and int(packet[2:]) < CHANNELS:
-            pulse = self.channels[int(packet[2:])].position(now_s)
-            return [Reply(bytes((round(pulse / 10),)), None)]
+            return [(0, VERSION)]
+        match = _ONE.fullmatch(packet)
+        if match and int(match[2]) < CHANNELS:
+            return self._one(match[1], int(match[2]), now_s)
         if not self._move(packet, now_s):
             self.refused += 1
+        return []
+
+    def _one(self, word: str, number: int, now_s: float) -> list[tuple[int, bytes]]:
+        """What is said of one channel."""
+        pulse = self.channels[number].position(now_s)
+        if word == "QP":
+            return [(number, bytes((round(pulse / 10),)))]
+        self.channels[number].go(pulse, now_s)
         return []
 
     def describe(self, now_s: float) -> list[dict[str, Any]]:
@@ -109,7 +122,7 @@ class Ssc32(Line):
         if group is None:
             return False
         moves = [(int(number), int(pulse), int(speed or 0)) for number, pulse, speed in _MOVE.findall(line)]
-        if any(number >= CHANNELS or not MIN_US <= pulse <= MAX_US for number, pulse, _ in moves):
+        if any(number >= CHANNELS or (pulse and not MIN_US <= pulse <= MAX_US) for number, pulse, _ in moves):
             return False
         seconds = int(group[1] or 0) * 1e-3
         for number, pulse, speed in moves:

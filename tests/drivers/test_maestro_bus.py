@@ -33,3 +33,19 @@ class BoardContract(BusContract):
 
 class TestMaestroBus(BoardContract):
     pass
+
+
+class TestSsc32Bus(BoardContract):
+    KIND = "ssc32"
+    STEP_RAD = 0.02
+
+
+class TestTextBus(BoardContract):
+    KIND = "text"
+    TORQUE = False
+    STEP_RAD = 0.003
+
+    @pytest.fixture
+    def bus(self) -> Bus:
+        texts = {"template": "S{ch},{us}\n", "off": "D{ch}\n"}
+        return open_bus("simulated", self.SERVOS, simulates="text", process=False, **texts, **QUICK)

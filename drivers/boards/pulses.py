@@ -1,0 +1,104 @@
+"""Boards that put out pulses for hobby servos: what one says of a pulse is checked against what it was told."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from drivers.boards.bus import BoardBus
+from drivers.boards.hobby import PulseScale
+from drivers.bus import Floats, ServoSpec
+
+GROUP = 8
+"""Channels asked in one cycle: boards have small input buffers."""
+
+
+class PulseTrack:
+    """Between which pulses each of ``n`` outputs must be: those it was last seen at and those it was told since.
+
+    A board moves towards its targets and never beyond; so an answer outside is a damaged or a foreign one.
+
+    Attributes
+    ----------
+    goal_us : (n,) last target; NaN for none.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.goal_us = np.full(n, math.nan)
+        self._low, self._high = self.goal_us, self.goal_us
+
+    def begin(self, seen_us: Floats) -> None:
+        """Begin from what a board puts out (n,) us; 0 is no pulses."""
+        self._low, self._high = np.fmin(seen_us, self.goal_us), np.fmax(seen_us, self.goal_us)
+
+    def go(self, goal_us: Floats) -> None:
+        """New targets (n,) us; NaN keeps the one before."""
+        self.goal_us = np.where(np.isfinite(goal_us), goal_us, self.goal_us)
+        self._low, self._high = np.fmin(self._low, self.goal_us), np.fmax(self._high, self.goal_us)
+
+    def believes(self, index: int, pulse_us: float, slack_us: float) -> bool:
+        """Whether an output can be where an answer says; narrows the range when it has arrived."""
+        if not pulse_us:
+            return True
+        if not self._low[index] - slack_us <= pulse_us <= self._high[index] + slack_us:
+            return False
+        if abs(pulse_us - self.goal_us[index]) <= slack_us:
+            self._low[index] = self._high[index] = self.goal_us[index]
+        return True
+
+
+class PulseBus(BoardBus):
+    """A board of hobby servos. See :class:`~drivers.boards.bus.BoardBus`.
+
+    Parameters
+    ----------
+    servos : the servos; ``id`` is the channel.
+    options : see :class:`~drivers.boards.bus.BoardBus`.
+
+    Raises
+    ------
+    DriverError : a model that is no hobby servo.
+    """
+
+    SLACK_US = 2.0
+    """By how much an answer may be off for the board's own rounding."""
+
+    def __init__(self, servos: Iterable[ServoSpec], **options: Any) -> None:
+        super().__init__(servos, **options)
+        self._scale = PulseScale(self.servos)
+        self._track = PulseTrack(len(self.servos))
+        self._next = 0
+        self._forgot = False
+
+    @abstractmethod
+    def _doubt(self) -> None:
+        """An answer cannot be right; what comes next may not be either."""
+
+    def _turn(self) -> list[int]:
+        """The servos to ask in this cycle."""
+        groups = self._groups()
+        self._next = (self._next + 1) % len(groups)
+        return groups[self._next]
+
+    def _groups(self) -> list[list[int]]:
+        indices = list(range(len(self.servos)))
+        return [indices[i : i + GROUP] for i in range(0, len(indices), GROUP)]
+
+    def _present(self, seen_us: Floats) -> Floats:
+        """Angles (n,) rad for pulses (n,) us that a board puts out, NaN where there are none."""
+        self._track.begin(seen_us)
+        return self._scale.radians(seen_us)
+
+    def _take(self, group: Sequence[int], pulses: Iterable[float]) -> None:
+        """What the board says of some servos. One that lost its pulses may have lost all it was set to."""
+        for index, pulse in zip(group, pulses, strict=True):
+            if not self._track.believes(index, pulse, self.SLACK_US):
+                self._report.count("corrupt", self.ids[index])
+                self._doubt()
+                return
+            self._forgot |= bool(self._running and self._on[index] and not pulse)
+            self._note(index, self._scale.radian(index, pulse))
