@@ -18,14 +18,15 @@ from rich.console import Console
 from rich.progress import track
 
 from controller.commands import CommandState
-from controller.mixer import DEFAULT_LAYERS, LayerSettings
+from controller.layers import default_layers
+from controller.mixer import LayerSettings
 from controller.parameters import PARAMETERS as P
 from controller.parameters import Floats
 from controller.paths import find_config
 from controller.rehearsal import Line
 from controller.robot import load_robot
 
-LAYERS = (*DEFAULT_LAYERS, LayerSettings("show", 45, "max"), LayerSettings("twitch", 55, "add", weight=0.2))
+LAYERS = (*default_layers(), LayerSettings("show", 45, "max"), LayerSettings("twitch", 55, "add", weight=0.2))
 DT = 0.01
 STEP_NS = 10_000_000
 SOURCES = ("speech", "capture", "show", "twitch")

@@ -15,12 +15,13 @@ from controller.expression import Expression
 from controller.motion import minimum_jerk
 from controller.parameters import Floats
 
-_BLINK, _GAZE = -2, -1
+_BLINK, _GAZE, _MOUTH = -3, -2, -1
+_OVERRIDES = 3
 
 
 @dataclass
 class _Pose:
-    """Where the face is going: an expression at an intensity; (P + 2,) with the overrides at the end."""
+    """Where the face is going: an expression at an intensity; (P + 3,) with the overrides at the end."""
 
     name: str
     intensity: float
@@ -38,7 +39,7 @@ class Actor:
 
     def __init__(self, neutral: Expression) -> None:
         self._neutral = neutral
-        self._now = np.zeros(len(neutral.weights) + 2)
+        self._now = np.zeros(len(neutral.weights) + _OVERRIDES)
         self._from = self._now.copy()
         self._mood = self._target = self._pose(neutral, 1.0)
         self._start_s, self._length_s = -np.inf, 0.0
@@ -47,7 +48,7 @@ class Actor:
     @property
     def values(self) -> Floats:
         """(P,) float64, the face at the last update; a view."""
-        return self._now[:_BLINK]
+        return self._now[:-_OVERRIDES]
 
     @property
     def name(self) -> str:
@@ -66,8 +67,13 @@ class Actor:
 
     @property
     def gaze_block(self) -> float:
-        """How much wandering of the gaze is held back, 0..1."""
+        """How much the gaze is held back, 0..1."""
         return float(self._now[_GAZE])
+
+    @property
+    def mouth_block(self) -> float:
+        """How much speech is held back, 0..1."""
+        return float(self._now[_MOUTH])
 
     def play(self, expression: Expression, intensity: float, duration_s: float | None, now_s: float) -> None:
         """Show an expression for ``duration_s`` from now until it falls, or as the new mood without one."""
@@ -116,7 +122,7 @@ class Actor:
 
     @staticmethod
     def _pose(expression: Expression, intensity: float) -> _Pose:
-        overrides = [_override(kind, intensity) for kind in (expression.blink, expression.gaze)]
+        overrides = [_override(kind, intensity) for kind in (expression.blink, expression.gaze, expression.mouth)]
         goal = np.concatenate([expression.weights * intensity, overrides])
         return _Pose(expression.name, intensity, goal, expression.offset_s)
 

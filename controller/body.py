@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from controller.busloop import BusLoop
 from controller.clock import Clock
-from controller.commands import CommandState
 from controller.errors import OMOTE_ERRORS
 from controller.following import Puppet
 from controller.linelink import LineLink
@@ -28,8 +27,10 @@ from controller.links import open_links
 from controller.livelink import Take, TakePlayer
 from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS, Parameters
+from controller.recording import SUFFIX, Face, Recorder, Replay
 from controller.robot import RobotSettings
 from controller.signals import ENDINGS, let_interrupts_through
+from controller.sources import Sources, Voice
 from controller.speech import layer_of, load_take
 from controller.stage import Stage, load_stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
@@ -49,6 +50,8 @@ class Body:
     mailbox : where the parameters are published, one per entry of ``parameters.names``.
     take, layer : a recorded take and the layer it is played into; None for none.
     mirror : leave the servos limp; the face shows where somebody moves them.
+    voice : a voice that moves the mouth. record : file to write every command and tick to.
+    replay : plays a recording instead of everything else.
     """
 
     def __init__(
@@ -60,21 +63,30 @@ class Body:
         layer: str = "capture",
         *,
         mirror: bool = False,
+        voice: Voice | None = None,
+        record: Path | None = None,
+        replay: Replay | None = None,
     ) -> None:
         self.stage = stage
-        self.state = CommandState(parameters)
+        self._closers = ExitStack()
+        self.state: Face = stage.state(parameters)
+        if record is not None:
+            recorder = Recorder(self.state, record, seed=stage.settings.seed, period_s=stage.period_s)
+            self.state = self._closers.enter_context(recorder)
         self.clock = Clock(stage.settings.control_hz)
         self.state.live(0.0 if mirror else stage.settings.liveliness, 0)  # no command: it has no time of arrival
-        self.player = TakePlayer(take, self.state, layer) if take is not None else None
+        self.replay = replay
         self.links: list[LineLink] = []
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
         self.puppet = self._puppet(parameters) if mirror else None
+        player = TakePlayer(take, self.state, layer) if take is not None else None
+        self.sources = Sources(self.state, player, self.puppet, voice)
+        self.live = take is None and replay is None
         self._mailbox = mailbox
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping = threading.Event()
         self._begun = threading.Event()
         self._error: Exception | None = None
-        self._closers = ExitStack()
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
 
     def _puppet(self, parameters: Parameters) -> Puppet:
@@ -97,8 +109,8 @@ class Body:
 
     @property
     def finished(self) -> bool:
-        """True once a take has been played to its end."""
-        return self.player is not None and self.player.finished
+        """True once there is nothing left to play."""
+        return self.sources.finished or (self.replay is not None and self.replay.finished)
 
     def start(self) -> None:
         """Bring the servos up where they stand, and keep them there.
@@ -125,16 +137,18 @@ class Body:
         LinkError, PortError
             when a link does not come up.
         """
-        if self.player is None:
+        if self.live:
             links = [link for link in self.stage.settings.links if self.puppet is None or link.port != "simulated"]
-            self.links = open_links(links, self.state, self._closers)
+            self.links = open_links(links, self.state, self._closers, self.stage.vocabularies)
+            self._closers.callback(self.sources.stop)
+            self.sources.begin()
         for bus in self.buses:
             bus.begin()
         self._begun.set()
 
     def check(self) -> None:
         """Raise what ended one of the loops, if any did."""
-        for error in (self._error, *(bus.error for bus in self.buses)):
+        for error in (self._error, self.sources.error, *(bus.error for bus in self.buses)):
             if error is not None:
                 raise error
 
@@ -153,14 +167,15 @@ class Body:
 
     def _control_loop(self) -> None:
         values = self._newest[0].copy()
-        last = time.monotonic_ns()
+        period, ticked = self.clock.period_ns, 0
         for now in self.clock.run(lambda: not self._stopping.is_set()):
-            if self.player is not None and self._begun.is_set():
-                self.player.tick(now)
-            if self.puppet is not None:
-                self.puppet.tick(self.state, now)
-            stamp = self.state.tick(now, (now - last) / 1e9, values)
-            last = now
+            begun = self._begun.is_set()
+            self.sources.tick(now, begun)
+            # whole periods, those that were skipped with them: a tick that is a little late is no uneven motion
+            steps = 1 + self.clock.skipped - ticked
+            ticked = self.clock.skipped
+            face = self.replay if self.replay is not None and begun else self.state
+            stamp = face.tick(now, steps * period / 1e9, values)
             self._newest = (values.copy(), stamp)
             self._mailbox.publish(values, stamp)
 
@@ -168,19 +183,10 @@ class Body:
         """What was measured by the control loop, the links and the buses."""
         return {
             "control": self.clock.report(),
-            "take": _played(self.player),
+            **self.sources.report(),
             "links": [link.report() for link in self.links],
             "buses": [bus.report() for bus in self.buses],
         }
-
-
-def _played(player: TakePlayer | None) -> dict[str, object] | None:
-    """How far a take was played (s); None without one."""
-    if player is None:
-        return None
-    played = min(player.position_s, player.take.duration_s)
-    return {"rows": player.take.frames, "rate_hz": player.take.rate_hz, "played_s": played,
-            "duration_s": player.take.duration_s}  # fmt: skip
 
 
 def body_main(orders: BodyOrders, pipe: Connection) -> None:
@@ -211,11 +217,7 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     parameters = PARAMETERS
     stage = load_stage(orders.stage, parameters)
     mailbox = Mailbox(orders.mailbox, len(parameters.names))
-    if orders.take:
-        path = Path(orders.take)
-        body = Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path))
-    else:
-        body = Body(stage, parameters, mailbox, mirror=orders.mirror)
+    body = _body(orders, stage, mailbox, parameters)
     body.start()
     try:
         _tell(pipe, Ready())
@@ -223,6 +225,16 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     finally:
         body.stop()
     _tell(pipe, Report(body.report()))
+
+
+def _body(orders: BodyOrders, stage: Stage, mailbox: Mailbox, parameters: Parameters) -> Body:
+    record = Path(orders.record) if orders.record else None
+    if orders.take is None:
+        return Body(stage, parameters, mailbox, mirror=orders.mirror, voice=orders.voice, record=record)
+    path = Path(orders.take)
+    if path.suffix == SUFFIX:
+        return Body(stage, parameters, mailbox, replay=Replay(path, parameters, stage.state))
+    return Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path), record=record)
 
 
 def _wait(body: Body, pipe: Connection, stop: threading.Event) -> None:

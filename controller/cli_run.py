@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
+
+if TYPE_CHECKING:
+    from controller.sources import Voice
 
 console = Console(highlight=False)
 
@@ -17,6 +20,18 @@ Pictures = Annotated[
     Path | None, typer.Option("--pictures", help="Folder for a contact sheet and a clip (headless only).")
 ]
 NoFace = Annotated[bool, typer.Option("--no-face", help="Draw nothing: links and servos only, needs no OpenGL.")]
+DryRun = Annotated[
+    bool,
+    typer.Option("--dry-run", help="Open no port, move nothing; show what would be sent."),
+]
+VoiceHz = Annotated[
+    int | None,
+    typer.Option("--voice-rate", min=1000, help="The voice is signed 16 bit mono PCM without a header, at this rate."),
+]
+Record = Annotated[
+    Path | None,
+    typer.Option("--record", help="Write every command and tick to this file (.rec)."),
+]
 StageName = Annotated[str, typer.Option("--stage", help="Stage: a name from configs/stages or a file.")]
 
 
@@ -53,39 +68,58 @@ def run(
     report: ReportFile = None,
     pictures: Pictures = None,
     no_face: NoFace = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Open no port and move nothing; show what would be sent.")
-    ] = False,
+    dry_run: DryRun = False,
     mirror: Annotated[
         bool, typer.Option("--mirror", help="Motors off: the face follows a head that is moved by hand.")
     ] = False,
+    voice: Annotated[
+        str | None,
+        typer.Option("--voice", help="WAV that moves the mouth: a file or pipe, - for standard input."),
+    ] = None,
+    voice_hz: VoiceHz = None,
+    record: Record = None,
 ) -> None:
     """Run a stage until it is stopped (Ctrl-C) or its time is up.
 
     Example: omote run everything --headless --seconds 20 --report r.json
     """
     if dry_run:
-        from controller.session import Session
+        _rehearse(stage, None, seconds, report)
+        return
+    from controller.sources import Voice
 
-        show_plan(Session.load(stage).plan())
-    else:
-        _run(stage, None, seconds, headless, no_face, pictures, report, mirror=mirror)
+    heard = Voice(voice, voice_hz) if voice is not None else None
+    _run(stage, None, seconds, headless, no_face, pictures, report, mirror=mirror, voice=heard, record=record)
 
 
 def play(
-    take: Annotated[Path, typer.Argument(help="Live Link Face take (.csv), speech (.wav, .tsv, Rhubarb .json).")],
+    take: Annotated[
+        Path,
+        typer.Argument(help="Take (.csv), speech (.wav, .tsv, Rhubarb .json), recording (.rec), or - for a voice."),
+    ],
     stage: StageName = "play",
     seconds: Seconds = None,
     headless: Headless = False,
     report: ReportFile = None,
     pictures: Pictures = None,
     no_face: NoFace = False,
+    dry_run: DryRun = False,
+    voice_hz: VoiceHz = None,
+    record: Record = None,
 ) -> None:
-    """Play a recorded take on the face and the servo head, at the take's own rate.
+    """Play a recorded take, or a voice on standard input, on the face and the servo head, at its own rate.
 
     Example: omote play alex_rom_3.csv --headless --report r.json
     """
-    _run(stage, take, seconds, headless, no_face, pictures, report)
+    if str(take) == "-":
+        from controller.sources import Voice
+
+        heard = Voice("-", voice_hz, alone=True)
+        _run(stage, None, seconds, headless, no_face, pictures, report, voice=heard, record=record)
+    elif dry_run:
+        _rehearse(stage, take, seconds, report)
+    else:
+        _run(stage, take, seconds, headless, no_face, pictures, report, record=record)
 
 
 def _run(
@@ -98,11 +132,13 @@ def _run(
     report: Path | None,
     *,
     mirror: bool = False,
+    voice: Voice | None = None,
+    record: Path | None = None,
 ) -> None:
     from controller.session import Session, has_display, write_report
 
     with console.status("starting") as status:
-        session = Session.load(stage, take, status.update, mirror=mirror)
+        session = Session.load(stage, take, status.update, mirror=mirror, voice=voice, record=record)
         if no_face:
             measured = session.run_without_face(seconds)
         elif headless or not has_display():
@@ -113,6 +149,17 @@ def _run(
             write_report(measured, report)
             measured["written"].append(str(report))
     show_report(measured)
+
+
+def _rehearse(stage: str, take: Path | None, seconds: float | None, report: Path | None) -> None:
+    from controller.session import Session, write_report
+
+    with console.status("rehearsing"):
+        rows, sent = Session.load(stage, take).plan(seconds)
+    show_plan(rows)
+    if report is not None:
+        write_report({"stage": stage, "dry_run": True, "buses": sent}, report)
+        console.print(f"wrote {report}", soft_wrap=True)
 
 
 def show_report(report: dict[str, Any]) -> None:

@@ -17,8 +17,9 @@ from controller.acting import Actor
 from controller.errors import ParameterError
 from controller.expression import Vocabulary
 from controller.gaze import Gaze
+from controller.layers import default_layers
 from controller.life import Life, LifeSettings
-from controller.mixer import DEFAULT_LAYERS, LayerSettings, Mixer
+from controller.mixer import LayerSettings, Mixer
 from controller.motion import MotionLimiter
 from controller.parameters import Floats, Parameters
 
@@ -80,8 +81,9 @@ class CommandState:
     ----------
     parameters : the registry.
     vocabulary : the named expressions; the shipped ones without.
-    layers : the layers; must include ``expression``, ``idle``, ``gaze``, ``capture`` and ``manual``.
+    layers : the layers; the shipped ones without. Must have those of :data:`controller.layers.NEEDED`.
     life : the figures of idle life; the natural ones without. seed : the same seed lives the same life.
+    period_s : length of a tick.
 
     Raises
     ------
@@ -92,21 +94,23 @@ class CommandState:
         self,
         parameters: Parameters,
         vocabulary: Vocabulary | None = None,
-        layers: Sequence[LayerSettings] = DEFAULT_LAYERS,
+        layers: Sequence[LayerSettings] | None = None,
         *,
         life: LifeSettings | None = None,
         seed: int = 0,
+        period_s: float = 0.01,
     ) -> None:
         self.parameters = parameters
         self.vocabulary = vocabulary or Vocabulary.load(parameters)
-        self.mixer = Mixer(parameters, layers)
-        self.limiter = MotionLimiter.of(parameters)
+        self.mixer = Mixer(parameters, default_layers() if layers is None else layers)
+        self.limiter = MotionLimiter.of(parameters, period_s)
         self._actor = Actor(self.vocabulary["neutral"])
         self._gaze = Gaze(parameters)
         self._life = Life(parameters, life or LifeSettings.named("natural", parameters), seed)
         self._mixed, self._present = parameters.neutral(), parameters.neutral()
         self._expression, self._looking = self.mixer["expression"], self.mixer["gaze"]
         self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
+        self._speech = self.mixer["speech"]
         self._everything = np.ones(len(parameters), dtype=bool)
         self._lock = threading.Lock()
         self._stamp_ns = 0
@@ -131,6 +135,8 @@ class CommandState:
     def _write_layers(self, now_s: float) -> None:
         self._expression.write_masked(self._actor.update(now_s), self._everything, now_s)
         self._live(now_s)
+        self._looking.hold_back(self._actor.gaze_block)
+        self._speech.hold_back(self._actor.mouth_block)
         if self._gaze.active:
             self._looking.write(self._gaze.indices, self._gaze.update(self._present, self._life), now_s)
 

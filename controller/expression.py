@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from controller.errors import ParameterError
+from controller.errors import ConfigError, ParameterError
 from controller.parameters import Floats, Parameters, did_you_mean, file_error, fold, read_toml
 from controller.paths import config_dir
 
 KINDS = ("emotion", "gesture", "user")
 OVERRIDES = ("keep", "block", "blend")
-_KEYS = {"kind", "aliases", "source", "onset_s", "offset_s", "blink", "gaze", "weights"}
+_KEYS = {"kind", "aliases", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "weights", "of"}
 _RISE_S = 0.4
 
 
@@ -28,7 +28,7 @@ class Expression:
     name : canonical name. kind : one of :data:`KINDS`. source : where it comes from.
     weights : (P,) float64, the parameters at intensity 1; read-only.
     onset_s, offset_s : times to rise and to fall.
-    blink, gaze : what it does to idle life, one of :data:`OVERRIDES`.
+    blink, gaze, mouth : what it does to blinks, to the gaze and to speech meanwhile, one of :data:`OVERRIDES`.
     """
 
     name: str
@@ -39,6 +39,7 @@ class Expression:
     offset_s: float = _RISE_S
     blink: str = "keep"
     gaze: str = "keep"
+    mouth: str = "keep"
 
 
 class Vocabulary:
@@ -62,22 +63,31 @@ class Vocabulary:
         self._lookup = {fold(name): name for name in expressions} | (aliases or {})
 
     @classmethod
-    def load(cls, parameters: Parameters, path: Path | None = None) -> Vocabulary:
+    def load(cls, parameters: Parameters, path: Path | None = None, more: Sequence[Path] = ()) -> Vocabulary:
         """Read a vocabulary of expressions; the shipped one without ``path``.
+
+        Parameters
+        ----------
+        more : further files whose expressions are added, such as a user's own; they may mix those before them.
 
         Raises
         ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        ConfigError : a file cannot be read or is wrong; every fault of every file with its key.
         """
-        path = path or config_dir() / "vocabularies" / "expressions.toml"
-        reader = _Reader(parameters)
-        expressions = {name: reader.expression(name, given) for name, given in read_toml(path).items()}
-        aliases = reader.aliases(expressions)
-        if reader.faults:
-            raise file_error(path, reader.faults)
+        known: dict[str, Expression] = {}
+        aliases: dict[str, str] = {}
+        errors: list[ConfigError] = []
+        for file in (path or config_dir() / "vocabularies" / "expressions.toml", *more):
+            reader = _Reader(parameters, known)
+            known = known | reader.read(read_toml(file))
+            aliases |= reader.aliases(known, aliases)
+            if reader.faults:
+                errors.append(file_error(file, reader.faults))
+        if errors:
+            raise errors[0] if len(errors) == 1 else ConfigError("\n".join(map(str, errors)), hint=errors[0].hint)
         from controller.formulas import Formulas  # it needs this module
 
-        vocabulary = cls(expressions, aliases)
+        vocabulary = cls(known, aliases)
         vocabulary._formulas = Formulas(parameters, vocabulary)
         return vocabulary
 
@@ -113,52 +123,92 @@ class Vocabulary:
 
 
 class _Reader:
-    """Turns tables into expressions and collects every fault on the way."""
+    """Turns the tables of one file into expressions and collects every fault on the way.
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
-        self._aliases: list[tuple[str, Any]] = []
+    Parameters
+    ----------
+    known : expressions of files before this one.
+    """
+
+    def __init__(self, parameters: Parameters, known: Mapping[str, Expression]) -> None:
+        self._parameters, self._known = parameters, known
+        self._tables: dict[str, dict[str, Any]] = {}
+        self._made: dict[str, Floats] = {}
         self.faults: list[str] = []
 
-    def expression(self, name: str, given: Any) -> Expression:
-        if not isinstance(given, dict):
-            self.faults.append(f"{name}: must be a table with weights")
-            given = {"weights": {}}
+    def read(self, tables: dict[str, Any]) -> dict[str, Expression]:
+        """The expressions of a file."""
+        for name, given in tables.items():
+            if not isinstance(given, dict):
+                self.faults.append(f"{name}: must be a table with weights")
+            elif name in self._known:
+                self.faults.append(f"{name}: is already an expression of a file before this one; choose another name")
+            self._tables[name] = given if isinstance(given, dict) else {"weights": {}}
+        return {name: self._expression(name, given) for name, given in self._tables.items()}
+
+    def _expression(self, name: str, given: dict[str, Any]) -> Expression:
         self.faults += [f"{name}.{key}: unknown key{did_you_mean(key, _KEYS)}" for key in given if key not in _KEYS]
-        self._aliases.append((name, given.get("aliases", [])))
+        weights = self._weights(name, ()).copy()
+        weights.flags.writeable = False
         return Expression(
             name,
-            self._weights(name, given.get("weights")),
+            weights,
             self._choice(name, given, "kind", KINDS, "user"),
             str(given.get("source", "")),
             self._seconds(name, given, "onset_s"),
             self._seconds(name, given, "offset_s"),
-            self._choice(name, given, "blink", OVERRIDES, "keep"),
-            self._choice(name, given, "gaze", OVERRIDES, "keep"),
+            *(self._choice(name, given, key, OVERRIDES, "keep") for key in ("blink", "gaze", "mouth")),
         )
 
-    def aliases(self, known: dict[str, Expression]) -> dict[str, str]:
+    def aliases(self, known: Mapping[str, Expression], taken: Mapping[str, str]) -> dict[str, str]:
+        """Folded other names to canonical ones."""
         table: dict[str, str] = {}
-        for name, given in self._aliases:
+        names = {fold(name): name for name in known}
+        for name, given in ((name, table.get("aliases", [])) for name, table in self._tables.items()):
             if not (isinstance(given, list) and all(isinstance(a, str) for a in given)):
                 self.faults.append(f"{name}.aliases: must be a list of names")
                 continue
             for alias in map(fold, given):
-                taken = table.get(alias) or next((k for k in known if fold(k) == alias), None)
-                if taken is not None:
-                    self.faults.append(f"{name}.aliases: {alias!r} is already a name of {taken!r}")
+                holder = table.get(alias) or taken.get(alias) or names.get(alias)
+                if holder is not None:
+                    self.faults.append(f"{name}.aliases: {alias!r} is already a name of {holder!r}")
                 table[alias] = name
         return table
 
-    def _weights(self, name: str, given: Any) -> Floats:
-        weights = self._parameters.neutral()
-        if not isinstance(given, dict):
+    def _weights(self, name: str, path: tuple[str, ...]) -> Floats:
+        """(P,) weights of an expression of this file, with those of what it is mixed of."""
+        if name in self._made:
+            return self._made[name]
+        given = self._tables[name]
+        weights = self._mix(name, given.get("of", {}), (*path, name))
+        own = given.get("weights", {} if "of" in given else None)
+        if not isinstance(own, dict):
             self.faults.append(f"{name}.weights: missing")
-            given = {}
-        for key, value in given.items():
+            own = {}
+        for key, value in own.items():
             self._put(f"{name}.weights.{key}", key, value, weights)
-        weights.flags.writeable = False
+        self._made[name] = weights
         return weights
+
+    def _mix(self, name: str, parts: Any, path: tuple[str, ...]) -> Floats:
+        """(P,) sum of other expressions, kept in range."""
+        total = self._parameters.neutral()
+        if not isinstance(parts, dict):
+            self.faults.append(f"{name}.of: must be a table of expressions, like {{ smile = 0.5 }}")
+            return total
+        for key, share in parts.items():
+            where = f"{name}.of.{key}"
+            if key in path:
+                self.faults.append(f"{where}: goes in a circle: {' -> '.join((*path[path.index(key) :], key))}")
+            elif isinstance(share, bool) or not isinstance(share, int | float) or not 0.0 <= share <= 1.0:
+                self.faults.append(f"{where}: must be a number from 0 to 1 (is {share!r})")
+            elif key in self._tables:
+                total += share * self._weights(key, path)
+            elif key in self._known:
+                total += share * self._known[key].weights
+            else:
+                self.faults.append(f"{where}: unknown expression{did_you_mean(key, [*self._tables, *self._known])}")
+        return np.clip(total, self._parameters.low, self._parameters.high)
 
     def _put(self, where: str, key: str, value: Any, weights: Floats) -> None:
         positions = sides(self._parameters, key)

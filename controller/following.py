@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from controller.channels import ChannelTable
-from controller.commands import CommandState
 from controller.mirror import Mirror
 from controller.parameters import Floats, Parameters
+from controller.recording import Face
 from drivers.bus import BusState
 
 
@@ -69,7 +69,7 @@ class Puppet:
             mirror.read(np.zeros(len(mirror.readable)))
         self._values, self._mask = parameters.neutral(), np.zeros(len(parameters), dtype=bool)
 
-    def tick(self, state: CommandState, now_ns: int) -> None:
+    def tick(self, state: Face, now_ns: int) -> None:
         """Write the face that the servos make now."""
         self._mask.fill(False)
         stamp = 0

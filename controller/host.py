@@ -167,22 +167,28 @@ class RobotHost:
             self.counts["unanswered"] += self._greeted
 
 
-def load_script(name: str, parameters: Parameters) -> Script:
-    """The script at a path or of a name in ``configs/scripts``. Raises ConfigError."""
-    return Script.load(find_config("scripts", name), parameters, Vocabulary.load(parameters))
+def load_script(name: str, parameters: Parameters, vocabulary: Vocabulary | None = None) -> Script:
+    """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
+
+    Raises
+    ------
+    ConfigError : it is not there, or wrong; every fault with its key.
+    """
+    return Script.load(find_config("scripts", name), parameters, vocabulary or Vocabulary.load(parameters))
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Serve a script in a process of its own; see the module's text."""
     parser = argparse.ArgumentParser(prog="controller.host", description="simulated robot host")
     parser.add_argument("--script", default="tour", help="a path, or a name in configs/scripts")
+    parser.add_argument("--vocabulary", type=Path, action="append", default=[], help="file of further expressions")
     parser.add_argument("--link", type=Path, default=None, help="make this path a link to the port")
     options = parser.parse_args(arguments)
     for ending in (signal.SIGINT, *ENDINGS):  # they reach the whole group; the end of stdin ends this
         signal.signal(ending, signal.SIG_IGN)
     try:
         parameters = standard()
-        script = load_script(options.script, parameters)
+        script = load_script(options.script, parameters, Vocabulary.load(parameters, more=options.vocabulary))
         with HostPort(options.link) as port:
             _say(f"ready {port.path}")
             host = RobotHost(port, script, parameters)

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Protocol
 
 from controller.commands import CommandSink
@@ -34,8 +35,14 @@ class LinkChoice(Protocol):
         """Script of a simulated host."""
 
 
-def open_links(choices: Sequence[LinkChoice], sink: CommandSink, closers: ExitStack) -> list[LineLink]:
+def open_links(
+    choices: Sequence[LinkChoice], sink: CommandSink, closers: ExitStack, vocabularies: Sequence[Path] = ()
+) -> list[LineLink]:
     """Open every link of a stage; ``closers`` gets what closes them, simulated hosts last.
+
+    Parameters
+    ----------
+    vocabularies : files of further expressions that scripts of simulated hosts name.
 
     Raises
     ------
@@ -45,7 +52,7 @@ def open_links(choices: Sequence[LinkChoice], sink: CommandSink, closers: ExitSt
     for choice in choices:
         port = choice.port
         if port == "simulated":
-            host = HostProcess(choice.script or "tour")
+            host = HostProcess(choice.script or "tour", vocabularies)
             closers.callback(host.stop)
             port = host.path
         link = LineLink(port, choice.baud, sink).start()
@@ -59,7 +66,7 @@ class HostProcess:
 
     Parameters
     ----------
-    script : a path, or a name in ``configs/scripts``.
+    script : a path, or a name in ``configs/scripts``. vocabularies : files of further expressions it names.
 
     Attributes
     ----------
@@ -70,8 +77,9 @@ class HostProcess:
     LinkError : it does not start.
     """
 
-    def __init__(self, script: str) -> None:
+    def __init__(self, script: str, vocabularies: Sequence[Path] = ()) -> None:
         command = [sys.executable, "-m", "controller.host", "--script", script]
+        command += [word for path in vocabularies for word in ("--vocabulary", str(path))]
         self.counts: dict[str, object] = {}
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         patience = threading.Timer(_START_LIMIT_S, self._process.kill)

@@ -14,9 +14,9 @@ from typing import IO
 
 import numpy as np
 
-from controller.commands import CommandState
 from controller.errors import TakeError
 from controller.parameters import Floats, Parameters
+from controller.recording import Face
 from controller.speech import voice_shapes
 from controller.visemes import Visemes
 
@@ -77,21 +77,26 @@ class Listener:
     Parameters
     ----------
     stream : open for reading bytes. It need not know its length or be seekable.
+    raw_hz : samples per second of a stream of signed 16 bit mono PCM without a header; None for WAV.
+
+    Attributes
+    ----------
+    hops : how many pieces of 10 ms were heard.
 
     Raises
     ------
     TakeError : the stream does not begin as WAV of 8, 16 or 32 bit PCM.
     """
 
-    def __init__(self, stream: IO[bytes], state: CommandState) -> None:
-        self._file = _open(stream)
+    def __init__(self, stream: IO[bytes], state: Face, *, raw_hz: int | None = None) -> None:
+        self._file = _open(stream) if raw_hz is None else RawPcm(stream, raw_hz)
         self._channels, self._width = self._file.getnchannels(), self._file.getsampwidth()
         self._rate = self._file.getframerate()
         self._state, self._ear = state, Ear(state.parameters, self._rate)
         self._through = Visemes.load(state.parameters).through
         self._stopping = threading.Event()
         self.hops = 0
-        self._thread = threading.Thread(target=self._run, name="voice", daemon=True)
+        self._thread = threading.Thread(target=self.run, name="voice", daemon=True)
 
     def start(self) -> Listener:
         """Begin to listen."""
@@ -107,7 +112,8 @@ class Listener:
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
-    def _run(self) -> None:
+    def run(self) -> None:
+        """Listen until the stream ends."""
         began = time.monotonic()
         while not self._stopping.is_set():
             data = self._file.readframes(self._ear.hop)
@@ -120,6 +126,29 @@ class Listener:
             now = time.monotonic_ns()
             values = self._ear.hear(samples(data, self._width, self._channels))
             self._state.write_layer("speech", values, self._ear.mask, now, now, through=self._through)
+
+
+class RawPcm:
+    """PCM without a header, read as :class:`wave.Wave_read` reads WAV: signed 16 bit, little end first, mono."""
+
+    def __init__(self, stream: IO[bytes], rate_hz: int) -> None:
+        self._stream, self._rate_hz = stream, rate_hz
+
+    def getnchannels(self) -> int:
+        """One."""
+        return 1
+
+    def getsampwidth(self) -> int:
+        """Two bytes."""
+        return 2
+
+    def getframerate(self) -> int:
+        """Samples per second."""
+        return self._rate_hz
+
+    def readframes(self, count: int) -> bytes:
+        """Up to ``count`` samples; none at the end."""
+        return self._stream.read(2 * count)
 
 
 def samples(data: bytes, width: int, channels: int) -> Floats:

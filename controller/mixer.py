@@ -9,8 +9,8 @@ highest, with s the layer's share of a parameter (weight x fade) and v its value
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -33,6 +33,7 @@ class LayerSettings:
     name : unique name. priority : higher goes over lower. mode : how it joins what lies below.
     weight : 0..1. fade_in_s, fade_out_s : times to take and to give back a parameter.
     timeout_s : a parameter not written for so long is released; infinity keeps it.
+    gains : factors on its values by region, 1 where none is given.
     """
 
     name: str
@@ -42,6 +43,7 @@ class LayerSettings:
     fade_in_s: float = 0.0
     fade_out_s: float = 0.4
     timeout_s: float = math.inf
+    gains: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.mode not in ("set", "add", "max"):
@@ -50,17 +52,6 @@ class LayerSettings:
             raise ValueError(f"weight must be 0 to 1, not {self.weight}")
         if not (self.fade_in_s >= 0 and self.fade_out_s >= 0 and self.timeout_s > 0):
             raise ValueError("fade_in_s and fade_out_s must not be negative, timeout_s must be positive")
-
-
-DEFAULT_LAYERS = (
-    LayerSettings("expression", 10),
-    LayerSettings("idle", 20, "add"),
-    LayerSettings("gaze", 30, fade_in_s=0.1, fade_out_s=0.5, timeout_s=1.0),
-    LayerSettings("speech", 40, fade_in_s=0.05, fade_out_s=0.15, timeout_s=1.0),
-    LayerSettings("capture", 50, fade_in_s=0.2, fade_out_s=0.5, timeout_s=1.0),
-    LayerSettings("manual", 60, fade_out_s=0.5),
-)
-"""Base expression < idle < gaze < speech < live capture < manual (link and panel)."""
 
 
 class Layer:
@@ -79,7 +70,7 @@ class Layer:
         self.name = settings.name
         self.values, self.gain, self.share = table.values[row], table.gain[row], table.share[row]
         self.applied, self.held, self._stamp = table.applied[row], table.held[row], table.stamp[row]
-        self._fade_out = table.fade_out_s[row]
+        self._fade_out, self._block = table.fade_out_s[row], table.block[row]
         self._fresh = np.zeros(len(self.values), dtype=bool)
 
     def write(self, indices: Indices, values: Floats | Sequence[float] | float, now_s: float) -> None:
@@ -104,6 +95,10 @@ class Layer:
         self.held[indices] = False
         self._fade_out[:] = self.settings.fade_out_s if fade_s is None else fade_s
 
+    def hold_back(self, amount: float) -> None:
+        """Take away ``amount`` 0..1 of its say, as an expression does that blocks it."""
+        self._block[:] = 1.0 - amount
+
     @property
     def holding(self) -> int:
         """How many parameters the layer holds."""
@@ -122,7 +117,7 @@ class _Table:
         self._weight, self._fade_in_s, self.fade_out_s, self._timeout_s = (
             np.array([[getattr(each, name)] for each in settings]) for name in columns
         )
-        self._rate = np.zeros(shape)
+        self._rate, self.block = np.zeros(shape), np.ones((len(settings), 1))
 
     def advance(self, now_s: float, dt: float) -> NDArray[np.bool_]:
         """Let fades and time-outs pass; (n,) which layers have any say."""
@@ -134,7 +129,7 @@ class _Table:
         self.level += self._rate
         np.maximum(self.level, 0.0, out=self.level)
         np.minimum(self.level, 1.0, out=self.level)
-        np.multiply(self.level, self._weight, out=self.applied)
+        np.multiply(self.level, self._weight * self.block, out=self.applied)
         self.applied *= self.share
         np.multiply(self.values, self.gain, out=self.given)
         return np.logical_or.reduce(self.level != 0.0, axis=1)
@@ -149,10 +144,10 @@ class Mixer:
 
     Raises
     ------
-    ValueError : two layers of one name.
+    ValueError : two layers of one name. ParameterError : gains of a region that is none.
     """
 
-    def __init__(self, parameters: Parameters, layers: Sequence[LayerSettings] = DEFAULT_LAYERS) -> None:
+    def __init__(self, parameters: Parameters, layers: Sequence[LayerSettings]) -> None:
         ordered = sorted(layers, key=lambda layer: layer.priority)
         if len({layer.name for layer in ordered}) < len(ordered):
             raise ValueError("layers must have different names")
@@ -161,6 +156,9 @@ class Mixer:
         self._by_name = {layer.name: layer for layer in self.layers}
         self._work = np.zeros(len(parameters))
         self._better = np.zeros(len(parameters), dtype=bool)
+        for layer in self.layers:
+            for region, factor in layer.settings.gains.items():
+                layer.gain[parameters.region(region)] = factor
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import threading
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
@@ -22,8 +22,19 @@ from controller.errors import ControllerError
 from controller.expression import Vocabulary
 from controller.parameters import Floats, Parameters
 
+SUFFIX = ".rec"
+"""What names of recordings end in."""
+
 _VERSION = 1
-_COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live")
+_COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live", "set_gains")
+
+
+Maker = Callable[[Parameters, int, float], CommandState]
+
+
+def _plain(parameters: Parameters, seed: int, period_s: float) -> CommandState:
+    """A command state with everything as shipped."""
+    return CommandState(parameters, seed=seed, period_s=period_s)
 
 
 class Recorder:
@@ -31,23 +42,25 @@ class Recorder:
 
     Parameters
     ----------
-    state : what does the work. path : the file to write. seed : the seed of ``state``, for the replay.
+    state : what does the work. path : the file to write.
+    seed, period_s : those of ``state``, for the replay.
 
     Raises
     ------
     ControllerError : the file cannot be written.
     """
 
-    def __init__(self, state: CommandState, path: Path, *, seed: int = 0) -> None:
+    def __init__(self, state: CommandState, path: Path, *, seed: int = 0, period_s: float = 0.01) -> None:
         self.state = state
         self.parameters: Parameters = state.parameters
         self.vocabulary: Vocabulary = state.vocabulary
+        self.mixer, self.limiter = state.mixer, state.limiter
         self._lock = threading.Lock()
         try:
             self._file: TextIO = path.open("w", encoding="ascii")
         except OSError as error:
             raise ControllerError(f"{path}: cannot be written: {error.strerror}", hint="choose another path") from error
-        self._write("omote recording", _VERSION, seed, list(state.parameters.names))
+        self._write("omote recording", _VERSION, seed, period_s, list(state.parameters.names))
 
     def tick(self, now_ns: int, dt: float, out: Floats) -> int:
         """See :meth:`CommandState.tick`."""
@@ -105,6 +118,14 @@ class Recorder:
             shown = None if through is None else through.tolist()
             self._write("write_layer", name, held.tolist(), values[held].tolist(), now_ns, stamp_ns, shown)
 
+    def capture(self, values: Floats, mask: NDArray[np.bool_], now_ns: int, stamp_ns: int = 0) -> None:
+        """See :meth:`CommandState.capture`."""
+        self.write_layer("capture", values, mask, now_ns, stamp_ns)
+
+    def set_gains(self, name: str, gains: Mapping[str, float]) -> None:
+        """See :meth:`CommandState.set_gains`."""
+        self._do("set_gains", name, dict(gains))
+
     def snapshot(self, out: Floats) -> None:
         """See :class:`CommandSink`."""
         self.state.snapshot(out)
@@ -145,20 +166,27 @@ class Recorder:
             self._file.write(json.dumps(items, separators=(",", ":")) + "\n")
 
 
-def replay(path: Path, parameters: Parameters, *, check: bool = True) -> Iterator[tuple[int, Floats]]:
+Face = CommandState | Recorder
+"""What sources write to and the control loop ticks."""
+
+
+def replay(
+    path: Path, parameters: Parameters, *, check: bool = True, make: Maker = _plain
+) -> Iterator[tuple[int, Floats]]:
     """Play a recording again: time (ns) and parameters (P,) of each tick; the array is used again for the next.
 
     Parameters
     ----------
     check : compare each tick with the recorded one.
+    make : makes the state to play into, of the parameters, a seed and the length of a tick (s).
 
     Raises
     ------
     ControllerError : the file cannot be read, is damaged, or ``check`` finds a tick that came out differently.
     """
     lines = _lines(path)
-    seed = _header(path, lines, parameters)
-    state, out = CommandState(parameters, seed=seed), parameters.neutral()
+    seed, period_s = _header(path, lines, parameters)
+    state, out = make(parameters, seed, period_s), parameters.neutral()
     for number, items in lines:
         try:
             if items[0] == "tick":
@@ -167,13 +195,50 @@ def replay(path: Path, parameters: Parameters, *, check: bool = True) -> Iterato
                 if check and zlib.crc32(out.tobytes()) != crc:
                     raise ControllerError(
                         f"{path}, line {number}: this tick came out differently from the recorded one",
-                        hint="it was recorded with other vocabularies, limits or another version of omote",
+                        hint="it was recorded with another stage, other vocabularies or another version of omote",
                     )
                 yield now_ns, out
             else:
                 _again(state, items)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise _damaged(path, number) from error
+
+
+class Replay:
+    """Plays a recording at its own pace; ticks where a command state would, and takes no commands.
+
+    Parameters
+    ----------
+    path, parameters, make : see :func:`replay`.
+
+    Attributes
+    ----------
+    finished : the last tick has been given. ticks : how many were. played_s : how far it is.
+    """
+
+    def __init__(self, path: Path, parameters: Parameters, make: Maker = _plain) -> None:
+        self._ticks = replay(path, parameters, make=make)
+        self._next = self._pull()
+        self._start_ns = (0, 0)
+        self.finished = False
+        self.ticks, self.played_s = 0, 0.0
+
+    def tick(self, now_ns: int, dt: float, out: Floats) -> int:
+        """Write the recorded parameters of this time to ``out`` : (P,); returns 0, for no command came."""
+        if not self.ticks and self._next is not None:
+            self._start_ns = now_ns, self._next[0]
+        begun, first = self._start_ns
+        while self._next is not None and self._next[0] - first <= now_ns - begun:
+            out[:] = self._next[1]
+            self.played_s = (self._next[0] - first) * 1e-9
+            self.ticks += 1
+            self._next = self._pull()
+        self.finished = self._next is None
+        return 0
+
+    def _pull(self) -> tuple[int, Floats] | None:
+        found = next(self._ticks, None)
+        return None if found is None else (found[0], found[1].copy())
 
 
 def _again(state: CommandState, items: list[Any]) -> None:
@@ -206,14 +271,14 @@ def _lines(path: Path) -> Iterator[tuple[int, list[Any]]]:
         raise ControllerError(f"{path}: not a recording", hint="omote writes recordings as ASCII text") from error
 
 
-def _header(path: Path, lines: Iterator[tuple[int, list[Any]]], parameters: Parameters) -> int:
-    """The seed, once the header says that this is a recording of these parameters."""
+def _header(path: Path, lines: Iterator[tuple[int, list[Any]]], parameters: Parameters) -> tuple[int, float]:
+    """Seed and length of a tick (s), once the header says that this is a recording of these parameters."""
     _, items = next(lines, (1, []))
-    if len(items) != 4 or items[:2] != ["omote recording", _VERSION] or not isinstance(items[2], int):
+    if len(items) != 5 or items[:2] != ["omote recording", _VERSION] or not isinstance(items[2], int):
         raise ControllerError(f"{path}: not a recording of version {_VERSION}", hint="record it again")
-    if items[3] != list(parameters.names):
+    if items[4] != list(parameters.names):
         raise ControllerError(f"{path}: recorded with other parameters", hint="use the vocabulary it was recorded with")
-    return items[2]
+    return items[2], float(items[3])
 
 
 def _damaged(path: Path, number: int) -> ControllerError:

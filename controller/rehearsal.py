@@ -114,7 +114,9 @@ class Rehearsal:
             sent = np.degrees(self.sent_rad[channel.bus][:, i])
             yield {
                 "sent (deg)": f"{sent.min():.1f} to {sent.max():.1f}",
-                "fastest (deg/s)": f"{np.abs(np.diff(sent)).max(initial=0.0) / line.period_s:.0f}",
+                "limits (deg)": f"{channel.limit_deg[0]:g} to {channel.limit_deg[1]:g}",
+                "fastest (deg/s)": f"{np.abs(np.diff(sent)).max(initial=0.0) / line.period_s:.0f} of "
+                f"{channel.max_speed_deg_s:g}",
                 "held by": ", ".join(_held(line, i, channel.name)) or "nothing",
             }
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import multiprocessing
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext
 from pathlib import Path
 from types import TracebackType
 
@@ -13,6 +15,7 @@ from controller.errors import ControllerError
 from controller.mailbox import Mailbox
 from controller.parameters import Parameters
 from controller.signals import interrupts_held
+from controller.sources import Voice, pump
 from controller.stage import Stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show, Stop
 
@@ -30,9 +33,19 @@ class BodyProcess:
     parameters : the vocabulary.
     take : a recorded take to play instead of the links.
     mirror : leave the servos limp; the face shows where somebody moves them.
+    voice : a voice that moves the mouth. record : file to write every command and tick to.
     """
 
-    def __init__(self, stage: Stage, parameters: Parameters, take: Path | None = None, *, mirror: bool = False) -> None:
+    def __init__(
+        self,
+        stage: Stage,
+        parameters: Parameters,
+        take: Path | None = None,
+        *,
+        mirror: bool = False,
+        voice: Voice | None = None,
+        record: Path | None = None,
+    ) -> None:
         from controller.body import body_main
 
         self.mailbox = Mailbox.create(len(parameters.names))
@@ -40,11 +53,22 @@ class BodyProcess:
         self.report: dict[str, object] = {}
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        orders = BodyOrders(str(stage.path), self.mailbox.path, str(take) if take else None, mirror)
+        mine, voice = _through_pipe(context, voice)
+        orders = BodyOrders(
+            str(stage.path),
+            self.mailbox.path,
+            str(take) if take else None,
+            mirror,
+            voice,
+            str(record) if record else None,
+        )
         self._process = context.Process(target=body_main, args=(orders, theirs), name="omote body")
         with interrupts_held():
             self._process.start()
         theirs.close()
+        if mine is not None and voice is not None and voice.pipe is not None:
+            voice.pipe.close()
+            pump(mine)
 
     def wait_ready(self) -> Ready:
         """Wait until the servos stand.
@@ -151,6 +175,14 @@ class BodyProcess:
             self.stop()
         except ControllerError:
             self._end_process()
+
+
+def _through_pipe(context: SpawnContext, voice: Voice | None) -> tuple[Connection | None, Voice | None]:
+    """Our end of a pipe and the voice at the other, where it comes from standard input, which a child has not."""
+    if voice is None or voice.path != "-":
+        return None, voice
+    theirs, mine = context.Pipe(duplex=False)
+    return mine, replace(voice, pipe=theirs)
 
 
 @dataclass

@@ -16,9 +16,10 @@ from controller.face import HeadlessFace, HeadValues, Recorder
 from controller.files import replacing
 from controller.parameters import PARAMETERS
 from controller.pictures import write_pictures
-from controller.plan import plan_rows
+from controller.recording import SUFFIX, replay
 from controller.run import BodyProcess, Deadline
 from controller.signals import stop_flag
+from controller.sources import Voice
 from controller.stage import Stage, load_stage
 from drivers.priority import yield_to_servos
 
@@ -47,29 +48,44 @@ class Session:
     take : a recorded take to play instead of the stage's links.
     tell : hears in a few words what is being done.
     mirror : leave the servos limp; the face shows where somebody moves them.
+    voice : a voice that moves the mouth. record : file to write every command and tick to.
     """
 
     def __init__(
-        self, stage: Stage, take: Path | None = None, tell: Tell = lambda _: None, *, mirror: bool = False
+        self,
+        stage: Stage,
+        take: Path | None = None,
+        tell: Tell = lambda _: None,
+        *,
+        mirror: bool = False,
+        voice: Voice | None = None,
+        record: Path | None = None,
     ) -> None:
         self.stage = stage
         self.take = take
         self.tell = tell
         self.mirror = mirror
+        self.voice = voice
+        self.record = record
 
     @classmethod
     def load(
-        cls, stage: str, take: Path | None = None, tell: Tell = lambda _: None, *, mirror: bool = False
-    ) -> Session:  # fmt: skip
+        cls,
+        stage: str,
+        take: Path | None = None,
+        tell: Tell = lambda _: None,
+        *,
+        mirror: bool = False,
+        voice: Voice | None = None,
+        record: Path | None = None,
+    ) -> Session:
         """Find and check a stage and, where given, a take; raises before anything is opened."""
-        if take is not None:
-            from controller.speech import load_take
-
-            load_take(take, PARAMETERS)
         found = load_stage(stage, PARAMETERS)
+        if take is not None:
+            check_take(take, found)
         if mirror and not found.robots:
             raise ConfigError(f"{found.path}: robots: a stage without a robot has nothing to mirror")
-        return cls(found, take, tell, mirror=mirror)
+        return cls(found, take, tell, mirror=mirror, voice=voice, record=record)
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display; returns the report.
@@ -113,7 +129,7 @@ class Session:
 
     def _body(self) -> BodyProcess:
         self.tell("starting")
-        return BodyProcess(self.stage, PARAMETERS, self.take, mirror=self.mirror)
+        return BodyProcess(self.stage, PARAMETERS, self.take, mirror=self.mirror, voice=self.voice, record=self.record)
 
     def _head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
         """The head and its values; the servos come up meanwhile in the body's process."""
@@ -136,9 +152,30 @@ class Session:
         body.stop()
         return {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}
 
-    def plan(self) -> list[dict[str, str]]:
-        """What each channel would be sent: its chain in words and its angle for a neutral face."""
-        return [row for robot in self.stage.robots for row in plan_rows(robot, PARAMETERS)]
+    def plan(self, seconds: float | None = None) -> tuple[list[dict[str, str]], list[dict[str, object]]]:
+        """What the servos would be sent, without opening a port.
+
+        Parameters
+        ----------
+        seconds : how much of it; all of the take or one round of the script without, 30 s at most for an endless one.
+
+        Returns
+        -------
+        A row a channel for people, and every angle of every cycle for programs.
+        """
+        from controller.plan import rehearse
+
+        return rehearse(self.stage, self.take, seconds, PARAMETERS)
+
+
+def check_take(take: Path, stage: Stage) -> None:
+    """Raise what is wrong with a take or a recording."""
+    if take.suffix == SUFFIX:
+        next(replay(take, PARAMETERS, make=stage.state), None)
+        return
+    from controller.speech import load_take
+
+    load_take(take, PARAMETERS)
 
 
 def write_report(report: dict[str, Any], path: Path) -> None:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from controller.commands import CommandState
 from controller.config import Settings, config_error, load
 from controller.errors import ConfigError
+from controller.expression import Vocabulary
 from controller.host import load_script
+from controller.layers import load_layers
+from controller.life import LifeSettings
+from controller.mixer import LayerSettings
 from controller.parameters import Parameters
 from controller.paths import find_config
 from controller.robot import RobotSettings, load_robot
@@ -51,6 +56,10 @@ class StageSettings(Settings):
     robots: list[str] = []
     control_hz: Annotated[float, Field(ge=10, le=1000)] = 100.0
     liveliness: Annotated[float, Field(ge=0, le=1)] = 0.0
+    life: str = "natural"
+    seed: Annotated[int, Field(ge=0)] = 0
+    vocabularies: list[str] = []
+    layers: dict[str, dict[str, Any]] = {}
     face: FaceSettings = FaceSettings()
     links: list[LinkSettings] = []
 
@@ -65,12 +74,34 @@ class Stage:
     settings : its content.
     head : folder of the head.
     robots : the robots, in file order.
+    vocabulary : the named expressions, the user's own from files ``vocabularies`` among them.
+    layers : the layers. life : figures of idle life.
     """
 
     path: Path
     settings: StageSettings
     head: Path
     robots: tuple[RobotSettings, ...]
+    vocabularies: tuple[Path, ...]
+    vocabulary: Vocabulary
+    layers: tuple[LayerSettings, ...]
+    life: LifeSettings
+
+    @property
+    def period_s(self) -> float:
+        """Length of a tick."""
+        return 1.0 / self.settings.control_hz
+
+    def state(self, parameters: Parameters, seed: int | None = None, period_s: float | None = None) -> CommandState:
+        """A face of its own, as the stage wants it; nothing is commanded yet."""
+        return CommandState(
+            parameters,
+            self.vocabulary,
+            self.layers,
+            life=self.life,
+            seed=self.settings.seed if seed is None else seed,
+            period_s=period_s or self.period_s,
+        )
 
 
 def load_stage(name: str, parameters: Parameters) -> Stage:
@@ -97,12 +128,20 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
         )
         for i, robot in enumerate(settings.robots)
     ]
+    own = [
+        _collect(faults, f"vocabularies[{i}]", lambda name=name: find_config("vocabularies", name, beside=path))
+        for i, name in enumerate(settings.vocabularies)
+    ]
+    more = tuple(file for file in own if file is not None)
+    vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
+    layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
+    life = _collect(faults, "life", lambda: LifeSettings.named(settings.life, parameters))
     for i, link in enumerate(settings.links):
         if link.script is not None:
-            _collect(faults, f"links[{i}].script", lambda name=link.script: load_script(name, parameters))
+            _collect(faults, f"links[{i}].script", lambda name=link.script: load_script(name, parameters, vocabulary))
     if faults:
         raise config_error(path, faults)
-    return Stage(path, settings, head, tuple(robots))
+    return Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life)
 
 
 def _collect(faults: list[str], key: str, read):  # type: ignore[no-untyped-def]

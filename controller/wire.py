@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from controller.sources import Voice
+
 
 @dataclass(frozen=True)
 class BodyOrders:
@@ -15,12 +17,15 @@ class BodyOrders:
     mailbox : path of the mailbox the parameters are published in.
     take : a recorded take to play instead of the links; None for none.
     mirror : leave the servos limp; the face shows where somebody moves them.
+    voice : a voice that moves the mouth. record : file to write every command and tick to.
     """
 
     stage: str
     mailbox: str
     take: str | None = None
     mirror: bool = False
+    voice: Voice | None = None
+    record: str | None = None
 
 
 @dataclass(frozen=True)

@@ -94,3 +94,63 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         "grin.weights.jawOpen: must be a number from 0 to 1 (is 1.5)", "sneer.weights: missing", "sneer.aliases",
     ):  # fmt: skip
         assert part in text
+
+
+def own(tmp_path: Path, text: str, name: str = "own.toml") -> Path:
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+def test_own_files_add_expressions_and_mix_those_before_them(tmp_path: Path) -> None:
+    path = own(
+        tmp_path,
+        """
+        [smirk]
+        aliases = ["half_smile"]
+        weights = { mouthSmileLeft = 0.7 }
+        [glee]
+        of = { happiness = 0.5, smirk = 1.0 }
+        weights = { jawOpen = 0.3 }
+        mouth = "blend"
+        """,
+    )
+    vocabulary = Vocabulary.load(P, more=[path])
+    happy, glee = Vocabulary.load(P)["happiness"].weights, vocabulary["glee"]
+    left = P.index("mouthSmileLeft")
+    assert vocabulary["Half-Smile"].name == "smirk" and vocabulary["smile"].name == "smile"
+    assert glee.weights[left] == pytest.approx(min(1.0, 0.5 * happy[left] + 0.7)) and glee.mouth == "blend"
+    assert glee.weights[P.index("jawOpen")] == 0.3
+    more = own(tmp_path, "[joyful]\nof = { glee = 0.5 }", "more.toml")
+    assert Vocabulary.load(P, more=[path, more])["joyful"].weights[left] == pytest.approx(glee.weights[left] / 2)
+
+
+def test_faults_of_all_files_come_together_circles_too(tmp_path: Path) -> None:
+    first = own(
+        tmp_path,
+        """
+        smile = { weights = {} }
+        [a]
+        of = { b = 1.0 }
+        [b]
+        of = { c = 0.5, a = 1.0 }
+        [c]
+        of = { happines = 1.0, sadness = 2.0 }
+        aliases = ["joy"]
+        """,
+    )
+    second = own(tmp_path, "[d]\nof = 3", "second.toml")
+    with pytest.raises(ConfigError) as caught:
+        Vocabulary.load(P, more=[first, second])
+    text = str(caught.value)
+    for part in (
+        "own.toml: 5 faults",
+        "smile: is already an expression of a file before this one",
+        "b.of.a: goes in a circle: a -> b -> a",
+        "c.of.happines: unknown expression, did you mean 'happiness'",
+        "c.of.sadness: must be a number from 0 to 1",
+        "c.aliases: 'joy' is already a name of 'happiness'",
+        "second.toml: 1 fault",
+        "d.of: must be a table of expressions",
+    ):
+        assert part in text

@@ -8,7 +8,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from controller.mixer import DEFAULT_LAYERS, LayerSettings, Mixer
+from controller.layers import default_layers
+from controller.mixer import LayerSettings, Mixer
 from controller.parameters import PARAMETERS as P
 
 JAW, SMILE, BROW = P.index("jawOpen"), P.index("mouthSmileLeft"), P.index("browInnerUp")
@@ -19,7 +20,7 @@ def mix(mixer: Mixer, now_s: float = 0.0, dt: float = 0.01) -> np.ndarray:
 
 
 def test_default_layers_are_in_order() -> None:
-    assert Mixer(P).names == ("expression", "idle", "gaze", "speech", "capture", "manual")
+    assert Mixer(P, default_layers()).names == ("expression", "idle", "gaze", "speech", "capture", "manual")
 
 
 def test_the_higher_layer_wins_parameter_by_parameter() -> None:
@@ -52,7 +53,7 @@ def test_an_adding_layer_alone_is_the_holder() -> None:
 
 
 def test_latest_value_and_order_of_writing_does_not_matter() -> None:
-    mixer = Mixer(P)
+    mixer = Mixer(P, default_layers())
     for value in (0.1, 0.9, 0.4):
         mixer["manual"].write([JAW], [value], 0.0)
     mixer["expression"].write([JAW], [1.0], 0.0)
@@ -90,7 +91,7 @@ def test_silence_releases_to_the_layer_below_each_parameter_for_itself() -> None
 
 
 def test_what_is_not_finite_changes_nothing() -> None:
-    mixer = Mixer(P)
+    mixer = Mixer(P, default_layers())
     mixer["manual"].write([JAW, SMILE], [0.5, 0.5], 0.0)
     mixer["manual"].write([JAW, SMILE, BROW], [math.nan, 0.6, math.inf], 0.0)
     assert mix(mixer)[[JAW, SMILE, BROW]] == pytest.approx([0.5, 0.6, 0.0])
@@ -118,7 +119,7 @@ def test_gain_and_share() -> None:
 
 
 def test_mixing_does_not_allocate() -> None:
-    mixer = Mixer(P)
+    mixer = Mixer(P, default_layers())
     for name in mixer.names:
         mixer[name].write(slice(None), np.full(59, 0.5), 0.0)
     out = np.empty(59)
@@ -135,7 +136,7 @@ def test_mixing_does_not_allocate() -> None:
 
 def test_wrong_layers_are_refused() -> None:
     with pytest.raises(ValueError, match="different names"):
-        Mixer(P, [*DEFAULT_LAYERS, LayerSettings("gaze", 99)])
+        Mixer(P, [*default_layers(), LayerSettings("gaze", 99)])
     with pytest.raises(ValueError, match="mode"):
         LayerSettings("a", 1, "mul")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="weight"):
@@ -143,4 +144,4 @@ def test_wrong_layers_are_refused() -> None:
     with pytest.raises(ValueError, match="timeout_s"):
         LayerSettings("a", 1, timeout_s=0.0)
     with pytest.raises(KeyError, match="did you mean 'manual'"):
-        Mixer(P)["manuel"]
+        Mixer(P, default_layers())["manuel"]

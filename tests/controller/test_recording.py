@@ -77,7 +77,7 @@ def test_a_tick_that_comes_out_differently_is_noticed(tmp_path: Path) -> None:
         ("{}\n", "line 1: damaged"),
         ("[]\n", "line 1: damaged"),
         ('["omote recording",99,0,[]]\n', "not a recording of version 1"),
-        ('["omote recording",1,0,["jawOpen"]]\n', "other parameters"),
+        ('["omote recording",1,0,0.01,["jawOpen"]]\n', "other parameters"),
         ("\xff", "not a recording"),
     ],
 )
