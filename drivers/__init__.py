@@ -29,6 +29,7 @@ KINDS = {
     "maestro": Kind("drivers.maestro.bus:MaestroBus", "drivers.boards.hobby:check_hobby"),
     "ssc32": Kind("drivers.text.ssc32:Ssc32Bus", "drivers.boards.hobby:check_hobby"),
     "text": Kind("drivers.text.bus:TextBus", "drivers.boards.hobby:check_hobby"),
+    "omote": Kind("drivers.lineout.bus:LineOutBus", "drivers.lineout.bus:check_lineout"),
     "feetech": Kind("drivers.feetech.bus:FeetechBus", "drivers.models:check_feetech"),
 }
 

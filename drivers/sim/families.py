@@ -7,6 +7,7 @@ from typing import Any
 
 from drivers.sim.chain import Chain
 from drivers.sim.line import Line
+from drivers.sim.linehead import LineHead
 from drivers.sim.maestro import Maestro
 from drivers.sim.serve import make_chain, make_servos
 from drivers.sim.ssc32 import Ssc32
@@ -67,8 +68,13 @@ def _text(servos: Servos, now_s: float, seed: int, options: dict[str, Any]) -> L
     return TextBoard(ids=[device_id for device_id, _ in servos], now_s=now_s, seed=seed, **options)
 
 
+def _omote(servos: Servos, now_s: float, seed: int, options: dict[str, Any]) -> Line:
+    return LineHead(now_s=now_s, seed=seed, **options)
+
+
 _BOARDS: dict[str, Callable[[Servos, float, int, dict[str, Any]], Line]] = {
     "maestro": _maestro,
     "ssc32": _ssc32,
     "text": _text,
+    "omote": _omote,
 }

@@ -16,13 +16,14 @@ class ValueScale:
 
     Parameters
     ----------
-    field : ``us``, ``deg``, ``deg10``, ``angle`` or ``unit``.
+    field : ``us``, ``deg``, ``deg10``, ``angle``, ``unit``, or ``parameter`` (1 for 90 degrees of the shaft).
     decimals : that the value keeps on the wire.
-    servos : n of them. pulses : their pulses.
+    servos : n of them. pulses : their pulses, where the value is one.
     """
 
-    def __init__(self, field: str, decimals: int, servos: Sequence[ServoSpec], pulses: PulseScale) -> None:
-        self.field, self._step, self._pulses = field, 10.0**-decimals, pulses
+    def __init__(self, field: str, decimals: int, servos: Sequence[ServoSpec], pulses: PulseScale | None) -> None:
+        self.field, self._step = field, 10.0**-decimals
+        self._pulses = pulses if field == "us" else None
         self._offset, self._slope = (
             np.array(column) for column in zip(*(_line(field, s) for s in servos), strict=True)
         )
@@ -38,16 +39,16 @@ class ValueScale:
 
     def radians(self, values: Floats) -> Floats:
         """(n,) rad for values (n,)."""
-        return self._pulses.radians(values) if self.field == "us" else (values - self._offset) / self._slope
+        return self._pulses.radians(values) if self._pulses else (values - self._offset) / self._slope
 
     def radian(self, index: int, value: float) -> float:
         """The angle (rad) of one servo for a value."""
-        if self.field == "us":
+        if self._pulses:
             return self._pulses.radian(index, value)
         return float((value - self._offset[index]) / self._slope[index])
 
     def _plain(self, angle_rad: Floats) -> Floats:
-        return self._pulses.pulses(angle_rad) if self.field == "us" else self._offset + self._slope * angle_rad
+        return self._pulses.pulses(angle_rad) if self._pulses else self._offset + self._slope * angle_rad
 
 
 def _line(field: str, servo: ServoSpec) -> tuple[float, float]:
@@ -60,5 +61,5 @@ def _line(field: str, servo: ServoSpec) -> tuple[float, float]:
     middle, slope = math.degrees(servo.zero_rad), math.degrees(-1.0 if servo.reverse else 1.0)
     if field == "angle":
         middle -= math.degrees(hobby_model(servo.model).rad[0])
-    factor = 10.0 if field == "deg10" else 1.0
+    factor = {"deg10": 10.0, "parameter": 1.0 / 90.0}.get(field, 1.0)
     return factor * middle, factor * slope

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from drivers import open_bus
@@ -49,3 +51,10 @@ class TestTextBus(BoardContract):
     def bus(self) -> Bus:
         texts = {"template": "S{ch},{us}\n", "off": "D{ch}\n"}
         return open_bus("simulated", self.SERVOS, simulates="text", process=False, **texts, **QUICK)
+
+
+class TestLineOutBus(BoardContract):
+    KIND = "omote"
+    TORQUE = False
+    SERVOS = tuple(replace(servo, model="parameter") for servo in SERVOS)
+    MODELS = ("parameter",) * 3
