@@ -52,7 +52,7 @@ def programs(ctx: moderngl.Context, quality: str) -> dict[str, moderngl.Program]
     """Every program of a quality, by name."""
     flat = ("flat.frag",)
     made = {
-        "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), LID_POINTS=LID_POINTS),
+        "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
         "inner": build(ctx, ("light.glsl", "inner.vert"), flat),
         "hair": build(ctx, ("light.glsl", "hair.vert"), ("hair.frag",)),
         "background": build(ctx, ("background.vert",), ("background.frag",)),

@@ -53,8 +53,9 @@ class Offscreen:
     head : anything with the parts of `surface.view.parts.ViewHead`.
     size : (width, height), pixels.
     samples : per pixel; None = 4 for quality "full" and 1 with smoothed edges for "fast". Once :meth:`draw` is
-        used, the picture counts as live, and "full" too falls back to 1 where 4 cannot be kept up.
-    quality, theme : see :class:`surface.view.renderer.Renderer`.
+        used, the picture counts as live, and "full" too falls back to 1 where 4 cannot be kept up; "fast" on a
+        software renderer is then drawn at a share of its size (:data:`surface.view.pace.SCALE`) and enlarged.
+    quality, theme, evaluator : see :class:`surface.view.renderer.Renderer`.
 
     Raises
     ------
@@ -68,6 +69,7 @@ class Offscreen:
         samples: int | None = None,
         quality: str = "full",
         theme: str | Theme = "skin",
+        evaluator: str = "auto",
     ) -> None:
         self.head, self._closed = head, False
         self.ctx = open_context()
@@ -75,16 +77,17 @@ class Offscreen:
         if not all(1 <= length <= limit for length in size):
             self.ctx.release()
             raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
-        self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme)
+        self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme, evaluator=evaluator)
         self._pace = Pace(quality, samples, software=is_software(self.ctx))
-        self._wanted = self._pace.samples
-        self.target = Target(self.ctx, size, self._wanted)
+        self._wanted = self._pace.wanted
+        self.target = Target(self.ctx, size, *self._wanted)
 
     def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
         """Pose the head with `values` (P,) and draw it, without reading the picture back.
 
         The frame before is waited for after the pose, so on a software renderer posing runs beside the
-        filling of the last frame and never more than one frame is under way.
+        filling of the last frame and never more than one frame is under way. :meth:`read` and :meth:`finish`
+        wait for this one.
         """
         self._pace.begin_live()
         self._frame(values, camera)
@@ -96,9 +99,10 @@ class Offscreen:
 
     def _frame(self, values: np.ndarray, camera: Camera | None) -> None:
         """Pose and draw."""
-        self.head.pose(values)
+        self.renderer.pose(values)
         started = time.perf_counter()
         self.ctx.__enter__()  # another context may have been current since
+        self.target.complete()
         self.ctx.finish()
         self._fit_target()
         self.renderer.update()
@@ -108,11 +112,11 @@ class Offscreen:
 
     def _fit_target(self) -> None:
         """Make the target anew when the pace asks for other samples."""
-        if self._wanted != self._pace.samples:
-            self._wanted = self._pace.samples
+        if self._wanted != self._pace.wanted:
+            self._wanted = self._pace.wanted
             size = self.target.size
             self.target.release()
-            self.target = Target(self.ctx, size, self._wanted)
+            self.target = Target(self.ctx, size, *self._wanted)
 
     def read(self) -> np.ndarray:
         """The picture last drawn, (height, width, 3) uint8, top row first."""
@@ -122,6 +126,7 @@ class Offscreen:
     def finish(self) -> None:
         """Wait until the last frame is drawn."""
         self.ctx.__enter__()
+        self.target.complete()
         self.ctx.finish()
 
     def close(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,21 +52,36 @@ class EyeFrame:
     lids: Aperture | None
 
 
+Read = Callable[[ViewPart, np.ndarray], np.ndarray]
+
+
+def from_vertices(part: ViewPart, ids: np.ndarray) -> np.ndarray:
+    """Positions (k, 3) of vertices `ids` (k,) as the part holds them."""
+    return part.vertices[ids]
+
+
 class Openings:
     """Lids, lips and eyeballs of a head at rest; reads them again each frame.
 
     Parameters
     ----------
     parts : the head's parts, at rest.
+    read : gives the positions (k, 3) of vertices (k,) of a part as posed now.
     """
 
-    def __init__(self, parts: Sequence[ViewPart]) -> None:
+    def __init__(self, parts: Sequence[ViewPart], read: Read = from_vertices) -> None:
+        self._read = read
         self._skin = max((p for p in parts if p.material == "skin"), key=lambda p: len(p.vertices), default=None)
         loops = boundary_loops(self._skin.triangles) if self._skin is not None else []
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
         area = np.array(_FALLBACK_AREA) if self._lips is None else self._edge_area()
         self._shut_area, self._outward = _SHUT * float(np.linalg.norm(area)), 1.0 if area[2] > 0 else -1.0
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read the mouth anew, once after each pose: five materials ask for it."""
+        self._mouth = self._read_mouth()
 
     def _eye(self, part: ViewPart, loops: list[np.ndarray]) -> EyeFrame:
         """Frame and lids of one eyeball."""
@@ -109,17 +124,19 @@ class Openings:
     def eye(self, part: ViewPart) -> dict[str, object]:
         """Uniforms of an eye now: its rotation and its lid margins."""
         frame = self._eyes[part.name]
-        columns = (frame.solve @ part.vertices[frame.ids])[:3].T
+        columns = (frame.solve @ self._read(part, frame.ids))[:3].T
         rotation = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
         if frame.lids is None or self._skin is None:
             none = np.zeros((LID_POINTS, 3), np.float32)
             return {"eye_rotation": rotation, "lid_upper": none, "lid_lower": none, "lids": 0.0}
-        skin = self._skin.vertices
-        upper, lower = skin[frame.lids.upper], skin[frame.lids.lower]
+        upper, lower = self._read(self._skin, frame.lids.upper), self._read(self._skin, frame.lids.lower)
         return {"eye_rotation": rotation, "lid_upper": upper, "lid_lower": lower, "lids": 1.0}
 
     def mouth(self) -> dict[str, object]:
         """Uniforms of the opening between the lips now: centre and vector area, mm and mm^2."""
+        return self._mouth
+
+    def _read_mouth(self) -> dict[str, object]:
         if self._lips is None or self._skin is None:
             return {
                 "opening_centre": (0.0, -35.0, 110.0),
@@ -128,8 +145,8 @@ class Openings:
             }
         area = self._edge_area() * self._outward
         size = max(float(np.linalg.norm(area)), 1e-6)
-        centre = self._skin.vertices[self._lips.loop].mean(axis=0) + area * (_LIP_DEPTH / size)
-        corners = self._skin.vertices[self._lips.upper[[0, -1]]]
+        centre = self._read(self._skin, self._lips.loop).mean(axis=0) + area * (_LIP_DEPTH / size)
+        corners = self._read(self._skin, self._lips.upper)[[0, -1]]
         return {
             "opening_centre": centre,
             "opening_area": area * (max(size - self._shut_area, 20.0) / size),
@@ -140,7 +157,7 @@ class Openings:
         """Vector area (3,) inside the edge of the lips now, mm^2."""
         if self._skin is None or self._lips is None:
             return np.zeros(3)
-        return vector_area(self._skin.vertices[self._lips.loop])
+        return vector_area(self._read(self._skin, self._lips.loop))
 
 
 def fit_sphere(points: np.ndarray) -> tuple[np.ndarray, float]:

@@ -9,6 +9,8 @@ if TYPE_CHECKING:
 
 #: Samples per pixel of each quality where nothing is in a hurry.
 SAMPLES = {"full": 4, "fast": 1}
+#: A live picture of quality "fast" is drawn at this share of its size where the processor draws it.
+SCALE = 0.6
 #: A live frame may take this long to draw before its samples are given up, seconds.
 BUDGET_S = 0.020
 _FRAMES = 15
@@ -31,14 +33,20 @@ class Pace:
     def __init__(self, quality: str, wanted: int | None = None, *, software: bool = False) -> None:
         self._free = wanted is None
         self._software = software
-        self.samples = SAMPLES[quality] if wanted is None else wanted
+        self._quality = quality
+        self.samples, self.scale = SAMPLES[quality] if wanted is None else wanted, 1.0
         self.live = False
         self._frames, self._seconds = 0, 0.0
+
+    @property
+    def wanted(self) -> tuple[int, float]:
+        """Samples per pixel, and the share of the picture's size to draw at."""
+        return self.samples, self.scale
 
     def begin_live(self) -> None:
         """From now on frames are in a hurry."""
         if not self.live and self._free and self._software:
-            self.samples = 1
+            self.samples, self.scale = 1, SCALE if self._quality == "fast" else 1.0
         self.live = True
 
     def note(self, seconds: float) -> None:

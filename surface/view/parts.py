@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -58,6 +58,7 @@ class PartBuffers:
     part : the head part.
     program : its material's program, with inputs `position`, `normal` and any of `static`.
     static : per-vertex data that never changes, by shader input name: (m, k) float32, or uint8 read as 0..1.
+    interleaved : positions and normals lie in one buffer, `moving`, which somebody else fills.
     """
 
     def __init__(
@@ -66,24 +67,32 @@ class PartBuffers:
         part: ViewPart,
         program: moderngl.Program,
         static: Mapping[str, np.ndarray],
+        *,
+        interleaved: bool = False,
     ) -> None:
         self.part = part
         count = len(part.vertices)
-        self._position = ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True)
-        self._normal = ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True)
         self._index = ctx.buffer(np.ascontiguousarray(part.triangles, np.int32).tobytes())
         self._static: list[moderngl.Buffer] = []
-        content: list[tuple[moderngl.Buffer, str, str]] = [
-            (self._position, "3f", "position"),
-            (self._normal, "3f", "normal"),
-        ]
+        content: list[tuple[Any, ...]] = []
         for name, data in static.items():
             kind = "f1" if data.dtype == np.uint8 else "f"
             self._static.append(ctx.buffer(np.ascontiguousarray(data).tobytes()))
             content.append((self._static[-1], f"{data.shape[1]}{kind}", name))
+        if interleaved:
+            self.moving = ctx.buffer(reserve=2 * count * _VERTEX_BYTES, dynamic=True)
+            normal = ("3f 3f", "position", "normal") if "normal" in program else ("3f 12x", "position")
+            content.append((self.moving, *normal))
+            self._static.append(self.moving)
+        else:
+            self._position = ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True)
+            self._normal = ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True)
+            self._static += [self._position, self._normal]
+            content += [(self._position, "3f", "position"), (self._normal, "3f", "normal")]
         kept = [entry for entry in content if entry[2] in program]
         self._array = ctx.vertex_array(program, kept, index_buffer=self._index, index_element_size=4)
-        self.upload([(0, count)])
+        if not interleaved:
+            self.upload([(0, count)])
 
     def upload(self, ranges: Sequence[tuple[int, int]]) -> int:
         """Send the vertex ranges [start, stop) that changed; returns how many vertices were sent."""
@@ -105,7 +114,7 @@ class PartBuffers:
     def release(self) -> None:
         """Give the buffers back."""
         self._array.release()
-        for buffer in (self._position, self._normal, self._index, *self._static):
+        for buffer in (self._index, *self._static):
             buffer.release()
 
 

@@ -30,9 +30,20 @@ def assemble(names: tuple[str, ...], defines: Mapping[str, int]) -> str:
 
 
 def build(
-    ctx: moderngl.Context, vertex: tuple[str, ...], fragment: tuple[str, ...], **defines: int
+    ctx: moderngl.Context,
+    vertex: tuple[str, ...],
+    fragment: tuple[str, ...],
+    *,
+    outputs: tuple[str, ...] = (),
+    defines: Mapping[str, int] | None = None,
 ) -> moderngl.Program:
     """Compile and link the named files.
+
+    Parameters
+    ----------
+    vertex, fragment : shader files, in order; no fragment files for a program that only fills a buffer.
+    outputs : what such a program writes, one after the other.
+    defines : macros set before the files.
 
     Raises
     ------
@@ -40,8 +51,13 @@ def build(
     """
     import moderngl
 
+    texts: dict[str, Any] = {"vertex_shader": assemble(vertex, defines or {})}
+    if fragment:
+        texts["fragment_shader"] = assemble(fragment, defines or {})
+    if outputs:
+        texts["varyings"] = outputs
     try:
-        program = ctx.program(vertex_shader=assemble(vertex, defines), fragment_shader=assemble(fragment, defines))
+        program = ctx.program(**texts)
     except moderngl.Error as error:
         raise ViewError(
             f"the graphics driver refused the shader {'+'.join(vertex)} / {'+'.join(fragment)}: {error}",

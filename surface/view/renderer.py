@@ -13,7 +13,9 @@ import numpy as np
 
 from surface.errors import ViewError
 from surface.view import materials
+from surface.view.bounds import box_corners
 from surface.view.camera import Camera
+from surface.view.evaluator import choose
 from surface.view.openings import Openings
 from surface.view.parts import PartBuffers, ViewHead
 from surface.view.programs import put
@@ -39,22 +41,31 @@ class Renderer:
     head : anything with the parts of `surface.view.parts.ViewHead`.
     quality : "full" shades skin and mouth per pixel, "fast" per vertex.
     theme : name in `surface.view.theme.THEMES`, or a :class:`Theme`.
+    evaluator : who works out the vertices: "cpu", "gpu", or "auto" (see :func:`surface.view.evaluator.choose`).
 
     Raises
     ------
-    ValueError : unknown quality or theme.
-    ViewError : the driver refuses a shader.
+    ValueError : unknown quality or evaluator.
+    ViewError : unknown theme, the driver refuses a shader, or evaluator "gpu" cannot be had.
     """
 
     def __init__(
-        self, ctx: moderngl.Context, head: ViewHead, *, quality: str = "full", theme: str | Theme = "skin"
+        self,
+        ctx: moderngl.Context,
+        head: ViewHead,
+        *,
+        quality: str = "full",
+        theme: str | Theme = "skin",
+        evaluator: str = "auto",
     ) -> None:
         if quality not in QUALITIES:
             raise ValueError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}")
         self.ctx, self.head, self.quality = ctx, head, quality
         self.theme = theme_named(theme)
         head.pose(np.zeros(len(head.parameters)))
-        self.openings = Openings(head.parts)
+        self.evaluator = choose(ctx, head, evaluator)
+        self.evaluator.pose(np.zeros(len(head.parameters)))
+        self.openings = Openings(head.parts, self.evaluator.positions)
         self._programs = materials.programs(ctx, quality)
         self._detail = materials.detail_texture(ctx)
         self._background = ctx.vertex_array(self._programs["background"], [])
@@ -69,11 +80,17 @@ class Renderer:
         """Buffers of `part` with what its material reads."""
         material = materials.of(part.material)
         static = material.static(part, self.theme, self.openings)
-        return PartBuffers(self.ctx, part, self._programs[material.program], static)
+        elsewhere = self.evaluator.name == "gpu"
+        return PartBuffers(self.ctx, part, self._programs[material.program], static, interleaved=elsewhere)
+
+    def pose(self, values: np.ndarray) -> None:
+        """Move the head to parameter values (P,)."""
+        self.evaluator.pose(values)
 
     def update(self) -> int:
-        """Upload what the last `head.pose` changed; call once after every pose. Returns vertices sent."""
-        sent = sum(buffers.upload(buffers.part.changed) for buffers in self._parts)
+        """Bring the buffers up to date with the last :meth:`pose`, once after each. Returns vertices changed."""
+        self.openings.refresh()
+        sent = self.evaluator.update(self._parts)
         self.revision += sent > 0
         return sent
 
@@ -98,7 +115,10 @@ class Renderer:
 
     def region(self, camera: Camera, size: tuple[int, int]) -> Region:
         """The rectangle of a picture of `size` that the head can touch, as posed now."""
-        corners = np.concatenate([box_corners(buffers.part.vertices) for buffers in self._parts])
+        boxes = [self.evaluator.box(buffers.part) for buffers in self._parts]
+        if any(box is None for box in boxes):
+            return 0, 0, *size
+        corners = np.concatenate([box_corners(box) for box in boxes if box is not None])
         clip = np.column_stack([corners, np.ones(len(corners))]) @ camera.matrix(size[0] / size[1]).T
         if clip[:, 3].min() < camera.near:
             return 0, 0, *size
@@ -156,6 +176,7 @@ class Renderer:
         """Give back every buffer and program."""
         for buffers in self._parts:
             buffers.release()
+        self.evaluator.release()
         self._background.release()
         self._detail.release()
         for program in self._programs.values():
@@ -175,12 +196,3 @@ def light_direction(light: Light, turn_deg: float) -> np.ndarray:
     """Unit vector (3,) towards `light`, turned about y by `turn_deg`."""
     yaw, pitch = np.radians(light.yaw_deg + turn_deg), np.radians(light.pitch_deg)
     return np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)], np.float32)
-
-
-def box_corners(points: np.ndarray) -> np.ndarray:
-    """Corners (8, 3) of the axis-parallel box round `points` (m, 3)."""
-    # Column by column: numpy's minimum along a short last axis is twenty times slower.
-    low = np.array([points[:, axis].min() for axis in range(3)])
-    high = np.array([points[:, axis].max() for axis in range(3)])
-    pick = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], bool)
-    return np.where(pick, high, low)

@@ -23,82 +23,146 @@ class Target:
     rectangle around the head, where it is and where it was, is drawn again: on a software renderer
     pixels are what costs.
 
+    :meth:`paint` begins a picture, :meth:`complete` ends it. Between the two a software renderer fills its
+    pixels on other threads, so whoever has something else to do does it there.
+
     Parameters
     ----------
     size : (width, height), pixels.
     samples : per pixel; capped at what the driver offers.
+    scale : the head is drawn at this share of the size, up to 1, and enlarged; 1 where `samples` > 1.
     """
 
-    def __init__(self, ctx: moderngl.Context, size: tuple[int, int], samples: int = 4) -> None:
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int], samples: int = 4, scale: float = 1.0) -> None:
         self._ctx, self.size = ctx, size
         samples = min(samples, ctx.max_samples)
         self.samples = samples if samples > 1 else 1
+        self.scale = scale if self.samples == 1 else 1.0
+        inner = max(1, round(size[0] * self.scale)), max(1, round(size[1] * self.scale))
         self._texture = ctx.texture(size, 4)
         self.picture = ctx.framebuffer([self._texture])
-        many = self.samples if self.samples > 1 else 0
-        self._raw = None if many else _raw_texture(ctx, size)
-        self._colour = ctx.renderbuffer(size, 4, samples=many) if self._raw is None else self._raw
-        self._depth = ctx.depth_renderbuffer(size, samples=many)
-        self._drawn = ctx.framebuffer([self._colour], self._depth)
-        self._smooth = None if many else build(ctx, ("background.vert",), ("smooth.frag",))
-        self._smoother = None if self._smooth is None else ctx.vertex_array(self._smooth, [])
+        self._raw = _texture(ctx, inner, ctx.NEAREST) if self.samples == 1 else None
+        self._drawn = _drawn(ctx, inner, self.samples, self._raw)
+        self._kick = ctx.framebuffer([ctx.renderbuffer((1, 1), 4)])
+        self._smooth = None if self.samples > 1 else Pass(ctx, "smooth.frag", inner)
+        self._enlarge = Pass(ctx, "enlarge.frag", size) if inner != size else None
+        self._small = _texture(ctx, inner, ctx.LINEAR) if self._enlarge else None
+        self._small_frame = ctx.framebuffer([self._small]) if self._small else None
         self._last: Region | None = None
+        self._pending: Region | None = None
         self._backdrop: tuple[object, object] | None = None
         self._shown: tuple[Renderer, int, Theme, Camera] | None = None
 
     def paint(self, renderer: Renderer, camera: Camera) -> None:
-        """Draw the renderer's head as it was last uploaded; `picture` then holds it.
+        """Begin to draw the renderer's head as it was last uploaded; :meth:`complete` ends it.
 
         A picture that would come out as it is already is left alone: a face at rest costs nothing.
         """
         shown = (renderer, renderer.revision, renderer.theme, camera)
         if shown == self._shown:
             return
+        self.complete()
         self._shown = shown
-        whole = (0, 0, *self.size)
-        region = renderer.region(camera, self.size)
-        theme = renderer.theme
-        backdrop = (theme.background_top, theme.background_bottom)
-        dirty = whole if self._last is None or backdrop != self._backdrop else union(region, self._last)
+        inner = self._drawn.size
+        region = renderer.region(camera, inner)
+        backdrop = (renderer.theme.background_top, renderer.theme.background_bottom)
+        whole = self._last is None or backdrop != self._backdrop
+        dirty = (0, 0, *inner) if whole else union(region, self._last or region)
         self._last, self._backdrop = region, backdrop
         if dirty[2] <= 0 or dirty[3] <= 0:
             return
         renderer.draw(camera, self._drawn, dirty)
-        self._bring_together(dirty)
+        self._pending = dirty
+        self._kick.clear()  # drawing elsewhere sets a software renderer's threads to work on what was drawn
 
-    def _bring_together(self, region: Region) -> None:
-        """Samples or raw pixels of `region` to the picture."""
-        self.picture.scissor = region
-        if self._raw is None or self._smooth is None or self._smoother is None:
-            self._ctx.copy_framebuffer(self.picture, self._drawn)
+    def complete(self) -> None:
+        """Bring the samples or raw pixels last painted to `picture`, waiting for them."""
+        region, self._pending = self._pending, None
+        if region is None:
             return
-        self.picture.use()
-        self._ctx.enable_only(self._ctx.NOTHING)
-        self._raw.use(1)
-        put(self._smooth, {"picture": 1, "pixel": (1.0 / self.size[0], 1.0 / self.size[1])})
-        self._smoother.render(vertices=3)
+        if self._smooth is None or self._raw is None:
+            self.picture.scissor = region
+            self._ctx.copy_framebuffer(self.picture, self._drawn)
+        elif self._enlarge is None or self._small_frame is None or self._small is None:
+            self._smooth.render(self._raw, self.picture, region)
+        else:
+            self._smooth.render(self._raw, self._small_frame, region)
+            self._enlarge.render(self._small, self.picture, enlarged(region, self._drawn.size, self.size))
 
     def read(self) -> np.ndarray:
         """The picture, (height, width, 3) uint8, top row first."""
+        self.complete()
         width, height = self.size
         raw = self.picture.read(components=3, alignment=1)
         return np.flipud(np.frombuffer(raw, np.uint8).reshape(height, width, 3)).copy()
 
     def release(self) -> None:
         """Give the buffers back."""
-        if self._smooth is not None and self._smoother is not None:
-            self._smoother.release()
-            self._smooth.release()
-        for thing in (self._drawn, self.picture, self._colour, self._depth, self._texture):
-            thing.release()
+        for step in (self._smooth, self._enlarge):
+            if step is not None:
+                step.release()
+        for frame in (self._drawn, self.picture, self._kick, self._small_frame):
+            if frame is not None:
+                for attachment in (*frame.color_attachments, frame.depth_attachment):
+                    if attachment is not None:
+                        attachment.release()
+                frame.release()
 
 
-def _raw_texture(ctx: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
-    """A texture read pixel by pixel, its edge pixels standing for what lies outside."""
+class Pass:
+    """One fragment shader over a rectangle of a picture.
+
+    Parameters
+    ----------
+    shader : its file; reads the sampler `picture` and the uniform `pixel`.
+    size : (width, height) of what is read, in the units `pixel` is one of.
+    """
+
+    def __init__(self, ctx: moderngl.Context, shader: str, size: tuple[int, int]) -> None:
+        self._ctx = ctx
+        self._program = build(ctx, ("background.vert",), (shader,))
+        self._array = ctx.vertex_array(self._program, [])
+        put(self._program, {"picture": 1, "pixel": (1.0 / size[0], 1.0 / size[1])})
+
+    def render(self, source: moderngl.Texture, target: moderngl.Framebuffer, region: Region) -> None:
+        """Fill `region` of `target`."""
+        target.scissor = region
+        target.use()
+        self._ctx.enable_only(self._ctx.NOTHING)
+        source.use(1)
+        self._array.render(vertices=3)
+
+    def release(self) -> None:
+        """Give the program back."""
+        self._array.release()
+        self._program.release()
+
+
+def _drawn(
+    ctx: moderngl.Context, size: tuple[int, int], samples: int, raw: moderngl.Texture | None
+) -> moderngl.Framebuffer:
+    """What the head is drawn into: the texture `raw`, which is smoothed later, or many samples."""
+    many = 0 if raw is not None else samples
+    colour = raw if raw is not None else ctx.renderbuffer(size, 4, samples=many)
+    return ctx.framebuffer([colour], ctx.depth_renderbuffer(size, samples=many))
+
+
+def _texture(ctx: moderngl.Context, size: tuple[int, int], kind: int) -> moderngl.Texture:
+    """A texture read with filter `kind`, its edge pixels standing for what lies outside."""
     texture = ctx.texture(size, 4)
-    texture.filter = (ctx.NEAREST, ctx.NEAREST)
+    texture.filter = (kind, kind)
     texture.repeat_x = texture.repeat_y = False
     return texture
+
+
+def enlarged(region: Region, inner: tuple[int, int], size: tuple[int, int]) -> Region:
+    """`region` of a picture of size `inner` in a picture of `size`, with the pixels its edge reaches."""
+    x, y, width, height = region
+    scale = size[0] / inner[0], size[1] / inner[1]
+    left, bottom = max(0, int((x - 1) * scale[0])), max(0, int((y - 1) * scale[1]))
+    right = min(size[0], int((x + width + 1) * scale[0]) + 1)
+    top = min(size[1], int((y + height + 1) * scale[1]) + 1)
+    return left, bottom, right - left, top - bottom
 
 
 def union(a: Region, b: Region) -> Region:

@@ -142,7 +142,7 @@ class _Window:
         self._ctx: moderngl.Context | None = None
         self._renderer: Renderer | None = None
         self._target: Target | None = None
-        self._made_for = (0, 0, 0)
+        self._made_for: tuple[object, ...] = ()
         self._pace = Pace(quality)
 
     def guarded(self, action: Callable[[], None]) -> Callable[[], None]:
@@ -195,6 +195,7 @@ class _Window:
         target = self._fitting(self._ctx, size)
         self._renderer.update()
         target.paint(self._renderer, self.viewpoint.camera)
+        target.complete()
         target.picture.scissor = (0, 0, *size)
         screen.viewport = screen.scissor = (0, 0, *size)
         self._ctx.copy_framebuffer(screen, target.picture)
@@ -219,11 +220,11 @@ class _Window:
 
     def _fitting(self, ctx: moderngl.Context, size: tuple[int, int]) -> Target:
         """The target, made anew when the window changed its size or the pace its samples."""
-        wanted = (*size, self._pace.samples)
+        wanted = (*size, *self._pace.wanted)
         if self._target is None or self._made_for != wanted:
             if self._target is not None:
                 self._target.release()
-            self._target, self._made_for = Target(ctx, size, self._pace.samples), wanted
+            self._target, self._made_for = Target(ctx, size, *self._pace.wanted), wanted
         return self._target
 
     def _count(self) -> None:

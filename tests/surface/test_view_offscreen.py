@@ -12,6 +12,7 @@ import pytest
 from ball_head import BallHead, values
 
 from surface.errors import ViewError
+from surface.head import Head
 from surface.view import Camera, Offscreen
 from surface.view.offscreen import NO_OPENGL_HINT, open_context
 
@@ -20,12 +21,20 @@ import sys
 sys.path[:0] = [{root!r}, {here!r}]
 import numpy as np
 from ball_head import BallHead, values
+from surface.head import Head
 from surface.view import Offscreen
 for quality in ("full", "fast"):
     with Offscreen(BallHead(), (160, 120), quality=quality) as screen:
         assert screen.ctx.version_code == 310, screen.ctx.version_code
         np.save({out!r} + quality, screen.render(values(jawOpen=0.6)))
+        screen.draw(values(jawOpen=0.3))
+        screen.finish()
         assert screen.ctx.error == "GL_NO_ERROR", screen.ctx.error
+head = Head.load(sys.path[0] + "/configs/heads/ict")
+with Offscreen(head, (160, 120), evaluator="gpu") as screen:
+    assert screen.ctx.version_code == 310, screen.ctx.version_code
+    np.save({out!r} + "gpu", screen.render(np.full(len(head.parameters), 0.2)))
+    assert screen.ctx.error == "GL_NO_ERROR", screen.ctx.error
 """
 
 
@@ -40,6 +49,11 @@ def test_draws_on_opengl_31(gl: None, root: Path, tmp_path: Path) -> None:
         with Offscreen(BallHead(), (160, 120), quality=quality) as screen:
             here = screen.render(values(jawOpen=0.6)).astype(float)
         assert np.abs(np.load(tmp_path / f"{quality}.npy") - here).mean() < 1.0
+    head = Head.load(root / "configs" / "heads" / "ict")
+    with Offscreen(head, (160, 120), evaluator="cpu") as screen:
+        here = screen.render(np.full(len(head.parameters), 0.2)).astype(float)
+    assert here.std() > 20
+    assert np.abs(np.load(tmp_path / "gpu.npy") - here).mean() < 1.0
 
 
 def test_no_driver_complaint(gl: None) -> None:

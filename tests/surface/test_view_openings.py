@@ -52,6 +52,7 @@ def test_the_mouth_opens_monotonously(head: BallHead) -> None:
     areas = []
     for amount in (0.0, 0.3, 0.7, 1.0):
         head.pose(values(jawOpen=amount))
+        openings.refresh()
         mouth = openings.mouth()
         areas.append(np.linalg.norm(mouth["opening_area"]))
         assert abs(mouth["opening_centre"][0]) < 3
@@ -105,6 +106,7 @@ def test_the_shipped_heads_mouth_lets_in_more_light_when_open(shipped: Head) -> 
     areas = []
     for amount in (0.0, 0.25, 0.5, 1.0):
         posed(shipped, jawOpen=amount)
+        openings.refresh()
         areas.append(np.linalg.norm(openings.mouth()["opening_area"]))
     assert (np.diff(areas) > 60).all()
 

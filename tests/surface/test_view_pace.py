@@ -7,7 +7,7 @@ from ball_head import BallHead, values
 
 from surface.view import Offscreen
 from surface.view.offscreen import open_context
-from surface.view.pace import BUDGET_S, Pace, is_software
+from surface.view.pace import BUDGET_S, SCALE, Pace, is_software
 
 SLOW, QUICK = 2 * BUDGET_S, 0.5 * BUDGET_S
 
@@ -27,6 +27,14 @@ def test_stills_take_all_samples() -> None:
 def test_live_pictures_begin_with_one_sample_in_software() -> None:
     assert run(Pace("full", software=True), 0.0, 0) == 1
     assert run(Pace("full"), 0.0, 0) == 4
+
+
+def test_a_live_fast_picture_is_drawn_smaller_in_software() -> None:
+    for quality, software, scale in (("fast", True, SCALE), ("fast", False, 1.0), ("full", True, 1.0)):
+        pace = Pace(quality, software=software)
+        assert pace.wanted[1] == 1.0
+        pace.begin_live()
+        assert pace.wanted == (pace.samples, scale)
 
 
 @pytest.mark.parametrize(("seconds", "samples"), [(SLOW, 1), (QUICK, 4)])

@@ -12,7 +12,7 @@ from ball_head import BallHead, values
 from surface.errors import ViewError
 from surface.head import Head
 from surface.view import Camera, Offscreen, Theme
-from surface.view.renderer import box_corners, light_direction, theme_named
+from surface.view.renderer import light_direction, theme_named
 from surface.view.theme import THEMES, Light
 
 SIZE = (200, 160)
@@ -96,7 +96,7 @@ def test_region_holds_everything_that_differs_from_the_background(screen: Offscr
     picture = screen.render(values(headYaw=0.3), camera).astype(int)
     x, y, width, height = screen.renderer.region(camera, SIZE)
     screen.renderer.draw(camera.aimed((5000.0, 0.0, 0.0)), screen.target._drawn)
-    screen.target._bring_together((0, 0, *SIZE))
+    screen.target._pending = (0, 0, *SIZE)
     differs = np.flipud(np.abs(picture - screen.read()).max(axis=2) > 2)
     inside = np.zeros_like(differs)
     inside[y : y + height, x : x + width] = True
@@ -145,13 +145,6 @@ def test_lights_come_from_where_the_theme_says(name: str) -> None:
     assert np.linalg.norm(key) == pytest.approx(1.0, abs=1e-6)
     assert key[0] < 0 < key[1]
     assert light_direction(Light(0, 0, (1, 1, 1)), 90.0) == pytest.approx([1, 0, 0], abs=1e-6)
-
-
-def test_box_corners() -> None:
-    corners = box_corners(np.array([[1.0, 2.0, 3.0], [0.0, 5.0, -1.0]]))
-    assert len(np.unique(corners, axis=0)) == 8
-    assert corners.min(axis=0) == pytest.approx([0, 2, -1])
-    assert corners.max(axis=0) == pytest.approx([1, 5, 3])
 
 
 @pytest.mark.parametrize("quality", ["full", "fast"])

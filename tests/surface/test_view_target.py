@@ -7,7 +7,9 @@ import pytest
 from ball_head import BallHead, values
 
 from surface.view import Camera, Offscreen
-from surface.view.target import union
+from surface.view.offscreen import open_context
+from surface.view.renderer import Renderer
+from surface.view.target import Target, enlarged, union
 
 
 @pytest.mark.parametrize("samples", [1, 4])
@@ -80,3 +82,49 @@ def _touch_nothing(screen: Offscreen) -> None:
     """What a head does when the values are those it has."""
     for part in screen.head.parts:
         part.changed = []
+
+
+def test_a_picture_drawn_smaller_looks_the_same_but_softer(gl: None) -> None:
+    ctx = open_context()
+    renderer = Renderer(ctx, BallHead(), quality="fast")
+    renderer.update()
+    pictures = []
+    for scale in (1.0, 0.6):
+        target = Target(ctx, (300, 260), 1, scale)
+        target.paint(renderer, Camera.front())
+        pictures.append(target.read().astype(int))
+        target.release()
+    assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 0).any()
+    assert np.abs(pictures[0] - pictures[1]).mean() < 2.0
+    renderer.release()
+    ctx.release()
+
+
+def test_a_smaller_picture_leaves_no_trace_when_the_head_moves(gl: None) -> None:
+    ctx = open_context()
+    renderer = Renderer(ctx, BallHead(), quality="fast")
+    moving, fresh = Target(ctx, (200, 170), 1, 0.6), Target(ctx, (200, 170), 1, 0.6)
+    for yaw, camera in ((0.0, Camera.front().zoom(0.7)), (1.0, Camera.profile()), (0.4, Camera.front().zoom(0.5))):
+        renderer.pose(values(headYaw=yaw))
+        renderer.update()
+        moving.paint(renderer, camera)
+    fresh.paint(renderer, camera)
+    assert np.abs(moving.read().astype(int) - fresh.read()).max() <= 1
+    ctx.release()
+
+
+def test_a_picture_is_complete_when_it_is_read(gl: None) -> None:
+    with Offscreen(BallHead(), (90, 80), samples=1) as screen:
+        screen.draw(values(jawOpen=0.0))
+        screen.draw(values(jawOpen=1.0))
+        late = screen.read()
+        assert (screen.render(values(jawOpen=1.0)) == late).all()
+        assert (screen.render(values(jawOpen=0.0)) != late).any()
+
+
+def test_enlarged_rectangles_hold_what_their_edge_reaches() -> None:
+    assert enlarged((0, 0, 60, 60), (60, 60), (100, 100)) == (0, 0, 100, 100)
+    x, y, width, height = enlarged((10, 20, 5, 6), (60, 60), (100, 100))
+    assert (x <= 9 / 0.6, y <= 19 / 0.6) == (True, True)
+    assert (x + width >= 16 / 0.6, y + height >= 27 / 0.6) == (True, True)
+    assert max(width, height) < 18
