@@ -156,7 +156,7 @@ def recipe_plan(mesh: FitMesh, recipe: Recipe) -> Plan:
             tiled = len(own) > 1 or not _unit_square(own[0])
             parts.append((replace(part, tiled=tiled), own))
     hinge = np.array(recipe.hinge or (0.0, 0.0, 0.0))
-    return Plan(parts, _eyes(mesh, recipe), hinge, np.arange(*recipe.jaw_teeth))
+    return Plan(parts, eyes_of(mesh, recipe), hinge, np.arange(*recipe.jaw_teeth))
 
 
 def _unit_square(island: Island) -> bool:
@@ -187,7 +187,7 @@ def _with_mesh(part: PartData, head: HeadData) -> PartData:
     return replace(part, mesh=pack(tessellate(part, surface), part.budget))
 
 
-def _eyes(mesh: FitMesh, recipe: Recipe) -> tuple[Floats, float]:
+def eyes_of(mesh: FitMesh, recipe: Recipe) -> tuple[Floats, float]:
     """Centres (2, 3) and radius; a head without known eyes gets none (radius 0)."""
     balls = recipe.eyeballs(mesh)
     if balls is None:

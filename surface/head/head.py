@@ -49,7 +49,7 @@ class Head:
 
         Parameters
         ----------
-        identity : variations of the head to mix in, by name, each by -1 to 1.
+        identity : variations of the head to mix in, by name, each by 0 to 1.
 
         Raises
         ------

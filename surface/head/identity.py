@@ -1,0 +1,172 @@
+"""Identities: variations of a head as groups of control points, kept beside it in ``identities.npz``.
+
+A head with identities mixed in is another head at rest: parts, eyes and the jaw's hinge stand elsewhere, and all shapes
+go on from there.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.errors import HeadFileError
+from surface.head.data import Group, HeadData, PartData
+
+FILE = "identities.npz"
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """One variation, per unit.
+
+    Attributes
+    ----------
+    name : what a user calls it. groups : part name -> control points and how far they stand away, mm.
+    changes : part name -> what is added to groups of the head, so that lids of another height still close.
+    eyes : (2, 3) shift of the eyeballs' centres, jaw : (3,) of the hinge, mm.
+    """
+
+    name: str
+    groups: dict[str, Group]
+    changes: dict[str, list[Group]]
+    eyes: Floats
+    jaw: Floats
+
+
+def load_identities(head: str | Path) -> dict[str, Identity]:
+    """The identities of a head, by name; empty where it has none.
+
+    Parameters
+    ----------
+    head : the head's folder or its head.toml.
+
+    Raises
+    ------
+    HeadFileError : the file is damaged.
+    """
+    path = identities_path(head)
+    if not path.is_file():
+        return {}
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as z:
+            names = [str(n) for n in z["names"]]
+            eyes, jaw = _finite(z["eyes"], (len(names), 2, 3)), _finite(z["jaw"], (len(names), 3))
+            groups = [_groups(z, k, name) for k, name in enumerate(names)]
+            changes = [_changes(z, k) for k in range(len(names))]
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as e:
+        raise HeadFileError(f"{path}: {e}", hint="make it again: omote fit MESH --identities FILE") from e
+    return {n: Identity(n, groups[k], changes[k], eyes[k], jaw[k]) for k, n in enumerate(names)}
+
+
+def _finite(a: NDArray, shape: tuple[int, ...]) -> Floats:
+    if a.shape != shape or not np.isfinite(a).all():
+        raise ValueError(f"an array has shape {a.shape}, expected {shape}, or is not finite")
+    return a.astype(np.float64)
+
+
+def _groups(z: np.lib.npyio.NpzFile, k: int, name: str) -> dict[str, Group]:
+    out = {}
+    for key in z.files:
+        if key.startswith(f"{k}/ids/"):
+            part = key.split("/", 2)[2]
+            ids = z[key].astype(np.int32)
+            out[part] = Group(name, ids, _finite(z[f"{k}/moves/{part}"], (len(ids), 3)).astype(np.float32))
+    return out
+
+
+def _changes(z: np.lib.npyio.NpzFile, k: int) -> dict[str, list[Group]]:
+    out: dict[str, list[Group]] = {}
+    for key in z.files:
+        if key.startswith(f"{k}/change_ids/"):
+            part, shape = key.split("/", 2)[2].rsplit("/", 1)
+            ids = z[key].astype(np.int32)
+            moves = _finite(z[f"{k}/change_moves/{part}/{shape}"], (len(ids), 3)).astype(np.float32)
+            out.setdefault(part, []).append(Group(shape, ids, moves))
+    return out
+
+
+def save_identities(head: str | Path, identities: list[Identity]) -> Path:
+    """Keep identities beside a head; returns the file's path."""
+    path = identities_path(head)
+    arrays: dict[str, NDArray] = {
+        "names": np.array([i.name for i in identities]),
+        "eyes": np.array([i.eyes for i in identities]).reshape(-1, 2, 3),
+        "jaw": np.array([i.jaw for i in identities]).reshape(-1, 3),
+    }
+    for k, identity in enumerate(identities):
+        for part, group in identity.groups.items():
+            arrays |= {f"{k}/ids/{part}": group.ids, f"{k}/moves/{part}": group.moves}
+        for part, changes in identity.changes.items():
+            for g in changes:
+                arrays |= {f"{k}/change_ids/{part}/{g.name}": g.ids, f"{k}/change_moves/{part}/{g.name}": g.moves}
+    new = path.with_suffix(".npz.new")
+    with new.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    new.replace(path)
+    return path
+
+
+def identities_path(head: str | Path) -> Path:
+    """Where a head's identities are kept."""
+    folder = Path(head)
+    return (folder.parent if folder.suffix == ".toml" else folder) / FILE
+
+
+def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mapping[str, float], where: str) -> HeadData:
+    """The head with identities mixed in, each by 0 to 1.
+
+    Raises
+    ------
+    HeadFileError : no identity of that name, an amount out of range, or identities that were made for another fit.
+    """
+    eyes, jaw = head.eyes.copy(), np.array(head.jaw.centre, float)
+    parts = {p.name: p for p in head.parts}
+    for name, amount in wanted.items():
+        if name not in known:
+            there = ", ".join(known) or "none"
+            raise HeadFileError(f"{where}: no identity {name!r}; there are {there}", hint="see docs/heads.md")
+        if not (math.isfinite(amount) and 0.0 <= amount <= 1.0):
+            raise HeadFileError(f"{where}: identity {name}: {amount:g} is not between 0 and 1", hint=f"{name}=0.6")
+        identity = known[name]
+        eyes += amount * identity.eyes
+        jaw += amount * identity.jaw
+        for part, group in identity.groups.items():
+            parts[part] = _moved(_known(parts, part, group, where), group, amount)
+        for part, changes in identity.changes.items():
+            for group in changes:
+                parts[part] = _changed(_known(parts, part, group, where), group, amount)
+    moved = replace(head.jaw, centre=tuple(jaw.tolist()))
+    return replace(head, eyes=eyes, jaw=moved, parts=[parts[p.name] for p in head.parts])
+
+
+def _known(parts: Mapping[str, PartData], name: str, group: Group, where: str) -> PartData:
+    part = parts.get(name)
+    if part is None or group.ids.min(initial=0) < 0 or group.ids.max(initial=-1) >= len(part.points):
+        raise HeadFileError(f"{where}: identities.npz was made for another fit of this head",
+                            hint="make it again: omote fit MESH --identities FILE")  # fmt: skip
+    return part
+
+
+def _moved(part: PartData, group: Group, amount: float) -> PartData:
+    points = part.points.copy()
+    points[group.ids] += amount * group.moves
+    return replace(part, points=points)
+
+
+def _changed(part: PartData, change: Group, amount: float) -> PartData:
+    """The part with something added to its group of the same name."""
+    total = np.zeros((len(part.points), 3), np.float32)
+    total[change.ids] += np.float32(amount) * change.moves
+    groups = [g for g in part.groups if g.name != change.name]
+    for g in part.groups:
+        if g.name == change.name:
+            total[g.ids] += g.moves
+    ids = np.flatnonzero(np.abs(total).max(axis=1) > 0).astype(np.int32)
+    return replace(part, groups=[*groups, Group(change.name, ids, total[ids])])
