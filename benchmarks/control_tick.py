@@ -132,8 +132,8 @@ def ticks_to_output(chain: Chain) -> int:
 
 def faults(chain: Chain, ticks: range) -> dict[str, int]:
     """Kinds of broken limits at the bus over ``ticks`` of hostile input, and how often."""
-    table, before = chain.table, chain.sent.copy()
-    speed, push = np.zeros(len(before)), np.zeros(len(before))
+    table, way = chain.table, np.array([chain.sent.copy(), *(chain.tick().copy() for _ in range(3))])
+    before, speed, push = way[-1], np.diff(way, axis=0)[-1] / DT, np.diff(way, 2, axis=0)[-1] / DT**2
     counts = dict.fromkeys(("not a number", "position", "speed", "acceleration", "jerk"), 0)
     for i in ticks:
         if i % 4 == 0 and i // 2000 % 4:  # now and then silence, for layers to time out
