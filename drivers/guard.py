@@ -19,6 +19,10 @@ class SpeedGuard:
     Parameters
     ----------
     max_speed_rad_s : (n,) top speeds.
+
+    Attributes
+    ----------
+    shortened : how many steps of the last call were.
     """
 
     def __init__(self, max_speed_rad_s: Floats) -> None:
@@ -26,6 +30,10 @@ class SpeedGuard:
         self._saved = np.zeros_like(self._speed)
         self._last = np.zeros_like(self._speed)
         self._time_s = 0.0
+        self.shortened = 0
+        from drivers.kernels import spend_travel  # compiled: only who drives servos pays for it
+
+        self._spend = spend_travel
 
     def reset(self, position_rad: Floats, now_s: float) -> None:
         """Begin again from where the servos are, with nothing saved up."""
@@ -52,8 +60,5 @@ class SpeedGuard:
         """
         elapsed = min(max(now_s - self._time_s, 0.0), BURST_S)
         self._time_s = now_s
-        self._saved = np.minimum(self._saved + elapsed * self._speed, BURST_S * self._speed)
-        move = np.minimum(np.maximum(target_rad - self._last, -self._saved), self._saved)
-        self._saved -= np.abs(move)
-        self._last = self._last + move
+        self.shortened = self._spend(target_rad, self._speed, elapsed, BURST_S, self._saved, self._last)
         return self._last.copy()

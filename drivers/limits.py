@@ -29,6 +29,9 @@ class TargetLimits:
         self._high = np.array([servo.max_rad for servo in servos])
         self._guard = SpeedGuard(np.array([servo.max_speed_rad_s for servo in servos]))
         self._report = report
+        from drivers.kernels import clip_targets  # compiled: only who drives servos pays for it
+
+        self._clip = clip_targets
 
     def begin(self, position_rad: Floats, now_s: float) -> None:
         """Begin from where the servos (n,) are."""
@@ -52,12 +55,9 @@ class TargetLimits:
         -------
         (n,) float64 : inside the angle limits, and no further from the last call's than top speed allows.
         """
-        known = np.isfinite(wanted_rad)
-        self._report.refused_targets += int(np.count_nonzero(~known))
-        target = np.where(known, wanted_rad, self.target)
-        clipped = np.minimum(np.maximum(target, self._low), self._high)
-        self._report.limits_hit += int(np.count_nonzero(clipped != target))
-        self.target = clipped
-        allowed = self._guard.step(clipped, now_s)
-        self._report.speed_limited += int(np.count_nonzero(np.abs(allowed - clipped) > 1e-9))
+        refused, clipped = self._clip(wanted_rad, self._low, self._high, self.target)
+        allowed = self._guard.step(self.target, now_s)
+        self._report.refused_targets += refused
+        self._report.limits_hit += clipped
+        self._report.speed_limited += self._guard.shortened
         return allowed

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from drivers.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec
 from drivers.dynamixel import startup
-from drivers.dynamixel.layout import Scale
+from drivers.dynamixel.indirect import set_up
+from drivers.dynamixel.layout import Block, Scale
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
@@ -28,6 +30,9 @@ from drivers.wirebus import WireBus
 
 log = logging.getLogger(__name__)
 
+MAP_TRIES = 5
+"""How often the pointers of one servo are set again between two starts."""
+
 
 class DynamixelBus(WireBus):
     """Dynamixel servos on one serial port. See :class:`~drivers.bus.Bus` for the contract.
@@ -37,11 +42,13 @@ class DynamixelBus(WireBus):
     servos : the servos in the order of all arrays.
     port : device path; ``/dev/serial/by-id/...`` survives a replug.
     baud : rate on the wire.
-    feedback : ``"full"`` reads velocity and current with every position, ``"position"`` only the position.
-    fast : use fast sync read where every servo's firmware has it.
+    feedback : ``"full"`` reads velocity and current with every position, and by indirect addressing temperature,
+        hardware error, torque and watchdog too; ``"position"`` reads only the position.
+    fast : use fast reads where every servo's firmware has them.
+    indirect : use indirect addressing where the model has it.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
-    slow_group : servos asked for one slow value (torque, error, watchdog, supply) each cycle; 0 asks only about
-        servos that raise an alert.
+    slow_group : servos asked at once for what is not in the feedback (supply, and torque, error and watchdog where
+        they are not), so that each is asked every half second; 0 asks only about servos that raise an alert.
     clock : monotonic seconds.
     policy : fields of :class:`~drivers.dynamixel.startup.Policy`, such as ``watchdog_ms``.
 
@@ -57,7 +64,8 @@ class DynamixelBus(WireBus):
         port: str,
         baud: int = 1_000_000,
         feedback: str = "full",
-        fast: bool = False,
+        fast: bool = True,
+        indirect: bool = True,
         margin_s: float | None = None,
         slow_group: int = 4,
         clock: Callable[[], float] = time.monotonic,
@@ -69,6 +77,10 @@ class DynamixelBus(WireBus):
         self._registers = Registers(Packets(), self._port, self.servos)
         self._tables([load_table(model_number(servo.model)) for servo in self.servos])
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, fast, slow_group)
+        self._may_map = indirect and feedback == "full"
+        self._mapped: dict[int, Block] = {}
+        self._mended: Counter[int] = Counter()
+        self._goals = np.zeros(len(self.ids), np.int32)
         self._heard_s = 0.0
 
     @classmethod
@@ -133,15 +145,18 @@ class DynamixelBus(WireBus):
         self._port.suspects.clear()
         startup.identify(self._registers, self.servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
-        self._telemetry.rebuild()
-        started = startup.bring_up(self._registers, self.servos, self.policy)
+        started = startup.bring_up(self._registers, self.servos, self.policy, indirect=self._may_map)
         self._report.eeprom_writes += started.eeprom
+        self._mapped = started.mapped
+        self._mended.clear()
+        self._telemetry.rebuild(self._mapped)
         for index, servo in enumerate(self.ids):
             if servo in started.limits:
                 self.scale.narrow(index, *started.limits[servo])
         self._telemetry.started(self.ids)
         self._heard_s = self._clock()
-        return self.scale.radians(np.array([started.ticks[servo] for servo in self.ids]))
+        self._goals = np.array([started.ticks[servo] for servo in self.ids], np.int32)
+        return self.scale.radians(self._goals)
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that let go or were rebooted, where they stand; ``ids`` None means all of them.
@@ -153,8 +168,9 @@ class DynamixelBus(WireBus):
         chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
         with self._losing():
             startup.identify(self._registers, chosen)
-            started = startup.bring_up(self._registers, chosen, self.policy)
+            started = startup.bring_up(self._registers, chosen, self.policy, indirect=self._may_map)
             self._report.eeprom_writes += started.eeprom
+            self._use_map(self._mapped | started.mapped)
             for servo, ticks in started.ticks.items():
                 self._hold(self.ids.index(servo), ticks)
             self._telemetry.started(list(started.ticks))
@@ -168,6 +184,7 @@ class DynamixelBus(WireBus):
 
     def _hold(self, index: int, ticks: int) -> None:
         """One servo begins again from a position."""
+        self._goals[index] = ticks
         full = np.zeros(len(self.ids))
         full[index] = ticks
         self._limits.begin_one(index, float(self.scale.radians(full)[index]))
@@ -176,24 +193,39 @@ class DynamixelBus(WireBus):
 
     def _send(self, angle_rad: Floats) -> Floats:
         """One sync write of all goals, inside the servos' own limits too."""
-        ticks = np.minimum(np.maximum(self.scale.ticks(angle_rad), self.scale.low), self.scale.high)
-        self._telemetry.send_goals(ticks)
-        return self.scale.radians(ticks)
+        sent = self.scale.goals(angle_rad, self._goals)
+        self._telemetry.send_goals(self._goals)
+        return sent
 
     def _settle(self, now: float) -> None:
         """Look at all watchdogs when the caller was away for so long that they may have tripped."""
         pause, self._heard_s = now - self._heard_s, now
         limit = self.policy.watchdog_ms / 1000.0
         if self._running and limit and pause > limit:
-            self._telemetry.ask_watchdogs()
+            self._telemetry.ask_watchdogs(self._clock)
             self._clear_watchdogs()
 
     def _ask(self) -> BusState:
         """One sync read of all servos and one slow value of some."""
+        for servo in self._telemetry.take_forgetful():
+            self._map_again(servo)
         self._telemetry.cycle(self._clock, self._running)
         if self._running:
             self._clear_watchdogs()
         return self._telemetry.state(self.scale, self._clock())
+
+    def _use_map(self, mapped: dict[int, Block]) -> None:
+        """Group the servos anew where other registers are mapped now."""
+        if mapped != self._mapped:
+            self._mapped = mapped
+            self._telemetry.rebuild(mapped)
+
+    def _map_again(self, servo: int) -> None:
+        """Set the pointers of a servo that forgot them; one that will not keep them is read plainly from now on."""
+        self._mended[servo] += 1
+        mapped = set_up(self._registers, [servo]) if self._mended[servo] <= MAP_TRIES else {}
+        if not mapped:
+            self._use_map({i: block for i, block in self._mapped.items() if i != servo})
 
     def _clear_watchdogs(self) -> None:
         """Clear tripped watchdogs with the goal where the servo stands, so that nothing jumps."""

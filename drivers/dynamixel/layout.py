@@ -29,9 +29,17 @@ class Scale:
     ----------
     servos : n servos.
     tables : their control tables, in the same order.
+
+    Attributes
+    ----------
+    low, high : where goals may lie, steps.
+    lowest, highest : what the servos take as a goal at all, steps.
     """
 
     def __init__(self, servos: Sequence[ServoSpec], tables: Sequence[ControlTable]) -> None:
+        from drivers.kernels import to_steps  # compiled: only who drives servos pays for it
+
+        self._to_steps = to_steps
         self.sign = np.array([-1.0 if servo.reverse else 1.0 for servo in servos])
         self.zero_rad = np.array([servo.zero_rad for servo in servos])
         self.center = np.array([float(table.center) for table in tables])
@@ -40,6 +48,7 @@ class Scale:
         top = np.array([table.ticks_per_turn - 1 for table in tables])
         self.low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), 0, top).astype(np.int32)
         self.high = np.clip(np.floor(np.maximum(*ends) + _EDGE), self.low, top).astype(np.int32)
+        self.lowest, self.highest = np.zeros_like(self.low), top.astype(np.int32)
 
     def _steps(self, angle_rad: Floats) -> Floats:
         steps: Floats = self.center + (self.zero_rad + self.sign * angle_rad) / self.rad_per_tick
@@ -54,8 +63,28 @@ class Scale:
         angle: Floats = self.sign * ((ticks - self.center) * self.rad_per_tick - self.zero_rad)
         return angle
 
+    def goals(self, angle_rad: Floats, steps: Ticks) -> Floats:
+        """Where the servos shall go, inside all limits; one that stands outside them is led in, not thrown in.
+
+        Parameters
+        ----------
+        angle_rad : (n,) finite.
+        steps : (n,) the goals before, changed to the new ones.
+
+        Returns
+        -------
+        (n,) float64 : the angles of the new goals.
+        """
+        sent: Floats = np.empty(len(steps))
+        self._to_steps(
+            angle_rad, self.sign, self.zero_rad, self.center, self.rad_per_tick,
+            self.low, self.high, self.lowest, self.highest, steps, sent,
+        )  # fmt: skip
+        return sent
+
     def narrow(self, index: int, low: int, high: int) -> None:
-        """Also keep one servo inside limits that its own registers hold."""
+        """Also keep one servo inside limits that its own registers hold, outside which it takes no goal."""
+        self.lowest[index], self.highest[index] = low, high
         self.low[index] = min(max(self.low[index], low), high)
         self.high[index] = max(min(self.high[index], high), self.low[index])
 
@@ -93,9 +122,9 @@ class Block:
             }
         )
 
-    def decode(self, data: Sequence[bytes]) -> NDArray[np.void]:
-        """Raw values of k servos from their k replies of ``size`` bytes; fields by name, shape ``(k,)``."""
-        return np.frombuffer(b"".join(data), dtype=self.dtype)
+    def decode(self, data: NDArray[np.uint8]) -> NDArray[np.void]:
+        """Raw values of k servos from their replies ``(k, size)`` uint8; fields by name, shape ``(k,)``."""
+        return np.ascontiguousarray(data).view(self.dtype)[:, 0]
 
 
 @dataclass(frozen=True)
@@ -106,16 +135,20 @@ class Layout:
     ----------
     goal : register of the target.
     feedback : block read every cycle.
-    slow : blocks read in turn.
+    slow : blocks read in turn: all that is not in ``feedback``.
+    watchdog : the watchdog's register, where the model has one.
     scales : value of one step in SI units, by name; NaN where the model has no such value.
     signed_magnitude : velocity keeps its direction in bit 10 (XL-320).
+    indirect : ``feedback`` is read through pointers, which a servo forgets when it reboots.
     """
 
     goal: Item
     feedback: Block
     slow: tuple[Block, ...]
+    watchdog: Block | None
     scales: Mapping[str, float]
     signed_magnitude: bool = False
+    indirect: bool = False
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -165,26 +198,44 @@ def _block(table: ControlTable, *names: str) -> Block | None:
     return Block(items) if items else None
 
 
-def layout_of(table: ControlTable, feedback: str = "full") -> Layout:
+FULL = ("position", "velocity", "current")
+INDIRECT = (*FULL, "temperature", "hardware", "torque", "watchdog")
+"""What is read in one go where registers can be mapped side by side. The last four are what tells a servo that
+forgot its pointers: it reads 0 in all of them, and no servo that answers has that (see ``Telemetry``)."""
+
+
+def layout_of(table: ControlTable, feedback: str = "full", indirect: Block | None = None) -> Layout:
     """Layout of a control table.
 
     Parameters
     ----------
     table : the model's.
     feedback : ``"full"`` reads velocity and current with the position, ``"position"`` only the position.
+    indirect : block to read instead, through pointers that were set up before.
     """
-    names = ("position", "velocity", "current") if feedback == "full" else ("position",)
-    blocks = [_block(table, name) for name in ("torque", "hardware", "watchdog")]
+    goal = item_of(table, "goal")
+    block = indirect or _block(table, *(FULL if feedback == "full" else FULL[:1]))
+    if goal is None or block is None:
+        raise ValueError(f"{table.model} has no goal or no present position")
+    blocks = [_block(table, name) for name in ("torque", "hardware", "watchdog") if name not in block.items]
     blocks.append(_supply(table))
+    return Layout(
+        goal,
+        block,
+        tuple(block for block in blocks if block is not None),
+        _block(table, "watchdog"),
+        _scales(table),
+        signed_magnitude=table.model == "xl320",
+        indirect=indirect is not None,
+    )
+
+
+def _scales(table: ControlTable) -> dict[str, float]:
     items = {name: item_of(table, name) for name in ("velocity", "current", "voltage", "temperature")}
     scales = {name: np.nan if item is None or item.unit == "" else item.scale for name, item in items.items()}
     if items["current"] is None or items["current"].unit != "A":
         scales["current"] = np.nan  # a load in per cent is no current
-    goal, block = item_of(table, "goal"), _block(table, *names)
-    if goal is None or block is None:
-        raise ValueError(f"{table.model} has no goal or no present position")
-    slow = tuple(block for block in blocks if block is not None)
-    return Layout(goal, block, slow, scales, signed_magnitude=table.model == "xl320")
+    return scales
 
 
 def _supply(table: ControlTable) -> Block | None:

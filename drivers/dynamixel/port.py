@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import threading
 import time
-from pathlib import Path
+from collections.abc import Callable
 
 from dynamixel_sdk import port_handler
 
 from drivers.errors import DriverError
-from drivers.serialport import SerialPort, latency_s
+from drivers.serialport import SerialPort, reply_margin_s
 
-HOST_MARGIN_S = 0.010
-"""Time a busy host may need to notice a reply, beyond the wire and the adapter."""
-UNKNOWN_LATENCY_S = 0.002
-PSEUDO_MARGIN_S = 0.05
-"""Behind a pseudo-terminal sits a program, which competes for the processor with everything else."""
+NAP_LEAST_S = 0.0005
+"""A shorter sleep costs more than it saves."""
+NAP_EARLY_S = 0.0003
+"""How much before the last byte a sleep through a reply ends: what the system may add to it."""
 
 
 class Port(port_handler.PortHandler):
@@ -29,9 +28,23 @@ class Port(port_handler.PortHandler):
     path : device path.
     baud : any rate the adapter takes.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
+    clock, sleep : monotonic seconds, and the way to let them pass.
+
+    Attributes
+    ----------
+    suspects : ids that did not answer when they should have; see :class:`~drivers.dynamixel.sdk.Packets`.
+    stray : replies thrown away.
     """
 
-    def __init__(self, path: str, baud: int = 1_000_000, margin_s: float | None = None) -> None:
+    def __init__(
+        self,
+        path: str,
+        baud: int = 1_000_000,
+        margin_s: float | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> None:
+        self.clock, self.sleep = clock, sleep
         self._busy = threading.Lock()
         super().__init__(path)
         self.baudrate = baud
@@ -41,11 +54,13 @@ class Port(port_handler.PortHandler):
         self.deadline_s = 0.0
         self._margin_s = margin_s
         self._held = bytearray()
+        self._free_s = 0.0
         self._tune()
 
     def _tune(self) -> None:
-        self.margin_s = _margin(self.link.path) if self._margin_s is None else self._margin_s
+        self.margin_s = reply_margin_s(self.link.path) if self._margin_s is None else self._margin_s
         self.tx_time_per_byte = 10_000.0 / self.baudrate  # milliseconds, the SDK's unit
+        self._byte_s = 10.0 / self.baudrate
 
     def openPort(self) -> bool:
         """Open exclusively; raises PortMissing, PortBusy or PortPermission instead of returning False."""
@@ -97,8 +112,23 @@ class Port(port_handler.PortHandler):
 
     def writePort(self, packet: bytes) -> int:
         """Send; returns the count sent."""
-        self.link.write(bytes(packet))
+        self.transmit(bytes(packet))
         return len(packet)
+
+    def transmit(self, packet: bytes) -> None:
+        """Hand bytes to the system, and keep count of when the last of them will have left."""
+        self._free_s = max(self.clock(), self._free_s) + len(packet) * self._byte_s
+        self.link.write(packet)
+
+    def expect(self, size: int) -> None:
+        """Deadline for ``size`` bytes of reply to what was sent: time on the wire, both ways, plus margin (S7)."""
+        self.deadline_s = max(self.clock(), self._free_s) + size * self._byte_s + self.margin_s
+
+    def nap(self, missing: int) -> None:
+        """Sleep while the wire carries all but the last of so many bytes that must still come."""
+        pause = min(missing * self._byte_s, self.deadline_s - self.clock()) - NAP_EARLY_S
+        if pause > NAP_LEAST_S:
+            self.sleep(pause)
 
     def setPacketTimeout(self, packet_length: int) -> None:
         """Deadline for a reply of ``packet_length`` bytes: wire time plus margin (S7)."""
@@ -107,15 +137,15 @@ class Port(port_handler.PortHandler):
     def setPacketTimeoutMillis(self, msec: float) -> None:
         """Deadline so many milliseconds from now."""
         super().setPacketTimeoutMillis(msec)
-        self.deadline_s = time.monotonic() + msec / 1000.0
+        self.deadline_s = self.clock() + msec / 1000.0
 
     def isPacketTimeout(self) -> bool:
         """True behind the deadline."""
-        return time.monotonic() > self.deadline_s
+        return self.clock() > self.deadline_s
 
     def getCurrentTime(self) -> float:
         """Milliseconds on the monotonic clock (S8)."""
-        return time.monotonic() * 1000.0
+        return self.clock() * 1000.0
 
     @property
     def is_using(self) -> bool:
@@ -138,11 +168,3 @@ class Port(port_handler.PortHandler):
                 hint="let one thread do all reads and writes of a bus",
                 port=self.port_name,
             )
-
-
-def _margin(path: str) -> float:
-    """Longest wait for a reply beyond its time on the wire, for what a path leads to."""
-    if str(Path(path).resolve()).startswith("/dev/pts/"):
-        return PSEUDO_MARGIN_S
-    latency = latency_s(path)
-    return 2 * (UNKNOWN_LATENCY_S if latency is None else latency) + HOST_MARGIN_S

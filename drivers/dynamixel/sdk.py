@@ -26,7 +26,6 @@ S15 (``fastBulkRead`` mixes up ids and lengths) is avoided by never using it.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -34,10 +33,10 @@ from typing import Any, NamedTuple
 from dynamixel_sdk import protocol2_packet_handler, robotis_def
 
 from drivers.dynamixel import packet
+from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Rows, Run
 from drivers.dynamixel.packet import Instruction, StatusPacket, StatusReader, encode_instruction
 from drivers.dynamixel.port import Port
 
-STATUS_SIZE = 11
 PING_DATA = 3
 PING_SLOT_MS = 3.0
 _LATE_CHUNKS = 16
@@ -51,11 +50,13 @@ class Exchange(NamedTuple):
     replies : by servo id; only those with the right id, length and CRC.
     missing : ids that were asked and are not in ``replies``.
     corrupt : True when damaged bytes arrived too, so that a missing reply may have been one of them.
+    joint_lost : True when nobody answered a fast read, whoever answered the plain one after it.
     """
 
     replies: dict[int, StatusPacket]
     missing: tuple[int, ...]
     corrupt: bool
+    joint_lost: bool = False
 
 
 class Packets(protocol2_packet_handler.Protocol2PacketHandler):
@@ -126,15 +127,18 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         port.is_using = True
         try:
             port.clearPort()
-            port.link.write(frame)
+            port.transmit(frame)
         except BaseException:
             port.is_using = False
             raise
 
     def tell(self, port: Port, frame: bytes) -> None:
-        """Send one packet that nobody answers (S13)."""
-        self.send(port, frame)
-        port.is_using = False
+        """Send a packet, or several, that nobody answers (S13)."""
+        port.is_using = True
+        try:
+            port.transmit(frame)
+        finally:
+            port.is_using = False
 
     def ask(self, port: Port, servo: int, instruction: int, params: bytes, length: int) -> Exchange:
         """One instruction to one servo and its reply of ``length`` data bytes.
@@ -179,16 +183,38 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         Servos in ``port.suspects`` are not asked and count as missing until :meth:`revive` brought them back.
         """
         left_out = tuple(servo for servo in ids if servo in port.suspects) if port.suspects else ()
-        if left_out:
-            ids = [servo for servo in ids if servo not in left_out]
-        if not ids:
+        asked = tuple(servo for servo in ids if servo not in left_out)
+        if not asked:
             return Exchange({}, left_out, False)
-        frame = _group_read_frame(bytes(ids), address, length, fast)
-        if fast:
-            got = self._exchange_fast(port, frame, [(servo, length) for servo in ids])
-        else:
-            got = self.exchange(port, frame, dict.fromkeys(ids, length))
-        return got._replace(missing=got.missing + left_out) if left_out else got
+        group = group_read((Run(asked, address, length),), fast)
+        got = self.read_rows(port, group)
+        if isinstance(got, Exchange):
+            return got._replace(missing=got.missing + left_out)
+        return Exchange(_replies(group.runs, got), left_out, False)
+
+    def read_rows(self, port: Port, group: GroupRead) -> list[Rows] | Exchange:
+        """Ask a group that was made before. None of it may be in ``port.suspects``.
+
+        Returns
+        -------
+        list of Rows : what every servo said, run by run, when all is as it should be; otherwise an Exchange with
+            whatever arrived.
+        """
+        port.suspects.update(group.wanted)  # until they have answered, so also when this is interrupted
+        self.send(port, group.frame)
+        try:
+            port.expect(group.size)
+            data = self._fill(port, group.size)
+            rows = group.decode(data)
+            if rows is not None:
+                port.suspects.difference_update(group.wanted)
+                return rows
+            if not group.fast:
+                return self._collect(port, group.wanted, data)
+            got = self._salvage(port, group, data)
+        finally:
+            port.is_using = False
+        return self._read_behind(port, group, got)
 
     def write_group(self, port: Port, address: int, length: int, rows: bytes) -> None:
         """One sync write that nobody answers (S11, S13).
@@ -215,20 +241,23 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         wanted : data bytes expected, by servo id, in the order of the replies.
         """
         size = len(wanted) * STATUS_SIZE + sum(wanted.values())
-        port.suspects.update(wanted)  # until they have answered, so also when this is interrupted
+        port.suspects.update(wanted)
         self.send(port, frame)
         try:
-            port.setPacketTimeout(len(frame) + size)
-            data = self._fill(port, size)
-            replies = _in_order(data, wanted) if len(data) == size else None
-            return _settle(port, wanted, replies, False) if replies else self._collect(port, wanted, data)
+            port.expect(size)
+            return self._collect(port, wanted, self._fill(port, size))
         finally:
             port.is_using = False
 
     def _fill(self, port: Port, size: int) -> bytes:
-        """Received bytes, at least ``size`` of them unless the deadline passes."""
+        """Received bytes, at least ``size`` of them unless the deadline passes.
+
+        Once the first have come, the others are known to take their time on the wire: sleeping through it costs
+        one awakening instead of one for every few bytes.
+        """
         data = port.link.read(port.deadline_s)
-        while len(data) < size:
+        while data and len(data) < size:
+            port.nap(size - len(data))
             more = port.link.read(port.deadline_s)
             if not more:
                 break
@@ -244,29 +273,37 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
             if not data:
                 box.take(reader.flush())
                 break
-            late += time.monotonic() > port.deadline_s
+            late += port.isPacketTimeout()
             box.take(reader.feed(data))
         port.stray += box.stray
         corrupt = bool(reader.broken_frames or reader.noise_bytes or box.twice)
         return _settle(port, wanted, box.unique(), corrupt)
 
-    def _exchange_fast(self, port: Port, frame: bytes, devices: list[tuple[int, int]]) -> Exchange:
-        size = packet.fast_reply_size(length for _, length in devices)
-        raw, replies = bytearray(), list[StatusPacket]()
-        port.suspects.update(servo for servo, _ in devices)
-        self.send(port, frame)
-        try:
-            port.setPacketTimeout(len(frame) + size)
-            while len(replies) < len(devices) and len(raw) < _LATE_CHUNKS * packet.MAX_LENGTH:
-                data = port.link.read(port.deadline_s)
-                raw += data
-                if not data or len(raw) >= size:
-                    replies = packet.decode_fast(bytes(raw), devices)
-                if not data:
-                    break
-        finally:
-            port.is_using = False
-        return _settle(port, dict(devices), {reply.id: reply for reply in replies}, len(raw) >= size)
+    def _salvage(self, port: Port, group: GroupRead, data: bytes) -> Exchange:
+        """What can be read of a joint reply that is cut short, damaged, or has something before it."""
+        devices, raw = list(group.wanted.items()), bytearray(data)
+        replies = packet.decode_fast(bytes(raw), devices)
+        while data and len(replies) < len(devices) and len(raw) < _LATE_CHUNKS * packet.MAX_LENGTH:
+            data = port.link.read(port.deadline_s)
+            raw += data
+            if data:
+                replies = packet.decode_fast(bytes(raw), devices)
+        return _settle(port, group.wanted, {reply.id: reply for reply in replies}, len(raw) >= group.size)
+
+    def _read_behind(self, port: Port, group: GroupRead, got: Exchange) -> Exchange:
+        """Ask those behind the first silent servo plainly: it cut them off from the joint reply (S14).
+
+        What they might still send of that is no packet, so it cannot be taken for an answer.
+        """
+        behind = set(got.missing[1:])
+        runs = tuple(run for run in (run.among(behind) for run in group.runs) if run.ids)
+        lost = not got.replies
+        if not runs:
+            return got._replace(joint_lost=lost)
+        more = self.read_rows(port, group_read(runs, False))
+        if not isinstance(more, Exchange):
+            more = Exchange(_replies(runs, more), (), False)
+        return Exchange(got.replies | more.replies, got.missing[:1] + more.missing, got.corrupt or more.corrupt, lost)
 
 
 class _Sorter:
@@ -307,34 +344,18 @@ def _settle(port: Port, wanted: Mapping[int, int], replies: dict[int, StatusPack
 
 
 @lru_cache(maxsize=256)
-def _group_read_frame(ids: bytes, address: int, length: int, fast: bool) -> bytes:
-    head = bytes((address & 0xFF, address >> 8, length & 0xFF, length >> 8))
-    instruction = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
-    return encode_instruction(packet.BROADCAST_ID, instruction, head + ids)
+def group_read(runs: tuple[Run, ...], fast: bool) -> GroupRead:
+    """A group read, made once for the same servos and registers."""
+    return GroupRead(runs, fast)
 
 
-@lru_cache(maxsize=1024)
-def _status_head(servo: int, length: int) -> tuple[bytes, int]:
-    """Bytes of an unstuffed status packet before its error byte, and their CRC."""
-    size = length + 4
-    head = packet.HEADER + bytes((0, servo, size & 0xFF, size >> 8, Instruction.STATUS))
-    return head, packet.crc16(head)
-
-
-def _in_order(data: bytes, wanted: Mapping[int, int]) -> dict[int, StatusPacket] | None:
-    """The usual case, quickly: exactly the replies asked for, in order, unstuffed. None when it is not that."""
-    at, replies = 0, {}
-    for servo, length in wanted.items():
-        head, crc = _status_head(servo, length)
-        end = at + STATUS_SIZE + length
-        body = data[at + 8 : end - 2]
-        if not data.startswith(head, at) or packet.HEADER in body:
-            return None
-        if packet.crc16(body, crc) != data[end - 2] | data[end - 1] << 8:
-            return None
-        replies[servo] = StatusPacket(servo, body[0], body[1:])
-        at = end
-    return replies
+def _replies(runs: Sequence[Run], rows: Sequence[Rows]) -> dict[int, StatusPacket]:
+    """The replies of all runs by servo id."""
+    return {
+        servo: StatusPacket(servo, error, data.tobytes())
+        for run, (errors, block) in zip(runs, rows, strict=True)
+        for servo, error, data in zip(run.ids, errors.tolist(), block, strict=True)
+    }
 
 
 def _params(txpacket: Sequence[int]) -> bytes:

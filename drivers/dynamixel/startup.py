@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import logging
 import math
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
 from drivers.bus import ServoSpec
-from drivers.dynamixel.layout import NAMES
+from drivers.dynamixel.indirect import set_up
+from drivers.dynamixel.layout import NAMES, Block
 from drivers.dynamixel.registers import Registers, together
 from drivers.dynamixel.tables import load_table, model_name, model_number
 from drivers.errors import BusError, CorruptReply, NoReply, PortLost, ServoFault, ServoRefused, WrongModel
@@ -69,11 +69,13 @@ class Started:
     ----------
     ticks : present position by id, read after torque came on.
     limits : lowest and highest step by id that the servo's own registers allow.
+    mapped : block that is read through pointers, by id.
     eeprom : one line for every permanent register written.
     """
 
     ticks: dict[int, int] = field(default_factory=dict)
     limits: dict[int, tuple[int, int]] = field(default_factory=dict)
+    mapped: dict[int, Block] = field(default_factory=dict)
     eeprom: list[str] = field(default_factory=list)
 
 
@@ -104,9 +106,16 @@ def bring_up(
     registers: Registers,
     servos: Sequence[ServoSpec],
     policy: Policy,
-    sleep: Callable[[float], None] = time.sleep,
+    *,
+    indirect: bool = False,
 ) -> Started:
     """Start identified servos where they stand.
+
+    Parameters
+    ----------
+    registers, servos : the wire and who is on it.
+    policy : what may be done.
+    indirect : map registers side by side where the models have indirect addressing.
 
     Raises
     ------
@@ -117,12 +126,14 @@ def bring_up(
     registers.put_all(dict.fromkeys(ids, 2), "status_level")
     held = [servo for servo, on in registers.get_all(ids, "torque").items() if on]
     _take_over(registers, held, policy)
-    _wait_for_voltage(registers, ids, policy, sleep)
-    rebooted = _clear_faults(registers, ids, policy, sleep)
+    _wait_for_voltage(registers, ids, policy)
+    rebooted = _clear_faults(registers, ids, policy)
     held = [servo for servo in held if policy.takeover == "adopt" and servo not in rebooted]
     for servo in ids:
         _settings(registers, servo, servo in held, started)
     started.limits = _limits(registers, ids)
+    if indirect:
+        started.mapped = set_up(registers, ids)
     _prepare(registers, servos, policy)
     try:
         _torque_on(registers, ids, started)
@@ -147,20 +158,21 @@ def _take_over(registers: Registers, held: Sequence[int], policy: Policy) -> Non
     )
 
 
-def _wait_for_voltage(registers: Registers, ids: Sequence[int], policy: Policy, sleep: Callable[[float], None]) -> None:
+def _wait_for_voltage(registers: Registers, ids: Sequence[int], policy: Policy) -> None:
     """Switching torque on while the supply ramps up latches input-voltage errors."""
     need = registers.get_all(ids, "min_voltage")
     if policy.min_voltage_v is not None:
         need = dict.fromkeys(ids, round(policy.min_voltage_v * 10))
-    deadline = time.monotonic() + policy.voltage_wait_s
+    port = registers.port
+    deadline = port.clock() + policy.voltage_wait_s
     while True:
         volts = registers.get_all(ids, "voltage")
         low = {servo: volts[servo] for servo in need if servo in volts and volts[servo] < need[servo]}
         if not low:
             return
-        if time.monotonic() > deadline:
+        if port.clock() > deadline:
             break
-        sleep(0.1)
+        port.sleep(0.1)
     worst = min(low, key=lambda servo: low[servo] - need[servo])
     raise ServoFault(
         f"{len(low)} servos have too little supply voltage: {registers.label(worst)} reads "
@@ -171,9 +183,7 @@ def _wait_for_voltage(registers: Registers, ids: Sequence[int], policy: Policy, 
     )
 
 
-def _clear_faults(
-    registers: Registers, ids: Sequence[int], policy: Policy, sleep: Callable[[float], None]
-) -> list[int]:
+def _clear_faults(registers: Registers, ids: Sequence[int], policy: Policy) -> list[int]:
     """Reboot servos with a latched error where that is allowed; input voltage alone is let pass."""
     latched = registers.get_all(ids, "hardware")
     bad = {servo: bits for servo, bits in latched.items() if bits and not _passable(registers, servo, bits)}
@@ -183,7 +193,7 @@ def _clear_faults(
         raise _fault(registers, bad)
     for servo in bad:
         registers.packets.reboot(registers.port, servo)
-    sleep(BOOT_S / 4)
+    registers.port.sleep(BOOT_S / 4)
     patience = math.ceil(BOOT_S / registers.port.margin_s)
     registers.each(bad, lambda servo: registers.hello(servo, tries=patience))
     registers.put_all(dict.fromkeys(bad, 2), "status_level")  # all RAM is at its default again

@@ -4,57 +4,33 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from drivers.bus import BusReport, BusState, frozen
-from drivers.dynamixel.layout import Block, Layout, Scale, Ticks, layout_of
+from drivers.bus import BusReport, BusState, Flags
+from drivers.dynamixel.frames import Octets, Rows
+from drivers.dynamixel.groups import Group, Question
+from drivers.dynamixel.layout import Block, Scale, Ticks, layout_of
 from drivers.dynamixel.packet import ALERT
 from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.sdk import Exchange
+from drivers.dynamixel.sdk import Exchange, group_read
 
 log = logging.getLogger(__name__)
 
 PROBE_S = 1.0
 """How often one silent servo is asked whether it is back."""
+SLOW_S = 0.5
+"""Every slow value of every servo is asked for within this time."""
 FAILED_PINGS = 3
 """Pings without an answer that one cycle may wait for."""
+JOINT_FAILURES = 2
+"""Fast reads in a row that nobody answers before plain ones are used."""
 TRIPPED = 0xFF
-
-
-class Group:
-    """Servos that share one transaction because their registers lie at the same addresses.
-
-    Parameters
-    ----------
-    ids : k servo ids.
-    index : (k,) their places in the bus's arrays.
-    layouts : their layouts.
-    fast : use fast sync read.
-    """
-
-    def __init__(self, ids: Sequence[int], index: Sequence[int], layouts: Sequence[Layout], fast: bool) -> None:
-        self.ids = tuple(ids)
-        self.index = np.array(index)
-        self.place = dict(zip(ids, index, strict=True))
-        self.layout = layouts[0]
-        self.fast = fast
-        names = self.layout.scales
-        self.scales = {name: np.array([layout.scales[name] for layout in layouts]) for name in names}
-        self._slot = {servo: slot for slot, servo in enumerate(self.ids)}
-        size = self.layout.goal.size
-        self._rows = np.zeros(len(self.ids), dtype=[("id", "u1"), ("goal", f"<i{size}")])
-        self._rows["id"] = self.ids
-
-    def rows(self, ticks: Ticks) -> bytes:
-        """Goals as the rows of a sync write. ``(n,)`` steps of the whole bus."""
-        self._rows["goal"] = ticks[self.index]
-        return self._rows.tobytes()
-
-    def slots(self, ids: Sequence[int]) -> slice | list[int]:
-        """Places of ids within the group; all of it as a slice, which is cheaper."""
-        return slice(None) if tuple(ids) == self.ids else [self._slot[servo] for servo in ids]
+_VITAL = ("temperature", "hardware", "torque", "watchdog")
+_SLOW = frozenset({"hardware", "voltage", "temperature"})
 
 
 class Telemetry:
@@ -74,52 +50,68 @@ class Telemetry:
         ids: Sequence[int],
         report: BusReport,
         feedback: str = "full",
-        fast: bool = False,
+        fast: bool = True,
         slow_group: int = 4,
     ) -> None:
         self._registers, self._packets, self._port = registers, registers.packets, registers.port
         self.ids = tuple(ids)
         self.report = report
-        self._options = (feedback, fast, max(slow_group, 0))
+        self._feedback, self._may_be_fast, self._slow_group = feedback, fast, max(slow_group, 0)
         n = len(self.ids)
         self._ticks, self._speed, self._current = (np.full(n, np.nan) for _ in range(3))
         self._volts, self._celsius = np.full(n, np.nan), np.full(n, np.nan)
         self._seen_s = np.full(n, -np.inf)
         self._fresh, self._torque = np.zeros(n, bool), np.zeros(n, bool)
         self._error, self._hardware = np.zeros(n, np.uint8), np.zeros(n, np.uint8)
+        self._alarmed = False
+        self._slow_state: tuple[NDArray[Any], ...] | None = None
         self._place = {servo: index for index, servo in enumerate(self.ids)}
         self._missed: set[int] = set()
         self._silent: deque[int] = deque()
         self._probe_s = -np.inf
         self._tripped: set[int] = set()
+        self._forgetful: set[int] = set()
         self.rebuild()
 
-    def rebuild(self) -> None:
-        """Group the servos anew after their tables were loaded; nobody is silent yet."""
-        feedback, fast, _ = self._options
+    def rebuild(self, indirect: Mapping[int, Block] = {}) -> None:
+        """Group the servos anew after their tables were loaded; nobody is silent yet.
+
+        Parameters
+        ----------
+        indirect : by id, the block that is read through pointers that were set up.
+        """
+        tables = self._registers.tables
+        layouts = [layout_of(tables[servo], self._feedback, indirect.get(servo)) for servo in self.ids]
         members: dict[tuple[object, ...], list[int]] = {}
-        layouts = [layout_of(self._registers.tables[servo], feedback) for servo in self.ids]
         for index, layout in enumerate(layouts):
             members.setdefault(layout.key, []).append(index)
         self._groups = [
-            Group(
-                [self.ids[i] for i in places],
-                places,
-                [layouts[i] for i in places],
-                fast and all(self._registers.tables[self.ids[i]].fast_read for i in places),
-            )
-            for places in members.values()
+            Group(places, [self.ids[i] for i in places], [layouts[i] for i in places]) for places in members.values()
         ]
+        self._feedbacks = [Question(group, group.layout.feedback, group.ids) for group in self._groups]
+        self._fast = self._may_be_fast and all(table.fast_read for table in tables.values())
+        self._joint_failures = 0
         self._ticks[:] = np.nan  # the servos may have been moved since
         self._seen_s[:] = -np.inf
-        self._missed.clear()
-        self._silent.clear()
-        self._tripped.clear()
-        self._urgent: deque[tuple[Group, Block, tuple[int, ...]]] = deque()
+        for known in (self._missed, self._silent, self._tripped, self._forgetful):
+            known.clear()
+        self._urgent: deque[Question] = deque()
         self._turns = self._rota()
+        self._turn, self._turn_s = 0, -np.inf
+
+    def _rota(self) -> list[Question]:
+        """Slow values, some servos at a time; none where the size is 0."""
+        size = self._slow_group
+        return [
+            Question(group, block, group.ids[at : at + size])
+            for group in self._groups
+            for block in group.layout.slow
+            for at in range(0, len(group.ids) if size else 0, max(size, 1))
+        ]
 
     def started(self, ids: Sequence[int]) -> None:
         """Torque of these servos was read back as on."""
+        self._slow_state = None
         self._torque[[self._place[servo] for servo in ids]] = True
 
     def silent_ids(self) -> tuple[int, ...]:
@@ -135,46 +127,50 @@ class Telemetry:
         """Hand a servo out once more at the next :meth:`take_tripped`."""
         self._tripped.add(servo)
 
+    def take_forgetful(self) -> list[int]:
+        """Servos that have lost their pointers since the last call: they have been rebooted, or were without power."""
+        found, self._forgetful = sorted(self._forgetful), set()
+        return found
+
     def send_goals(self, ticks: Ticks) -> None:
-        """One sync write per group. ``(n,)`` steps."""
-        for group in self._groups:
-            goal = group.layout.goal
-            self._packets.write_group(self._port, goal.address, goal.size, group.rows(ticks))
+        """One sync write per group, all handed over at once. ``(n,)`` steps."""
+        self._packets.tell(self._port, b"".join([group.goals.encode(ticks[group.index]) for group in self._groups]))
 
     def cycle(self, clock: Callable[[], float], running: bool) -> None:
         """Bring back who can be brought back, read everybody, and ask some for one slow value."""
         self._fresh[:] = False
         if self._port.suspects:
             self._revive(clock())
-        for group in self._groups:
-            self._read(group, clock)
-        turn = self._urgent.popleft() if self._urgent else next(self._turns, None)
+        self._ask(self._feedbacks, clock, running, self._fast)
+        turn = self._urgent.popleft() if self._urgent else self._next_turn(clock())
         if turn is not None:
-            self._slow(*turn, running)
+            self._ask([turn], clock, running)
 
-    def ask_watchdogs(self) -> None:
+    def ask_watchdogs(self, clock: Callable[[], float]) -> None:
         """Look at every servo's watchdog now."""
-        for group in self._groups:
-            for block in group.layout.slow:
-                if "watchdog" in block.items:
-                    self._slow(group, block, group.ids, True)
+        blocks = [(group, group.layout.watchdog) for group in self._groups]
+        self._ask([Question(group, block, group.ids) for group, block in blocks if block], clock, True)
 
     def state(self, scale: Scale, now: float) -> BusState:
         """Everything known, in SI units."""
-        silent = np.isin(self.ids, list(self._silent)) if self._silent else np.zeros(len(self.ids), bool)
+        silent = np.isin(self.ids, self._silent) if self._silent else np.zeros(len(self.ids), bool)
+        if self._slow_state is None:
+            slow = (self._error, self._volts, self._celsius, self._hardware, self._torque)
+            self._slow_state = tuple(sealed(array.copy()) for array in slow)
+        error, volts, celsius, hardware, torque = self._slow_state
         return BusState(
             time_s=now,
-            position_rad=frozen(scale.radians(self._ticks)),
-            velocity_rad_s=frozen(scale.sign * self._speed),
-            current_a=frozen(scale.sign * self._current),
-            fresh=frozen(self._fresh, bool),
-            age_s=frozen(now - self._seen_s),
-            error=frozen(self._error, np.uint8),
-            silent=frozen(silent, bool),
-            voltage_v=frozen(self._volts),
-            temperature_c=frozen(self._celsius),
-            hardware_error=frozen(self._hardware, np.uint8),
-            torque=frozen(self._torque, bool),
+            position_rad=sealed(scale.radians(self._ticks)),
+            velocity_rad_s=sealed(scale.sign * self._speed),
+            current_a=sealed(scale.sign * self._current),
+            fresh=sealed(self._fresh.copy()),
+            age_s=sealed(now - self._seen_s),
+            error=error,
+            silent=sealed(silent),
+            voltage_v=volts,
+            temperature_c=celsius,
+            hardware_error=hardware,
+            torque=torque,
         )
 
     # ------------------------------------------------------------------ who answers
@@ -208,113 +204,168 @@ class Telemetry:
             self._look_at(servo)  # it may have lost its supply, and its torque with it
             log.warning("servo %s answers again", self._registers.label(servo))
 
-    def _note_missing(self, got: Exchange) -> None:
-        for servo in got.missing:
+    def _note_missing(self, missing: Sequence[int], corrupt: bool) -> None:
+        for servo in missing:
             if servo not in self._missed:
                 self._missed.add(servo)
-                self.report.count("corrupt" if got.corrupt else "no_reply", servo)
+                self.report.count("corrupt" if corrupt else "no_reply", servo)
 
     def _look_at(self, servo: int) -> None:
         """Ask one servo for its error and torque next, before the turn of the others."""
         for group in self._groups:
-            if servo in group.place:
+            if servo in group.ids:
                 wanted = [b for b in group.layout.slow if {"hardware", "torque", "watchdog"} & set(b.items)]
-                self._urgent.extend((group, block, (servo,)) for block in wanted)
+                self._urgent.extend(Question(group, block, (servo,)) for block in wanted)
+
+    def _next_turn(self, now: float) -> Question | None:
+        """Whose turn it is to be asked for a slow value; None while nobody's is."""
+        if not self._turns or now < self._turn_s:
+            return None
+        turn = self._turns[self._turn % len(self._turns)]
+        self._turn += 1
+        if self._turn >= len(self._turns):  # the first round goes as quickly as it can
+            self._turn_s = max(self._turn_s + SLOW_S / len(self._turns), now)
+        return turn
 
     # ------------------------------------------------------------------ what they say
 
-    def _read(self, group: Group, clock: Callable[[], float]) -> None:
-        block = group.layout.feedback
-        got = self._packets.read_group(self._port, group.ids, block.address, block.size, fast=group.fast)
-        ids, data, errors = self._good(got, block)
-        if got.missing:
-            self._note_missing(got)
-        if not ids:
-            self._no_fast_reply(group, got)
-            return
-        slots = group.slots(ids)
-        where, raw = group.index[slots], block.decode(data)
-        self._ticks[where] = raw["position"]
-        if "velocity" in block.items:
-            self._speed[where] = group.layout.speeds(raw["velocity"]) * group.scales["velocity"][slots]
-        if "current" in block.items:
-            self._current[where] = raw["current"] * group.scales["current"][slots]
-        self._fresh[where] = True
-        self._seen_s[where] = clock()
-        self._note_errors(ids, where, np.array(errors, np.uint8))
+    def _ask(self, questions: list[Question], clock: Callable[[], float], running: bool, fast: bool = False) -> None:
+        """One transaction for all questions: a sync read, or a bulk read where there are several."""
+        suspects = self._port.suspects
+        asked = [question.without(suspects) for question in questions] if suspects else questions
+        asked = [question for question in asked if question.ids]
+        got: list[Rows] | Exchange = Exchange({}, (), False)
+        if asked:
+            got = self._packets.read_rows(self._port, group_read(tuple([q.run for q in asked]), fast))
+        now = clock()
+        if isinstance(got, Exchange):
+            self._note_missing([i for question in questions for i in question.ids if i in suspects], got.corrupt)
+            self._note_joint(got, fast)
+            asked, got = self._good(asked, got)
+        else:
+            self._joint_failures = 0
+        for question, rows in zip(asked, got, strict=True):
+            self._take(question, rows, now, running)
 
-    def _good(self, got: Exchange, block: Block) -> tuple[list[int], list[bytes], list[int]]:
-        """Ids, data and error bytes of the replies that carry data; the others are counted as refusals."""
-        ids, data, errors = [], [], []
-        for servo, reply in got.replies.items():
-            if len(reply.params) == block.size:
-                ids.append(servo)
-                data.append(reply.params)
-                errors.append(reply.error)
-            else:
-                self.report.count("refused", servo)
-        return ids, data, errors
+    def _good(self, asked: list[Question], got: Exchange) -> tuple[list[Question], list[Rows]]:
+        """Replies that carry data, sorted as if only they had been asked for; the others count as refusals."""
+        questions, rows = [], []
+        for question in asked:
+            replies = [got.replies[servo] for servo in question.ids if servo in got.replies]
+            good = [reply for reply in replies if len(reply.params) == question.block.size]
+            for reply in replies:
+                if len(reply.params) != question.block.size:
+                    self.report.count("refused", reply.id)
+            if good:
+                data = np.frombuffer(b"".join([reply.params for reply in good]), np.uint8).reshape(len(good), -1)
+                questions.append(question._replace(ids=tuple(reply.id for reply in good)))
+                rows.append(Rows(np.array([reply.error for reply in good], np.uint8), data))
+        return questions, rows
 
-    def _no_fast_reply(self, group: Group, got: Exchange) -> None:
-        if group.fast and not got.replies and set(got.missing) >= set(group.ids):
-            group.fast = False
+    def _note_joint(self, got: Exchange, fast: bool) -> None:
+        """Use plain reads when nobody answers fast ones, though they answer."""
+        self._joint_failures = self._joint_failures + 1 if fast and got.joint_lost and got.replies else 0
+        if self._joint_failures >= JOINT_FAILURES:
+            self._fast = False
             log.warning("nobody answers fast sync reads; using plain ones")
 
-    def _note_errors(self, ids: Sequence[int], where: np.ndarray, errors: np.ndarray) -> None:
+    def _take(self, question: Question, rows: Rows, now: float, running: bool) -> None:
+        group, block, ids = question
+        raw, errors, names = block.decode(rows.data), rows.errors, block.items
+        if group.layout.indirect and "position" in names:
+            known = self._remembering(ids, names, raw)
+            if not known.all():
+                ids = tuple(servo for servo, has in zip(ids, known, strict=True) if has)
+                raw, errors = raw[known], errors[known]
+        slots = group.slots(ids)
+        where = group.index[slots]
+        if "position" in names:
+            self._take_motion(group, slots, where, names, raw)
+            self._fresh[where] = True
+            self._seen_s[where] = now
+        if errors.any() or self._alarmed:
+            self._note_errors(ids, where, errors)
+        if not _SLOW.isdisjoint(names):
+            self._take_slow(group, slots, where, names, raw)
+        if "torque" in names:
+            self._note_torque(ids, where, raw["torque"] != 0, running)
+        if "watchdog" in names and running:
+            self._note_watchdogs(ids, raw["watchdog"] == TRIPPED)
+
+    def _remembering(self, ids: Sequence[int], names: Collection[str], raw: NDArray[np.void]) -> Flags:
+        """Who still has its pointers: without them all reads as 0, and a position of 0 must not be believed."""
+        known = raw[_VITAL[0]] != 0
+        for name in _VITAL[1:]:
+            if name in names and not known.all():
+                known |= raw[name] != 0
+        if not known.all():
+            for servo in [servo for servo, has in zip(ids, known, strict=True) if not has]:
+                if servo not in self._forgetful:
+                    self._forgetful.add(servo)
+                    self.report.count("reset", servo)
+                    log.warning("servo %s was rebooted or without power", self._registers.label(servo))
+        return known
+
+    def _take_motion(
+        self,
+        group: Group,
+        slots: slice | list[int],
+        where: NDArray[np.intp],
+        names: Collection[str],
+        raw: NDArray[np.void],
+    ) -> None:
+        self._ticks[where] = raw["position"]
+        if "velocity" in names:
+            self._speed[where] = group.layout.speeds(raw["velocity"]) * group.scales["velocity"][slots]
+        if "current" in names:
+            self._current[where] = raw["current"] * group.scales["current"][slots]
+
+    def _take_slow(
+        self,
+        group: Group,
+        slots: slice | list[int],
+        where: NDArray[np.intp],
+        names: Collection[str],
+        raw: NDArray[np.void],
+    ) -> None:
+        self._slow_state = None
+        if "hardware" in names:
+            self._hardware[where] = raw["hardware"]
+        for name, store in (("voltage", self._volts), ("temperature", self._celsius)):
+            if name in names:
+                store[where] = raw[name] * group.scales[name][slots]
+
+    def _note_errors(self, ids: Sequence[int], where: NDArray[np.intp], errors: Octets) -> None:
         rising = errors & ~self._error[where] & ALERT
         self._error[where] = errors
+        self._alarmed, self._slow_state = bool(self._error.any()), None
         if rising.any():
             for servo in [servo for servo, new in zip(ids, rising, strict=True) if new]:
                 self.report.count("alert", servo)
                 log.warning("servo %s reports a hardware error", self._registers.label(servo))
                 self._look_at(servo)
 
-    def _rota(self) -> Iterator[tuple[Group, Block, tuple[int, ...]]]:
-        """Slow values in turn, some servos at a time, for ever; none where the size is 0."""
-        size = self._options[2]
-        turns = (
-            []
-            if not size
-            else [
-                (group, block, group.ids[at : at + size])
-                for group in self._groups
-                for block in group.layout.slow
-                for at in range(0, len(group.ids), size)
-            ]
-        )
-        while turns:
-            yield from turns
-
-    def _slow(self, group: Group, block: Block, ids: Sequence[int], running: bool) -> None:
-        got = self._packets.read_group(self._port, ids, block.address, block.size)
-        if got.missing:
-            self._note_missing(got)
-        good, data, errors = self._good(got, block)
-        if not good:
-            return
-        where, raw = np.array([group.place[servo] for servo in good]), block.decode(data)
-        self._note_errors(good, where, np.array(errors, np.uint8))
-        for name, store in (("hardware", self._hardware), ("voltage", self._volts), ("temperature", self._celsius)):
-            if name in block.items:
-                scale = group.scales.get(name)
-                store[where] = raw[name] if scale is None else raw[name] * scale[group.slots(good)]
-        if "torque" in block.items:
-            self._note_torque(good, where, raw["torque"] != 0, running)
-        if "watchdog" in block.items and running:
-            self._note_watchdogs([servo for servo, v in zip(good, raw["watchdog"], strict=True) if v == TRIPPED])
-
-    def _note_torque(self, ids: Sequence[int], where: np.ndarray, now_on: np.ndarray, running: bool) -> None:
+    def _note_torque(self, ids: Sequence[int], where: NDArray[np.intp], now_on: Flags, running: bool) -> None:
         let_go = self._torque[where] & ~now_on
-        self._torque[where] = now_on
-        if not running:
+        self._torque[where], self._slow_state = now_on, None
+        if not running or not let_go.any():
             return
         for servo in [servo for servo, gone in zip(ids, let_go, strict=True) if gone]:
             self.report.count("torque_lost", servo)
             log.warning("servo %s let go: its torque is off", self._registers.label(servo))
 
-    def _note_watchdogs(self, ids: Sequence[int]) -> None:
-        for servo in ids:
+    def _note_watchdogs(self, ids: Sequence[int], tripped: Flags) -> None:
+        if not tripped.any():
+            return
+        found = [servo for servo, has in zip(ids, tripped, strict=True) if has]
+        for servo in found:
             if servo not in self._tripped:
                 self.report.count("watchdog", servo)
                 log.warning("watchdog of servo %s tripped", self._registers.label(servo))
-        self._tripped.update(ids)
+        self._tripped.update(found)
+
+
+def sealed(array: NDArray[Any]) -> NDArray[Any]:
+    """The array itself, read-only from now on."""
+    array.flags.writeable = False
+    return array

@@ -102,7 +102,7 @@ def test_a_block_decodes_as_its_registers_do(current: int, velocity: int, positi
     block: Block = layout_of(table).feedback
     items = [item_of(table, name) for name in ("current", "velocity", "position")]
     data = b"".join(item.encode(v) for item, v in zip(items, (current, velocity, position), strict=True) if item)
-    row = block.decode([data, data])[1]
+    row = block.decode(np.frombuffer(data + data, np.uint8).reshape(2, -1))[1]
     assert (row["current"], row["velocity"], row["position"]) == (current, velocity, position)
 
 

@@ -106,9 +106,9 @@ def test_s7_a_silent_servo_costs_the_margin_and_not_34_ms(wire: Wire) -> None:
 
 
 def test_s7_the_latency_timer_sets_the_margin(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.dynamixel.port.latency_s", lambda path: 0.016)
+    monkeypatch.setattr("drivers.serialport.latency_s", lambda path: 0.016)
     slow = Port("/dev/ttyUSB0").margin_s
-    monkeypatch.setattr("drivers.dynamixel.port.latency_s", lambda path: 0.001)
+    monkeypatch.setattr("drivers.serialport.latency_s", lambda path: 0.001)
     assert slow - Port("/dev/ttyUSB0").margin_s == pytest.approx(0.030)
 
 
