@@ -43,6 +43,8 @@ class Packets1(Exchanges, protocol1_packet_handler.Protocol1PacketHandler):
         if port.is_using:
             return int(robotis_def.COMM_PORT_BUSY)
         self.send(port, encode(txpacket[2], txpacket[4], _params(txpacket)))
+        if txpacket[2] != BROADCAST_ID:
+            port.suspects.add(txpacket[2])  # until its answer was taken, which some callers never do
         return int(robotis_def.COMM_SUCCESS)
 
     def rxPacket(self, port: Port) -> tuple[list[int], int]:
@@ -84,6 +86,7 @@ class Packets1(Exchanges, protocol1_packet_handler.Protocol1PacketHandler):
             if result != robotis_def.COMM_SUCCESS:
                 return [], result, 0
             if frame[2] == dxl_id and len(frame) == length + 6:
+                port.suspects.discard(dxl_id)
                 return frame[5:-1], result, frame[4]
 
     def bulkReadTx(self, port: Port, param: Sequence[int], param_length: int, fast: bool = False) -> int:

@@ -12,7 +12,6 @@ from drivers.protocol1 import HELLO
 from drivers.serialport import SerialPort
 
 STATUS_SIZE = 6
-BITS_PER_BYTE = 10
 _LATE_CHUNKS = 16
 
 
@@ -21,13 +20,19 @@ class WirePort(Protocol):
 
     link: SerialPort
     baudrate: int
-    margin_s: float
+    deadline_s: float
     suspects: set[int]
     stray: int
     is_using: bool
 
     def clearPort(self) -> None:
         """Throw away all input."""
+
+    def transmit(self, packet: bytes) -> None:
+        """Hand bytes to the system, and keep count of when the last of them will have left."""
+
+    def expect(self, size: int) -> None:
+        """Set ``deadline_s`` for so many bytes of reply to what was sent."""
 
 
 class Exchange(NamedTuple):
@@ -62,7 +67,7 @@ class Exchanges:
         port.is_using = True
         try:
             port.clearPort()
-            port.link.write(frame)
+            port.transmit(frame)
         except BaseException:
             port.is_using = False
             raise
@@ -154,26 +159,26 @@ class Exchanges:
         port.suspects.update(wanted)  # until they have answered, so also when this is interrupted
         self.send(port, frame)
         try:
-            deadline_s = time.monotonic() + (len(frame) + size) * BITS_PER_BYTE / port.baudrate + port.margin_s
-            data = _fill(port.link, size, deadline_s)
+            port.expect(size)
+            data = _fill(port.link, size, port.deadline_s)
             replies = _in_order(data, wanted) if len(data) == size else None
             if replies is not None:
                 port.suspects.difference_update(replies)
                 return Exchange(replies, (), False)
-            return self._collect(port, wanted, data, deadline_s)
+            return self._collect(port, wanted, data)
         finally:
             port.is_using = False
 
-    def _collect(self, port: WirePort, wanted: Mapping[int, int], data: bytes, deadline_s: float) -> Exchange:
+    def _collect(self, port: WirePort, wanted: Mapping[int, int], data: bytes) -> Exchange:
         """The replies in `data` and in what still comes, whatever lies between them."""
         reader, box, late = Reader1(), _Sorter(wanted, self.refusals), 0
         box.take(reader.feed(data))
         while len(box.replies) < len(wanted) and late < _LATE_CHUNKS:
-            data = port.link.read(deadline_s)
+            data = port.link.read(port.deadline_s)
             if not data:
                 box.take(reader.flush())
                 break
-            late += time.monotonic() > deadline_s
+            late += time.monotonic() > port.deadline_s
             box.take(reader.feed(data))
         port.stray += box.stray
         replies = box.unique()

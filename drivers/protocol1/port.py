@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import threading
+import time
 
 from drivers.errors import DriverError
 from drivers.serialport import SerialPort, reply_margin_s
+
+BITS_PER_BYTE = 10
 
 
 class Port:
@@ -23,6 +26,7 @@ class Port:
         self.baudrate = baud
         self.suspects: set[int] = set()
         self.stray = 0
+        self.deadline_s = self._free_s = 0.0
         self._margin_s = margin_s
         self.margin_s = reply_margin_s(path) if margin_s is None else margin_s
         self._busy = threading.Lock()
@@ -56,6 +60,16 @@ class Port:
     def clearPort(self) -> None:
         """Throw away all input."""
         self.link.drain()
+
+    def transmit(self, packet: bytes) -> None:
+        """Hand bytes to the system, and keep count of when the last of them will have left."""
+        self._free_s = max(time.monotonic(), self._free_s) + len(packet) * BITS_PER_BYTE / self.baudrate
+        self.link.write(packet)
+
+    def expect(self, size: int) -> None:
+        """Deadline for so many bytes of reply to what was sent: time on the wire, both ways, plus the margin."""
+        begin_s = max(time.monotonic(), self._free_s)
+        self.deadline_s = begin_s + size * BITS_PER_BYTE / self.baudrate + self.margin_s
 
     @property
     def is_using(self) -> bool:
