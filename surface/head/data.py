@@ -108,6 +108,44 @@ class Neck:
 
 
 @dataclass(frozen=True)
+class Contact:
+    """Two sides of an opening that meet and do not pass through each other.
+
+    Attributes
+    ----------
+    name : for people; part : whose opening it is.
+    followers : other parts that yield with it; they come after ``part``.
+    eye : 0 or 1 for the lids of the left or right eye, whose heights go round the eyeball; -1 for lips.
+    reach_mm : how far from the rim what gives way fades out. share : how much of it the upper side does, 0..1.
+    places : (2, columns, rows, 2) samples in (u, v), the upper side first, columns in the order of x, rows from the
+        rim on; two thirds of the rows can meet the other side, in the rest motion fades out.
+    """
+
+    name: str
+    part: str
+    followers: tuple[str, ...]
+    eye: int
+    reach_mm: float
+    share: float
+    places: Floats
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What moves a group that is no parameter: the product of its terms.
+
+    Attributes
+    ----------
+    group : its name. terms : each a mix of parameters, by name, that counts up to 1.
+    power : each term is raised to it; 2 sets in softly.
+    """
+
+    group: str
+    terms: tuple[dict[str, float], ...]
+    power: float = 1.0
+
+
+@dataclass(frozen=True)
 class HeadData:
     """All of a head.
 
@@ -115,6 +153,7 @@ class HeadData:
     ----------
     name : short name; provenance : free text by key (source, licence, how it was made).
     eyes : centres (2, 3), left then right, mm; eye_radius : mm.
+    contacts : openings whose sides meet; rules : what moves groups that are no parameters.
     """
 
     name: str
@@ -126,3 +165,5 @@ class HeadData:
     parts: list[PartData]
     seams: list[Seam]
     paint: list[dict]
+    contacts: list[Contact] = field(default_factory=list)
+    rules: list[Rule] = field(default_factory=list)

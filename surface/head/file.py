@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.errors import HeadFileError
-from surface.head.data import Group, HeadData, Jaw, Neck, PartData, Seam
+from surface.head.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.meshes import KEYS
 from surface.head.toml import toml_text
 
@@ -110,6 +110,8 @@ def load_data(path: str | Path) -> HeadData:
         parts=[_part(src, p, f"parts[{i}].") for i, p in enumerate(t["parts"])],
         seams=[_seam(src, s, i, names) for i, s in enumerate(src.value(t, "seams", list))],
         paint=src.value(t, "paint", list),
+        contacts=[_contact(src, c, i) for i, c in enumerate(t.get("contacts", []))],
+        rules=[_rule(src, r, i) for i, r in enumerate(t.get("rules", []))],
     )
 
 
@@ -175,6 +177,27 @@ def _seam(src: Source, t: dict[str, Any], i: int, names: list[str]) -> Seam:
     return Seam(parts[0], parts[1], uv_a, src.array(f"seams/{i}/b", (len(uv_a), 2)))
 
 
+def _contact(src: Source, t: dict[str, Any], i: int) -> Contact:
+    where = f"contacts[{i}]."
+    reach, share = (float(src.numbers(t, k, (), where)) for k in ("reach_mm", "share"))
+    name, part, eye = (
+        src.value(t, "name", str, where),
+        src.value(t, "part", str, where),
+        src.value(t, "eye", int, where),
+    )
+    places = src.array(f"contacts/{i}", (2, -1, -1, 2)).astype(float)
+    return Contact(name, part, tuple(src.value(t, "followers", list, where)), eye, reach, share, places)
+
+
+def _rule(src: Source, t: dict[str, Any], i: int) -> Rule:
+    where = f"rules[{i}]."
+    terms = src.value(t, "terms", list, where)
+    for k, term in enumerate(terms):
+        for name in term:
+            src.numbers(term, name, (), f"{where}terms[{k}].")
+    return Rule(src.value(t, "group", str, where), tuple(terms), float(src.numbers(t, "power", (), where)))
+
+
 def save_data(folder: str | Path, head: HeadData) -> None:
     """Write head.toml and head.npz; either both are replaced or none is."""
     folder = Path(folder)
@@ -184,6 +207,7 @@ def save_data(folder: str | Path, head: HeadData) -> None:
         arrays |= {f"{p.name}/{k}": v for k, v in _part_arrays(p).items()}
     for i, s in enumerate(head.seams):
         arrays |= {f"seams/{i}/a": s.uv_a, f"seams/{i}/b": s.uv_b}
+    arrays |= {f"contacts/{i}": c.places.astype(np.float32) for i, c in enumerate(head.contacts)}
     new_npz, new_toml = folder / "head.npz.new", folder / "head.toml.new"
     with new_npz.open("wb") as f:
         np.savez_compressed(f, **arrays)  # type: ignore[arg-type]
@@ -225,5 +249,10 @@ def _table(head: HeadData) -> dict[str, Any]:
             for p in head.parts
         ],
         "seams": [{"a": s.part_a, "b": s.part_b} for s in head.seams],
+        "contacts": [
+            {**{k: v for k, v in vars(c).items() if k != "places"}, "followers": list(c.followers)}
+            for c in head.contacts
+        ],
+        "rules": [{**vars(r), "terms": list(r.terms)} for r in head.rules],
         "paint": head.paint,
     }  # fmt: skip

@@ -18,6 +18,13 @@ KEYS = ("mesh_uv", "mesh_triangles", "mesh_side", "mesh_cell_start", "mesh_list_
 LOOP_SHARE = 0.4  # how near a border follows its loop, in chord errors
 
 
+def make_surface(data: PartData) -> DCPSurface:
+    """The part's DCP surface."""
+    return DCPSurface.from_padded(
+        data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1]
+    )
+
+
 def tessellate(data: PartData, surface: DCPSurface) -> Mesh:
     """Triangles for a part by its budget."""
     most, chord, depth = data.budget

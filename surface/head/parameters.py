@@ -6,7 +6,7 @@ eyeLook shapes; both add up to one gaze, which turns the eyeball and moves the l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,8 @@ class Pose:
     shapes : (52,) float64, how far each group is moved; lids already follow the gaze.
     jaw : how far the jaw is open, 0..1; closed : how much of that the lips make up for, 0..1.
     head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
+    pushes : (2, k) by the name of a contact, what its upper and lower side give way by, mm; the part that has the
+        opening fills it in for those that come after it.
     """
 
     shapes: NDArray[np.float64]
@@ -53,6 +55,7 @@ class Pose:
     closed: float
     head: NDArray[np.float64]
     gaze: NDArray[np.float64]
+    pushes: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 def read_pose(values: NDArray[np.float64]) -> Pose:

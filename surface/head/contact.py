@@ -1,0 +1,173 @@
+"""Lips and lids that meet: where the two sides of an opening would pass through each other, both give way; and lids
+that lie on an eyeball do not sink into it.
+
+Columns of samples run across an opening's upper and lower side. What overlaps is found column by column in every
+pose, so that any mixture of parameters is covered, and control points near the rim move by it. How they move is
+worked out once, by least squares over the samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.dcp import DCPSurface
+from surface.head.contact_kernels import find_overlap, find_sinking, move_points, place_samples
+from surface.head.data import Contact, HeadData, PartData
+
+Floats = NDArray[np.float64]
+MEET = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
+SOFT_MM = 0.1
+PASSES, AGAIN_MM = 2, 0.4  # the second pass takes what bending left over of more than that
+LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
+TOUCH_MM = 0.05  # what rests on the eyeball keeps this far away
+STIFF = 0.02  # weight of moving no control point, beside a sample's
+FELT = 0.004  # of a sample: points with less are left out of it
+LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
+
+
+class Feeler:
+    """Keeps the two sides of one opening apart, and lids off the eyeball, on the part that has the opening.
+
+    Parameters
+    ----------
+    contact : which opening; part : the part that has it; head : for the eyes.
+    """
+
+    def __init__(self, contact: Contact, part: PartData, surface: DCPSurface, head: HeadData) -> None:
+        self.contact = contact
+        self.eye, self.radius = eye_of(contact, head)
+        self._start, self._ids, self._share = shares_at(surface, contact.places.reshape(-1, 2))
+        self._samples = np.empty((*contact.places.shape[:3], 3))
+        self._meeting = meeting_rows(contact)
+        self._sinking = np.empty(len(self._start) - 1)
+        self._place(surface.points)
+        self._thick = np.clip(self._samples[..., 2].ravel() - self.radius, TOUCH_MM, LID_MM)
+        self.ids, self._lift = _inverse(self._start, self._ids, self._share)
+        self._away = _spread(contact).T @ self._lift
+        self._overlap = np.zeros((2, contact.places.shape[1]))
+        self.push = np.zeros_like(self._overlap)
+
+    def _place(self, points: Floats) -> None:
+        flat = self._samples.reshape(-1, 3)
+        place_samples(self._start, self._ids, self._share, points, self.eye, self.radius, flat)
+
+    def apply(self, axis: Floats, points: Floats) -> Floats:
+        """Mend control points (n, 3) in place; returns the overlap (2, k) in mm that was found.
+
+        ``axis (3,)`` is where the eye looks. The result is the feeler's own and is overwritten each time.
+        """
+        self.push[:] = 0.0
+        for _ in range(PASSES):
+            moved = self._part(points)
+            if self.radius > 0:
+                moved = max(moved, self._raise(axis, points))
+            if moved < AGAIN_MM:
+                break
+        return self.push
+
+    def _part(self, points: Floats) -> float:
+        """Move the sides apart where they overlap; returns the deepest overlap, mm."""
+        self._place(points)
+        find_overlap(self._samples[:, :, : self._meeting], SOFT_MM, self._overlap)
+        self.push += self._overlap
+        move_points(self.ids, self._overlap.ravel(), self._away, self.eye, self.radius, False, points)
+        return float(self._overlap.max())
+
+    def _raise(self, axis: Floats, points: Floats) -> float:
+        """Move lids out of the eyeball; returns how deep the deepest was, mm."""
+        self._place(points)
+        find_sinking(self._samples.reshape(-1, 3), self.radius, self._thick, axis, self._sinking)
+        move_points(self.ids, self._sinking, self._lift, self.eye, self.radius, True, points)
+        return float(self._sinking.max())
+
+
+class Follower:
+    """Moves the control points of another part that lie near an opening along with it.
+
+    Parameters
+    ----------
+    contact : which opening; points : (n, 3) of the part at rest; surface : of the part that has it.
+    """
+
+    def __init__(self, contact: Contact, points: Floats, surface: DCPSurface, head: HeadData) -> None:
+        self.eye, self.radius = eye_of(contact, head)
+        places = contact.places[:, :, : meeting_rows(contact)]
+        at, columns = surface.evaluate(places.reshape(-1, 2)).reshape(*places.shape[:3], 3), places.shape[1]
+        distance = np.stack([_nearest(points, side.reshape(-1, 3)) for side in at])
+        side = (distance[1] < distance[0]).astype(int)
+        t = np.clip(distance[side, np.arange(len(points))] / contact.reach_mm, 0.0, 1.0)
+        weight = (1.0 - t * t * (3.0 - 2.0 * t)) * np.where(side == 1, contact.share - 1.0, contact.share)
+        self.ids = np.flatnonzero(np.abs(weight) > 1e-3).astype(np.int64)
+        self._away = np.zeros((2 * columns, len(self.ids)))
+        for k, i in enumerate(self.ids):
+            x = np.interp(points[i, 0], at[side[i], ..., 0].mean(axis=1), np.arange(columns))
+            left = min(int(x), columns - 2)
+            self._away[side[i] * columns + left + np.array([0, 1]), k] = weight[i] * np.array([1 - x + left, x - left])
+
+    def apply(self, push: Floats, points: Floats) -> None:
+        """Add what ``push (2, k)`` asks of control points (n, 3)."""
+        move_points(self.ids, push.ravel(), self._away, self.eye, self.radius, False, points)
+
+
+def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:
+    """Centre (3,) and radius of the eyeball that a contact's heights go round; radius 0 for lips."""
+    if contact.eye < 0:
+        return np.zeros(3), 0.0
+    return np.ascontiguousarray(head.eyes[contact.eye], np.float64), head.eye_radius
+
+
+def shares_at(surface: DCPSurface, uv: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """The rational weights of a surface's points at places (s, 2), without scipy: those of place k are ``share (m,)``
+    of the points ``ids (m,)`` from ``start[k]`` to ``start[k + 1]``."""
+    from surface.kernels import fill_rows, row_capacity
+
+    samples, sides, _ = surface.sample(uv, None)
+    arrays, bins = surface.arrays(), surface.bin_arrays()
+    capacity = row_capacity(*bins[:3], samples)
+    data, ids = np.zeros((capacity, 3)), np.zeros(capacity, np.int32)
+    start = np.zeros(len(uv) + 1, np.int64)
+    used = fill_rows(*arrays[:4], arrays[5], *bins, samples, sides, data, ids, start)
+    rows = np.repeat(np.arange(len(uv)), np.diff(start))
+    share = data[:used, 0] / np.bincount(rows, data[:used, 0], len(uv))[rows]
+    felt = share > FELT
+    rows, share, ids = rows[felt], share[felt], ids[:used][felt]
+    start = np.searchsorted(rows, np.arange(len(uv) + 1))
+    return start, ids.astype(np.int64) % surface.n, share / np.bincount(rows, share, len(uv))[rows]
+
+
+def _nearest(points: Floats, others: Floats) -> Floats:
+    """(n,) distance of each of points (n, 3) from the nearest of others (m, 3)."""
+    square = (points**2).sum(axis=1)[:, None] - 2.0 * points @ others.T + (others**2).sum(axis=1)
+    return np.sqrt(np.maximum(square.min(axis=1), 0.0))
+
+
+def _inverse(start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Control points (k,) that reach the samples, and (s, k) how far each moves, in least squares, for every sample
+    that shall move by 1. A point that mostly acts elsewhere is left alone."""
+    dense = np.zeros((len(start) - 1, int(ids.max()) + 1))
+    np.add.at(dense, (np.repeat(np.arange(len(dense)), np.diff(start)), ids), share)
+    used = np.flatnonzero(dense.max(axis=0) > LEAST_SHARE).astype(np.int64)
+    dense = dense[:, used]
+    normal = dense.T @ dense
+    normal[np.diag_indices(len(used))] += STIFF
+    return used, np.ascontiguousarray(np.linalg.solve(normal, dense.T).T)
+
+
+def meeting_rows(contact: Contact) -> int:
+    """How many rows from the rim on can meet the other side."""
+    return round(MEET * contact.places.shape[2])
+
+
+def _spread(contact: Contact) -> Floats:
+    """(s, 2 k) how far each sample moves for a push of each column: up by the contact's share of it, down by the
+    rest."""
+    _, columns, rows, _ = contact.places.shape
+    meeting = meeting_rows(contact)
+    t = np.linspace(0.0, 1.0, rows - meeting + 1)[1:]
+    row = np.concatenate([np.ones(meeting), 1.0 - t * t * (3.0 - 2.0 * t)])
+    out = np.zeros((2, columns, rows, 2, columns))
+    for side, part in enumerate((contact.share, contact.share - 1.0)):
+        for k in range(columns):
+            out[side, k, :, side, k] = part * row
+    return out.reshape(-1, 2 * columns)

@@ -1,0 +1,133 @@
+"""Loops over the two sides of an opening, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.jit import kernel
+
+Floats = NDArray[np.float64]
+# The cornea stands out of the eyeball: its sphere's centre and radius, in eyeball radii, as surface.fit.eyeball has it
+CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
+
+
+@kernel
+def place_samples(
+    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats, points: Floats, eye: Floats, radius: float,
+    out: Floats,
+) -> None:  # fmt: skip
+    """Samples ``out (s, 3)`` of a surface as (x, height, depth), from control points ``points (n, 3)``.
+
+    Sample s is the sum of ``share`` times the points ``ids`` between ``start[s]`` and ``start[s + 1]``. Height and
+    depth are y and z, or, with a ``radius`` > 0, the arc above the eyeball's middle and the distance from it.
+    """
+    for s in range(len(start) - 1):
+        x, y, z = -eye[0], -eye[1], -eye[2]
+        for k in range(start[s], start[s + 1]):
+            i = ids[k]
+            x += share[k] * points[i, 0]
+            y += share[k] * points[i, 1]
+            z += share[k] * points[i, 2]
+        out[s, 0] = x
+        out[s, 1] = radius * np.arctan2(y, z) if radius > 0.0 else y
+        out[s, 2] = np.sqrt(x * x + y * y + z * z) if radius > 0.0 else z
+
+
+@kernel
+def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sign: float) -> float:
+    """How far a profile's line reaches beyond ``height`` at ``depth``, towards ``sign``; -1e9 where it has none."""
+    worst = -1e9
+    for j in range(len(heights) - 1):
+        a, b = depths[j], depths[j + 1]
+        if (a - depth) * (b - depth) > 0.0 or a == b:
+            continue
+        t = (depth - a) / (b - a)
+        worst = max(worst, sign * (heights[j] + t * (heights[j + 1] - heights[j]) - height))
+    return worst
+
+
+@kernel
+def find_overlap(samples: Floats, soft: float, push: Floats) -> None:
+    """How far the sides of an opening must give way, ``push (2, k)``, from ``samples (2, k, m, 3)``.
+
+    Side 0 is the upper one. Every column of a side is held against the other side at the same x; where the two
+    profiles lie at one depth, the upper must not be lower. ``soft`` mm before they meet they begin to give way.
+    """
+    _, columns, rows, _ = samples.shape
+    heights, depths = np.empty(rows), np.empty(rows)
+    middle = np.zeros((2, columns))
+    for side in range(2):
+        for k in range(columns):
+            for j in range(rows):
+                middle[side, k] += samples[side, k, j, 0] / rows
+    for side in range(2):
+        sign, at = 1.0 - 2.0 * side, 0
+        own, other, x = samples[side], samples[1 - side], middle[1 - side]
+        for k in range(columns):
+            while at < columns - 2 and x[at + 1] < middle[side, k]:
+                at += 1
+            t = min(max((middle[side, k] - x[at]) / max(x[at + 1] - x[at], 1e-9), 0.0), 1.0)
+            for j in range(rows):
+                heights[j] = other[at, j, 1] + t * (other[at + 1, j, 1] - other[at, j, 1])
+                depths[j] = other[at, j, 2] + t * (other[at + 1, j, 2] - other[at, j, 2])
+            worst = -1e9
+            for j in range(rows):
+                worst = max(worst, overlap_at(own[k, j, 1], own[k, j, 2], heights, depths, sign))
+                worst = max(worst, overlap_at(heights[j], depths[j], own[k, :, 1], own[k, :, 2], -sign))
+            near = min(max(worst + soft, 0.0), 2.0 * soft)
+            push[side, k] = worst if worst > soft else near * near / (4.0 * soft)
+
+
+@kernel
+def find_sinking(samples: Floats, size: float, thick: Floats, axis: Floats, sinking: Floats) -> None:
+    """How far samples (s, 3) as (x, height, depth) lie too near to an eyeball of radius ``size``: ``sinking (s,)``.
+
+    Each keeps ``thick (s,)`` mm away. The eye looks along ``axis (3,)``; its cornea stands out.
+    """
+    for s in range(len(samples)):
+        x, depth = samples[s, 0], samples[s, 2]
+        sinking[s] = 0.0
+        if depth < 1e-6 or depth > 1.5 * size:
+            continue
+        across = np.sqrt(max(depth * depth - x * x, 0.0))
+        y, z = across * np.sin(samples[s, 1] / size), across * np.cos(samples[s, 1] / size)
+        along = (x * axis[0] + y * axis[1] + z * axis[2]) / depth
+        root = CORNEA_RADIUS**2 - CORNEA_AT**2 * (1.0 - along * along)
+        height = 1.0
+        if along > 0.0 and root > 0.0:
+            height = max(1.0, CORNEA_AT * along + np.sqrt(root))
+        sinking[s] = max(0.0, size * height + thick[s] - depth)
+
+
+@kernel
+def move_points(
+    ids: NDArray[np.int64], amounts: Floats, table: Floats, eye: Floats, radius: float, outward: bool, points: Floats
+) -> None:
+    """Move ``points (n, 3)`` with the numbers ``ids (k,)`` up by ``amounts (s,) @ table (s, k)``, mm.
+
+    With a ``radius`` they go up round the eyeball at ``eye (3,)``, or away from its centre if ``outward``.
+    """
+    moves, still = np.zeros(len(ids)), True
+    for s in range(len(amounts)):
+        if amounts[s] != 0.0:
+            still = False
+            for k in range(len(ids)):
+                moves[k] += amounts[s] * table[s, k]
+    if still:
+        return
+    for k in range(len(ids)):
+        i, move = ids[k], moves[k]
+        if radius <= 0.0:
+            points[i, 1] += move
+            continue
+        x, y, z = points[i, 0] - eye[0], points[i, 1] - eye[1], points[i, 2] - eye[2]
+        if outward:
+            scale = move / max(np.sqrt(x * x + y * y + z * z), 1e-6)
+            points[i, 0] += scale * x
+            points[i, 1] += scale * y
+            points[i, 2] += scale * z
+        else:
+            cosine, sine = np.cos(move / radius), np.sin(move / radius)
+            points[i, 1] = eye[1] + cosine * y + sine * z
+            points[i, 2] = eye[2] + cosine * z - sine * y

@@ -1,0 +1,209 @@
+"""Measures of a posed head: openings, cuts and crossings, in millimetres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from surface.fit.eyeball import CORNEA, IRIS
+from surface.head import Head
+from surface.head.part import border_edges
+from surface.jit import kernel
+
+LEAST_MM = 0.15  # shallower crossings are not looked for
+FAR_MM = 6.0  # beyond that a point behind a sheet belongs to something else
+
+
+@kernel
+def draw_depth(points, triangles, u0, v0, step, depth):
+    """Z-buffer of triangles (t, 3) of points (m, 3): ``depth (h, w)`` keeps the largest z; row 0 is the lowest y."""
+    h, w = depth.shape
+    for t in range(triangles.shape[0]):
+        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
+        x0, x1 = (min(a[0], b[0], c[0]) - u0) / step, (max(a[0], b[0], c[0]) - u0) / step
+        y0, y1 = (min(a[1], b[1], c[1]) - v0) / step, (max(a[1], b[1], c[1]) - v0) / step
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if x1 < 0 or y1 < 0 or x0 > w - 1 or y0 > h - 1 or abs(area) < 1e-12:
+            continue
+        for j in range(max(0, int(np.ceil(y0))), min(h - 1, int(np.floor(y1))) + 1):
+            for i in range(max(0, int(np.ceil(x0))), min(w - 1, int(np.floor(x1))) + 1):
+                x, y = u0 + i * step, v0 + j * step
+                p = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
+                q = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
+                r = 1.0 - p - q
+                if p >= 0 and q >= 0 and r >= 0:
+                    z = p * a[2] + q * b[2] + r * c[2]
+                    if z > depth[j, i]:
+                        depth[j, i] = z
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle of the picture plane seen from ``turn (3, 3)``: x and y from, to; step, mm."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    step: float = 0.25
+    turn: np.ndarray = None  # type: ignore[assignment]
+
+    def depth(self, *parts) -> np.ndarray:
+        """(h, w) the nearest z of parts, -inf where there is none."""
+        shape = tuple(int((b - a) / self.step) + 1 for a, b in (self.y, self.x))
+        out = np.full(shape, -np.inf)
+        for p in parts:
+            points = p.vertices.astype(float)
+            points = points if self.turn is None else points @ self.turn.T
+            draw_depth(points, p.triangles, self.x[0], self.y[0], self.step, out)
+        return out
+
+
+def rim(part, loop: np.ndarray) -> np.ndarray:
+    """Ids of the part's border vertices on a loop in (u, v), in its order."""
+    ids = np.unique(border_edges(part.mesh.triangles))
+    steps = np.concatenate([loop, loop[:1]])
+    fine = np.concatenate([a + np.linspace(0, 1, 16, endpoint=False)[:, None] * (b - a)
+                           for a, b in zip(steps, steps[1:], strict=False)])  # fmt: skip
+    distance, at = cKDTree(fine).query(part.mesh.uv[ids])
+    near = distance < 2e-3
+    return ids[near][np.argsort(at[near])]
+
+
+@kernel
+def way_out(points, directions, corners, normals, far, out):
+    """Where rays first meet triangles ``corners (t, 3, 3)`` within ``far``: ``out`` is the distance if that is from
+    behind (outward ``normals (t, 3)`` along the ray), and 0 if from the front or not at all."""
+    for k in range(len(points)):
+        best, behind = far, False
+        p, d = points[k], directions[k]
+        for t in range(len(corners)):
+            a = corners[t, 0]
+            e, f, s = corners[t, 1] - a, corners[t, 2] - a, p - a
+            h0, h1, h2 = d[1] * f[2] - d[2] * f[1], d[2] * f[0] - d[0] * f[2], d[0] * f[1] - d[1] * f[0]
+            det = e[0] * h0 + e[1] * h1 + e[2] * h2
+            if abs(det) < 1e-12:
+                continue
+            u = (s[0] * h0 + s[1] * h1 + s[2] * h2) / det
+            if u < 0.0 or u > 1.0:
+                continue
+            q0, q1, q2 = s[1] * e[2] - s[2] * e[1], s[2] * e[0] - s[0] * e[2], s[0] * e[1] - s[1] * e[0]
+            v = (d[0] * q0 + d[1] * q1 + d[2] * q2) / det
+            along = (f[0] * q0 + f[1] * q1 + f[2] * q2) / det
+            if v >= 0.0 and u + v <= 1.0 and 1e-3 < along < best:
+                best, behind = along, normals[t, 0] * d[0] + normals[t, 1] * d[1] + normals[t, 2] * d[2] > 0.0
+        out[k] = best if behind else 0.0
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """One side of an opening: (part, ids of vertices, rows of triangles) for each part it reaches over."""
+
+    pieces: list
+
+    def points(self) -> np.ndarray:
+        return np.concatenate([p.vertices[i] for p, i, _ in self.pieces]).astype(float)
+
+    def normals(self) -> np.ndarray:
+        return np.concatenate([p.normals[i] for p, i, _ in self.pieces]).astype(float)
+
+    def corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """(t, 3, 3) corners of the triangles, (t, 3) outward normals."""
+        at = np.concatenate([p.vertices[p.triangles[t]] for p, _, t in self.pieces]).astype(float)
+        out = np.concatenate([p.normals[p.triangles[t]].mean(axis=1) for p, _, t in self.pieces]).astype(float)
+        flat = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
+        return at, flat * np.sign((flat * out).sum(axis=1))[:, None]
+
+
+def sides(head: Head, loop: np.ndarray, lining: str, reach: float) -> tuple[Sheet, Sheet]:
+    """The two lips (or lids) at an opening of the face: what lies within ``reach`` of its rim at rest, mm.
+
+    Corners, where one side goes over into the other, are left out.
+    """
+    head.pose(head.values({}))
+    face, inner = head.part("face"), head.part(lining)
+    ids = rim(face, loop)
+    middle = 0.5 * (loop[:, 1].min() + loop[:, 1].max())
+    u0, u1 = loop[:, 0].min() + 0.04 * np.ptp(loop[:, 0]), loop[:, 0].max() - 0.04 * np.ptp(loop[:, 0])
+    above, uv = face.mesh.uv[ids, 1] > middle, face.mesh.uv[ids]
+    tree = cKDTree(face.vertices[ids])
+    out = []
+    for wanted in (True, False):
+        pieces = []
+        for part in (face, inner):
+            distance, at = tree.query(part.vertices)
+            own = part.mesh.uv[:, 1] > middle if part is face else above[at[: len(part.mesh.uv)]]
+            inside = (uv[at, 0] > u0) & (uv[at, 0] < u1)
+            own = np.concatenate([own, np.zeros(len(part.vertices) - len(own), bool)])
+            side = own if wanted else ~own & (np.arange(len(own)) < len(part.mesh.uv))
+            chosen = (distance < reach) & inside & side
+            pieces.append((part, np.flatnonzero(chosen), np.flatnonzero(chosen[part.triangles].all(axis=1))))
+        out.append(Sheet(pieces))
+    return out[0], out[1]
+
+
+def crossing(one: Sheet, other: Sheet) -> tuple[float, np.ndarray]:
+    """How deep points of either side lie in the flesh of the other, and where the deepest lies (3,).
+
+    A point lies inside if its own way out, along its normal, first meets the other side from behind. Its depth is
+    its distance from the other side's surface.
+    """
+    worst, where = 0.0, np.zeros(3)
+    for a, b in ((one, other), (other, one)):
+        points, (at, normals) = a.points(), (b.points(), b.normals())
+        distance, near = cKDTree(at).query(points, distance_upper_bound=FAR_MM)
+        found = np.flatnonzero(np.isfinite(distance))
+        behind = -((points[found] - at[near[found]]) * normals[near[found]]).sum(axis=1)
+        found = found[behind > LEAST_MM]
+        if not len(found):
+            continue
+        out = np.zeros(len(found))
+        way_out(points[found], a.normals()[found], *b.corners(), FAR_MM, out)
+        depth = np.minimum(np.minimum(behind[behind > LEAST_MM], distance[found]), out)
+        if depth.max() > worst:
+            worst, where = float(depth.max()), points[found][depth.argmax()]
+    return worst, where
+
+
+def eye_height(directions: np.ndarray, gaze: np.ndarray) -> np.ndarray:
+    """(m,) distance of an eyeball's surface from its centre in unit directions (m, 3), in radii."""
+    axis_z = np.sqrt(1 - IRIS**2) - np.sqrt(CORNEA**2 - IRIS**2)  # the cornea's centre
+    along = directions @ gaze
+    root = CORNEA**2 - axis_z**2 * (1 - along**2)
+    return np.maximum(1.0, np.where(root > 0, axis_z * along + np.sqrt(np.maximum(root, 0)), 0.0))
+
+
+def eye_cut(head: Head, side: int, *parts: str) -> float:
+    """How deep a lid reaches into an eyeball that looks where the pose says; the head must not be turned."""
+    eye, radius = head.data.eyes[side], head.data.eye_radius
+    ball = head.part(("eye_left", "eye_right")[side])
+    pole = ball.vertices[np.argmin(ball.mesh.uv[:, 1])] - eye
+    gaze = pole / np.linalg.norm(pole)
+    worst = 0.0
+    for name in parts:
+        local = head.part(name).vertices.astype(float) - eye
+        distance = np.linalg.norm(local, axis=1)
+        near = (distance < 1.3 * radius) & (local[:, 2] > 0)
+        height = radius * eye_height(local[near] / distance[near, None], gaze)
+        worst = max(worst, float((height - distance[near]).max(initial=0.0)))
+    return worst
+
+
+def eye_opening(head: Head, side: int, step: float = 0.1) -> tuple[float, float, float]:
+    """Largest height of the visible eyeball in the middle half of the lids, seen from the front; y of its upper and
+    lower end in the middle column, from the eyeball's centre."""
+    x, y, _ = head.data.eyes[side]
+    window = Window((x - 6.0, x + 6.0), (y - 14.0, y + 14.0), step)
+    skin = window.depth(head.part("face"), head.part("sockets"))
+    seen = window.depth(head.part(("eye_left", "eye_right")[side])) > skin
+    rows = np.flatnonzero(seen[:, seen.shape[1] // 2])
+    ends = (rows.max() * step - 14.0, rows.min() * step - 14.0) if len(rows) else (0.0, 0.0)
+    return float(seen.sum(axis=0).max() * step), *ends
+
+
+def lips_gap(head: Head, step: float = 0.1) -> float:
+    """Largest height, in the middle half of the mouth, where one looks between the lips, seen from the front."""
+    window = Window((-14.0, 14.0), (-75.0, -10.0), step)
+    skin = window.depth(head.part("face"))
+    back = window.depth(*(head.part(n) for n in ("cavity", "teeth_upper", "teeth_lower", "tongue")))
+    return float(((back > skin) & np.isfinite(skin)).sum(axis=0).max() * step)
