@@ -12,8 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .lanes import add, div, fma, load, mul, root, splat, store, store3, sub, zero
+from .lanes import add, div, fma, load, mul, prefetch, root, splat, store, store3, sub, zero
 
+AHEAD = 1024  # weights that are asked for before they are needed
 KEEP = -2  # in ``kept``: compute this cell anew and keep its numerators
 
 
@@ -38,6 +39,8 @@ def sum_values(value, at, rows, local):
     while k + 4 <= rows:
         a, b = load(value, at + 8 * k), load(value, at + 8 * k + 8)
         c, d = load(value, at + 8 * k + 16), load(value, at + 8 * k + 24)
+        prefetch(value, at + 8 * k + AHEAD)
+        prefetch(value, at + 8 * k + 16 + AHEAD)
         x0, y0, z0 = fma(a, local[k, 0], x0), fma(a, local[k, 1], y0), fma(a, local[k, 2], z0)
         x1, y1, z1 = fma(b, local[k + 1, 0], x1), fma(b, local[k + 1, 1], y1), fma(b, local[k + 1, 2], z1)
         x2, y2, z2 = fma(c, local[k + 2, 0], x2), fma(c, local[k + 2, 1], y2), fma(c, local[k + 2, 2], z2)

@@ -69,6 +69,21 @@ def load(typingctx, array, index):
 
 
 @intrinsic
+def prefetch(typingctx, array, index):
+    """Ask for the cache line of ``array[index]``, which may lie beyond the array's end."""
+
+    def generate(context, builder, signature, args):
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        pointer = builder.bitcast(builder.gep(data, [args[1]]), ir.IntType(8).as_pointer())
+        kind = ir.FunctionType(ir.VoidType(), [pointer.type, INDEX, INDEX, INDEX])
+        flags = [ir.Constant(INDEX, number) for number in (0, 3, 1)]  # read, keep in all caches, data
+        builder.call(builder.module.declare_intrinsic("llvm.prefetch", (pointer.type,), kind), [pointer, *flags])
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp), generate
+
+
+@intrinsic
 def store(typingctx, array, index, value):
     """``array[index : index + 8] = value``."""
 

@@ -104,13 +104,13 @@ def _lines(uv: Floats, domain: Domain) -> Ints:
 
 
 def _weights_in(flat: Flat, point: Floats) -> Floats:
-    """(t, 3): barycentric coordinates of a point in every triangle."""
+    """(t, 3): barycentric coordinates of a point in every triangle; -inf in those without area, which hold nothing."""
     a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
     area = _cross(b - a, c - a)
-    return (
-        np.stack([_cross(b - point, c - point), _cross(c - point, a - point), _cross(a - point, b - point)], 1)
-        / (area[:, None])
-    )
+    parts = np.stack([_cross(b - point, c - point), _cross(c - point, a - point), _cross(a - point, b - point)], 1)
+    shares = parts / np.where(area > 0, area, 1.0)[:, None]
+    shares[area <= 0] = -np.inf
+    return shares
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
