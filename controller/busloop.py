@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from controller.channels import build_table, limiter_of, play, servo_specs
 from controller.clock import Clock, Samples
-from controller.following import Following
+from controller.following import Following, regions_of
 from controller.parameters import Parameters
 from controller.robot import BusSettings, ChannelSettings
 from controller.rules import RuleSettings
@@ -71,17 +71,11 @@ class BusLoop:
         self.settings = settings
         own = [channel.name for channel in channels]
         self.table = build_table(channels, parameters, anchors.on(own) if anchors is not None else None)
-        self.bus: Bus = open_bus(
-            kind=settings.kind,
-            port=settings.port,
-            baud=settings.baud,
-            servos=servo_specs(channels),
-            watchdog_ms=settings.watchdog_ms,
-            faults=tuple(settings.faults),
-        )
+        rest, _ = self.table.angles(np.zeros(len(parameters)))
+        self.bus: Bus = open_bus(settings.kind, servo_specs(channels, rest), **settings.options())
         self.clock = Clock(settings.rate_hz)
         self.latency_ms = Samples()
-        self.following = Following(own)
+        self.following = Following(own, regions_of(self.table, parameters))
         self.held = 0
         self.limp = limp
         self.realtime = False
@@ -111,6 +105,10 @@ class BusLoop:
             self.bus.start()
             if self.limp:
                 self.bus.stop()
+                if not self.bus.measures:
+                    log.warning(
+                        "bus %s does not measure its servos: the face cannot follow", self.settings.name
+                    )
             self._resume()
         except BaseException:
             self.bus.close()
@@ -152,7 +150,7 @@ class BusLoop:
         """
         for _ in range(_READS):
             state = self._state = self.bus.read()
-            if state.fresh.all():
+            if state.fresh.all() or not self.bus.measures:
                 return state
         names = [name for name, fresh in zip(self.table.names, state.fresh, strict=True) if not fresh]
         raise NoReply(
@@ -211,7 +209,8 @@ class BusLoop:
             for now in Clock(self.settings.rate_hz).run(lambda: self._retry_ns is None):
                 self._send(rest)
                 state = self._state = self.bus.read()
-                away = np.where(state.fresh, np.abs(state.position_rad - rest), np.inf)
+                known = state.fresh | (not self.bus.measures)
+                away = np.where(known, np.abs(state.position_rad - rest), np.inf)
                 if now > end_ns or away.max() < _AT_REST_RAD:
                     return
 

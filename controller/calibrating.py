@@ -75,7 +75,7 @@ def _opened(stack: ExitStack, robot: RobotSettings, bus: BusSettings, channels: 
     indices = [i for i, channel in enumerate(channels) if channel.bus == bus.name]
     specs = servo_specs([channels[i] for i in indices])
     slow = [replace(spec, max_speed_rad_s=min(spec.max_speed_rad_s, SLOW_RAD_S)) for spec in specs]
-    opened = open_bus(bus.kind, slow, port=bus.port, baud=bus.baud, faults=tuple(bus.faults))
+    opened = open_bus(bus.kind, slow, **bus.options())
     stack.enter_context(opened)
     stack.enter_context(stop_on_signals(opened.stop))
     return _Wire(opened, np.array(indices, dtype=np.intp))

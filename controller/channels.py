@@ -229,8 +229,14 @@ def play(channels: Sequence[ChannelSettings]) -> tuple[Floats, Floats]:
     )
 
 
-def servo_specs(channels: Sequence[ChannelSettings]) -> list[ServoSpec]:
-    """What the driver has to know of each channel's servo."""
+def servo_specs(channels: Sequence[ChannelSettings], rest_rad: Floats | None = None) -> list[ServoSpec]:
+    """What the driver has to know of each channel's servo.
+
+    Parameters
+    ----------
+    rest_rad : (n,) angles of the neutral face, where servos begin that cannot tell where they are; 0 without.
+    """
+    rest = np.zeros(len(channels)) if rest_rad is None else rest_rad
     return [
         ServoSpec(
             id=channel.id,
@@ -242,6 +248,15 @@ def servo_specs(channels: Sequence[ChannelSettings]) -> list[ServoSpec]:
             max_accel_rad_s2=float(np.radians(channel.max_accel_deg_s2)),
             reverse=channel.reverse,
             zero_rad=float(np.radians(channel.zero_deg)),
+            rest_rad=float(rest[i]),
+            pulse_us=_pulses(channel),
+            wire_name=channel.wire_name,
         )
-        for channel in channels
+        for i, channel in enumerate(channels)
     ]
+
+
+def _pulses(channel: ChannelSettings) -> tuple[tuple[float, float], ...]:
+    """Measured (rad, us) of a hobby servo; none without."""
+    pulse = channel.pulse
+    return () if pulse is None else tuple(zip(np.radians(pulse.deg).tolist(), pulse.us, strict=True))

@@ -6,11 +6,13 @@ inside its limits, speed and acceleration. Angles are degrees from the servo's c
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from controller.buses import PULSES, BusSettings
 from controller.config import Settings, config_error, load
 from controller.parameters import Parameters, did_you_mean
 from controller.rules import RuleSettings
@@ -19,28 +21,6 @@ from controller.terms import Curve, Finite, Term, check_points
 Degrees = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Play = Annotated[float, Field(ge=0, le=20, allow_inf_nan=False)]
-
-
-class BusSettings(Settings):
-    """One wire with many servos."""
-
-    name: str
-    kind: Literal["dynamixel", "simulated"]
-    port: str = ""
-    baud: int = 1_000_000
-    rate_hz: Annotated[float, Field(ge=1, le=500)] = 50.0
-    watchdog_ms: Annotated[int, Field(ge=0, le=2540)] = 200
-    faults: list[str] = []
-
-    @model_validator(mode="after")
-    def _needs_port(self) -> BusSettings:
-        if self.kind != "simulated" and not self.port:
-            raise ValueError("port is needed for a real bus; omote ports lists them")
-        if self.kind == "simulated" and self.port:
-            raise ValueError('port is for a real bus: set kind = "dynamixel", or leave the port out')
-        if 0 < self.watchdog_ms < 2000 / self.rate_hz:
-            raise ValueError(f"watchdog_ms must be 0 or span two cycles, {2000 / self.rate_hz:g} at this rate_hz")
-        return self
 
 
 class Calibration(Settings):
@@ -53,6 +33,21 @@ class Calibration(Settings):
     @model_validator(mode="after")
     def _pairs(self) -> Calibration:
         check_points(self.at, self.deg, "deg")
+        return self
+
+
+class PulseSettings(Settings):
+    """Pulses of a hobby servo (us) at angles of the channel (degrees), measured in place of the model's."""
+
+    deg: list[Degrees]
+    us: list[Annotated[float, Field(ge=64, le=4080)]]
+
+    @model_validator(mode="after")
+    def _pairs(self) -> PulseSettings:
+        check_points(self.deg, self.us, "us")
+        steps = [after - before for before, after in pairwise(self.us)]
+        if not (all(step > 0 for step in steps) or all(step < 0 for step in steps)):
+            raise ValueError("us must rise, or fall, with every angle")
         return self
 
 
@@ -102,6 +97,8 @@ class ChannelSettings(Settings):
     max_jerk_deg_s3: Positive | None = None
     reverse: bool = False
     zero_deg: Degrees = 0.0
+    pulse: PulseSettings | None = None
+    wire_name: str = ""
     trim_deg: Degrees = 0.0
     dead_band_deg: Play = 0.0
     slack_deg: Play = 0.0
@@ -193,16 +190,22 @@ def _doubled(robot: RobotSettings) -> list[str]:
 
 
 def _models(robot: RobotSettings) -> list[str]:
-    """Servo models the drivers have no table of."""
-    from drivers.dynamixel.tables import load_table, model_number
+    """Servo models that their bus does not drive, and settings that mean nothing there."""
+    from drivers import check_model
     from drivers.errors import DriverError
 
     faults = []
+    buses = {bus.name: bus for bus in robot.buses}
     for i, channel in enumerate(robot.channels):
+        bus = buses.get(channel.bus)
+        if bus is None:
+            continue
         try:
-            load_table(model_number(channel.model))
+            check_model(bus.family, channel.model)
         except DriverError as error:
             faults.append(f"channels[{i}].model: {error}" + (f" ({error.hint})" if error.hint else ""))
+        if channel.pulse is not None and bus.family not in (*PULSES, "omote"):
+            faults.append(f"channels[{i}].pulse: is for hobby servos; {bus.name!r} is a {bus.family} bus")
     return faults
 
 
