@@ -114,9 +114,9 @@ class Offscreen:
         """Make the target anew when the pace asks for other samples."""
         if self._wanted != self._pace.wanted:
             self._wanted = self._pace.wanted
-            size = self.target.size
-            self.target.release()
-            self.target = Target(self.ctx, size, *self._wanted)
+            old = self.target
+            self.target = Target(self.ctx, old.size, *self._wanted)  # before its framebuffer, still bound, is released
+            old.release()
 
     def read(self) -> np.ndarray:
         """The picture last drawn, (height, width, 3) uint8, top row first."""

@@ -222,9 +222,10 @@ class _Window:
         """The target, made anew when the window changed its size or the pace its samples."""
         wanted = (*size, *self._pace.wanted)
         if self._target is None or self._made_for != wanted:
-            if self._target is not None:
-                self._target.release()
+            old = self._target
             self._target, self._made_for = Target(ctx, size, *self._pace.wanted), wanted
+            if old is not None:
+                old.release()
         return self._target
 
     def _count(self) -> None:
