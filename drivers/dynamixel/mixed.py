@@ -79,6 +79,10 @@ class MixedBus(WireBus):
     def _close_link(self) -> None:
         self._new._close_link()
 
+    def _release(self) -> None:
+        for half in self._halves:
+            half._release()
+
     # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
@@ -103,6 +107,7 @@ class MixedBus(WireBus):
 
     def _bring_up(self) -> Floats:
         here = np.zeros(len(self.ids))
+        self._old._keep &= not hasattr(self, "simulation")  # a simulated bus dies with its program
         for half, index in zip(self._halves, self._index, strict=True):
             try:
                 half._start()

@@ -9,6 +9,7 @@ that let go by itself is told, never switched on again behind the user's back. T
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, ClassVar
@@ -20,6 +21,7 @@ from drivers.dynamixel.layout import Scale
 from drivers.dynamixel.packet1 import Packet1
 from drivers.dynamixel.tables import ControlTable, load_table, model_name
 from drivers.errors import DriverError, PortLost
+from drivers.keeper import Keeper
 from drivers.protocol1 import startup
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.registers import Registers
@@ -44,7 +46,8 @@ class Protocol1Bus(WireBus):
     singles : of servos that must be read one by one, how many are read a cycle, in turn.
     slow_group : servos asked for one slow value (torque) each cycle; 0 asks only those that raise an alert.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
-    watchdog_ms : these servos have none; a time given is only warned about.
+    watchdog_ms : these servos have none; 0 says that they may hold on when this program is killed, any other time
+        keeps a small process beside it that lets them go then (:mod:`drivers.keeper`).
     clock : monotonic seconds.
     policy : fields of :class:`~drivers.protocol1.startup.Policy`, such as ``torque_limit``.
 
@@ -65,13 +68,14 @@ class Protocol1Bus(WireBus):
         feedback: str = "full",
         singles: int = 6,
         slow_group: int = 4,
-        watchdog_ms: int = 0,
+        watchdog_ms: int = 200,
         clock: Callable[[], float] = time.monotonic,
         **policy: Any,
     ) -> None:
         super().__init__(servos, clock=clock)
         self.policy = Policy(**policy)
-        self._port, self._watchdog_ms = port, watchdog_ms
+        self._port, self._keep = port, watchdog_ms > 0 and os.name == "posix"
+        self._keeper: Keeper | None = None
         self._registers = Registers(packets, port, self.servos)
         self._tables([load_table(servo.model) for servo in self.servos])
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, singles, slow_group)
@@ -140,10 +144,17 @@ class Protocol1Bus(WireBus):
         startup.identify(self._registers, self.servos, started)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         self._group()
-        if self._watchdog_ms:
-            log.warning("servos on %s have no bus watchdog: if this program is killed, they hold on", self.path)
+        self._watch()
         self._started(startup.bring_up(self._registers, self.servos, self.policy, started))
         return self.scale.radians(np.array([started.ticks[servo] for servo in self.ids]))
+
+    def _watch(self) -> None:
+        """Have the servos let go when this program is killed. A simulated bus dies with it and needs nobody."""
+        if self._keeper is not None and self._keeper.watching:
+            return
+        if self._keep and not hasattr(self, "simulation"):
+            frames = self._registers.frames(dict.fromkeys(self.ids, 0), "torque")
+            self._keeper = Keeper(self.path, self._port.baudrate, frames)
 
     def _started(self, started: Started) -> None:
         self._report.eeprom_writes += started.eeprom
@@ -172,6 +183,12 @@ class Protocol1Bus(WireBus):
 
     def _switch_off(self) -> None:
         startup.switch_off(self._registers, self.ids)
+
+    def _release(self) -> None:
+        super()._release()
+        keeper, self._keeper = self._keeper, None
+        if keeper is not None:
+            keeper.dismiss()
 
     def _tables(self, tables: list[ControlTable]) -> None:
         self._registers.tables = dict(zip(self.ids, tables, strict=True))

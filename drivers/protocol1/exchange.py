@@ -129,7 +129,12 @@ class Exchanges:
         return Exchange(replies, tuple(servo for servo in ids if servo not in replies), corrupt)
 
     def write_group(self, port: WirePort, address: int, size: int, rows: bytes) -> None:
-        """Sync writes, as many as the rows need, that nobody answers.
+        """Sync writes, as many as the rows need, that nobody answers; parameters as for :meth:`group_frames`."""
+        for frame in self.group_frames(address, size, rows):
+            self.tell(port, frame)
+
+    def group_frames(self, address: int, size: int, rows: bytes) -> list[bytes]:
+        """Sync writes of some registers of many servos.
 
         Parameters
         ----------
@@ -144,9 +149,9 @@ class Exchanges:
         if not rows or len(rows) % width:
             raise ValueError(f"rows: {len(rows)} bytes are not whole rows of 1 + {size}")
         step = (self.longest - 8) // width * width
-        for at in range(0, len(rows), step):
-            params = bytes((address, size)) + rows[at : at + step]
-            self.tell(port, encode(BROADCAST_ID, Instruction1.SYNC_WRITE, params))
+        head = bytes((address, size))
+        parts = (rows[at : at + step] for at in range(0, len(rows), step))
+        return [encode(BROADCAST_ID, Instruction1.SYNC_WRITE, head + part) for part in parts]
 
     def exchange(self, port: WirePort, frame: bytes, wanted: Mapping[int, int]) -> Exchange:
         """Send a packet and collect the replies to it.

@@ -150,13 +150,17 @@ class Registers:
 
     def put_all(self, values: Mapping[int, int], name: str) -> None:
         """Write one register of many servos with one packet per address; nobody answers."""
+        for frame in self.frames(values, name):
+            self.packets.tell(self.port, frame)
+
+    def frames(self, values: Mapping[int, int], name: str) -> list[bytes]:
+        """The sync writes of :meth:`put_all`."""
         groups: dict[tuple[int, int], bytes] = {}
         for servo in self.having(values, name):
             item = self._known(servo, name)
             row = bytes((servo,)) + item.encode(values[servo])
             groups[item.address, item.size] = groups.get((item.address, item.size), b"") + row
-        for (address, size), rows in groups.items():
-            self.packets.write_group(self.port, address, size, rows)
+        return [frame for key, rows in groups.items() for frame in self.packets.group_frames(*key, rows)]
 
     def set_all(self, values: Mapping[int, int], name: str) -> None:
         """Write one register of many servos and make sure that each has it.
