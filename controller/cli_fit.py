@@ -31,6 +31,10 @@ def fit(
     without: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Leave out an object or material; may be repeated.")
     ] = None,
+    identities: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Identity modes of the mesh (.npz): adds named variations.")
+    ] = None,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep the head that is there; only add --identities.")] = False,
     report: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for a report: figures, tables, error drawn on the face.")
     ] = None,
@@ -39,11 +43,14 @@ def fit(
 
     Example: omote fit me.glb -o heads/me --report report
     """
-    from controller.fitting import fit_with_progress
+    from controller.fitting import add_with_progress, fit_with_progress
     from surface.fit.load import LoadOptions
 
-    options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
-    fit_with_progress(mesh, out, name or out.resolve().name, console, options, report)
+    if not keep:
+        options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
+        fit_with_progress(mesh, out, name or out.resolve().name, console, options, report)
+    if identities is not None:
+        add_with_progress(mesh, out, identities, console)
 
 
 def export(
@@ -56,6 +63,9 @@ def export(
         list[str] | None,
         typer.Option("--expression", "-e", metavar="NAME[=INTENSITY]", help="Pose it: add a named expression."),
     ] = None,
+    identity: Annotated[
+        str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
+    ] = None,
 ) -> None:
     """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.
 
@@ -63,4 +73,4 @@ def export(
     """
     from controller.exporting import export_with_progress
 
-    export_with_progress(head, out, settings or [], expression or [], console)
+    export_with_progress(head, out, settings or [], expression or [], identity, console)

@@ -29,6 +29,9 @@ def render(
     camera: Annotated[str, typer.Option(help="front, three_quarter or profile.")] = "front",
     quality: Annotated[str, typer.Option(help="full or fast.")] = "full",
     head: Annotated[str, typer.Option(help="Head: a name from configs/heads or a folder.")] = "ict",
+    identity: Annotated[
+        str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
+    ] = None,
     sheet: Annotated[
         bool, typer.Option("--sheet", help="Draw every parameter at its end and every named expression.")
     ] = False,
@@ -39,7 +42,7 @@ def render(
     """
     from controller.still import Still, draw_sheet, draw_still
 
-    still = Still.parse(settings or [], expression or [], size, camera, quality, head)
+    still = Still.parse(settings or [], expression or [], size, camera, quality, head, identity)
     if sheet:
         with console.status("drawing") as status:
             draw_sheet(still, out, lambda done, total: status.update(f"drawing {done} of {total}"))

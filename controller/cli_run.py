@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from controller.identity import parse_identity
+
 if TYPE_CHECKING:
     from controller.sources import Voice
 
@@ -78,6 +80,9 @@ def run(
     ] = None,
     voice_hz: VoiceHz = None,
     record: Record = None,
+    identity: Annotated[
+        str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
+    ] = None,
 ) -> None:
     """Run a stage until it is stopped (Ctrl-C) or its time is up.
 
@@ -89,7 +94,10 @@ def run(
     from controller.sources import Voice
 
     heard = Voice(voice, voice_hz) if voice is not None else None
-    _run(stage, None, seconds, headless, no_face, pictures, report, mirror=mirror, voice=heard, record=record)
+    _run(
+        stage, None, seconds, headless, no_face, pictures, report,
+        mirror=mirror, voice=heard, record=record, identity=parse_identity(identity),
+    )  # fmt: skip
 
 
 def play(
@@ -134,11 +142,12 @@ def _run(
     mirror: bool = False,
     voice: Voice | None = None,
     record: Path | None = None,
+    identity: dict[str, float] | None = None,
 ) -> None:
     from controller.session import Session, has_display, write_report
 
     with console.status("starting") as status:
-        session = Session.load(stage, take, status.update, mirror=mirror, voice=voice, record=record)
+        session = Session.load(stage, take, status.update, mirror=mirror, voice=voice, record=record, identity=identity)
         if no_face:
             measured = session.run_without_face(seconds)
         elif headless or not has_display():

@@ -7,11 +7,12 @@ from pathlib import Path
 from rich.console import Console
 
 from controller.parameters import PARAMETERS
-from controller.paths import find_config
 from controller.still import Still
 
 
-def export_with_progress(head: str, out: Path, settings: list[str], expressions: list[str], console: Console) -> None:
+def export_with_progress(
+    head: str, out: Path, settings: list[str], expressions: list[str], identity: str | None, console: Console
+) -> None:
     """Write the head ``head`` to ``out`` in the pose that the words of a command line ask for.
 
     Raises
@@ -24,10 +25,10 @@ def export_with_progress(head: str, out: Path, settings: list[str], expressions:
     from surface.export import export_head
     from surface.head import Head
 
-    values = Still.parse(settings, expressions, "64x64", "front", "full", head).values
-    pose = {name: float(v) for name, v in zip(PARAMETERS.names, values, strict=True) if v}
+    still = Still.parse(settings, expressions, "64x64", "front", "full", head, identity)
+    pose = {name: float(v) for name, v in zip(PARAMETERS.names, still.values, strict=True) if v}
     with console.status("exporting"):
-        loaded = Head.load(find_config("heads", head))
+        loaded = Head.load(still.head, still.identity)
         written = export_head(loaded, out, {n: v for n, v in pose.items() if n in loaded.parameters})
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)

@@ -48,6 +48,21 @@ def fit_with_progress(
     console.print(f"wrote {out}", soft_wrap=True)
 
 
+def add_with_progress(mesh: Path, head: Path, modes: Path, console: Console) -> None:
+    """Add named variations to a head that was fitted to ``mesh``.
+
+    Raises
+    ------
+    FitError
+        when head, mesh and modes do not belong together; nothing is written then.
+    """
+    from surface.fit.identities import add_identities
+
+    with console.status("fitting identities"):
+        names = add_identities(head, mesh, modes)
+    console.print(f"identities: {', '.join(names)}", soft_wrap=True)
+
+
 def _shade(out: Path, console: Console) -> bool:
     """Bake how much light reaches each vertex of the head; False without OpenGL."""
     from surface.errors import ViewError

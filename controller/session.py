@@ -7,13 +7,15 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from controller.errors import ConfigError
 from controller.face import HeadlessFace, HeadValues, Recorder
 from controller.files import replacing
+from controller.identity import check_identity
 from controller.parameters import PARAMETERS
 from controller.pictures import write_pictures
 from controller.recording import SUFFIX, replay
@@ -78,9 +80,16 @@ class Session:
         mirror: bool = False,
         voice: Voice | None = None,
         record: Path | None = None,
+        identity: Mapping[str, float] | None = None,
     ) -> Session:
-        """Find and check a stage and, where given, a take; raises before anything is opened."""
+        """Find and check a stage and, where given, a take; raises before anything is opened.
+
+        ``identity`` replaces the stage's own.
+        """
         found = load_stage(stage, PARAMETERS)
+        if identity:
+            check_identity(found.head, identity)
+            found = replace(found, settings=found.settings.model_copy(update={"identity": dict(identity)}))
         if take is not None:
             check_take(take, found)
         if mirror and not found.robots:
@@ -136,7 +145,7 @@ class Session:
         from surface.head import Head
 
         yield_to_servos()
-        head = Head.load(self.stage.head)
+        head = Head.load(self.stage.head, self.stage.settings.identity)
         return HeadValues(body.mailbox, PARAMETERS, head.parameters), head
 
     def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:

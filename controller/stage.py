@@ -13,6 +13,7 @@ from controller.config import Settings, config_error, load
 from controller.errors import ConfigError
 from controller.expression import Vocabulary
 from controller.host import load_script
+from controller.identity import check_identity
 from controller.layers import load_layers
 from controller.life import LifeSettings
 from controller.mixer import LayerSettings
@@ -53,6 +54,7 @@ class StageSettings(Settings):
     name: str
     description: str = ""
     head: str = "ict"
+    identity: dict[str, Annotated[float, Field(ge=0, le=1)]] = {}
     robots: list[str] = []
     control_hz: Annotated[float, Field(ge=10, le=1000)] = 100.0
     liveliness: Annotated[float, Field(ge=0, le=1)] = 0.0
@@ -120,6 +122,8 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
     settings = load(path, StageSettings)
     faults: list[str] = []
     head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
+    if head is not None and settings.identity:
+        _collect(faults, "identity", lambda: check_identity(head, settings.identity))
     robots = [
         _collect(
             faults,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from controller.errors import ParameterError
 from controller.expression import Vocabulary
+from controller.identity import check_identity, parse_identity
 from controller.parameters import PARAMETERS
 from controller.paths import find_config
 
@@ -29,7 +30,7 @@ class Still:
     values : (p,) float64, the full parameter vector.
     size : width and height (pixels).
     camera, quality : names.
-    head : folder of the head.
+    head : folder of the head. identity : variations of it to mix in, by name.
     """
 
     values: NDArray[np.float64]
@@ -37,11 +38,13 @@ class Still:
     camera: str
     quality: str
     head: Path
+    identity: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def parse(
-        cls, settings: list[str], expressions: list[str], size: str, camera: str, quality: str, head: str
-    ) -> Still:
+        cls, settings: list[str], expressions: list[str], size: str, camera: str, quality: str, head: str,
+        identity: str | None = None,
+    ) -> Still:  # fmt: skip
         """Read the words of a command line.
 
         Raises
@@ -57,7 +60,9 @@ class Still:
             values[index] = value
         _one_of("--camera", camera, _CAMERAS)
         _one_of("--quality", quality, _QUALITIES)
-        return cls(values, parse_size(size), camera, quality, find_config("heads", head))
+        folder, wanted = find_config("heads", head), parse_identity(identity)
+        check_identity(folder, wanted)
+        return cls(values, parse_size(size), camera, quality, folder, wanted)
 
 
 def parse_setting(word: str) -> tuple[int, float]:
@@ -114,7 +119,7 @@ def draw_still(still: Still, out: Path) -> None:
     from surface.view.offscreen import Offscreen
     from surface.view.sheet import write_png
 
-    head = Head.load(still.head)
+    head = Head.load(still.head, still.identity)
     with Offscreen(head, still.size, quality=still.quality) as screen:
         picture = screen.render(for_head(still.values, head.parameters), getattr(Camera, still.camera)())
     write_png(picture, out)
@@ -151,7 +156,7 @@ def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | N
     from surface.view.camera import Camera
     from surface.view.sheet import contact_sheet, write_png
 
-    head = Head.load(still.head)
+    head = Head.load(still.head, still.identity)
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses()]
     camera = getattr(Camera, still.camera)()
     write_png(contact_sheet(head, entries, views=[camera], quality=still.quality, progress=progress), out)

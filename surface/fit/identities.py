@@ -24,7 +24,7 @@ from surface.fit.recipe import Recipe, recipe_for
 from surface.fit.solve import basis, solve
 from surface.head.data import Group, HeadData, PartData
 from surface.head.file import load_data
-from surface.head.identity import Identity, save_identities, with_identities
+from surface.head.identity import Identity, fingerprint, save_identities, with_identities
 from surface.head.parameters import NAMES, read_pose
 from surface.head.rig import SkinRig
 from surface.readers.npzmesh import DAMAGED
@@ -147,9 +147,9 @@ def fit_identities(
     moves = _part_moves(head, charts, base.vertices, shifts, eye_shifts, where)
     jaw = _jaw_shift(head, moves)
     lids = [_rims(base, charts[head.parts[0].name], eye) for eye in eyes]
-    out = []
+    out, fit = [], fingerprint(head)
     for k, name in enumerate(fields):
-        identity = Identity(name, {p: _group(name, m[k]) for p, m in moves.items()}, {}, eye_shifts[k], jaw[k])
+        identity = Identity(name, {p: _group(name, m[k]) for p, m in moves.items()}, {}, eye_shifts[k], jaw[k], fit)
         out.append(close_lids(head, identity, lids))
     return out
 

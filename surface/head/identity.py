@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +32,7 @@ class Identity:
     name : what a user calls it. groups : part name -> control points and how far they stand away, mm.
     changes : part name -> what is added to groups of the head, so that lids of another height still close.
     eyes : (2, 3) shift of the eyeballs' centres, jaw : (3,) of the hinge, mm.
+    fit : :func:`fingerprint` of the head it was made for.
     """
 
     name: str
@@ -38,6 +40,16 @@ class Identity:
     changes: dict[str, list[Group]]
     eyes: Floats
     jaw: Floats
+    fit: int
+
+
+def fingerprint(head: HeadData) -> int:
+    """A number that changes when a head's control points stand elsewhere in (u, v)."""
+    out = 0
+    for part in head.parts:
+        for knots in (part.knots_u, part.knots_v):
+            out = zlib.crc32(np.ascontiguousarray(knots, np.float64).tobytes(), out)
+    return out
 
 
 def load_identities(head: str | Path) -> dict[str, Identity]:
@@ -58,11 +70,20 @@ def load_identities(head: str | Path) -> dict[str, Identity]:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as z:
             names = [str(n) for n in z["names"]]
             eyes, jaw = _finite(z["eyes"], (len(names), 2, 3)), _finite(z["jaw"], (len(names), 3))
+            fit = int(z["fit"])
             groups = [_groups(z, k, name) for k, name in enumerate(names)]
             changes = [_changes(z, k) for k in range(len(names))]
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as e:
-        raise HeadFileError(f"{path}: {e}", hint="make it again: omote fit MESH --identities FILE") from e
-    return {n: Identity(n, groups[k], changes[k], eyes[k], jaw[k]) for k, n in enumerate(names)}
+        raise HeadFileError(
+            f"{path}: {e}", hint="make it again: omote fit MESH -o FOLDER --keep --identities FILE"
+        ) from e
+    return {n: Identity(n, groups[k], changes[k], eyes[k], jaw[k], fit) for k, n in enumerate(names)}
+
+
+def _indices(a: NDArray) -> NDArray[np.int32]:
+    if a.ndim != 1 or a.dtype.kind not in "iu" or a.min(initial=0) < 0:
+        raise ValueError("an array of control points holds something else")
+    return a.astype(np.int32)
 
 
 def _finite(a: NDArray, shape: tuple[int, ...]) -> Floats:
@@ -76,7 +97,7 @@ def _groups(z: np.lib.npyio.NpzFile, k: int, name: str) -> dict[str, Group]:
     for key in z.files:
         if key.startswith(f"{k}/ids/"):
             part = key.split("/", 2)[2]
-            ids = z[key].astype(np.int32)
+            ids = _indices(z[key])
             out[part] = Group(name, ids, _finite(z[f"{k}/moves/{part}"], (len(ids), 3)).astype(np.float32))
     return out
 
@@ -86,7 +107,7 @@ def _changes(z: np.lib.npyio.NpzFile, k: int) -> dict[str, list[Group]]:
     for key in z.files:
         if key.startswith(f"{k}/change_ids/"):
             part, shape = key.split("/", 2)[2].rsplit("/", 1)
-            ids = z[key].astype(np.int32)
+            ids = _indices(z[key])
             moves = _finite(z[f"{k}/change_moves/{part}/{shape}"], (len(ids), 3)).astype(np.float32)
             out.setdefault(part, []).append(Group(shape, ids, moves))
     return out
@@ -96,6 +117,7 @@ def save_identities(head: str | Path, identities: list[Identity]) -> Path:
     """Keep identities beside a head; returns the file's path."""
     path = identities_path(head)
     arrays: dict[str, NDArray] = {
+        "fit": np.array(identities[0].fit if identities else 0, np.int64),
         "names": np.array([i.name for i in identities]),
         "eyes": np.array([i.eyes for i in identities]).reshape(-1, 2, 3),
         "jaw": np.array([i.jaw for i in identities]).reshape(-1, 3),
@@ -135,23 +157,25 @@ def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mappi
         if not (math.isfinite(amount) and 0.0 <= amount <= 1.0):
             raise HeadFileError(f"{where}: identity {name}: {amount:g} is not between 0 and 1", hint=f"{name}=0.6")
         identity = known[name]
+        _check_fit(head, identity, where)
         eyes += amount * identity.eyes
         jaw += amount * identity.jaw
         for part, group in identity.groups.items():
-            parts[part] = _moved(_known(parts, part, group, where), group, amount)
+            parts[part] = _moved(parts[part], group, amount)
         for part, changes in identity.changes.items():
             for group in changes:
-                parts[part] = _changed(_known(parts, part, group, where), group, amount)
+                parts[part] = _changed(parts[part], group, amount)
     moved = replace(head.jaw, centre=tuple(jaw.tolist()))
     return replace(head, eyes=eyes, jaw=moved, parts=[parts[p.name] for p in head.parts])
 
 
-def _known(parts: Mapping[str, PartData], name: str, group: Group, where: str) -> PartData:
-    part = parts.get(name)
-    if part is None or group.ids.min(initial=0) < 0 or group.ids.max(initial=-1) >= len(part.points):
+def _check_fit(head: HeadData, identity: Identity, where: str) -> None:
+    points = {p.name: len(p.points) for p in head.parts}
+    every = [*identity.groups.items(), *((p, g) for p, groups in identity.changes.items() for g in groups)]
+    inside = all(group.ids.max(initial=-1) < points.get(part, -1) for part, group in every)
+    if identity.fit != fingerprint(head) or not inside:
         raise HeadFileError(f"{where}: identities.npz was made for another fit of this head",
-                            hint="make it again: omote fit MESH --identities FILE")  # fmt: skip
-    return part
+                            hint="make it again: omote fit MESH -o FOLDER --keep --identities FILE")  # fmt: skip
 
 
 def _moved(part: PartData, group: Group, amount: float) -> PartData:
