@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from controller.busloop import BusLoop
 from controller.clock import Clock
 from controller.errors import OMOTE_ERRORS
-from controller.following import Puppet
+from controller.following import Puppet, Reflection
 from controller.linelink import LineLink
 from controller.links import open_links
 from controller.livelink import Take, TakePlayer
@@ -78,7 +78,9 @@ class Body:
         self.replay = replay
         self.links: list[LineLink] = []
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
-        self.puppet = self._puppet(parameters) if mirror else None
+        self.reflection = self._reflection(parameters)
+        self.state.watch = self.reflection
+        self.puppet = Puppet(self.reflection, parameters) if mirror and self.reflection is not None else None
         player = TakePlayer(take, self.state, layer) if take is not None else None
         self.sources = Sources(self.state, player, self.puppet, voice)
         self.live = take is None and replay is None
@@ -89,8 +91,13 @@ class Body:
         self._error: Exception | None = None
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
 
-    def _puppet(self, parameters: Parameters) -> Puppet:
-        return Puppet([bus.table for bus in self.buses], [bus.measured for bus in self.buses], parameters)
+    def _reflection(self, parameters: Parameters) -> Reflection | None:
+        buses = self.buses
+        if not buses:
+            return None
+        return Reflection(
+            [b.table for b in buses], [b.measured for b in buses], parameters, [b.following for b in buses]
+        )
 
     def _loops(self, robot: RobotSettings, parameters: Parameters, limp: bool) -> list[BusLoop]:
         anchors = None

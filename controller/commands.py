@@ -64,6 +64,9 @@ class CommandSink(Protocol):
     def snapshot(self, out: Floats) -> None:
         """Copy the present parameters to ``out`` : (P,)."""
 
+    def measured(self, out: Floats) -> bool:
+        """Copy the parameters that the servos show to ``out`` : (P,); False when no servo says where it stands."""
+
     def holder(self, index: int) -> str | None:
         """The layer that holds a parameter."""
 
@@ -72,6 +75,16 @@ class CommandSink(Protocol):
 
     def status(self) -> dict[str, StatusValue]:
         """How the face is, as short words and numbers."""
+
+
+class Watch(Protocol):
+    """What looks at the servos; see :class:`controller.following.Reflection`."""
+
+    def measured(self, out: Floats) -> bool:
+        """Copy the parameters that the servos show to ``out`` : (P,); False when none is known."""
+
+    def status(self) -> Mapping[str, StatusValue]:
+        """How the servos are, as short words and numbers."""
 
 
 class CommandState:
@@ -84,6 +97,10 @@ class CommandState:
     layers : the layers; the shipped ones without. Must have those of :data:`controller.layers.NEEDED`.
     life : the figures of idle life; the natural ones without. seed : the same seed lives the same life.
     period_s : length of a tick.
+
+    Attributes
+    ----------
+    watch : looks at the servos; None without any.
 
     Raises
     ------
@@ -112,6 +129,7 @@ class CommandState:
         self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
         self._speech = self.mixer["speech"]
         self._everything = np.ones(len(parameters), dtype=bool)
+        self.watch: Watch | None = None
         self._lock = threading.Lock()
         self._stamp_ns = 0
         self._now_s = 0.0
@@ -258,6 +276,10 @@ class CommandState:
         with self._lock:
             out[:] = self._present
 
+    def measured(self, out: Floats) -> bool:
+        """See :class:`CommandSink`."""
+        return self.watch is not None and self.watch.measured(out)
+
     def holder(self, index: int) -> str | None:
         """See :class:`CommandSink`."""
         with self._lock:
@@ -280,6 +302,8 @@ class CommandState:
                 "capture": self.mixer["capture"].holding,
                 "limited": int(np.count_nonzero(self.limiter.limited)),
                 "ticks": self._ticks,
+                "layers": ",".join(self.mixer.active) or "none",
+                **(self.watch.status() if self.watch is not None else {}),
             }
 
     def _stop_looking(self, fade_s: float | None = None) -> None:

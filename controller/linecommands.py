@@ -8,10 +8,32 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from controller.errors import ParameterError
 from controller.lineprotocol import Code, LineError, Words, format_words, parse_words
+from controller.linewords import (
+    READINGS,
+    Command,
+    Expr,
+    Gaze,
+    GazeAt,
+    GazeOff,
+    Get,
+    Hello,
+    Info,
+    List,
+    Live,
+    Measured,
+    Neutral,
+    Ping,
+    Read,
+    Release,
+    Request,
+    Set,
+    Status,
+    Subscribe,
+    Unsubscribe,
+)
 from controller.parameters import Parameters, did_you_mean
 
 MAX_RATE_HZ = 200.0
@@ -25,132 +47,6 @@ MAX_FADE_S = 60.0
 LISTS = ("COMMANDS", "EXPRESSIONS", "HOLDERS", "LAYERS", "PARAMETERS")
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
-
-
-@dataclass(frozen=True)
-class Hello:
-    """Say who you are. ``HELLO``, ``VERSION``."""
-
-
-@dataclass(frozen=True)
-class Ping:
-    """Answer with the same words. ``PING [word ...]``."""
-
-    text: str = ""
-
-
-@dataclass(frozen=True)
-class Set:
-    """Hold parameters at values. ``SET name value [name value ...]``, ``FRAME v0 ... v58``."""
-
-    indices: tuple[int, ...]
-    values: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Release:
-    """Give parameters held by SET back to the layers below. ``RELEASE name ...``, ``RELEASE ALL``."""
-
-    indices: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Expr:
-    """Make a named expression. ``EXPR name [intensity [duration_s]]``; None holds it until the next."""
-
-    name: str
-    intensity: float = 1.0
-    duration_s: float | None = None
-
-
-@dataclass(frozen=True)
-class Gaze:
-    """Look in a direction, degrees. ``GAZE yaw pitch``."""
-
-    yaw_deg: float
-    pitch_deg: float
-
-
-@dataclass(frozen=True)
-class GazeAt:
-    """Look at a point, mm from the middle between the eyes. ``GAZE AT x y z``."""
-
-    x_mm: float
-    y_mm: float
-    z_mm: float
-
-
-@dataclass(frozen=True)
-class GazeOff:
-    """Leave the gaze to the layers below. ``GAZE OFF``."""
-
-
-@dataclass(frozen=True)
-class Neutral:
-    """Release SET, EXPR and GAZE and return to neutral. ``NEUTRAL [seconds]``."""
-
-    seconds: float = 0.5
-
-
-@dataclass(frozen=True)
-class Live:
-    """Set how lively the face is by itself, 0 to 1. ``LIFE amount``."""
-
-    amount: float
-
-
-@dataclass(frozen=True)
-class Get:
-    """Tell parameters. ``GET name ...``, ``GET ALL``."""
-
-    indices: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Info:
-    """Tell about one parameter. ``INFO name``."""
-
-    index: int
-
-
-@dataclass(frozen=True)
-class Status:
-    """Tell how omote is. ``STATUS``."""
-
-
-@dataclass(frozen=True)
-class Subscribe:
-    """Stream parameters. ``SUB rate_hz [ALL | name ...]``."""
-
-    rate_hz: float
-    indices: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Unsubscribe:
-    """End the stream. ``UNSUB``."""
-
-
-@dataclass(frozen=True)
-class List:
-    """Tell names. ``LIST COMMANDS|EXPRESSIONS|HOLDERS|LAYERS|PARAMETERS``."""
-
-    what: str
-
-
-Command = (
-    Hello | Ping | Set | Release | Expr | Gaze | GazeAt | GazeOff | Neutral | Live
-    | Get | Info | Status | Subscribe | Unsubscribe | List
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Request:
-    """A command with the tag and the checksum habit of its line."""
-
-    command: Command
-    tag: int | None = None
-    checked: bool = False
 
 
 class Grammar:
@@ -230,7 +126,11 @@ class Grammar:
         return Gaze(yaw, in_range("pitch", given[1], -GAZE_PITCH_DEG, GAZE_PITCH_DEG))
 
     def read_subscribe(self, given: Sequence[str]) -> Subscribe:
-        rate = in_range("rate_hz", given[0], MIN_RATE_HZ, MAX_RATE_HZ)
+        rate, first = in_range("rate_hz", given[0], MIN_RATE_HZ, MAX_RATE_HZ), given[1].upper() if given[1:] else "ALL"
+        if first == "READ":
+            return Subscribe(rate, question=_read(self, given[2:]))
+        if first == "MEASURED":
+            return Subscribe(rate, question=Measured(self.names_or_all(given[2:] or ("ALL",))))
         return Subscribe(rate, self.names_or_all(given[1:] or ("ALL",)))
 
     def names_or_all(self, given: Sequence[str]) -> tuple[int, ...]:
@@ -273,8 +173,12 @@ class Grammar:
                 return ["RELEASE", *self._names(indices)]
             case Get(indices):
                 return ["GET", *self._names(indices)]
-            case Subscribe(rate, indices):
+            case Measured(indices):
+                return ["MEASURED", *self._names(indices)]
+            case Subscribe(rate, indices, None):
                 return ["SUB", repr(rate), *self._names(indices)]
+            case Subscribe(rate, _, question) if question is not None:
+                return ["SUB", repr(rate), *self._words(question)]
             case Info(index):
                 return ["INFO", self._name(index)]
             case _:
@@ -306,6 +210,8 @@ def _plain_words(command: Command) -> list[str]:
             return ["PING", text] if text else ["PING"]
         case List(what):
             return ["LIST", what]
+        case Read(what, measured):
+            return ["READ", what, *(["MEASURED"] if measured else [])]
     return [{Hello: "HELLO", Status: "STATUS", Unsubscribe: "UNSUB"}[type(command)]]
 
 
@@ -329,6 +235,13 @@ def _gaze_at(given: Sequence[str]) -> GazeAt:
     if math.hypot(*at) < 1.0:
         raise LineError(Code.RANGE, "the point must be at least 1 mm from the middle between the eyes")
     return GazeAt(*at)
+
+
+def _read(_: Grammar, given: Sequence[str]) -> Read:
+    words = [word.upper() for word in given]
+    if not words or words[0] not in READINGS or words[1:] not in ([], ["MEASURED"]):
+        raise LineError(Code.ARGUMENTS, f"usage: {USAGE['READ']}")
+    return Read(words[0], len(words) > 1)
 
 
 def _list(_: Grammar, given: Sequence[str]) -> List:
@@ -356,6 +269,8 @@ _RULES: dict[str, Rule] = {
     "NEUTRAL": (0, 1, _neutral),
     "LIFE": (1, 1, lambda _, given: Live(in_range("amount", given[0], 0.0, 1.0))),
     "GET": (1, None, lambda g, given: Get(g.names_or_all(given))),
+    "MEASURED": (1, None, lambda g, given: Measured(g.names_or_all(given))),
+    "READ": (1, 2, _read),
     "INFO": (1, 1, lambda g, given: Info(g.name(given[0]))),
     "STATUS": (0, 0, lambda _, given: Status()),
     "SUB": (1, None, Grammar.read_subscribe),
@@ -378,9 +293,11 @@ USAGE = {
     "NEUTRAL": "NEUTRAL [seconds]",
     "LIFE": "LIFE amount",
     "GET": "GET name ... or GET ALL",
+    "MEASURED": "MEASURED name ... or MEASURED ALL",
+    "READ": f"READ {', '.join(READINGS[:-1])} or {READINGS[-1]}, and MEASURED for what the servos show",
     "INFO": "INFO name",
     "STATUS": "STATUS",
-    "SUB": "SUB rate_hz [ALL] or SUB rate_hz name ...",
+    "SUB": "SUB rate_hz [ALL], SUB rate_hz name ..., SUB rate_hz READ ..., or SUB rate_hz MEASURED [name ...]",
     "UNSUB": "UNSUB",
     "LIST": "LIST COMMANDS, EXPRESSIONS, HOLDERS, LAYERS or PARAMETERS",
 }

@@ -7,34 +7,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from functools import cache
+from functools import cache, cached_property
 from importlib import metadata
+from typing import TYPE_CHECKING
 
 from controller.commands import CommandSink
 from controller.errors import OMOTE_ERRORS
-from controller.linecommands import (
-    COMMANDS,
-    MAX_RATE_HZ,
-    Command,
-    Expr,
-    Gaze,
-    GazeAt,
-    GazeOff,
-    Get,
-    Grammar,
-    Hello,
-    Info,
-    List,
-    Live,
-    Neutral,
-    Ping,
-    Release,
-    Request,
-    Set,
-    Status,
-    Subscribe,
-    Unsubscribe,
-)
+from controller.linecommands import COMMANDS, MAX_RATE_HZ, Grammar
 from controller.lineprotocol import (
     MAX_LINE,
     VERSION,
@@ -48,6 +27,31 @@ from controller.lineprotocol import (
     number,
     pairs,
 )
+from controller.linewords import (
+    Command,
+    Expr,
+    Gaze,
+    GazeAt,
+    GazeOff,
+    Get,
+    Hello,
+    Info,
+    List,
+    Live,
+    Measured,
+    Neutral,
+    Ping,
+    Read,
+    Release,
+    Request,
+    Set,
+    Status,
+    Subscribe,
+    Unsubscribe,
+)
+
+if TYPE_CHECKING:
+    from controller.reading import Readings
 
 
 class LineSession:
@@ -90,13 +94,29 @@ class LineSession:
             return b""
         period = round(1e9 / request.command.rate_hz)
         self._due_ns += period * (1 + (now_ns - self._due_ns) // period)
-        self._sink.snapshot(self._values)
-        time_ms = (now_ns - self._start_ns) // 1_000_000
-        indices = request.command.indices
+        return self._streamed(request.command, (now_ns - self._start_ns) // 1_000_000, request.checked)
+
+    def _streamed(self, command: Subscribe, time_ms: int, checked: bool) -> bytes:
+        question, indices = command.question, command.indices
+        if isinstance(question, Read):
+            if not self._look(question.measured):
+                return b""
+            shown = self._readings.read(question.what, self._values)
+            return format_parameters(time_ms, *_unzip(shown), checked=checked)
+        if not self._look(question is not None):
+            return b""
+        indices = indices if question is None else question.indices
         if len(indices) == len(self._values):
-            return format_frame(time_ms, self._values, checked=request.checked)
+            return format_frame(time_ms, self._values, checked=checked)
         names = [self._parameters.names[i] for i in indices]
-        return format_parameters(time_ms, names, self._values[list(indices)], checked=request.checked)
+        return format_parameters(time_ms, names, self._values[list(indices)], checked=checked)
+
+    def _look(self, measured: bool) -> bool:
+        """Take the face that is shown, or that the servos make; False when that is not known."""
+        if measured:
+            return self._sink.measured(self._values)
+        self._sink.snapshot(self._values)
+        return True
 
     def reset(self) -> None:
         """The other side is gone: forget its half line and its subscription."""
@@ -156,7 +176,14 @@ class LineSession:
         """Text of the reply to a question."""
         match command:
             case Get(indices):
+                self._look(measured=False)
                 return "GET " + self._get(indices)
+            case Measured(indices):
+                self._look_at_servos()
+                return "MEASURED " + self._get(indices)
+            case Read(what, measured):
+                self._look_at_servos() if measured else self._look(measured=False)
+                return f"READ {what} " + pairs(*_unzip(self._readings.read(what, self._values)))
             case Info(index):
                 return "INFO " + self._info(index)
             case Status():
@@ -170,8 +197,17 @@ class LineSession:
                 return f"PONG {text}".rstrip()
         raise TypeError(f"no answer to {command!r}")
 
+    def _look_at_servos(self) -> None:
+        if not self._look(measured=True):
+            raise LineError(Code.BUSY, "no servo says where it stands")
+
+    @cached_property
+    def _readings(self) -> Readings:
+        from controller.reading import Readings  # takes a moment to import; few ask for it
+
+        return Readings(self._parameters, self._sink.vocabulary)
+
     def _get(self, indices: tuple[int, ...]) -> str:
-        self._sink.snapshot(self._values)
         if len(indices) == len(self._values):
             return "ALL " + " ".join(map(number, self._values.tolist()))
         return pairs((self._parameters.names[i] for i in indices), (self._values[i] for i in indices))
@@ -205,6 +241,10 @@ def _receipt(command: Command) -> str:
             return f"{type(command).__name__.upper()} {len(indices)}"
         case Expr(name, intensity, _):
             return f"EXPR {name} {number(intensity)}"
+        case Subscribe(rate, _, Read(what, measured)):
+            return f"SUB {number(rate)} READ {what}" + (" MEASURED" if measured else "")
+        case Subscribe(rate, _, Measured(indices)):
+            return f"SUB {number(rate)} MEASURED {len(indices)}"
         case Subscribe(rate, indices):
             return f"SUB {number(rate)} {len(indices)}"
         case Unsubscribe():
@@ -214,6 +254,10 @@ def _receipt(command: Command) -> str:
         case Live(amount):
             return f"LIFE {number(amount)}"
     return "NEUTRAL"
+
+
+def _unzip(shown: list[tuple[str, float]]) -> tuple[list[str], list[float]]:
+    return [name for name, _ in shown], [value for _, value in shown]
 
 
 def _word(value: str | int | float) -> str:

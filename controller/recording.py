@@ -17,7 +17,7 @@ from typing import Any, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.commands import CommandState, StatusValue
+from controller.commands import CommandState, StatusValue, Watch
 from controller.errors import ControllerError
 from controller.expression import Vocabulary
 from controller.parameters import Floats, Parameters
@@ -129,6 +129,19 @@ class Recorder:
     def snapshot(self, out: Floats) -> None:
         """See :class:`CommandSink`."""
         self.state.snapshot(out)
+
+    @property
+    def watch(self) -> Watch | None:
+        """See :class:`CommandState`."""
+        return self.state.watch
+
+    @watch.setter
+    def watch(self, watch: Watch | None) -> None:
+        self.state.watch = watch
+
+    def measured(self, out: Floats) -> bool:
+        """See :class:`CommandSink`."""
+        return self.state.measured(out)
 
     def holder(self, index: int) -> str | None:
         """See :class:`CommandSink`."""

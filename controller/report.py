@@ -53,6 +53,8 @@ def _buses(buses: list[dict[str, Any]]) -> list[tuple[str, str]]:
             worst = away["worst"][0]
             text = f"rms {away['rms_deg']:.1f} deg, most at {worst['channel']}: rms {worst['rms_deg']:.1f} deg"
             found.append((f"{name}: measured face is away from the wanted one by", text))
+            by_region = "  ".join(f"{region} {rms:.1f}" for region, rms in away.get("regions_rms_deg", {}).items())
+            found.append((f"{name}: by region (rms deg)", by_region))
         found += [(f"{name}: rule", _rule(rule)) for rule in bus.get("rules", [])]
     return found
 

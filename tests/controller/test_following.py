@@ -12,7 +12,8 @@ from controller.body import Body
 from controller.channels import build_table
 from controller.commands import CommandState
 from controller.errors import ConfigError
-from controller.following import Following, Puppet
+from controller.following import Following, Puppet, Reflection, regions_of
+from controller.linesession import LineSession
 from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS as P
 from controller.paths import find_config
@@ -49,7 +50,7 @@ def test_a_puppet_writes_what_its_channels_show_and_leaves_the_rest() -> None:
     face[P.index("jawOpen")] = 0.7
     state, out = CommandState(P), P.neutral()
     angles = table.angles(face)[0]
-    puppet = Puppet([table], [lambda: measured(angles, np.ones(len(angles), bool))], P)
+    puppet = Puppet(Reflection([table], [lambda: measured(angles, np.ones(len(angles), bool))], P), P)
     for i in range(100):
         puppet.tick(state, i * 10_000_000)
         state.tick(i * 10_000_000, 0.01, out)
@@ -63,9 +64,29 @@ def test_a_head_that_was_not_read_yet_moves_nothing() -> None:
     state, out = CommandState(P), P.neutral()
     silent = measured(np.full(24, np.nan), np.zeros(24, bool))
     for read in (lambda: None, lambda: silent):
-        Puppet([table], [read], P).tick(state, 0)
+        Puppet(Reflection([table], [read], P), P).tick(state, 0)
         state.tick(10_000_000, 0.01, out)
         assert not out.any()
+
+
+def test_a_driven_head_says_what_it_shows_and_how_far_each_region_is_away() -> None:
+    table = build_table(load_robot(find_config("robots", "head24"), P).channels, P)
+    wanted = table.angles(P.neutral())[0]
+    there = wanted.copy()
+    there[table.names.index("jawOpen")] += np.radians(8.0)
+    state = measured(there, np.ones(24, bool))
+    following = Following(table.names, regions_of(table, P))
+    reflection = Reflection([table], [lambda: state], P, [following])
+    assert reflection.status() == {"away_deg": "unknown"}
+    following.note(wanted, state)
+    away = reflection.differences()
+    assert away["jaw"] == pytest.approx(8.0 / np.sqrt(2)) and away["brows"] == 0.0  # two servos move the jaw
+    assert {"brows", "lids", "eyes", "jaw", "mouth", "head"} <= set(away)
+    assert reflection.status()["away_deg"] == pytest.approx(8.0 / np.sqrt(24), abs=0.01)
+    assert following.report()["regions_rms_deg"]["jaw"] == pytest.approx(away["jaw"])
+    face = np.full(len(P), np.nan)
+    assert reflection.measured(face) and face[P.index("jawOpen")] > 0.15
+    assert face[P.index("tongueOut")] == 0.0
 
 
 def test_a_limp_head_moved_by_hand_moves_the_face(tmp_path: Path, root: Path) -> None:
@@ -89,6 +110,10 @@ def test_a_limp_head_moved_by_hand_moves_the_face(tmp_path: Path, root: Path) ->
                     time.sleep(0.02)
                 assert body.newest()[0][jaw] == pytest.approx(0.6, abs=0.1)
                 assert servos.servo(JAW_ID).goal == goal  # nothing was asked of it
+                session = LineSession(body.state, 0)
+                said = session.feed(b"MEASURED jawOpen\nREAD UNITS MEASURED\n", 0).decode().split()
+                assert float(said[2].removeprefix("jawOpen=")) == pytest.approx(0.6, abs=0.1)
+                assert said[3:6] == ["OK", "READ", "UNITS"] and any(word.startswith("26=") for word in said)
                 body.check()
             finally:
                 body.stop()

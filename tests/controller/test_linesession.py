@@ -160,3 +160,49 @@ def test_any_bytes_get_one_answer_a_line_and_never_move_the_face(pieces: list[tu
 
 
 STATE, FACE = CommandState(P), P.neutral()
+
+
+class Servos:
+    """Servos that show an open jaw."""
+
+    def __init__(self) -> None:
+        self.known = True
+
+    def measured(self, out: np.ndarray) -> bool:
+        out[:] = 0.0
+        out[JAW] = 0.5
+        return self.known
+
+    def status(self) -> dict[str, float]:
+        return {"away_deg": 1.5}
+
+
+def test_a_face_is_told_and_streamed_in_other_vocabularies(talk: Talk) -> None:
+    talk.say("EXPR happiness")
+    talk.run(1.5)
+    assert talk.say("READ EMOTION").text.startswith("READ EMOTION happiness=")
+    assert "L12=" in talk.say("read units").text
+    assert talk.say("READ MOOD").text.startswith("READ MOOD valence=")
+    assert talk.say("READ VISEMES").text.startswith("READ VISEMES")
+    assert talk.say("SUB 20 READ EMOTION").text == "SUB 20 READ EMOTION"
+    reply = parse_reply(talk.session.stream(talk.now).strip())
+    assert reply is not None and reply.kind == "P" and "happiness=" in reply.text
+    assert (
+        talk.say("READ").code == 21 and talk.say("READ TEA").code == 21 and talk.say("SUB 5 READ UNITS NOW").code == 21
+    )
+
+
+def test_what_the_servos_show_is_told_and_streamed(talk: Talk) -> None:
+    for line in ("MEASURED jawOpen", "READ UNITS MEASURED"):
+        assert (talk.say(line).code, talk.say(line).text) == (30, "no servo says where it stands")
+    servos = talk.state.watch = Servos()
+    assert talk.say("MEASURED jawOpen tongueOut").text == "MEASURED jawOpen=0.5 tongueOut=0"
+    assert "26=" in talk.say("READ UNITS MEASURED").text
+    assert "away_deg=1.5" in talk.say("STATUS").text
+    assert talk.say("SUB 20 MEASURED jawOpen").text == "SUB 20 MEASURED 1"
+    assert talk.session.stream(talk.now).strip().endswith(b"jawOpen=0.5")
+    assert talk.say("SUB 20 MEASURED").text == "SUB 20 MEASURED 59"
+    assert talk.session.stream(talk.now).startswith(b"F ")
+    servos.known = False
+    talk.now += SECOND
+    assert talk.session.stream(talk.now) == b""
