@@ -26,8 +26,15 @@ def render(
         typer.Option("--expression", "-e", metavar="NAME[=INTENSITY]", help="Add a named expression."),
     ] = None,
     size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "800x800",
-    camera: Annotated[str, typer.Option(help="front, three_quarter or profile.")] = "front",
+    camera: Annotated[
+        str, typer.Option(help="front, three-quarter, three-quarter-right, profile or profile-right.")
+    ] = "front",
     quality: Annotated[str, typer.Option(help="full or fast.")] = "full",
+    theme: Annotated[str, typer.Option(help="skin or mask.")] = "skin",
+    background: Annotated[
+        str | None, typer.Option(metavar="#RRGGBB[,#RRGGBB]", help="One colour, or a gradient from top to bottom.")
+    ] = None,
+    evaluator: Annotated[str, typer.Option(help="Who works out the vertices: auto, cpu or gpu.")] = "auto",
     head: Annotated[str, typer.Option(help="Head: a name from configs/heads or a folder.")] = "ict",
     identity: Annotated[
         str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
@@ -40,9 +47,14 @@ def render(
 
     Example: omote render --set jawOpen=0.8 --size 800x800 -o out.png
     """
+    from controller.picture import parse_background
     from controller.still import Still, draw_sheet, draw_still
 
-    still = Still.parse(settings or [], expression or [], size, camera, quality, head, identity)
+    look = {
+        "camera": camera, "quality": quality, "theme": theme, "background": parse_background(background),
+        "evaluator": evaluator,
+    }  # fmt: skip
+    still = Still.parse(settings or [], expression or [], size, look, head, identity)
     if sheet:
         with console.status("drawing") as status:
             draw_sheet(still, out, lambda done, total: status.update(f"drawing {done} of {total}"))

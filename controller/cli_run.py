@@ -83,6 +83,14 @@ def run(
     identity: Annotated[
         str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
     ] = None,
+    kiosk: Annotated[
+        bool, typer.Option("--kiosk", help="Full screen, no panel, no cursor; Esc or Ctrl-C ends.")
+    ] = False,
+    monitor: Annotated[int | None, typer.Option(help="Monitor of the full screen, from 0.")] = None,
+    quality: Annotated[str | None, typer.Option(help="full or fast.")] = None,
+    theme: Annotated[str | None, typer.Option(help="skin or mask.")] = None,
+    camera: Annotated[str | None, typer.Option(help="front, three-quarter, profile and so on.")] = None,
+    evaluator: Annotated[str | None, typer.Option(help="Who works out the vertices: auto, cpu or gpu.")] = None,
 ) -> None:
     """Run a stage until it is stopped (Ctrl-C) or its time is up.
 
@@ -96,7 +104,10 @@ def run(
     heard = Voice(voice, voice_hz) if voice is not None else None
     _run(
         stage, None, seconds, headless, no_face, pictures, report,
-        mirror=mirror, voice=heard, record=record, identity=parse_identity(identity),
+        mirror=mirror, voice=heard, record=record, identity=parse_identity(identity), picture={
+            "kiosk": kiosk or None, "monitor": monitor, "quality": quality, "theme": theme, "camera": camera,
+            "evaluator": evaluator,
+        },
     )  # fmt: skip
 
 
@@ -143,11 +154,14 @@ def _run(
     voice: Voice | None = None,
     record: Path | None = None,
     identity: dict[str, float] | None = None,
+    picture: dict[str, object] | None = None,
 ) -> None:
+    from controller.picture import with_picture
     from controller.session import Session, has_display, write_report
 
     with console.status("starting") as status:
         session = Session.load(stage, take, status.update, mirror=mirror, voice=voice, record=record, identity=identity)
+        session.stage = with_picture(session.stage, picture or {})
         if no_face:
             measured = session.run_without_face(seconds)
         elif headless or not has_display():

@@ -182,11 +182,12 @@ class HeadlessFace:
         values: Callable[[], Floats],
         recorder: Recorder | None = None,
     ) -> None:
-        from surface.view.camera import Camera
         from surface.view.offscreen import Offscreen
 
-        self._screen: Offscreen = Offscreen(head, settings.size, quality=settings.quality)
-        self._camera = getattr(Camera, settings.camera)()
+        self._screen: Offscreen = Offscreen(
+            head, settings.size, quality=settings.quality, theme=settings.make_theme(), evaluator=settings.evaluator
+        )
+        self._camera = settings.make_camera()
         self._values = values
         self._recorder = recorder
         self._settings = settings
@@ -211,4 +212,9 @@ class HeadlessFace:
 
     def report(self) -> dict[str, object]:
         """What was drawn; see :meth:`FrameLog.report`."""
-        return self._log.report(self._settings, self._screen.ctx.info["GL_RENDERER"])
+        evaluator = self._screen.renderer.evaluator
+        return {
+            **self._log.report(self._settings, self._screen.ctx.info["GL_RENDERER"]),
+            "evaluator": evaluator.name,
+            "evaluator_chosen": evaluator.reason,
+        }

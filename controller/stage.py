@@ -19,18 +19,17 @@ from controller.life import LifeSettings
 from controller.mixer import LayerSettings
 from controller.parameters import Parameters
 from controller.paths import find_config
+from controller.picture import PictureSettings
 from controller.robot import RobotSettings, load_robot
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 
 
-class FaceSettings(Settings):
+class FaceSettings(PictureSettings):
     """How the picture is drawn."""
 
     size: tuple[Pixels, Pixels] = (1280, 720)
     fps: Annotated[float, Field(ge=1, le=1000)] = 60.0
-    quality: Literal["full", "fast"] = "full"
-    camera: Literal["front", "three_quarter", "profile"] = "front"
 
 
 class LinkSettings(Settings):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,9 +16,7 @@ from controller.expression import Vocabulary
 from controller.identity import check_identity, parse_identity
 from controller.parameters import PARAMETERS
 from controller.paths import find_config
-
-_CAMERAS = ("front", "three_quarter", "profile")
-_QUALITIES = ("full", "fast")
+from controller.picture import PictureSettings, checked
 
 
 @dataclass(frozen=True)
@@ -29,20 +27,19 @@ class Still:
     ----------
     values : (p,) float64, the full parameter vector.
     size : width and height (pixels).
-    camera, quality : names.
+    look : theme, camera and the rest.
     head : folder of the head. identity : variations of it to mix in, by name.
     """
 
     values: NDArray[np.float64]
     size: tuple[int, int]
-    camera: str
-    quality: str
+    look: PictureSettings
     head: Path
     identity: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def parse(
-        cls, settings: list[str], expressions: list[str], size: str, camera: str, quality: str, head: str,
+        cls, settings: list[str], expressions: list[str], size: str, look: Mapping[str, object], head: str,
         identity: str | None = None,
     ) -> Still:  # fmt: skip
         """Read the words of a command line.
@@ -58,11 +55,10 @@ class Still:
         for word in settings:
             index, value = parse_setting(word)
             values[index] = value
-        _one_of("--camera", camera, _CAMERAS)
-        _one_of("--quality", quality, _QUALITIES)
+        picture = checked(PictureSettings(), look)
         folder, wanted = find_config("heads", head), parse_identity(identity)
         check_identity(folder, wanted)
-        return cls(values, parse_size(size), camera, quality, folder, wanted)
+        return cls(values, parse_size(size), picture, folder, wanted)
 
 
 def parse_setting(word: str) -> tuple[int, float]:
@@ -98,11 +94,6 @@ def parse_size(text: str) -> tuple[int, int]:
     return size
 
 
-def _one_of(option: str, given: str, known: tuple[str, ...]) -> None:
-    if given not in known:
-        raise ParameterError(f"{option} {given}: must be one of {', '.join(known)}")
-
-
 def _add_expression(values: NDArray[np.float64], word: str) -> None:
     name, equals, text = word.partition("=")
     intensity = parse_number(f"--expression {word}", text) if equals else 1.0
@@ -115,13 +106,13 @@ def _add_expression(values: NDArray[np.float64], word: str) -> None:
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
     from surface.head import Head
-    from surface.view.camera import Camera
     from surface.view.offscreen import Offscreen
     from surface.view.sheet import write_png
 
     head = Head.load(still.head, still.identity)
-    with Offscreen(head, still.size, quality=still.quality) as screen:
-        picture = screen.render(for_head(still.values, head.parameters), getattr(Camera, still.camera)())
+    look = still.look
+    with Offscreen(head, still.size, quality=look.quality, theme=look.make_theme(), evaluator=look.evaluator) as screen:
+        picture = screen.render(for_head(still.values, head.parameters), look.make_camera())
     write_png(picture, out)
 
 
@@ -153,10 +144,12 @@ def _vector(values: dict[int, float]) -> NDArray[np.float64]:
 def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Draw every parameter and every named expression on one sheet (PNG); ``progress(done, total)`` is told."""
     from surface.head import Head
-    from surface.view.camera import Camera
     from surface.view.sheet import contact_sheet, write_png
 
     head = Head.load(still.head, still.identity)
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses()]
-    camera = getattr(Camera, still.camera)()
-    write_png(contact_sheet(head, entries, views=[camera], quality=still.quality, progress=progress), out)
+    look = still.look
+    page = contact_sheet(
+        head, entries, views=[look.make_camera()], quality=look.quality, theme=look.make_theme(), progress=progress
+    )
+    write_png(page, out)

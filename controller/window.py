@@ -47,7 +47,6 @@ class WindowFace:
         ViewError
             when no window can be opened.
         """
-        from surface.view.camera import Camera
         from surface.view.window import run_window
 
         began = time.monotonic_ns()
@@ -65,10 +64,14 @@ class WindowFace:
             source,
             size=self._settings.size,
             title=_TITLE,
-            gui=self._panel,
+            gui=None if self._settings.kiosk else self._panel,
             keep_going=keep_going,
-            camera=getattr(Camera, self._settings.camera)(),
+            camera=self._settings.make_camera(),
             quality=self._settings.quality,
+            theme=self._settings.make_theme(),
+            evaluator=self._settings.evaluator,
+            kiosk=self._settings.kiosk,
+            monitor=self._settings.monitor,
         )
 
     def report(self) -> dict[str, object]:

@@ -23,6 +23,7 @@ from surface.view.viewpoint import Viewpoint
 if TYPE_CHECKING:
     import moderngl
 
+_MINIMISED_S = 0.02
 HEADLESS_HINT = "add --headless, or start it under: xvfb-run -a"
 
 
@@ -51,7 +52,9 @@ def run_window(
     camera: Camera | None = None,
     quality: str = "full",
     theme: str | Theme = "skin",
-    full_screen: bool = False,
+    evaluator: str = "auto",
+    kiosk: bool = False,
+    monitor: int = 0,
 ) -> WindowReport:
     """Show the head until the window is closed.
 
@@ -62,9 +65,10 @@ def run_window(
     source : called once per frame, gives values (P,) in `head.parameters` order.
     gui : draws ImGui panels, once per frame.
     seconds : close by itself after this long.
-    keep_going : asked once per frame; the window closes when it says False.
-    quality, theme : see :class:`surface.view.renderer.Renderer`.
-    full_screen : cover the whole monitor (kiosk).
+    keep_going : asked once per frame, also while the window is minimised; it closes when told False.
+    quality, theme, evaluator : see :class:`surface.view.renderer.Renderer`.
+    kiosk : cover a whole monitor, hide the cursor, let mouse and keys alone but for Esc, which ends it.
+    monitor : which one, from 0.
 
     Raises
     ------
@@ -73,9 +77,12 @@ def run_window(
     """
     _require_display()
     runner = _imgui()
-    window = _Window(head, source, Viewpoint(camera), quality, theme)
-    window.gui, window.seconds, window.keep_going = gui, seconds, keep_going
-    return _show(runner, window, _parameters(runner, window, size, title, full_screen))
+    window = _Window(head, source, Viewpoint(camera), quality, theme, evaluator)
+    window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk
+    params = _parameters(runner, window, size, title)
+    if kiosk:
+        _cover(runner, params, monitor)
+    return _show(runner, window, params)
 
 
 def has_display() -> bool:
@@ -131,13 +138,15 @@ class _Window:
         viewpoint: Viewpoint,
         quality: str,
         theme: str | Theme,
+        evaluator: str,
     ) -> None:
         self.head, self.source = head, source
-        self.viewpoint, self.quality, self.theme = viewpoint, quality, theme
+        self.viewpoint, self.quality, self.theme, self.evaluator = viewpoint, quality, theme, evaluator
+        self.kiosk = False
         self.gui: Callable[[], None] | None = None
         self.seconds: float | None = None
         self.keep_going: Callable[[], bool] | None = None
-        self.frames, self.first, self.last = 0, 0.0, 0.0
+        self.frames, self.first, self.last, self._began = 0, 0.0, 0.0, 0.0
         self.failure: BaseException | None = None
         self._ctx: moderngl.Context | None = None
         self._renderer: Renderer | None = None
@@ -179,7 +188,9 @@ class _Window:
         self._ctx.clear_errors()
         self._pace = Pace(self.quality, software=is_software(self._ctx))
         self._pace.begin_live()
-        self._renderer = Renderer(self._ctx, self.head, quality=self.quality, theme=self.theme)
+        self._renderer = Renderer(
+            self._ctx, self.head, quality=self.quality, theme=self.theme, evaluator=self.evaluator
+        )
 
     def background(self) -> None:
         """One frame of the head, under the panels."""
@@ -190,7 +201,7 @@ class _Window:
         size = _pixels()
         if size[0] < 1 or size[1] < 1:
             return
-        self.head.pose(self.source())
+        self._renderer.pose(self.source())
         started = time.perf_counter()
         target = self._fitting(self._ctx, size)
         self._renderer.update()
@@ -206,9 +217,30 @@ class _Window:
 
     def panels(self) -> None:
         """Mouse, keys and the caller's panels."""
-        _steer(self.viewpoint)
+        if self.kiosk:
+            self._rest_hands()
+        else:
+            _steer(self.viewpoint)
         if self.gui is not None:
             self.gui()
+
+    def ask(self) -> None:
+        """Before every frame, drawn or not: whether to go on."""
+        now = time.perf_counter()
+        self._began = self._began or now
+        over = self.seconds is not None and now - (self.first if self.frames else self._began) >= self.seconds
+        if over or (self.keep_going is not None and not self.keep_going()):
+            self.close()
+        elif min(_pixels()) < 1:
+            time.sleep(_MINIMISED_S)  # nothing to draw, and nobody to wait for the screen
+
+    def _rest_hands(self) -> None:
+        """No cursor in a kiosk, and one key."""
+        from imgui_bundle import imgui
+
+        imgui.set_mouse_cursor(imgui.MouseCursor_.none)
+        if imgui.is_key_pressed(imgui.Key.escape, repeat=False):
+            self.close()
 
     def stop(self) -> None:
         """Give back what was drawn with, while the context still lives."""
@@ -229,13 +261,10 @@ class _Window:
         return self._target
 
     def _count(self) -> None:
-        """Note the frame, and close when the time is over."""
+        """Note the frame."""
         self.last = time.perf_counter()
         self.first = self.first if self.frames else self.last
         self.frames += 1
-        over = self.seconds is not None and self.last - self.first >= self.seconds
-        if over or (self.keep_going is not None and not self.keep_going()):
-            self.close()
 
 
 def _pixels() -> tuple[int, int]:
@@ -266,19 +295,25 @@ def _steer(viewpoint: Viewpoint) -> None:
                 viewpoint.press(str(digit))
 
 
-def _parameters(runner: Any, window: _Window, size: tuple[int, int], title: str, full_screen: bool) -> Any:
+def _cover(runner: Any, params: Any, monitor: int) -> None:
+    """Let the window cover a monitor."""
+    geometry = params.app_window_params.window_geometry
+    geometry.full_screen_mode = runner.FullScreenMode.full_screen_desktop_resolution
+    geometry.monitor_idx = monitor
+
+
+def _parameters(runner: Any, window: _Window, size: tuple[int, int], title: str) -> Any:
     """The runner's settings: OpenGL, no files left behind, our callbacks."""
     params = runner.RunnerParams()
     params.app_window_params.window_title = title
     params.app_window_params.window_geometry.size = size
-    if full_screen:
-        params.app_window_params.window_geometry.full_screen_mode = runner.FullScreenMode.full_screen_desktop_resolution
     params.ini_disable = True
     params.imgui_window_params.default_imgui_window_type = runner.DefaultImGuiWindowType.no_default_window
     params.fps_idling.enable_idling = False
     _choose_opengl(runner, params)
     callbacks = params.callbacks
     callbacks.post_init = window.guarded(window.start)
+    callbacks.pre_new_frame = window.guarded(window.ask)
     callbacks.custom_background = window.guarded(window.background)
     callbacks.show_gui = window.guarded(window.panels)
     callbacks.before_exit = window.stop
