@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -165,6 +166,9 @@ def parse_ids(text: str) -> list[int]:
 
 
 Link = Annotated[Path | None, typer.Option("--link", help="Make this path a link to the pseudo-terminal.")]
+Tcp = Annotated[
+    str | None, typer.Option("--tcp", metavar="HOST:PORT", help="Listen here; clients open socket://HOST:PORT.")
+]
 Wire = Annotated[bool, typer.Option("--wire", help="Bytes take the time they take at the baud rate.")]
 Faults = Annotated[
     list[str] | None, typer.Option("--fault", metavar="SPEC", help="Fault to inject, for example mute:7; repeatable.")
@@ -174,11 +178,19 @@ Look = Annotated[bool, typer.Option("--watch", help="Show the servos and the dec
 Control = Annotated[Path | None, typer.Option("--control", help="Socket that takes faults while it runs.")]
 
 
+def _where(link: Path | None, tcp: str | None) -> Path | str | None:
+    """Where to serve: a link to a pseudo-terminal, or a TCP address."""
+    if link is not None and tcp is not None:
+        raise ConfigError("--link and --tcp do not go together", hint="run it twice for two ports")
+    return link if tcp is None else f"socket://{tcp}"
+
+
 def simulate_dynamixel(
     ids: Annotated[str, typer.Option("--ids", help="Ids of the servos: 1-24 or 1,3,7-9.")] = "1-24",
     model: Annotated[str, typer.Option(help="Model of the servos.")] = "xl330-m288",
     baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
     link: Link = None,
+    tcp: Tcp = None,
     wire: Wire = False,
     fault: Faults = None,
     control: Control = None,
@@ -190,9 +202,8 @@ def simulate_dynamixel(
     """
     from controller.simulating import SimulatedId, serve_servos
 
-    serve_servos(
-        [SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console, control, watch
-    )
+    servos = [SimulatedId(i, model) for i in parse_ids(ids)]
+    serve_servos(servos, baud, _where(link, tcp), wire, fault or [], console, control, watch)
 
 
 def simulate_feetech(
@@ -200,6 +211,7 @@ def simulate_feetech(
     model: Annotated[str, typer.Option(help="Model of the servos.")] = "sts3215",
     baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
     link: Link = None,
+    tcp: Tcp = None,
     wire: Wire = False,
     fault: Faults = None,
     control: Control = None,
@@ -211,47 +223,48 @@ def simulate_feetech(
     """
     from controller.simulating import SimulatedId, serve_servos
 
-    serve_servos(
-        [SimulatedId(i, model) for i in parse_ids(ids)], baud, link, wire, fault or [], console, control, watch
-    )
+    servos = [SimulatedId(i, model) for i in parse_ids(ids)]
+    serve_servos(servos, baud, _where(link, tcp), wire, fault or [], console, control, watch)
 
 
-def simulate_maestro(link: Link = None, fault: Faults = None, watch: Look = False) -> None:
+def simulate_maestro(link: Link = None, tcp: Tcp = None, fault: Faults = None, watch: Look = False) -> None:
     """Serve a simulated Pololu Maestro until interrupted; prints `ready PATH`.
 
     Example: omote simulate maestro --link /tmp/maestro
     """
     from controller.simulating import serve_board
+    from drivers.sim import Maestro
 
-    serve_board("maestro", link, fault or [], console, watch)
+    serve_board(Maestro(now_s=time.monotonic()), 115_200, _where(link, tcp), False, fault or [], console, watch)
 
 
-def simulate_ssc32(link: Link = None, fault: Faults = None, watch: Look = False) -> None:
+def simulate_ssc32(link: Link = None, tcp: Tcp = None, fault: Faults = None, watch: Look = False) -> None:
     """Serve a simulated Lynxmotion SSC-32 until interrupted; prints `ready PATH`.
 
     Example: omote simulate ssc32 --link /tmp/ssc32
     """
     from controller.simulating import serve_board
+    from drivers.sim import Ssc32
 
-    serve_board("ssc32", link, fault or [], console, watch)
+    serve_board(Ssc32(now_s=time.monotonic()), 115_200, _where(link, tcp), False, fault or [], console, watch)
 
 
 def simulate_robot(
     robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],
     bus: Annotated[str | None, typer.Option("--bus", help="Name of the bus; the first without it.")] = None,
     link: Link = None,
+    tcp: Tcp = None,
     wire: Wire = False,
     fault: Faults = None,
     watch: Look = False,
 ) -> None:
-    """Serve the simulated servos a robot file describes, until interrupted; prints `ready PATH`.
+    """Serve the simulated servos or board of a robot file, until interrupted; prints `ready PATH`.
 
     Example: omote simulate robot head24 --link /tmp/head
     """
-    from controller.simulating import robot_servos, serve_servos
+    from controller.simulating import serve_robot
 
-    models, baud = robot_servos(robot, bus)
-    serve_servos(models, baud, link, wire, fault or [], console, watch=watch)
+    serve_robot(robot, bus, _where(link, tcp), wire, fault or [], console, watch)
 
 
 def simulate_host(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import signal
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,16 +14,22 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from controller.buses import BOARDS, SIMULATION, BusSettings
+from controller.channels import servo_specs
 from controller.errors import ConfigError
 from controller.parameters import PARAMETERS
 from controller.paths import find_config
-from controller.robot import load_robot
+from controller.robot import ChannelSettings, load_robot
 from controller.signals import stop_flag
 from controller.watching import Watch
 from drivers.traffic import Decoder
 
 if TYPE_CHECKING:
-    from drivers.sim.serve import PtyServer
+    from drivers.sim.line import Line
+    from drivers.sim.serve import PortServer
+
+Where = Path | str | None
+"""A path that becomes a link to a pseudo-terminal, or a URL to listen at instead."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,7 @@ class SimulatedId:
 def serve_servos(
     servos: list[SimulatedId],
     baud: int,
-    link: Path | None,
+    link: Where,
     wire: bool,
     faults: list[str],
     console: Console,
@@ -50,7 +56,7 @@ def serve_servos(
     ----------
     servos : ids and models; the model decides the protocol.
     baud : rate the servos listen at.
-    link : path that becomes a link to the pseudo-terminal.
+    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT``.
     wire : bytes take the time they take at ``baud``.
     faults : faults to inject, see docs/simulated-buses.md.
     control : path of a socket that takes faults while it runs.
@@ -63,9 +69,6 @@ def serve_servos(
     tables = {servo.id: load_table(servo.model) for servo in servos}
     decoder = (Decoder1 if any(table.protocol == 1 for table in tables.values()) else Decoder2)(tables)
 
-    def ready(path: str) -> None:
-        console.print(f"ready {link or path}", soft_wrap=True)
-
     with _watching(decoder if watch else None, console) as look:
         _until_stopped(
             lambda stop: serve_dynamixel(
@@ -74,7 +77,7 @@ def serve_servos(
                 link=link,
                 wire=wire,
                 faults=faults,
-                on_ready=ready,
+                on_ready=lambda path: _say_ready(path, console),
                 commands=control,
                 stop=stop,
                 on_server=look,
@@ -83,12 +86,12 @@ def serve_servos(
 
 
 @contextmanager
-def _watching(decoder: Decoder | None, console: Console) -> Iterator[Callable[[PtyServer], None]]:
+def _watching(decoder: Decoder | None, console: Console) -> Iterator[Callable[[PortServer], None]]:
     """Gives what begins to watch a server; the view ends with the block. Without a decoder nobody watches."""
     over = threading.Event()
     threads: list[threading.Thread] = []
 
-    def look(server: PtyServer) -> None:
+    def look(server: PortServer) -> None:
         if decoder is None:
             return
 
@@ -109,23 +112,29 @@ def _watching(decoder: Decoder | None, console: Console) -> Iterator[Callable[[P
             thread.join()
 
 
-def serve_board(board: str, link: Path | None, faults: list[str], console: Console, watch: bool = False) -> None:
-    """Serve a simulated servo board, ``maestro`` or ``ssc32``; prints ``ready PATH`` and returns when interrupted."""
-    from drivers.sim import Maestro, Ssc32, serve
+def _say_ready(path: str, console: Console) -> None:
+    console.print(f"ready {path}", soft_wrap=True)
+
+
+def serve_board(
+    line: Line, baud: int, link: Where, wire: bool, faults: list[str], console: Console, watch: bool = False
+) -> None:
+    """Serve a simulated board; prints ``ready PATH`` and returns when interrupted. Parameters as `serve_servos`."""
+    from drivers.sim import Maestro, serve
     from drivers.traffic import HexDecoder, TextDecoder
 
-    decoder = HexDecoder() if board == "maestro" else TextDecoder()
-    made = {"maestro": Maestro, "ssc32": Ssc32}[board](now_s=time.monotonic(), faults=faults)
-
-    def ready(path: str) -> None:
-        console.print(f"ready {link or path}", soft_wrap=True)
-
+    line.faults.add(faults, time.monotonic())
+    decoder = HexDecoder() if isinstance(line, Maestro) else TextDecoder()
     with _watching(decoder if watch else None, console) as look:
-        _until_stopped(lambda stop: serve(made, link=link, on_ready=ready, stop=stop, on_server=look))
+        _until_stopped(
+            lambda stop: serve(
+                line, link, lambda path: _say_ready(path, console), baud=baud, wire=wire, stop=stop, on_server=look
+            )
+        )
 
 
-def robot_servos(name: str, bus: str | None) -> tuple[list[SimulatedId], int]:
-    """The servos on one bus of a robot file, and its baud rate; the first bus without a name.
+def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSettings]]:
+    """One bus of a robot file and the channels on it; the first bus without a name.
 
     Raises
     ------
@@ -137,7 +146,30 @@ def robot_servos(name: str, bus: str | None) -> tuple[list[SimulatedId], int]:
     if bus is not None and bus not in names:
         raise ConfigError(f"robot {robot.name} has no bus called {bus!r}", hint=f"its buses: {', '.join(names)}")
     chosen = robot.buses[names.index(bus) if bus else 0]
-    return [SimulatedId(channel.id, channel.model) for channel in robot.on_bus(chosen.name)], chosen.baud
+    return chosen, robot.on_bus(chosen.name)
+
+
+def serve_robot(
+    name: str, bus: str | None, link: Where, wire: bool, faults: list[str], console: Console, watch: bool = False
+) -> None:
+    """Serve what is on a bus of a robot file (:func:`robot_bus`); further parameters as `serve_servos`."""
+    chosen, channels = robot_bus(name, bus)
+    if chosen.family in BOARDS:
+        serve_board(_board(chosen, channels), chosen.baud, link, wire, faults, console, watch)
+        return
+    servos = [SimulatedId(channel.id, channel.model) for channel in channels]
+    serve_servos(servos, chosen.baud, link, wire, faults, console, watch=watch)
+
+
+def _board(bus: BusSettings, channels: list[ChannelSettings]) -> Line:
+    """The simulated board of a bus, set to what its driver will expect."""
+    from drivers import open_bus
+    from drivers.sim.families import make_line
+
+    options = {key: value for key, value in bus.options().items() if key not in SIMULATION}
+    driver = open_bus(bus.family, servo_specs(channels), **{"port": "", **options})
+    servos = [(channel.id, channel.model) for channel in channels]
+    return make_line(bus.family, servos, time.monotonic(), options=driver.far_end())
 
 
 def serve_host(script: str, link: Path | None, console: Console) -> None:
@@ -159,12 +191,12 @@ def serve_host(script: str, link: Path | None, console: Console) -> None:
     console.print(f"{counts['sent']} lines sent, {counts['accepted']} accepted, {counts['refused']} refused")
 
 
-def _until_stopped(serve: Callable[[int], None]) -> None:
-    """Run ``serve(stop)`` until SIGINT or SIGTERM; the descriptor ``stop`` becomes readable then."""
-    reading, writing = os.pipe()
+def _until_stopped(serve: Callable[[socket.socket], None]) -> None:
+    """Run ``serve(stop)`` until SIGINT or SIGTERM; the socket ``stop`` becomes readable then."""
+    reading, writing = socket.socketpair()
 
     def note(_number: int, _frame: object) -> None:
-        os.write(writing, b"x")
+        writing.send(b"x")
 
     before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -172,5 +204,5 @@ def _until_stopped(serve: Callable[[int], None]) -> None:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        os.close(reading)
-        os.close(writing)
+        reading.close()
+        writing.close()

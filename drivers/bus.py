@@ -280,6 +280,10 @@ class Bus(ABC):
     def report(self) -> BusReport:
         """Counters since the bus was opened, as a copy."""
 
+    def far_end(self) -> dict[str, Any]:
+        """What a simulated far end has to be set to, beyond ids and models; plain values for JSON."""
+        return {}
+
     @abstractmethod
     def _release(self) -> None:
         """Give the port back; never raises."""

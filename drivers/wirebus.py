@@ -11,7 +11,6 @@ import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,10 +78,6 @@ class WireBus(Bus):
     @abstractmethod
     def _switch_off(self) -> None:
         """Torque off for every reachable servo, each by itself; raises NoReply for those not confirmed."""
-
-    def far_end(self) -> dict[str, Any]:
-        """What a simulated far end has to be set to, beyond ids and models; plain values for JSON."""
-        return {}
 
     def _settle(self, now_s: float) -> None:
         """Look after the servos before a cycle, such as watchdogs that tripped; nothing by default."""

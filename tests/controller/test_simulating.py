@@ -13,18 +13,19 @@ import pytest
 import serial
 
 from controller.errors import ConfigError
-from controller.simulating import robot_servos
+from controller.simulating import robot_bus
 
 
 @contextmanager
-def served(*words: str) -> Iterator[subprocess.Popen[str]]:
-    """``omote simulate WORDS``, ready; it must end well on SIGINT."""
+def served(*words: str) -> Iterator[str]:
+    """What ``omote simulate WORDS`` serves, once it is ready; it must end well on SIGINT."""
     command = [sys.executable, "-c", "from controller.cli import main; main()", "simulate", *words]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
-        assert process.stdout.readline().startswith("ready ")
-        yield process
+        word, _, path = process.stdout.readline().strip().partition(" ")
+        assert word == "ready"
+        yield path
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 0
     finally:
@@ -58,6 +59,31 @@ def test_every_family_answers(tmp_path: Path, words: tuple[str, ...], asked: str
         assert port.read(len(answer) // 2) == bytes.fromhex(answer)
 
 
+@pytest.mark.parametrize(
+    ("robot", "asked", "answer"),
+    [
+        ("head-dynamixel1", "FFFF010201FB", b"\xff\xff\x01\x02\x00\xfc"),  # ping, Protocol 1.0
+        ("head-feetech", "FFFF010201FB", b"\xff\xff\x01\x02\x00\xfc"),
+        ("eyes-maestro", "AE", b"\x01"),  # script status: stopped
+        ("head-ssc32", b"VER\r".hex(), b"SSC32-V2.50USB\r"),
+        ("head-arduino", b"HELLO\n".hex(), b"OK HELLO head"),
+    ],
+)
+def test_every_shipped_robot_is_served_on_tcp(robot: str, asked: str, answer: bytes) -> None:
+    with served("robot", robot, "--tcp", "127.0.0.1:0") as ready:
+        client = serial.serial_for_url(ready, baudrate=115_200, timeout=2)
+        client.write(bytes.fromhex(asked))
+        assert client.read(len(answer)) == answer
+        client.close()
+
+
+def test_a_port_is_a_terminal_or_an_address() -> None:
+    command = [sys.executable, "-c", "from controller.cli import main; main()", "simulate", "maestro"]
+    done = subprocess.run([*command, "--link", "/tmp/x", "--tcp", ":1"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "--link and --tcp do not go together" in done.stderr + done.stdout
+
+
 def test_the_host_plays_its_script_to_whoever_opens_it(tmp_path: Path) -> None:
     link = tmp_path / "robot"
     with served("host", "tour", "--link", str(link)), serial.Serial(str(link), 115_200, timeout=5) as port:
@@ -66,10 +92,10 @@ def test_the_host_plays_its_script_to_whoever_opens_it(tmp_path: Path) -> None:
 
 
 def test_a_robot_file_says_which_servos(root: Path) -> None:
-    servos, baud = robot_servos("head24", None)
-    assert [servo.id for servo in servos] == list(range(1, 25))
-    assert {servo.model for servo in servos} == {"xl330-m288"}
-    assert baud == 1_000_000
+    bus, channels = robot_bus("head24", None)
+    assert [channel.id for channel in channels] == list(range(1, 25))
+    assert {channel.model for channel in channels} == {"xl330-m288"}
+    assert bus.baud == 1_000_000
     with pytest.raises(ConfigError, match="no bus called 'neck'") as caught:
-        robot_servos("head24", "neck")
+        robot_bus("head24", "neck")
     assert "head" in caught.value.hint
