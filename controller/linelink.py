@@ -1,11 +1,13 @@
 """A serial port that speaks the line protocol, in a thread of its own.
 
 Replies and streamed lines are written without waiting: a peer that does not read loses lines, and never holds up the
-face. A port that vanishes is looked for until it is there again.
+face. A port that vanishes is looked for until it is there again; a subscription goes on then, for whoever asked for it
+is most likely still there. Nothing ends the thread but its owner: what goes wrong is told and counted.
 """
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from types import TracebackType
@@ -15,9 +17,12 @@ from controller.linesession import LineSession
 from drivers.errors import PortError
 from drivers.serialport import SerialPort
 
+log = logging.getLogger(__name__)
+
 _POLL_S = 0.05
 _RETRY_S = 0.5
 _OUT_LIMIT = 16_384
+_FAULT_PAUSE_S = 0.05
 
 
 class LineLink:
@@ -32,12 +37,15 @@ class LineLink:
     Attributes
     ----------
     connected : whether the port is there. reconnects : how often it came back.
+    faults : how often something went wrong that was not the port; last_fault : what it was.
     """
 
     def __init__(self, port: str, baud: int, sink: CommandSink, *, retry_s: float = _RETRY_S) -> None:
         self.port = port
         self.connected = False
         self.reconnects = 0
+        self.faults = 0
+        self.last_fault = ""
         self._serial = SerialPort(port, baud)
         self._session = LineSession(sink, time.monotonic_ns())
         self._out = bytearray()
@@ -75,6 +83,8 @@ class LineLink:
             "refused": {str(code): count for code, count in sorted(self._session.refused.items())},
             **self._counts,
             "reconnects": self.reconnects,
+            "faults": self.faults,
+            "last_fault": self.last_fault,
         }
 
     def __enter__(self) -> LineLink:
@@ -91,6 +101,17 @@ class LineLink:
                 self._serve()
             except PortError:
                 self._lost()
+            except Exception as error:  # noqa: BLE001  a face must not go deaf over one line
+                self._failed(error)
+
+    def _failed(self, error: Exception) -> None:
+        """Tell what went wrong, once for each kind, and begin with the next line."""
+        text = f"{type(error).__name__}: {error}"
+        if text != self.last_fault:
+            log.exception("link %s: %s; it goes on with the next line", self.port, text)
+        self.faults, self.last_fault = self.faults + 1, text
+        self._session.drop()
+        self._stopping.wait(_FAULT_PAUSE_S)
 
     def _serve(self) -> None:
         while not self._stopping.is_set():
@@ -135,7 +156,7 @@ class LineLink:
     def _lost(self) -> None:
         """Wait for the port to come back; the face keeps what it was told last."""
         self.connected = False
-        self._session.reset()
+        self._session.drop()
         self._out.clear()
         while not self._stopping.wait(self._retry_s):
             try:

@@ -118,10 +118,9 @@ class LineSession:
         self._sink.snapshot(self._values)
         return True
 
-    def reset(self) -> None:
-        """The other side is gone: forget its half line and its subscription."""
+    def drop(self) -> None:
+        """The other side is gone for a while: forget its half line; its subscription goes on when it is back."""
         self._decoder.clear()
-        self._stream = None
 
     def _line(self, line: bytes, now_ns: int) -> bytes:
         try:

@@ -133,13 +133,16 @@ def test_a_port_that_vanishes_is_found_again(tmp_path: Path, state: CommandState
     path = tmp_path / "robot"
     first = HostPort(path)
     with LineLink(str(path), 115200, state, retry_s=0.02) as link:
-        assert Peer(first).ask("SET jawOpen 0.5").ok
+        peer = Peer(first)
+        assert peer.ask("SET jawOpen 0.5").ok and peer.ask("SUB 50 jawOpen").ok
         first.close()
         eventually(lambda: not link.connected)
         assert state.status()["manual"] == 1  # the face keeps what it was told
         with HostPort(path) as second:
             eventually(lambda: link.connected)
-            assert Peer(second).ask("PING").ok
+            peer = Peer(second)
+            assert peer.next("P").text.endswith("jawOpen=0")  # the stream goes on
+            assert peer.ask("PING").ok
             assert link.report()["reconnects"] == 1
             link.stop()
     assert not link.connected
@@ -158,3 +161,24 @@ def test_stop_may_be_called_again_and_before_start(port: HostPort, state: Comman
         link.stop()
     if descriptors:
         assert len(os.listdir("/proc/self/fd")) == descriptors
+
+
+def test_a_fault_of_its_own_is_told_once_and_the_link_goes_on(
+    port: HostPort,
+    state: CommandState,
+    link: LineLink,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def broken(amount: float, stamp_ns: int) -> None:
+        raise ZeroDivisionError("life is short")
+
+    monkeypatch.setattr(state, "live", broken)
+    peer = Peer(port)
+    for _ in range(2):
+        faults = link.faults
+        peer.send(b"LIFE 1\n")
+        eventually(lambda faults=faults: link.faults == faults + 1)
+    assert peer.ask("PING").ok
+    assert link.report()["last_fault"] == "ZeroDivisionError: life is short"
+    assert caplog.text.count("goes on with the next line") == 1

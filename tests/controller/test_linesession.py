@@ -121,11 +121,11 @@ def test_stream_keeps_its_rate_and_leaves_missed_lines_out(talk: Talk) -> None:
     assert talk.session.stream(talk.now + 99 * SECOND) == b""
 
 
-def test_reset_forgets_half_a_line_and_the_stream(talk: Talk) -> None:
+def test_a_dropped_line_forgets_its_half_and_keeps_its_stream(talk: Talk) -> None:
     talk.say("SUB 10")
     talk.session.feed(b"SET jaw", 0)
-    talk.session.reset()
-    assert talk.session.due_ns() is None
+    talk.session.drop()
+    assert talk.session.due_ns() == talk.now
     assert talk.session.feed(b"PING\n", 0) == b"OK PONG\n"
 
 
