@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import flips, loops
+from . import flips, keys, loops
 from .basis import Floats, Ints
 from .domain import Domain
 
@@ -52,9 +52,36 @@ def trim(flat: Flat, domain: Domain, scale: tuple[float, float]) -> Flat:
     sign = np.where(domain.inside(flat.uv), 1, -1)
     sign[fixed] = 0
     _snap(flat, domain, scale, lines, sign)
-    flat = _cut(flat, domain, scale, sign)
+    flat = _without_flat(_merged(_cut(flat, domain, scale, sign)))
     flips.improve(flat.uv * np.asarray(scale), flat.triangles, lines_of_edges(flat.uv, domain))
     return compact(flat)
+
+
+def _merged(flat: Flat) -> Flat:
+    """Make one vertex of the ends of edges without length: a loop's point that two vertices were moved to."""
+    edges = _edges(flat.triangles)
+    edges = edges[(flat.uv[edges[:, 0]] == flat.uv[edges[:, 1]]).all(axis=1)]
+    target = np.arange(len(flat.uv))
+    while (target[edges[:, 0]] != target[edges[:, 1]]).any():
+        least = np.minimum(target[edges[:, 0]], target[edges[:, 1]])
+        np.minimum.at(target, edges.ravel(), np.repeat(least, 2))
+    triangles = target[flat.triangles]
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return Flat(flat.uv, triangles[whole], flat.owner[whole])
+
+
+def _without_flat(flat: Flat) -> Flat:
+    """Drop triangles without area that have two edges on the border: what they leave is the same domain."""
+    while True:
+        a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
+        directed = np.sort(flat.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        width = int(directed.max(initial=0)) + 1
+        _, _, back = keys.unique(directed[:, 0] * width + directed[:, 1])
+        alone = (np.bincount(back)[back].reshape(-1, 3) == 1).sum(axis=1)
+        drop = (_cross(b - a, c - a) <= 0) & (alone >= 2)
+        if not drop.any():
+            return flat
+        flat = Flat(flat.uv, flat.triangles[~drop], flat.owner[~drop])
 
 
 def compact(flat: Flat) -> Flat:
@@ -203,7 +230,7 @@ def _across(triangles: Ints, b: int, c: int) -> int | None:
 def _edges(triangles: Ints) -> Ints:
     """(e, 2) undirected edges, each once, smaller index first."""
     pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    width = int(triangles.max()) + 1
+    width = int(triangles.max(initial=0)) + 1
     key = np.unique(pairs[:, 0] * width + pairs[:, 1])
     return np.stack([key // width, key % width], axis=1)
 
