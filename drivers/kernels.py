@@ -106,3 +106,13 @@ def to_steps(angle_rad, sign, zero_rad, center, rad_per_tick, low, high, lowest,
         step = min(step, min(max(high[i], goals[i]), highest[i]))
         goals[i] = int(step)
         sent[i] = sign[i] * ((step - center[i]) * rad_per_tick[i] - zero_rad[i])
+
+
+@_kernel
+def to_si(ticks, speed, current, seen_s, now_s, sign, zero_rad, center, rad_per_tick, out):  # type: ignore[no-untyped-def]
+    """Angle, speed, current and age of n servos into the rows of `out`, (4, n) float64."""
+    for i in range(ticks.shape[0]):
+        out[0, i] = sign[i] * ((ticks[i] - center[i]) * rad_per_tick[i] - zero_rad[i])
+        out[1, i] = sign[i] * speed[i]
+        out[2, i] = sign[i] * current[i]
+        out[3, i] = now_s - seen_s[i]

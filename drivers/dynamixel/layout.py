@@ -37,9 +37,9 @@ class Scale:
     """
 
     def __init__(self, servos: Sequence[ServoSpec], tables: Sequence[ControlTable]) -> None:
-        from drivers.kernels import to_steps  # compiled: only who drives servos pays for it
+        from drivers.kernels import to_si, to_steps  # compiled: only who drives servos pays for it
 
-        self._to_steps = to_steps
+        self._to_steps, self._to_si = to_steps, to_si
         self.sign = np.array([-1.0 if servo.reverse else 1.0 for servo in servos])
         self.zero_rad = np.array([servo.zero_rad for servo in servos])
         self.center = np.array([float(table.center) for table in tables])
@@ -81,6 +81,12 @@ class Scale:
             self.low, self.high, self.lowest, self.highest, steps, sent,
         )  # fmt: skip
         return sent
+
+    def measured(self, ticks: Floats, speed: Floats, current: Floats, seen_s: Floats, now_s: float) -> Floats:
+        """Angles (rad), speeds and currents with the angle's sign, and ages (s) of what was measured; (4, n)."""
+        out: Floats = np.empty((4, len(ticks)))
+        self._to_si(ticks, speed, current, seen_s, now_s, self.sign, self.zero_rad, self.center, self.rad_per_tick, out)
+        return out
 
     def narrow(self, index: int, low: int, high: int) -> None:
         """Also keep one servo inside limits that its own registers hold, outside which it takes no goal."""

@@ -158,13 +158,15 @@ class Telemetry:
             slow = (self._error, self._volts, self._celsius, self._hardware, self._torque)
             self._slow_state = tuple(sealed(array.copy()) for array in slow)
         error, volts, celsius, hardware, torque = self._slow_state
+        measured = scale.measured(self._ticks, self._speed, self._current, self._seen_s, now)
+        position, velocity, current, age = sealed(measured)
         return BusState(
             time_s=now,
-            position_rad=sealed(scale.radians(self._ticks)),
-            velocity_rad_s=sealed(scale.sign * self._speed),
-            current_a=sealed(scale.sign * self._current),
+            position_rad=position,
+            velocity_rad_s=velocity,
+            current_a=current,
             fresh=sealed(self._fresh.copy()),
-            age_s=sealed(now - self._seen_s),
+            age_s=age,
             error=error,
             silent=sealed(silent),
             voltage_v=volts,

@@ -22,6 +22,8 @@ from drivers.sim.wire import Timed, WireTiming, without_timing
 
 PAUSE_S = 0.1
 """A packet that is not complete after this pause is given up."""
+EARLY_S = 80e-6
+"""How long before bytes are due the server wakes: the system wakes it late by about that much."""
 
 Control = int | socket.socket
 """Where commands to the server come from: a descriptor, or (the only thing that Windows can wait for) a socket."""
@@ -111,7 +113,7 @@ class PortServer:
         """Seconds until something is due; None = nothing is."""
         due = self.chain.faults.next_change_s
         if self._queue:
-            due = min(due, self._queue[0][0])
+            due = min(due, self._queue[0][0] - EARLY_S)
         if self.chain.reader.pending:
             due = min(due, self._read_s + PAUSE_S)
         return None if due == float("inf") else max(due - time.monotonic(), 0.0)
@@ -152,7 +154,9 @@ class PortServer:
     def _work_off(self) -> None:
         """Replies, faults and broken packets whose time has come."""
         now_s = time.monotonic()
-        while self._queue and self._queue[0][0] <= now_s:
+        while self._queue and self._queue[0][0] - EARLY_S <= now_s:
+            while now_s < self._queue[0][0]:  # so little that the system would oversleep it
+                now_s = time.monotonic()
             self._write(self._queue.popleft()[1])
         if self.chain.reader.pending and now_s >= self._read_s + PAUSE_S:
             for packet in self.chain.reader.flush():

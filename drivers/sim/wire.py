@@ -13,7 +13,7 @@ BITS_PER_BYTE = 10
 USB_PACKET = 62
 """Data bytes in a full USB packet of a common bridge; a shorter one waits for the latency timer."""
 
-USB_FRAME_S = 0.25e-3
+USB_FRAME_S = 0.5e-3
 """Bytes that arrive within this time reach the host together, when the last of them has arrived."""
 
 Timed = tuple[float, bytes]

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import drivers.kernels  # noqa: F401  compiled code is loaded here and not within an example's deadline
 from drivers.bus import ServoSpec
 from drivers.dynamixel.layout import NAMES, Block, Scale, item_of, layout_of
 from drivers.dynamixel.tables import load_table
