@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.live import Live
 
-from controller.calibration import save_calibration
+from controller.calibration import rest_deg, save_calibration
 from controller.capturing import Capturing
 from controller.channels import servo_specs
 from controller.keys import Keyboard
@@ -73,7 +73,8 @@ def run_calibration(
 
 def _opened(stack: ExitStack, robot: RobotSettings, bus: BusSettings, channels: Sequence[ChannelSettings]) -> _Wire:
     indices = [i for i, channel in enumerate(channels) if channel.bus == bus.name]
-    specs = servo_specs([channels[i] for i in indices])
+    own = [channels[i] for i in indices]
+    specs = servo_specs(own, np.radians([rest_deg(channel) + channel.trim_deg for channel in own]))
     slow = [replace(spec, max_speed_rad_s=min(spec.max_speed_rad_s, SLOW_RAD_S)) for spec in specs]
     opened = open_bus(bus.kind, slow, **bus.options())
     stack.enter_context(opened)

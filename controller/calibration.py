@@ -82,12 +82,17 @@ def carried(channel: ChannelSettings, captured: Captured) -> ChannelSettings:
     stretched so that the outermost ones reach the captured ends, and the limits become the ends.
     """
     points = channel.map
-    rest = min(max(0.0, points.at[0]), points.at[-1])
-    at_rest = _between(points, rest)
+    at_rest = rest_deg(channel)
     low, high = min(points.deg), max(points.deg)
     deg = [_stretched(value, (low, at_rest, high), captured) for value in points.deg]
     moved = points.model_copy(update={"deg": [round(value, 3) for value in deg]})
     return channel.model_copy(update={"map": moved, "limit_deg": (captured.min_deg, captured.max_deg), "trim_deg": 0.0})
+
+
+def rest_deg(channel: ChannelSettings) -> float:
+    """What a channel's mix at rest (0, or the end nearest to it) gives before its trim."""
+    points = channel.map
+    return _between(points, min(max(0.0, points.at[0]), points.at[-1]))
 
 
 def _between(points: Calibration, at: float) -> float:
