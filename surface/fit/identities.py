@@ -174,7 +174,8 @@ def _at_rest(mesh: FitMesh, recipe: Recipe, field: Floats) -> FitMesh:
     """The face that a field makes, lips closed and lids seated, without the shapes that this does not need."""
     closing = [k for k, n in enumerate(mesh.names) if n == "mouthClose"]
     names = tuple(mesh.names[k] for k in closing)
-    return prepare(mesh.moved(mesh.vertices + field, mesh.deltas).with_shapes(names, mesh.deltas[closing]), recipe)
+    other = mesh.moved(mesh.vertices + field, mesh.deltas).with_shapes(names, mesh.deltas[closing])
+    return prepare(other, replace(recipe, frown={}))
 
 
 def _rims(mesh: FitMesh, chart: Chart, eye: Floats) -> tuple[Floats, Floats]:

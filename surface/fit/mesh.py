@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from surface.errors import FitError
 
+LARGE, SMALL = 1e7, 1e-7  # in any unit: no vertex of a head lies further out, no head is smaller
+
 
 @dataclass(frozen=True)
 class FitMesh:
@@ -110,14 +112,22 @@ def _check_indices(where: str, key: str, index: NDArray, n: int) -> None:
 
 def _check_finite(where: str, mesh: FitMesh) -> None:
     for key, a in (("neutral", mesh.vertices), ("uv", mesh.uv)):
-        bad = np.flatnonzero(~np.isfinite(a).all(axis=1))
+        bad = np.flatnonzero(~_usable(a))
         if len(bad):
-            raise FitError(f"{where}: {key}[{bad[0]}] is not a finite number", hint="repair the mesh and export again")
+            raise FitError(f"{where}: {key}[{bad[0]}] is not a finite number of usable size",
+                           hint="repair the mesh and export again")  # fmt: skip
     for name, d in zip(mesh.names, mesh.deltas, strict=True):
-        bad = np.flatnonzero(~np.isfinite(d).all(axis=1))
+        bad = np.flatnonzero(~_usable(d))
         if len(bad):
-            raise FitError(f"{where}: shape {name!r}, vertex {bad[0]} is not a finite number",
+            raise FitError(f"{where}: shape {name!r}, vertex {bad[0]} is not a finite number of usable size",
                            hint="repair the shape and export again")  # fmt: skip
+    if not np.ptp(mesh.vertices, axis=0).max() > SMALL:
+        raise FitError(f"{where}: all vertices stand in one place", hint="export the mesh again")
+
+
+def _usable(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) whether a row's numbers are finite, and not as large as only damage makes them."""
+    return np.asarray((np.abs(rows) < LARGE).all(axis=1))
 
 
 def triangles(faces: NDArray[np.int64]) -> NDArray[np.int64]:

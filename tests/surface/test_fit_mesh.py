@@ -59,7 +59,7 @@ def test_no_faces_are_refused(tmp_path):
 def test_nan_in_the_neutral_face_names_the_vertex(tmp_path):
     bad = slit_sheet().vertices.copy()
     bad[17, 1] = np.nan
-    assert "neutral[17]" in str(refused(tmp_path, neutral=bad))
+    assert "neutral[17] is not a finite number" in str(refused(tmp_path, neutral=bad))
 
 
 def test_nan_in_a_shape_names_shape_and_vertex(tmp_path):
