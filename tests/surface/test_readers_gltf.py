@@ -90,7 +90,9 @@ def test_a_skinned_mesh_stands_where_its_joints_are(tmp_path):
     }
     bind = np.eye(4, dtype=np.float32)
     bind[3, :3] = [0, -1.5, 0]  # column by column
-    builder.document["skins"] = [{"joints": [1], "inverseBindMatrices": builder.accessor(bind.reshape(1, 16), FLOAT, "MAT4")}]
+    builder.document["skins"] = [
+        {"joints": [1], "inverseBindMatrices": builder.accessor(bind.reshape(1, 16), FLOAT, "MAT4")}
+    ]
     builder.document["nodes"] = [
         {"mesh": 0, "skin": 0, "translation": [9.0, 9.0, 9.0]}, {"translation": [0.0, 1.75, 0.0]},
     ]  # fmt: skip
