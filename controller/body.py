@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 import time
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -34,6 +34,7 @@ from controller.sources import Sources, Voice
 from controller.speech import layer_of, load_take
 from controller.stage import Stage, load_stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
+from drivers.shutdown import Closers, with_those_before
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +69,7 @@ class Body:
         replay: Replay | None = None,
     ) -> None:
         self.stage = stage
-        self._closers = ExitStack()
+        self._closers = Closers()
         self.state: Face = stage.state(parameters)
         if record is not None:
             recorder = Recorder(self.state, record, seed=stage.settings.seed, period_s=stage.period_s)
@@ -213,7 +214,8 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
     try:
         _serve(orders, pipe, stop)
     except OMOTE_ERRORS as error:
-        _tell(pipe, Failed(str(error), error.hint))
+        all_told = with_those_before(error)
+        _tell(pipe, Failed(str(all_told), getattr(all_told, "hint", "")))
     except Exception as error:
         if os.environ.get("OMOTE_DEBUG"):
             raise

@@ -1,4 +1,7 @@
-"""Run one clean-up exactly once on every way out of a program: end, exception, SIGINT, SIGTERM, SIGHUP, exit.
+"""Clean up on every way out, and tell all that failed on it.
+
+:func:`stop_on_signals` runs one clean-up exactly once on every way out of a program: end, exception, SIGINT,
+SIGTERM, SIGHUP, exit.
 
 A signal handler may interrupt a transaction half way, so it does not touch the bus itself: it raises, the
 transaction unwinds, and the clean-up runs on the way out with further signals held back. SIGKILL cannot be
@@ -11,11 +14,13 @@ import atexit
 import logging
 import signal
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from types import FrameType
 from typing import Any
+
+from drivers.errors import DriverError
 
 log = logging.getLogger(__name__)
 
@@ -94,3 +99,63 @@ def _quietly(once: _Once) -> None:
         once()
     except Exception:
         log.exception("clean-up at exit failed")
+
+
+class Closers(ExitStack):
+    """An exit stack of which every callback runs, and every one that failed is told, not only the last.
+
+    ``close`` raises what failed: the error itself where it is one, a :class:`~drivers.errors.DriverError` that names
+    them all where there are more.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._failed: list[Exception] = []
+
+    def callback(self, callback: Callable[..., Any], /, *args: Any, **kwds: Any) -> Callable[..., Any]:
+        """Run this on the way out; what it raises is kept for :meth:`close`."""
+        super().callback(self._try, callback, *args, **kwds)
+        return callback
+
+    def close(self) -> None:
+        """Run everything, last come first served.
+
+        Raises
+        ------
+        Exception : what failed.
+        """
+        super().close()
+        failed, self._failed = self._failed, []
+        if failed:
+            raise together(failed)
+
+    def _try(self, callback: Callable[..., object], *args: Any, **kwds: Any) -> None:
+        try:
+            callback(*args, **kwds)
+        except Exception as error:  # noqa: BLE001  the others must run, and be told
+            log.debug("on the way out: %s", error)
+            self._failed.append(error)
+
+
+def together(failed: Sequence[Exception]) -> Exception:
+    """One error that tells several: their messages in order, each hint once, all servos."""
+    if len(failed) == 1:
+        return failed[0]
+    hints = dict.fromkeys(hint for error in failed if (hint := getattr(error, "hint", "")))
+    servos = dict.fromkeys(servo for error in failed for servo in getattr(error, "servo_ids", ()))
+    message = f"{len(failed)} things failed: " + "; ".join(str(error) or type(error).__name__ for error in failed)
+    return DriverError(message, hint="; ".join(hints), servo_ids=tuple(servos))
+
+
+def with_those_before(error: Exception) -> Exception:
+    """The error together with those that were under way when it was raised, which it would hide; oldest first.
+
+    One that it was raised from is in its message already, and is left out, as are those that are not for people.
+    """
+    found: list[Exception] = [error]
+    step: BaseException = error
+    while step.__context__ is not None:
+        step, told = step.__context__, step.__context__ is step.__cause__
+        if isinstance(step, Exception) and hasattr(step, "hint") and not told:
+            found.append(step)
+    return together(found[::-1])

@@ -10,11 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from drivers.shutdown import stop_on_signals
+from drivers.errors import DriverError, NoReply, PortLost
+from drivers.shutdown import Closers, stop_on_signals, with_those_before
 
 PROGRAM = """
 import os, signal, sys, time
-from drivers.shutdown import stop_on_signals
+from drivers.errors import DriverError, NoReply, PortLost
+from drivers.shutdown import Closers, stop_on_signals, with_those_before
 calls = 0
 def stop():
     global calls
@@ -93,3 +95,52 @@ def test_a_thread_without_signals_still_stops_once() -> None:
     thread.start()
     thread.join()
     assert calls == [1]
+
+
+def test_everything_runs_and_every_failure_is_told() -> None:
+    calls: list[str] = []
+
+    def fail(name: str, servo: int, hint: str) -> None:
+        calls.append(name)
+        raise NoReply(f"{name} not off", hint=hint, servo_ids=(servo,))
+
+    closers = Closers()
+    closers.callback(fail, "neck", 3, "switch the power off")
+    closers.callback(calls.append, "link")
+    closers.callback(fail, "jaw", 7, "switch the power off")
+    with pytest.raises(DriverError, match="2 things failed: jaw not off; neck not off") as caught:
+        closers.close()
+    assert calls == ["jaw", "link", "neck"]
+    assert (caught.value.hint, caught.value.servo_ids) == ("switch the power off", (7, 3))
+    closers.close()  # it is done
+
+
+def test_one_failure_is_told_as_it_is() -> None:
+    closers = Closers()
+    error = NoReply("jaw not off")
+
+    def fail() -> None:
+        raise error
+
+    closers.callback(fail)
+    with pytest.raises(NoReply) as caught:
+        closers.close()
+    assert caught.value is error
+
+
+def test_an_error_on_the_way_out_does_not_hide_what_led_there() -> None:
+    def stop() -> None:
+        try:
+            raise OSError("cable")
+        except OSError as cause:
+            raise PortLost("port lost: cable", hint="plug it in") from cause
+
+    with pytest.raises(PortLost) as caught:
+        try:
+            raise NoReply("servo 3 is silent", hint="check its cable")
+        finally:
+            stop()
+    told = with_those_before(caught.value)
+    assert str(told) == "2 things failed: servo 3 is silent; port lost: cable"
+    assert isinstance(told, DriverError)
+    assert told.hint == "check its cable; plug it in"
