@@ -86,6 +86,11 @@ class HeadPart:
         raise NotImplementedError
 
     @property
+    def turn(self) -> Floats:
+        """(3, 3) the head's rotation of the last pose."""
+        return self._turn.matrix
+
+    @property
     def share(self) -> Floats32:
         """(m,) how much of the head's rotation each vertex of the mesh takes, 0..1."""
         return self._share

@@ -1,5 +1,8 @@
 """Baked shade: how much sky each vertex of a head sees, kept beside the head in ``occlusion.npz``.
 
+For some parts there is more: which way the sky lies, ``PART/visible`` (m, 4), and how thin the flesh is,
+``PART/thin`` (m, 1), 0 thick.
+
 The file belongs to one tessellation. Parts that it does not fit, or a head without it, are drawn unshaded.
 """
 
@@ -20,7 +23,7 @@ Shares = Mapping[str, NDArray[np.floating]]
 
 
 def read_shade(head: str | Path) -> dict[str, NDArray[np.float32]]:
-    """Shares (m, 1) of each part, 0..1, by the part's name; empty where the head has no such file.
+    """Shares (m, k) of each part, 0..1, by the part's name; empty where the head has no such file.
 
     Parameters
     ----------
@@ -35,16 +38,16 @@ def read_shade(head: str | Path) -> dict[str, NDArray[np.float32]]:
         return {}
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            return {name: stored[name].reshape(-1, 1).astype(np.float32) / np.float32(255) for name in stored.files}
+            return {name: _rows(stored[name]) for name in stored.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise HeadFileError(f"{path}: {error}", hint=f"delete {path}, or make the head again: omote fit") from error
 
 
 def write_shade(head: str | Path, shares: Shares) -> Path:
-    """Keep shares (m, 1), 0..1, beside the head; returns the file's path."""
+    """Keep shares (m, k), 0..1, beside the head; returns the file's path."""
     path = shade_path(head)
     packed = {
-        name: np.rint(np.clip(share.ravel(), 0.0, 1.0) * 255.0).astype(np.uint8) for name, share in shares.items()
+        name: np.rint(np.clip(np.squeeze(share), 0.0, 1.0) * 255.0).astype(np.uint8) for name, share in shares.items()
     }
     temporary = path.with_suffix(".part")
     with temporary.open("wb") as stream:
@@ -60,6 +63,15 @@ def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:
         if share is not None and share.shape == (len(part.vertices), 1):
             painted = part.attributes.get("occlusion", np.float32(1.0))
             part.attributes["occlusion"] = (painted * share).astype(np.float32)
+        for name in ("visible", "thin"):
+            more = shares.get(f"{part.name}/{name}")
+            if more is not None and len(more) == len(part.vertices):
+                part.attributes[name] = more
+
+
+def _rows(stored: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Bytes (m,) or (m, k) as shares (m, k)."""
+    return stored.reshape(len(stored), -1).astype(np.float32) / np.float32(255)
 
 
 def shade_path(head: str | Path) -> Path:

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 #: since the light that comes in between the lips is worked out each frame.
 _COMPANIES = (("skin", "eye"), ("teeth", "gums", "tongue"))
 
+#: Coefficients of the sky lie between minus and plus this.
+SKY_RANGE = 2.0
+#: Skin whose other side is further away lets no light through, mm.
+_THICK_MM = 11.0
+_NEIGHBOURS = 220
+
 #: Pose in which mouth and lids show what they hide at rest.
 _OPEN = {"jawOpen": 0.45, "eyeBlinkLeft": 0.8, "eyeBlinkRight": 0.8}
 
@@ -45,7 +51,50 @@ def bake(
     ------
     ViewError : no OpenGL on this machine.
     """
-    result = {part.name: np.ones((len(part.vertices), 1), np.float32) for part in parts}
+    return {name: seen[:, :1] for name, seen in _bake_all(parts, directions, resolution, bias_mm).items()}
+
+
+def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str, np.ndarray]:
+    """The greater of what vertices see at rest and in `open_pose` (P,), so that what opens does not stay black.
+
+    `open_pose` has the mouth open and the eyes shut; the head is left at rest. Options as for :func:`bake`.
+    Skin also gets which way the sky lies, by "NAME/visible" (see :func:`fit_sky`), and how thin it is, by
+    "NAME/thin".
+    """
+    head.pose(np.asarray(open_pose, np.float64))
+    opened = _bake_all(head.parts, **options)
+    head.pose(np.zeros(len(head.parameters)))
+    rest = _bake_all(head.parts, **options)
+    result: dict[str, np.ndarray] = {}
+    for part in head.parts:
+        shut, wide = rest[part.name], opened[part.name]
+        best = np.where(wide[:, :1] > shut[:, :1], wide, shut)
+        result[part.name] = best[:, :1]
+        if part.material == "skin":
+            result[f"{part.name}/visible"] = best[:, 1:] / (2.0 * SKY_RANGE) + 0.5
+            result[f"{part.name}/thin"] = thinness(part)
+    return result
+
+
+def thinness(part: ViewPart) -> np.ndarray:
+    """How near the skin's other side lies, (m, 1): 1 touches, 0 is further than `_THICK_MM`."""
+    from scipy.spatial import cKDTree
+
+    vertices, normals = np.asarray(part.vertices, float), np.asarray(part.normals, float)
+    distance, near = cKDTree(vertices).query(vertices, k=min(_NEIGHBOURS, len(vertices)), distance_upper_bound=_THICK_MM)
+    there = np.append(vertices, [[0.0, 0.0, 0.0]], axis=0)[near] - vertices[:, None]
+    away = np.append(normals, [[0.0, 0.0, 0.0]], axis=0)[near]
+    facing = (away * normals[:, None]).sum(axis=2) < -0.4
+    inside = (there * normals[:, None]).sum(axis=2) < -0.5 * distance
+    depth = np.where(facing & inside, distance, _THICK_MM).min(axis=1)
+    return (1.0 - depth[:, None] / _THICK_MM).astype(np.float32)
+
+
+def _bake_all(
+    parts: Sequence[ViewPart], directions: int = 96, resolution: int = 512, bias_mm: float = 1.2
+) -> dict[str, np.ndarray]:
+    """Part name -> (m, 5): the share of the surroundings seen, and the sky of :func:`fit_sky`."""
+    result = {part.name: np.tile(np.float32([1, 1, 0, 0, 0]), (len(part.vertices), 1)) for part in parts}
     ctx = open_context()
     try:
         for company in _COMPANIES:
@@ -57,22 +106,22 @@ def bake(
     return result
 
 
-def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str, np.ndarray]:
-    """The greater of what vertices see at rest and in `open_pose` (P,), so that what opens does not stay black.
+def fit_sky(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Coefficients (m, 4) so that a + (b, c, d) . direction is nearest to what a vertex sees there.
 
-    `open_pose` has the mouth open and the eyes shut; the head is left at rest. Options as for :func:`bake`.
+    Parameters
+    ----------
+    normal : (m, 4, 4) sum over directions of weight times the products of (1, direction) with itself.
+    right : (m, 4) sum of weight times seen times (1, direction).
     """
-    head.pose(np.asarray(open_pose, np.float64))
-    opened = bake(head.parts, **options)
-    head.pose(np.zeros(len(head.parameters)))
-    rest = bake(head.parts, **options)
-    return {name: np.maximum(share, opened[name]) for name, share in rest.items()}
+    steady = normal + 0.02 * np.eye(4) * np.maximum(normal[:, :1, :1], 1e-6)
+    return np.clip(np.linalg.solve(steady, right[..., None])[..., 0], -SKY_RANGE, SKY_RANGE)
 
 
 def _bake(
     ctx: moderngl.Context, parts: Sequence[ViewPart], directions: int, resolution: int, bias_mm: float
 ) -> dict[str, np.ndarray]:
-    """As :func:`bake` for parts that shade each other."""
+    """As :func:`_bake_all` for parts that shade each other."""
     points = np.concatenate([np.asarray(part.vertices, np.float64) for part in parts])
     normals = np.concatenate([np.asarray(part.normals, np.float64) for part in parts])
     program = build(ctx, ("depth.vert",), ("depth.frag",))
@@ -80,15 +129,20 @@ def _bake(
     depth = ctx.depth_texture((resolution, resolution))
     target = ctx.framebuffer([], depth)
     seen, total = np.zeros(len(points)), np.zeros(len(points))
+    normal, right = np.zeros((len(points), 4, 4)), np.zeros((len(points), 4))
     for direction in spread(directions):
         weight = np.clip(normals @ direction, 0.0, None)
         box, matrix, span = orthographic(points, direction)
         put(program, {"view_projection": matrix})
         _draw_depth(ctx, target, arrays)
         picture = np.frombuffer(depth.read(), np.float32).reshape(resolution, resolution)
-        seen += weight * lit(box, picture, bias_mm / span)
+        visible = lit(box, picture, bias_mm / span)
+        seen += weight * visible
         total += weight
-    share = (seen / np.maximum(total, 1e-9)).astype(np.float32)[:, None]
+        one = np.append(1.0, direction)
+        normal += weight[:, None, None] * np.outer(one, one)
+        right += (weight * visible)[:, None] * one
+    share = np.column_stack([seen / np.maximum(total, 1e-9), fit_sky(normal, right)]).astype(np.float32)
     ends = np.cumsum([len(part.vertices) for part in parts])[:-1]
     return dict(zip([part.name for part in parts], np.split(share, ends), strict=True))
 
