@@ -110,10 +110,10 @@ class Protocol1Bus(WireBus):
             found = []
             for servo in range(LAST_ID + 1) if ids is None else ids:
                 reply = self._registers.packets.hello(self._port, servo).replies.get(servo)
-                if reply is None:
-                    self._port.suspects.discard(servo)  # it is nobody, or a configured one that is asked again anyway
-                else:
+                if reply is not None:
                     found.append(self._info(servo, reply))
+                elif servo not in self.ids:
+                    self._port.suspects.discard(servo)  # it is nobody
             return found
 
     def _info(self, servo: int, reply: Packet1) -> ServoInfo:

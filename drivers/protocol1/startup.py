@@ -131,7 +131,6 @@ def _greet(registers: Registers, servo: int, started: Started) -> Packet1:
     try:
         return registers.hello(servo)
     except NoReply:
-        registers.port.suspects.discard(servo)
         if "Status Return Level" not in registers.tables[servo] or not registers.packets.pings(registers.port, servo):
             raise
     registers.tell(servo, "status_level", 2)
