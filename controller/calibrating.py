@@ -24,6 +24,8 @@ from drivers.shutdown import stop_on_signals
 Floats = NDArray[np.float64]
 
 PERIOD_S = 0.03
+STALE_S = 0.5
+"""An older angle counts as unknown; a single read that was missed does not matter."""
 SLOW_RAD_S = 0.5
 """Nothing moves faster than this while it is calibrated."""
 
@@ -91,7 +93,7 @@ def _cycle(wires: Sequence[_Wire], state: Capturing) -> None:
         if state.holding:
             wire.bus.write(np.radians(state.target_deg[wire.indices]))
         measured = wire.bus.read()
-        known = measured.fresh | (not wire.bus.measures)
+        known = (measured.age_s < STALE_S) | (not wire.bus.measures)
         angles[wire.indices] = np.degrees(np.where(known, measured.position_rad, np.nan))
     state.see(angles)
 

@@ -84,6 +84,8 @@ class Capturing:
     def see(self, angle_deg: Floats) -> None:
         """Take in angles (n,), NaN where nothing fresh is known."""
         self.angle_deg = np.array(angle_deg, dtype=np.float64)
+        if self.holding:  # a board only knows where its servos are once it moves them
+            self.target_deg = np.where(np.isnan(self.target_deg), self.angle_deg, self.target_deg)
         if not self.tracking or self.holding:
             return
         for mark, angle in zip(self.marks, self.angle_deg, strict=True):
@@ -155,6 +157,8 @@ class Capturing:
             return
         low, high = self.channels[self.selected].limit_deg
         target = self.target_deg[self.selected] + step_deg
+        if math.isnan(target):
+            return
         self.target_deg[self.selected] = min(max(target, low), high)
         if target != self.target_deg[self.selected]:
             self.told = f"limit_deg of the robot file ends at {self.target_deg[self.selected]:g}"

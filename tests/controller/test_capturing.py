@@ -66,6 +66,17 @@ def test_motors_stay_off_while_a_servo_is_silent() -> None:
     assert not state.holding
 
 
+def test_servos_that_tell_nothing_are_moved_from_where_they_begin() -> None:
+    state = seen(Capturing(CHANNELS, measures=False), np.nan, np.nan, np.nan)
+    pressed(state, "h", "right")
+    assert np.isnan(state.target_deg[0])
+    seen(state, 2.0, 0.0, 0.0)
+    assert pressed(state, "right").target_deg[0] == 2.0 + STEP_DEG
+    seen(state, 2.25, 0.0, 0.0)
+    assert state.target_deg[0] == 2.0 + STEP_DEG
+    assert pressed(state, "t").tracking is False
+
+
 def test_what_is_missing_is_told_and_nothing_is_saved() -> None:
     state = pressed(seen(Capturing(CHANNELS), 0.0, 0.0, 0.0), "n", "s")
     assert not state.saving
