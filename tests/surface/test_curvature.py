@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from surface import DCPSurface
 from surface.curvature import curvatures
@@ -57,3 +59,29 @@ def test_uncovered_is_nan() -> None:
     gaussian, mean = curvatures(single, [[2.0, 0.5], [0.5, 0.5]])
     assert np.isnan(gaussian).all()
     assert np.isnan(mean).all()
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 10_000))
+def test_curvatures_agree_with_differences_of_normals(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.linspace(0, 1, 7), np.linspace(0, 1, 7), indexing="ij")
+    knots = np.concatenate([[0.0] * 5, [0.3, 0.6], [1.0] * 5])
+    net = np.stack([x, y, 0.3 * rng.normal(size=(7, 7))], axis=-1)
+    surface = DCPSurface.from_nurbs(4, 4, knots, knots, net, rng.uniform(0.5, 2, (7, 7)))
+    uv, h = rng.uniform(0.1, 0.9, (20, 2)), 1e-5
+    _, su, sv = surface.derivatives(uv)
+
+    def normal(at: np.ndarray) -> np.ndarray:
+        _, a, b = surface.derivatives(at)
+        product = np.cross(a, b)
+        return product / np.linalg.norm(product, axis=1)[:, None]
+
+    slopes = [(normal(uv + step) - normal(uv - step)) / (2 * h) for step in (np.array([h, 0]), np.array([0, h]))]
+    first = np.array([[(a * b).sum(axis=1) for b in (su, sv)] for a in (su, sv)]).transpose(2, 0, 1)
+    second = -np.array([[(a * b).sum(axis=1) for b in (su, sv)] for a in slopes]).transpose(2, 0, 1)
+    shape = np.linalg.solve(first, second)  # the shape operator: its determinant and half its trace
+    gaussian, mean = surface.curvatures(uv)
+    size = np.abs(shape).max()
+    assert np.allclose(gaussian, np.linalg.det(shape), rtol=1e-5, atol=1e-6 * size**2)
+    assert np.allclose(mean, np.trace(shape, axis1=1, axis2=2) / 2, rtol=1e-5, atol=1e-6 * size)
