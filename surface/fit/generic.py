@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from surface.errors import FitError
 from surface.fit.frame import head_scale
 from surface.fit.islands import Island, find_islands
-from surface.fit.layout import lay_out, separate
+from surface.fit.layout import lay_out, separate, signed_areas
 from surface.fit.mesh import FitMesh, triangles
 from surface.fit.recipe import PartRecipe
 from surface.fit.refine import Wish
@@ -149,7 +149,9 @@ def _within(mesh: FitMesh, label: NDArray, eyes: Floats, radius: float) -> set[i
 
 def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[PartRecipe, list[Island]]]:
     """The face, and what of the same piece hardly moves, as a part of its own."""
-    islands = [part for island in find_islands(mesh, np.flatnonzero(chosen)) for part in separate(island)]
+    islands = _spread(mesh, chosen)
+    if not islands:
+        raise FitError("the skin's texture coordinates have no area", hint="unwrap the mesh first")
     moved = np.array([_shapes_moving(mesh, i.vertex, scale) for i in islands])
     lively = moved >= LIVELY * moved.max(initial=0)
     face, rest = ([i for i, x in zip(islands, lively, strict=True) if x == wanted] for wanted in (True, False))
@@ -159,6 +161,12 @@ def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[
         points = int(np.clip(POINTS * share, max(REST, LEAST * len(rest)), POINTS))
         out.append(_part("back", "skin", points, 0.1, 0.4, scale, rest, mesh))
     return out
+
+
+def _spread(mesh: FitMesh, chosen: NDArray[np.bool_]) -> list[Island]:
+    """Islands of the chosen faces, without overlap; those without area in (u, v) are dropped."""
+    found = [part for island in find_islands(mesh, np.flatnonzero(chosen)) for part in separate(island)]
+    return [i for i in found if np.ptp(i.uv, axis=0).min() > 1e-6 and np.abs(signed_areas(i)).sum() > 1e-12]
 
 
 def _shapes_moving(mesh: FitMesh, vertices: NDArray[np.int64], scale: float) -> int:
@@ -182,9 +190,10 @@ def _others(
     """All further pieces, one part for each object or material that they belong to."""
     out: list[tuple[PartRecipe, list[Island]]] = []
     for (name, material), own in _by_material(mesh, label, pieces, scale).items():
-        islands = [x for i in find_islands(mesh, np.flatnonzero(np.isin(label, own))) for x in separate(i)]
-        if len(islands) > MOST_ISLANDS:
-            notes.append(f"{name!r}: left out: {len(islands)} separate pieces are too many to fit")
+        islands = _spread(mesh, np.isin(label, own))
+        if not 0 < len(islands) <= MOST_ISLANDS:
+            why = f"{len(islands)} separate pieces are too many to fit" if islands else "no area in (u, v)"
+            notes.append(f"{name!r}: left out: {why}")
             continue
         share = sum(_area(mesh, i) for i in islands) / max(skin_area, 1e-9)
         points = int(np.clip(POINTS * share, LEAST * len(islands), POINTS))

@@ -1,7 +1,8 @@
 """Islands of a mesh that nothing is known of, made fit to be charts.
 
 A mirrored half that lies on the other one in (u, v) becomes an island of its own. Every island is turned so that up on
-the head is up in (u, v), since slits run along u, and stretched so that (u, v) is as wide and as high as the surface.
+the head is up in (u, v), since slits run along u, and evened out: on average, lengths in (u, v) are lengths on the
+surface.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from surface.fit.mesh import FitMesh
 
 Floats = NDArray[np.float64]
 LARGE = 0.03  # of an island's area: what runs the other way round in (u, v) and is smaller is a fold, not a half
+FLAT = 0.05  # sine of a slope below which a surface has no up
 SMALLEST = 0.12  # tiles are as large as their islands, but never smaller than this
 
 
@@ -90,13 +92,12 @@ def _upright(mesh: FitMesh, island: Island) -> Island:
     """Anticlockwise, up is up, in mm."""
     uv = island.uv * ([-1.0, 1.0] if signed_areas(island).sum() < 0 else [1.0, 1.0])
     slope, weight = _slopes(mesh, Island(island.vertex, uv, island.faces))
-    up = weight @ slope[:, :, 1]
-    if np.linalg.norm(up) > 0.05 * weight @ np.linalg.norm(slope, axis=(1, 2)):
-        c, s = up[::-1] / np.linalg.norm(up)
-        turn = np.array([[c, -s], [s, c]])
-        uv, slope = uv @ turn.T, np.einsum("ij,fjk->fik", turn, slope)
-    stretch = np.sqrt(weight @ (slope**2).sum(axis=2) / weight.sum())
-    return Island(island.vertex, uv * stretch, island.faces)
+    total = max(float(weight.sum()), 1e-30)
+    scale, axes = np.linalg.eigh(np.einsum("f,fik,fjk->ij", weight, slope, slope) / total)
+    even = (axes * np.sqrt(np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-30)))) @ axes.T
+    up = np.linalg.inv(even) @ (weight @ slope[:, :, 1]) / total
+    c, s = up[::-1] / np.linalg.norm(up) if np.linalg.norm(up) > FLAT else (1.0, 0.0)
+    return Island(island.vertex, uv @ even.T @ np.array([[c, -s], [s, c]]).T, island.faces)
 
 
 def _slopes(mesh: FitMesh, island: Island) -> tuple[Floats, Floats]:

@@ -297,7 +297,8 @@ def _groups(mesh: MeshData) -> NDArray[np.int64]:
     border = np.unique(np.concatenate([one[at[count == 1]], two[at[count == 1]]]))
     step = max(float(np.ptp(mesh.vertices, axis=0).max(initial=0.0)) * WELD, 1e-30)
     keys = np.concatenate([mesh.vertices[None, border], mesh.deltas[:, border]]).transpose(1, 0, 2)
-    rounded = np.ascontiguousarray(np.round(keys.reshape(len(border), -1) / step)) + 0.0  # no negative zeros
+    flat = keys.reshape(len(border), 3 * (1 + len(mesh.names)))
+    rounded = np.ascontiguousarray(np.round(flat / step)) + 0.0  # no negative zeros
     rows = rounded.view(np.dtype((np.void, rounded.shape[1] * 8))).ravel()
     _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)
     out = np.arange(n)

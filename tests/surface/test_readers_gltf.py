@@ -45,7 +45,7 @@ def test_a_mesh_comes_back(tmp_path, sparse):
 def test_vertices_doubled_along_a_seam_are_one_again(tmp_path):
     mesh = slit_sheet()
     right = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0
-    uv = np.vstack([mesh.uv, mesh.uv + [2.0, 0.0]])
+    uv = np.vstack([mesh.uv, mesh.uv + np.array([2.0, 0.0])])
     cut = mesh.__class__(mesh.vertices, mesh.faces, uv, np.where(right[:, None], mesh.face_uv + len(mesh.uv), mesh.face_uv),
                          mesh.names, mesh.deltas)  # fmt: skip
     path = write(tmp_path, glb(cut))
@@ -55,7 +55,7 @@ def test_vertices_doubled_along_a_seam_are_one_again(tmp_path):
 
 def test_lips_that_touch_but_move_apart_stay_two(tmp_path):
     quad = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
-    vertices = np.column_stack([np.vstack([quad, quad + [0, 1]]), np.zeros(8)]) * 100
+    vertices = np.column_stack([np.vstack([quad, quad + np.array([0, 1])]), np.zeros(8)]) * 100
     faces = np.array([[0, 1, 2, 3], [4, 5, 6, 7]])
     drop = np.zeros((1, 8, 3))
     drop[0, :4, 1] = -5
@@ -98,7 +98,7 @@ def test_a_skinned_mesh_stands_where_its_joints_are(tmp_path):
     ]  # fmt: skip
     builder.document["scenes"] = [{"nodes": [0, 1]}]
     got, plain = read_gltf(write(tmp_path, builder)), read_gltf(write(tmp_path, glb(slit_sheet()), "n.glb"))
-    np.testing.assert_allclose(got.vertices, plain.vertices + [0, 0.25, 0], atol=1e-6)
+    np.testing.assert_allclose(got.vertices, plain.vertices + np.array([0, 0.25, 0]), atol=1e-6)
 
 
 def test_several_primitives_and_unnamed_shapes(tmp_path):
