@@ -25,6 +25,7 @@ class Subject(StrEnum):
     surface = "surface"
     quadtree = "quadtree"
     drift = "drift"
+    bus = "bus"
 
 
 class Bar:
@@ -50,7 +51,7 @@ def register(app: typer.Typer) -> None:
 
 def bench(
     what: Annotated[
-        Subject, typer.Argument(help="A head, the engine at its limit, quad trees, or drift of many updates.")
+        Subject, typer.Argument(help="A head, the engine at its limit, quad trees, drift, or a servo bus.")
     ] = Subject.head,
     head: Annotated[str, typer.Option(help="Head: a name from configs/heads or a folder.")] = "ict",
     seconds: Annotated[float, typer.Option(help="Time for each measurement.", min=0.01)] = 0.3,
@@ -60,11 +61,16 @@ def bench(
         Path | None, typer.Option(help="Also growth with size, drawn as this SVG (surface only).")
     ] = None,
     updates: Annotated[int, typer.Option(help="How many (drift only).", min=1)] = 1_000_000,
+    face: Annotated[bool, typer.Option("--face", help="Also beside the face (bus only).")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON (bus only).")] = False,
 ) -> None:
     """Measure full evaluation and incremental updates on this machine, and peers in the same run.
 
     Example: omote bench surface --large --growth growth.svg
     """
+    if what is Subject.bus:
+        _bus(seconds, face, as_json)
+        return
     columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
     with Progress(*columns, console=console, transient=True) as progress:
         bar = Bar(progress)
@@ -74,6 +80,22 @@ def bench(
             tables = _head(what, head, seconds, bar, out, updates)
     for title, rows in tables:
         console.print(measure_table(title, rows))
+
+
+def _bus(seconds: float, face: bool, as_json: bool) -> None:
+    from controller.benching_bus import bench_bus, to_json
+
+    says = Console(stderr=True)  # lines and no moving bar: drawing one would disturb what is measured
+    tables = bench_bus(max(seconds, 1.0), lambda text: says.print(f"measuring {text}"), face=face)
+    if as_json:
+        console.print_json(to_json(tables))
+        return
+    for title, lines in tables:
+        table = Table("measure", "", "", "reach", "", title=title, title_justify="left")
+        for line in lines:
+            mark = {None: "", True: "kept", False: "missed"}[line.kept]
+            table.add_row(line.name, f"{line.value:.2f}", line.unit, line.reach, mark)
+        console.print(table)
 
 
 def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None) -> Tables:

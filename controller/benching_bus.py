@@ -1,0 +1,278 @@
+"""What ``omote bench bus`` measures: a simulated wire of 24 servos, driven by omote and by the bare SDK.
+
+The wire takes its time in both directions (``drivers.sim``, ``wire=True``), so the limit of a loop is known: bytes
+times ten bits over the baud rate, as the servos' return delay is 0. All of it runs on this machine's processors,
+the simulated servos (in a process of their own) too.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from controller.clock import Clock, Samples
+from controller.paths import find_config
+from drivers.bus import Bus, ServoSpec
+from drivers.priority import take_priority
+from drivers.sim import SimulatedBus
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Tell = Callable[[str], None]
+Cycle = Callable[["NDArray[np.float64]"], object]
+
+SERVOS = 24
+BAUD = 1_000_000
+PACED_HZ = 50
+JITTER_HZ = 100
+GOAL, POSITION, WIDTH = 116, 132, 4
+_SWING_RAD = 0.3
+_WARM = 40
+_FACE = {"as fast as it can": 1000, "30 frames/s": 30}
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the report.
+
+    Attributes
+    ----------
+    name, unit : what was measured.
+    value : the figure.
+    reach : what it shall be, as text; empty where nothing is asked.
+    kept : whether it is.
+    """
+
+    name: str
+    value: float
+    unit: str
+    reach: str = ""
+    kept: bool | None = None
+
+
+@dataclass(frozen=True)
+class Loop:
+    """How a loop of one write and one read went.
+
+    Attributes
+    ----------
+    rate_hz : cycles per second.
+    processor : share of one core that the calling thread used.
+    cycle_ms : wall time of one write and one read.
+    late_ms : how late each tick began; empty where nothing was paced.
+    """
+
+    rate_hz: float
+    processor: float
+    cycle_ms: dict[str, float]
+    late_ms: dict[str, float]
+
+
+def limit_hz(servos: int, baud: int, fast: bool) -> float:
+    """Cycles per second that the wire allows: a sync write and a sync read of 4 bytes for each servo.
+
+    Bytes (ROBOTIS e-Manual, Protocol 2.0): 14 + n (1 + 4) for the write, 14 + n for the request, n (11 + 4) for
+    the replies or 8 + n (4 + 4) for one joint reply.
+    """
+    write, request = 14 + servos * (1 + WIDTH), 14 + servos
+    replies = 8 + servos * (4 + WIDTH) if fast else servos * (11 + WIDTH)
+    return baud / (10.0 * (write + request + replies))
+
+
+def bench_bus(seconds: float, tell: Tell, *, face: bool = False) -> list[tuple[str, list[Line]]]:
+    """Tables of rates, processor time, latency and jitter.
+
+    Parameters
+    ----------
+    seconds : for each measurement.
+    tell : told what is measured now.
+    face : also run the whole program, face and body, and measure the jitter of its bus.
+    """
+    specs = [ServoSpec(i + 1, f"servo{i + 1}", "xl330-m288", -1.0, 1.0, 6.0, 60.0) for i in range(SERVOS)]
+    realtime = take_priority()
+    title = f"{SERVOS} servos at {BAUD} baud, wire-timed" + (", real-time priority" if realtime else "")
+    with SimulatedBus(specs, process=True, wire=True, baud=BAUD) as wire:
+        plain, fast, paced, ticks = (_ours(wire, specs, seconds, tell, *case) for case in _CASES)
+        tell("the bare SDK")
+        bare, bare_paced = _theirs(wire.path, seconds)
+    tables = [(title, _rates(plain, fast, bare) + _costs(paced, bare_paced) + _jitter(ticks, realtime))]
+    if face:
+        tables.append(("the whole program: face and body, simulated head of 24 servos", _beside_face(seconds, tell)))
+    return tables
+
+
+_CASES = ((False, 0.0), (True, 0.0), (False, PACED_HZ), (False, JITTER_HZ))
+"""(fast reads, cycles per second or 0 for as many as there can be) of our own loops."""
+
+
+def _ours(wire: SimulatedBus, specs: list[ServoSpec], seconds: float, tell: Tell, fast: bool, rate_hz: float) -> Loop:
+    from drivers import open_bus
+
+    tell(f"{'fast ' if fast else ''}sync read" + (f", {rate_hz:g} Hz" if rate_hz else ""))
+    options: dict[str, Any] = {"fast": fast, "feedback": "position", "slow_group": 0, "watchdog_ms": 0}
+    with open_bus("dynamixel", specs, port=wire.path, baud=BAUD, **options) as bus:
+        bus.start()
+        return measure_loop(_cycle_of(bus), seconds, rate_hz)
+
+
+def _cycle_of(bus: Bus) -> Cycle:
+    def cycle(angle_rad: NDArray[np.float64]) -> object:
+        bus.write(angle_rad)
+        return bus.read()
+
+    return cycle
+
+
+def _theirs(path: str, seconds: float) -> tuple[Loop, Loop]:
+    """The same goals and positions through the SDK's own group classes, free and paced."""
+    import dynamixel_sdk as sdk
+
+    port, packets = sdk.PortHandler(path), sdk.PacketHandler(2.0)
+    port.openPort()
+    port.setBaudRate(BAUD)
+    write = sdk.GroupSyncWrite(port, packets, GOAL, WIDTH)
+    read = sdk.GroupSyncRead(port, packets, POSITION, WIDTH)
+    for servo in range(1, SERVOS + 1):
+        read.addParam(servo)
+        write.addParam(servo, [0, 8, 0, 0])
+
+    def cycle(angle_rad: NDArray[np.float64]) -> object:
+        for servo, angle in enumerate(angle_rad, 1):
+            goal = 2048 + int(angle * 2048 / np.pi)
+            write.changeParam(servo, [goal & 0xFF, goal >> 8, 0, 0])
+        write.txPacket()
+        read.txRxPacket()
+        return [read.getData(servo, POSITION, WIDTH) for servo in range(1, SERVOS + 1)]
+
+    try:
+        return measure_loop(cycle, seconds, 0.0), measure_loop(cycle, seconds, PACED_HZ)
+    finally:
+        port.closePort()
+
+
+def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
+    """Run cycles for some time, paced or one behind the other."""
+    took, clock = Samples(), Clock(rate_hz or 1.0)
+    for k in range(_WARM):
+        cycle(_targets(k))
+    began, used, end = time.monotonic(), time.thread_time(), time.monotonic() + seconds
+    count = 0
+    while rate_hz == 0.0 and time.monotonic() < end:
+        count += 1
+        _timed(cycle, count, took)
+    for _ in clock.run(lambda: rate_hz > 0.0 and time.monotonic() < end):
+        count += 1
+        _timed(cycle, count, took)
+    wall, used = time.monotonic() - began, time.thread_time() - used
+    return Loop(count / wall, used / wall, took.summary(), clock.jitter_ms.summary() if rate_hz else {})
+
+
+def _timed(cycle: Cycle, count: int, took: Samples) -> None:
+    began = time.perf_counter()
+    cycle(_targets(count))
+    took.add(1e3 * (time.perf_counter() - began))
+
+
+def _targets(k: int) -> NDArray[np.float64]:
+    return np.full(SERVOS, _SWING_RAD * np.sin(k / 50))
+
+
+# ---------------------------------------------------------------------------- what is asked of the figures
+
+
+def _rates(plain: Loop, fast: Loop, bare: Loop) -> list[Line]:
+    lines = []
+    for name, loop, is_fast, share in (("sync read", plain, False, 0.92), ("fast sync read", fast, True, 0.85)):
+        limit = limit_hz(SERVOS, BAUD, is_fast)
+        lines.append(Line(f"write and {name}", loop.rate_hz, "Hz"))
+        reach = f">= {share:.0%} of {limit:.0f} Hz"
+        lines.append(Line("  of the wire limit", 100 * loop.rate_hz / limit, "%", reach, loop.rate_hz >= share * limit))
+    ratio = plain.rate_hz / bare.rate_hz
+    return [
+        *lines,
+        Line("bare SDK, write and sync read", bare.rate_hz, "Hz"),
+        Line("  omote is quicker by", ratio, "x", ">= 1", ratio >= 1),
+    ]
+
+
+def _costs(paced: Loop, bare: Loop) -> list[Line]:
+    share = 100 * paced.processor
+    ratio = bare.processor / paced.processor
+    return [
+        Line(f"processor at {PACED_HZ} Hz", share, "% of a core", "<= 12 %", share <= 12.0),
+        Line("bare SDK, the same", 100 * bare.processor, "% of a core"),
+        Line("  omote uses less by", ratio, "x", ">= 2", ratio >= 2.0),
+        Line("write and read, median", paced.cycle_ms["p50"], "ms"),
+        Line("write and read, 99 of 100", paced.cycle_ms["p99"], "ms"),
+        Line("bare SDK, median", bare.cycle_ms["p50"], "ms"),
+        Line("bare SDK, 99 of 100", bare.cycle_ms["p99"], "ms"),
+    ]
+
+
+def _jitter(ticks: Loop, realtime: bool) -> list[Line]:
+    worst, bound = ticks.late_ms["p99"], 2.0 if realtime else 3.0
+    return [
+        Line(f"tick at {JITTER_HZ} Hz late by, median", ticks.late_ms["p50"], "ms"),
+        Line(f"tick at {JITTER_HZ} Hz late by, 99 of 100", worst, "ms", f"<= {bound:g} ms", worst <= bound),
+    ]
+
+
+# ---------------------------------------------------------------------------- beside the face
+
+
+def _beside_face(seconds: float, tell: Tell) -> list[Line]:
+    lines = []
+    for name, rate in _FACE.items():
+        tell(f"beside the face, {name}")
+        report = _run_program(rate, max(seconds, 3.0))
+        bus = report["buses"][0]
+        bound = 0.5 if rate == _FACE["30 frames/s"] else 2.0 if bus["realtime"] else 3.0
+        worst = bus["jitter_ms"]["p99"]
+        lines += [
+            Line(f"face, {name}", report["face"]["frames_per_second"], "frames/s"),
+            Line(f"  bus tick at {JITTER_HZ} Hz, 99 of 100", worst, "ms", f"<= {bound:g} ms", worst <= bound),
+            Line("  ticks left out", bus["skipped"], f"of {bus['ticks'] + bus['skipped']}"),
+        ]
+    return lines
+
+
+def _run_program(frames_per_second: int, seconds: float) -> dict[str, Any]:
+    """The report of ``omote run everything`` with the bus at 100 Hz and the face at a rate."""
+    with tempfile.TemporaryDirectory(prefix="omote-") as folder:
+        robot, stage, report = (Path(folder) / name for name in ("robot.toml", "stage.toml", "report.json"))
+        _write_changed(find_config("robots", "head24"), robot, {"rate_hz": str(JITTER_HZ)})
+        changes = {"fps": str(frames_per_second), "robots": json.dumps([str(robot)])}
+        _write_changed(find_config("stages", "everything"), stage, changes)
+        command = [sys.executable, "-c", "from controller.cli import main; main()", "run", str(stage), "--headless"]
+        command += ["--seconds", str(seconds), "--report", str(report)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise RuntimeError(f"omote run failed: {done.stderr.strip() or done.stdout.strip()}")
+        found: dict[str, Any] = json.loads(report.read_text(encoding="utf-8"))
+        return found
+
+
+def _write_changed(source: Path, target: Path, changes: dict[str, str]) -> None:
+    """A copy of a TOML file with other values for some of its keys, wherever they stand."""
+    lines = source.read_text(encoding="utf-8").splitlines()
+    for at, line in enumerate(lines):
+        key = line.partition("=")[0].strip()
+        if key in changes:
+            lines[at] = f"{key} = {changes[key]}"
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def to_json(tables: list[tuple[str, list[Line]]]) -> str:
+    """The tables for programs: by title, a list of lines."""
+    plain = {title: [{**asdict(line), "name": line.name.strip()} for line in lines] for title, lines in tables}
+    return json.dumps(plain, indent=2)
