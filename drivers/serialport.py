@@ -94,7 +94,11 @@ class SerialPort:
             raise PortError(message, hint="set a baud rate the adapter has", port=self.path) from error
         self._end = end
         self.low_latency = end.low_latency
-        self.drain()
+        try:
+            self.drain()
+        except PortLost:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Give the device back; never raises, may be called any number of times."""

@@ -91,6 +91,7 @@ class MaestroBus(PulseBus):
 
     def _bring_up(self) -> Floats:
         start = super()._bring_up()
+        self._go(start)  # all at once, as from now on: what the board does not know it says now
         _, errors = self._ask_about([], insist=True) or ((), 0)
         if errors:
             self._switch_off()

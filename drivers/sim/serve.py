@@ -68,7 +68,7 @@ class PortServer:
         except BaseException:
             self._close_socket()
             raise
-        self._link = link
+        self._link = self.port.path if "://" in self.port.path else link
         self._timing = WireTiming(latency_s) if wire else None
         self._on_line, self._lines = on_line, Lines()
         self._queue: deque[Timed] = deque()
