@@ -14,7 +14,7 @@ from drivers import open_bus
 from drivers.bus import Bus
 from drivers.sim import SimulatedBus
 from tests.drivers import contract
-from tests.drivers.contract import BusContract
+from tests.drivers.contract import BusContract, settle
 
 CALM = {"margin_s": 0.5, "watchdog_ms": 0}
 
@@ -59,13 +59,6 @@ class TestDynamixelAx(Family):
     STEP_RAD = np.deg2rad(300) / 1024
 
 
-class TestDynamixelMx(Family):
-    KIND = "dynamixel"
-    MODELS = ("mx1-28",) * 3
-    SERVOS = servos_of(*MODELS)
-    VOLTS = 12.0
-
-
 class TestDynamixelOfBothProtocols(Family):
     KIND = "dynamixel"
     MODELS = ("ax-12a", "xm430-w350", "mx1-28")
@@ -74,11 +67,66 @@ class TestDynamixelOfBothProtocols(Family):
     STEP_RAD = np.deg2rad(300) / 1024
 
 
-class TestSimulated(Family):
-    MODELS = ("sts3215",) * 3
-    SERVOS = servos_of(*MODELS)
-    VOLTS = 7.4
+def test_simulated_servos_come_with_the_driver_and_need_no_keeper() -> None:
+    servos = servos_of(*("sts3215",) * 3)
+    with open_bus("simulated", servos, simulates="feetech", margin_s=0.5) as bus:
+        bus.start()
+        settle(bus, [0.2, -0.3, 0.5])
+        assert [info.model for info in bus.discover([1, 7])] == ["sts3215"] * 2
+        assert bus._keeper is None
 
-    @pytest.fixture
-    def bus(self) -> Bus:
-        return open_bus("simulated", self.SERVOS, simulates="feetech", **CALM)
+
+def test_everybody_is_found_when_nobody_is_named(tmp_path: Path) -> None:
+    servos = servos_of(*("scs0009",) * 3)
+    with (
+        SimulatedBus(servos, link=tmp_path / "by-id", faults=["baud:7:57600"]) as wire,
+        open_bus("feetech", servos, port=wire.path, margin_s=0.002) as bus,
+    ):
+        bus._port.margin_s = 0.002
+        assert {1, 2} >= {info.id for info in bus.discover()}
+        bus._port.margin_s = 0.3
+        assert [info.id for info in bus.discover([0, 1, 2, 7])] == [1, 2]
+
+
+@pytest.mark.parametrize(("model", "tells"), [("sts3215", True), ("ax-12a", False)])
+def test_load_and_motion_are_told_where_the_model_does(tmp_path: Path, model: str, tells: bool) -> None:
+    servos = servos_of(*(model,) * 3)
+    kind = "feetech" if tells else "dynamixel"
+    with (
+        SimulatedBus(servos, link=tmp_path / "by-id") as wire,
+        open_bus(kind, servos, port=wire.path, **CALM) as bus,
+    ):
+        bus.start()
+        assert np.isnan(bus.load).all()
+        settle(bus, [0.4, -0.3, 0.4], 0.011)
+        contract.read_until(bus, lambda state: not state.velocity_rad_s.any())
+        assert np.sign(bus.load).tolist() == [1, -1, 1], "the skin pulls back"
+        for _ in range(5):
+            bus.write([-0.3, 0.4, -0.3])
+            state = bus.read()
+        assert bus.moving.tolist() == [tells] * 3
+        assert np.sign(state.velocity_rad_s).tolist() == [-1, 1, -1]
+
+
+def test_positions_alone_are_shorter_and_the_rest_comes_in_turn(tmp_path: Path) -> None:
+    servos = servos_of("sts3215", "scs0009", "sts3215")
+    with (
+        SimulatedBus(servos, link=tmp_path / "by-id") as wire,
+        open_bus("feetech", servos, port=wire.path, feedback="position", **CALM) as bus,
+    ):
+        bus.start()
+        state = contract.read_until(bus, lambda s: bool(np.isfinite(s.voltage_v + s.temperature_c).all()))
+        assert state.fresh.all()
+        np.testing.assert_allclose(state.voltage_v, [7.4, 6.0, 7.4], atol=0.2)
+
+
+def test_servos_read_one_by_one_take_turns(tmp_path: Path) -> None:
+    servos = servos_of(*("ax-12a",) * 3)
+    with (
+        SimulatedBus(servos, link=tmp_path / "by-id") as wire,
+        open_bus("dynamixel", servos, port=wire.path, singles=2, **CALM) as bus,
+    ):
+        bus.start()
+        fresh = [bus.read().fresh.tolist() for _ in range(3)]
+        assert fresh == [[True, True, False], [True, False, True], [False, True, True]]
+        assert bus.read().age_s.max() < 1.0
