@@ -70,26 +70,24 @@ def steps(shapes: Floats) -> Floats:
 
 
 def sample_skin(head: Head, part: str, uv: Floats) -> Skin:
-    """Ask a head how its shapes move the points ``uv`` : (m, 2) of a part; the head is left at rest.
+    """Ask a head how its shapes move the points ``uv`` : (m, 2) of a part; its vertices stay as they are.
 
     Raises
     ------
     KeyError : no such part.
     """
-    surface = head.part(part).surface
-    basis = surface.basis_matrix(uv)
-    rest = basis @ surface.points
+    index = head.parts.index(head.part(part))
+    basis = head.part(part).surface.basis_matrix(uv)
+    rest = basis @ head.place_points(np.zeros(len(head.parameters)))[0][index]
     shapes = _shape_names()
     moves = np.zeros((len(uv), 3, len(shapes), _LEVELS))
 
     def at(values: dict[str, float]) -> Floats:
-        head.pose(head.values(values))
-        return basis @ head.part(part).control_points - rest
+        return np.asarray(basis @ head.place_points(head.values(values))[0][index] - rest)
 
     for s, name in enumerate(shapes):
         way = _way(name, at)
         moves[:, :, s] = np.moveaxis(np.diff(way, axis=0, prepend=np.zeros_like(way[:1])), 0, -1)
-    head.pose(np.zeros(len(head.parameters)))
     jaw = next(p.jaw for p in head.data.parts if p.name == part)
     return Skin(part, uv, rest, moves, np.asarray(basis @ np.asarray(jaw, np.float64)))
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller.errors import ConfigError
+from controller.host import load_script
 from controller.parameters import PARAMETERS, Parameters
-from controller.paths import find_config
+from controller.paths import config_dir, find_config
+from controller.recording import SUFFIX, replay
 
 if TYPE_CHECKING:
     from controller.robot import RobotSettings
@@ -23,7 +25,7 @@ SURFACE_SUFFIXES = (".3dm", ".xml", ".tsm")
 
 
 def check_anything(name: str) -> list[str]:
-    """Check a stage, robot, head, take or surface file; returns what it is, in a line or two.
+    """Check any file omote reads; returns what it is, in a line or two.
 
     Parameters
     ----------
@@ -37,8 +39,12 @@ def check_anything(name: str) -> list[str]:
     path = _find(name)
     if path.is_dir() or path.name == "head.toml":
         return _check_head(path if path.is_dir() else path.parent)
+    if _is_group(path):
+        return _check_group(path)
     if _is_surface(path):
         return _check_surface(path)
+    if path.suffix == SUFFIX:
+        return _check_recording(path)
     if path.suffix.lower() in TAKE_SUFFIXES:
         return _check_take(path)
     return _check_toml(path)
@@ -85,6 +91,30 @@ def _is_surface(path: Path) -> bool:
     return kind in SURFACE_SUFFIXES
 
 
+def _is_group(path: Path) -> bool:
+    """A JSON file that says control points and their moves."""
+    try:
+        return path.suffix.lower() == ".json" and '"moves_mm"' in path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def _check_group(path: Path) -> list[str]:
+    from controller.dragging import load_group
+    from surface.head import Head
+
+    head = Head.load(find_config("heads", DEFAULT_HEAD))
+    name, shape = load_group(path, head)
+    return [f"group {name}: {len(shape.ids)} control points of part {shape.part} of head {head.name}: good"]
+
+
+def _check_recording(path: Path) -> list[str]:
+    """Play it again, as fast as it goes; every tick has to come out as it was recorded."""
+    times = [now_ns for now_ns, _ in replay(path, PARAMETERS)]
+    seconds = (times[-1] - times[0]) * 1e-9 if times else 0.0
+    return [f"recording {path.name}: {len(times)} ticks, {seconds:.1f} s, all came out again bit by bit: good"]
+
+
 def _check_surface(path: Path) -> list[str]:
     from surface.readers import read_surface, summary
 
@@ -105,7 +135,22 @@ def _check_toml(path: Path) -> list[str]:
         table = {}  # the reader below says what is wrong
     if "channels" in table or "buses" in table:
         return _check_robot(path, PARAMETERS)
+    if "steps" in table or "frames_hz" in table:
+        script = load_script(str(path), PARAMETERS)
+        return [f"script {script.name}: {len(script.steps)} steps, {len(script.marks)} marks: good"]
+    if table and all(isinstance(each, dict) and {"weights", "of"} & set(each) for each in table.values()):
+        return _check_expressions(path)
     return _check_stage(path, PARAMETERS)
+
+
+def _check_expressions(path: Path) -> list[str]:
+    """A user's expressions beside the shipped ones; or the shipped file itself."""
+    from controller.expression import Vocabulary
+
+    shipped = config_dir() / "vocabularies" / "expressions.toml"
+    more = () if path.resolve() == shipped.resolve() else (path,)
+    known = len(Vocabulary.load(PARAMETERS).names) if more else 0
+    return [f"expressions {path.name}: {len(Vocabulary.load(PARAMETERS, more=more).names) - known}: good"]
 
 
 def _check_robot(path: Path, parameters: Parameters) -> list[str]:
@@ -135,6 +180,8 @@ def _check_stage(path: Path, parameters: Parameters) -> list[str]:
     from controller.stage import load_stage
 
     stage = load_stage(str(path), parameters)
+    if stage.groups:
+        stage.load_head()
     links = ", ".join(f"{link.kind} on {link.port}" for link in stage.settings.links) or "none"
     robots = ", ".join(robot.name for robot in stage.robots) or "none"
     return [f"stage {stage.settings.name}: head {stage.head.name}, links: {links}, robots: {robots}: good"]

@@ -17,10 +17,13 @@ def register(app: typer.Typer) -> None:
 
 def check(
     file: Annotated[
-        str, typer.Argument(help="A stage, robot, head folder, take or surface file: a path or a shipped name.")
+        str,
+        typer.Argument(
+            help="A stage, robot, head, expressions, script, take, recording, group or surface: path or name."
+        ),
     ],
 ) -> None:
-    """Check a stage, a robot, a head, a take or a surface without running it; lists every fault with its place.
+    """Check any file omote reads, and all it refers to, without running it; lists every fault with its place.
 
     Example: omote check configs/robots/head24.toml
     """

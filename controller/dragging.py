@@ -44,6 +44,10 @@ class Dragger:
     head : the head; it is left at rest. uv : (m, 2) points of its part ``part``. parameters : the registry.
     sparsity : prefers few parameters; mm^2 per unit.
 
+    Attributes
+    ----------
+    skin : the points. moved : (s,) the parameters it solves for.
+
     Raises
     ------
     ValueError : a point lies where the part has no surface.
@@ -53,23 +57,40 @@ class Dragger:
                  sparsity: float = _SPARSITY) -> None:  # fmt: skip
         if not head.part(part).surface.covered(uv).all():
             raise ValueError("uv: a point lies where the part has no surface")
-        self.skin: Skin = sample_skin(head, part, np.asarray(uv, dtype=np.float64))
-        self._parameters, self._order = parameters, head_order(head.parameters, parameters)
-        names = head.parameters[: self.skin.moves.shape[2]]
-        self._at = np.array([parameters.index(name) for name in names])
-        self._low, self._high = parameters.low[self._at], parameters.high[self._at]
-        self._sparsity = sparsity
-        levels = self.skin.moves.shape[3]
+        skin = sample_skin(head, part, np.asarray(uv, dtype=np.float64))
+        self._set_up(skin, head_order(head.parameters, parameters), parameters, sparsity, np.ones(len(uv)))
+
+    @classmethod
+    def of(cls, skin: Skin, order: NDArray[np.intp], parameters: Parameters, *, sparsity: float = _SPARSITY,
+           weights: Floats, start: Floats) -> Dragger:  # fmt: skip
+        """A dragger of points that were sampled already.
+
+        Parameters
+        ----------
+        order : see :func:`controller.anchors.head_order`. weights : (m,) how much each point counts.
+        start : (p,) parameters to begin from.
+        """
+        dragger = object.__new__(cls)
+        dragger._set_up(skin, order, parameters, sparsity, weights)
+        dragger._last = np.clip(start[dragger.moved], dragger._low, dragger._high)
+        return dragger
+
+    def _set_up(self, skin: Skin, order: NDArray[np.intp], parameters: Parameters, sparsity: float,
+                weights: Floats) -> None:  # fmt: skip
+        self.skin, self._order, self._parameters = skin, order, parameters
+        self.moved = order[: skin.moves.shape[2]]
+        self._low, self._high = parameters.low[self.moved], parameters.high[self.moved]
+        self._sparsity, self._weights = sparsity, np.repeat(weights, 3)
+        levels = skin.moves.shape[3]
         # (3 m, s): the slope of each shape on each quarter of its way, and over all of it
-        self._slopes = self.skin.moves.reshape(-1, len(self._at), levels) * levels
+        self._slopes = skin.moves.reshape(-1, len(self.moved), levels) * levels
         self._solver = self._make(self._slopes.mean(axis=2))
         self._straight = np.abs(self._slopes - self._slopes[:, :, :1]).max(axis=(0, 2)) < 0.5
-        self._last = np.zeros(len(self._at))
+        self._last = np.zeros(len(self.moved))
 
     def _make(self, matrix: Floats) -> BoundedSolver:
-        return BoundedSolver(
-            matrix, self._low, self._high, ridge=_RIDGE, sparsity=self._sparsity, tolerance=_TOLERANCE
-        )  # fmt: skip
+        return BoundedSolver(matrix, self._low, self._high, weights=self._weights, ridge=_RIDGE,
+                             sparsity=self._sparsity, tolerance=_TOLERANCE)  # fmt: skip
 
     def solve(self, places: Floats) -> Floats:
         """Parameters (p,) whose face brings the points to ``places`` : (m, 3) mm, head not turned.
@@ -92,7 +113,7 @@ class Dragger:
                 break
         self._last = x
         values = self._parameters.neutral()
-        values[self._at] = x
+        values[self.moved] = x
         return values
 
     def _bent(self, wanted: Floats, x: Floats) -> Floats:
@@ -182,6 +203,11 @@ def _differences(points: Floats, jaw: NDArray):  # type: ignore[no-untyped-def]
     rows = np.repeat(np.arange(n), 6)
     mean = coo_matrix((np.full(6 * n, 1.0 / 6.0), (rows, near[:, 1:].ravel())), shape=(n, n))
     return (identity(n) - mean).tocsr()
+
+
+def wear(head: Head, shape: Reshape, amount: float = 1.0) -> None:
+    """Move a head's control points by ``amount`` of a reshape; every pose goes on from there."""
+    head.part(shape.part).rig.rest[shape.ids] += amount * shape.moves  # type: ignore[attr-defined]
 
 
 def save_group(path: Path, name: str, shape: Reshape) -> None:

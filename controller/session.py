@@ -124,7 +124,7 @@ class Session:
 
         with stop_flag() as flag, self._body() as body:
             values, head = self._head(body)
-            face = WindowFace(head, self.stage.settings.face, values, body)
+            face = WindowFace(head, self.stage.settings.face, values, body, self.stage.load_head)
             face.run(self._begin(body, flag, seconds))
             return self._end(body, face.report())
 
@@ -142,10 +142,8 @@ class Session:
 
     def _head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
         """The head and its values; the servos come up meanwhile in the body's process."""
-        from surface.head import Head
-
         yield_to_servos()
-        head = Head.load(self.stage.head, self.stage.settings.identity)
+        head = self.stage.load_head()
         return HeadValues(body.mailbox, PARAMETERS, head.parameters), head
 
     def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:

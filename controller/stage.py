@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -21,6 +21,9 @@ from controller.parameters import Parameters
 from controller.paths import find_config
 from controller.picture import PictureSettings
 from controller.robot import RobotSettings, load_robot
+
+if TYPE_CHECKING:
+    from surface.head import Head
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 
@@ -60,6 +63,7 @@ class StageSettings(Settings):
     life: str = "natural"
     seed: Annotated[int, Field(ge=0)] = 0
     vocabularies: list[str] = []
+    groups: dict[str, Annotated[float, Field(ge=-1, le=1)]] = {}
     layers: dict[str, dict[str, Any]] = {}
     face: FaceSettings = FaceSettings()
     links: list[LinkSettings] = []
@@ -76,7 +80,7 @@ class Stage:
     head : folder of the head.
     robots : the robots, in file order.
     vocabulary : the named expressions, the user's own from files ``vocabularies`` among them.
-    layers : the layers. life : figures of idle life.
+    layers : the layers. life : figures of idle life. groups : group files the head wears, and how much.
     """
 
     path: Path
@@ -87,11 +91,27 @@ class Stage:
     vocabulary: Vocabulary
     layers: tuple[LayerSettings, ...]
     life: LifeSettings
+    groups: tuple[tuple[Path, float], ...] = ()
 
     @property
     def period_s(self) -> float:
         """Length of a tick."""
         return 1.0 / self.settings.control_hz
+
+    def load_head(self) -> Head:
+        """The head as the stage wants it: identities mixed in, groups worn.
+
+        Raises
+        ------
+        SurfaceError : the head cannot be read. ConfigError : a group does not fit it.
+        """
+        from controller.dragging import load_group, wear
+        from surface.head import Head
+
+        head = Head.load(self.head, self.settings.identity)
+        for path, amount in self.groups:
+            wear(head, load_group(path, head)[1], amount)
+        return head
 
     def state(self, parameters: Parameters, seed: int | None = None, period_s: float | None = None) -> CommandState:
         """A face of its own, as the stage wants it; nothing is commanded yet."""
@@ -131,11 +151,8 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
         )
         for i, robot in enumerate(settings.robots)
     ]
-    own = [
-        _collect(faults, f"vocabularies[{i}]", lambda name=name: find_config("vocabularies", name, beside=path))
-        for i, name in enumerate(settings.vocabularies)
-    ]
-    more = tuple(file for file in own if file is not None)
+    more = _files(faults, "vocabularies", settings.vocabularies, path)
+    groups = _files(faults, "groups", list(settings.groups), path)
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
     layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
     life = _collect(faults, "life", lambda: LifeSettings.named(settings.life, parameters))
@@ -144,7 +161,17 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
             _collect(faults, f"links[{i}].script", lambda name=link.script: load_script(name, parameters, vocabulary))
     if faults:
         raise config_error(path, faults)
-    return Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life)
+    worn = tuple(zip(groups, settings.groups.values(), strict=True))
+    return Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, worn)
+
+
+def _files(faults: list[str], kind: str, names: list[str], path: Path) -> tuple[Path, ...]:
+    """The files of one kind that a stage names, those that are there."""
+    found = [
+        _collect(faults, f"{kind}[{i}]", lambda name=name: find_config(kind, name, beside=path))
+        for i, name in enumerate(names)
+    ]
+    return tuple(file for file in found if file is not None)
 
 
 def _collect(faults: list[str], key: str, read):  # type: ignore[no-untyped-def]

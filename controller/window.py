@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.face import FrameLog, HeadValues
+from controller.hand import Hand
 from controller.panel import Panel
 from controller.parameters import PARAMETERS
 from controller.stage import FaceSettings
@@ -17,6 +18,7 @@ from controller.stage import FaceSettings
 if TYPE_CHECKING:
     from controller.run import BodyProcess
     from surface.head import Head
+    from surface.view.viewpoint import Viewpoint
 
 _TITLE = "omote"
 
@@ -30,10 +32,19 @@ class WindowFace:
     settings : size, quality and camera.
     values : gives the head's newest values.
     body : hears what the panel wants.
+    copy : loads the head again, for points that are taken with the mouse; none can be without.
     """
 
-    def __init__(self, head: Head, settings: FaceSettings, values: HeadValues, body: BodyProcess) -> None:
+    def __init__(
+        self,
+        head: Head,
+        settings: FaceSettings,
+        values: HeadValues,
+        body: BodyProcess,
+        copy: Callable[[], Head] | None = None,
+    ) -> None:
         self._head = head
+        self._hand = None if copy is None or settings.kiosk else Hand(head, copy, lambda: values.full, body.tell)
         self._settings = settings
         self._values = values
         self._panel = Panel(PARAMETERS, lambda: values.full, body.tell)
@@ -47,8 +58,10 @@ class WindowFace:
         ViewError
             when no window can be opened.
         """
+        from surface.view.viewpoint import Viewpoint
         from surface.view.window import run_window
 
+        viewpoint = Viewpoint(self._settings.make_camera())
         began = time.monotonic_ns()
 
         def source() -> NDArray[np.float64]:
@@ -64,15 +77,20 @@ class WindowFace:
             source,
             size=self._settings.size,
             title=_TITLE,
-            gui=None if self._settings.kiosk else self._panel,
+            gui=None if self._settings.kiosk else lambda: self._gui(viewpoint),
             keep_going=keep_going,
-            camera=self._settings.make_camera(),
+            camera=viewpoint,
             quality=self._settings.quality,
             theme=self._settings.make_theme(),
             evaluator=self._settings.evaluator,
             kiosk=self._settings.kiosk,
             monitor=self._settings.monitor,
         )
+
+    def _gui(self, viewpoint: Viewpoint) -> None:
+        self._panel()
+        if self._hand is not None:
+            self._hand(viewpoint.camera)
 
     def report(self) -> dict[str, object]:
         """What was drawn; see :meth:`controller.face.FrameLog.report`."""

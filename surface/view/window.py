@@ -49,7 +49,7 @@ def run_window(
     gui: Callable[[], None] | None = None,
     seconds: float | None = None,
     keep_going: Callable[[], bool] | None = None,
-    camera: Camera | None = None,
+    camera: Camera | Viewpoint | None = None,
     quality: str = "full",
     theme: str | Theme = "skin",
     evaluator: str = "auto",
@@ -64,6 +64,7 @@ def run_window(
     ----------
     source : called once per frame, gives values (P,) in `head.parameters` order.
     gui : draws ImGui panels, once per frame.
+    camera : where the picture is taken from at first; a viewpoint stays in the caller's hands.
     seconds : close by itself after this long.
     keep_going : asked once per frame, also while the window is minimised; it closes when told False.
     quality, theme, evaluator : see :class:`surface.view.renderer.Renderer`.
@@ -77,7 +78,8 @@ def run_window(
     """
     _require_display()
     runner = _imgui()
-    window = _Window(head, source, Viewpoint(camera), quality, theme, evaluator)
+    viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera)
+    window = _Window(head, source, viewpoint, quality, theme, evaluator)
     window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk
     params = _parameters(runner, window, size, title)
     if kiosk:

@@ -39,3 +39,62 @@ def test_a_run_with_a_window_draws_and_reports(tmp_path: Path) -> None:
     assert measured["face"]["renderer"] == "window"
     assert measured["face"]["frames"] > 3
     assert measured["buses"][0]["bus"]["writes"] > 20
+
+
+DRAG = """
+import json
+
+import numpy as np
+from controller.face import HeadValues
+from controller.handling import Screen
+from controller.mailbox import Mailbox
+from controller.parameters import PARAMETERS as P
+from controller.stage import FaceSettings, load_stage
+from controller.window import WindowFace
+from surface.view.camera import Camera
+
+CORNER, BY = np.array([[28.6, -34.0, 102.0]]), -2.0  # the left corner of the mouth
+stage = load_stage("demo", P)
+head = stage.load_head()
+told, frames = {}, [0]
+
+
+class Body:
+    def tell(self, wish):
+        told[P.names[wish.index]] = wish.value
+
+
+with Mailbox.create(len(P)) as mailbox:
+    values = HeadValues(mailbox, P, head.parameters)
+    face = WindowFace(head, FaceSettings(size=(640, 480)), values, Body(), stage.load_head)
+    assert face._hand.handles.wait(60.0)
+    panel = face._panel
+
+    def act():
+        panel()
+        from imgui_bundle import imgui
+
+        io = imgui.get_io()
+        n = frames[0] = frames[0] + 1
+        n %= 24  # twice: parameters, then with Shift control points
+        io.add_key_event(imgui.Key.mod_ctrl, 2 <= n < 22)
+        io.add_key_event(imgui.Key.mod_shift, frames[0] >= 24)
+        screen = Screen(Camera.front(), (io.display_size.x, io.display_size.y))
+        x, y, _ = screen.project(CORNER)[0].tolist()
+        io.mouse_pos = imgui.ImVec2(x, y + BY * max(0, min(n - 8, 8)))
+        io.add_mouse_button_event(0, 6 <= n < 20)
+
+    face._panel = act
+    face.run(lambda: frames[0] < 46)
+    print(json.dumps({**told, "reshaped": face._hand.handles.reshaped}))
+"""
+
+
+def test_points_are_dragged_with_the_mouse() -> None:
+    command = ["xvfb-run", "-a", sys.executable, "-c", DRAG]
+    environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+    assert result.returncode == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert told["mouthSmileLeft"] > 0.1 and told["mouthSmileLeft"] > 3 * told.get("mouthSmileRight", 0.0)
+    assert told["reshaped"] is True
