@@ -65,10 +65,13 @@ class Recorder:
     ----------
     clip_hz : pictures per second in the clip.
     height : height of the kept pictures (pixels).
+    most : pictures kept. A longer run keeps every second one, then every fourth, and so on: all of it, in no more
+        memory.
     """
 
-    def __init__(self, *, clip_hz: float = 12.5, height: int = 360) -> None:
+    def __init__(self, *, clip_hz: float = 12.5, height: int = 360, most: int = 400) -> None:
         self.clip_hz = clip_hz
+        self._most = most
         self.height = height
         self.frames: list[Image] = []
         self.times_s: list[float] = []
@@ -83,6 +86,8 @@ class Recorder:
         step = max(1, picture.shape[0] // self.height)
         self.frames.append(_shrink(_middle_square(picture), step))
         self.times_s.append(time_s)
+        if len(self.frames) > self._most:
+            self.frames, self.times_s, self.clip_hz = self.frames[::2], self.times_s[::2], self.clip_hz / 2
         self._next_s = (int(time_s * self.clip_hz) + 1) / self.clip_hz
 
 

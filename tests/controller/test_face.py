@@ -31,6 +31,16 @@ def test_a_recorder_keeps_the_middle_at_its_own_rate() -> None:
     assert (recorder.frames[0] == 200).all()
 
 
+def test_a_long_recording_keeps_all_of_its_time_in_no_more_pictures() -> None:
+    recorder, picture = Recorder(clip_hz=10.0, height=4, most=16), np.zeros((4, 4, 3), dtype=np.uint8)
+    for t in np.arange(0.0, 20.0, 0.05):
+        if recorder.wants(t):
+            recorder.keep(picture, t)
+    assert 8 <= len(recorder.frames) <= 17 and len(recorder.times_s) == len(recorder.frames)
+    assert recorder.times_s[0] == 0.0 and recorder.times_s[-1] > 18.0
+    assert np.diff(recorder.times_s) == pytest.approx(1 / recorder.clip_hz, abs=0.06)
+
+
 def test_frames_with_motion_are_counted() -> None:
     log = FrameLog()
     for k, value in enumerate([0.0, 0.0, 1.0, 1.0, 2.0]):
