@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 EVALUATORS = ("auto", "cpu", "gpu")
 _WIDTH = 1024
 _SAMPLERS = 2
+_AHEAD = np.eye(3)
 
 
 class Evaluator(Protocol):
@@ -45,6 +46,9 @@ class Evaluator(Protocol):
 
     def positions(self, part: ViewPart, ids: np.ndarray) -> np.ndarray:
         """Where vertices `ids` (k,) of a part are now, (k, 3)."""
+
+    def rotation(self) -> np.ndarray:
+        """(3, 3) how the head is turned."""
 
     def box(self, part: ViewPart) -> np.ndarray | None:
         """Points whose box holds the part as posed now, (k, 3), or None if that would take too long to say."""
@@ -69,6 +73,9 @@ class CpuEvaluator:
 
     def positions(self, part: ViewPart, ids: np.ndarray) -> np.ndarray:
         return part.vertices[ids]
+
+    def rotation(self) -> np.ndarray:
+        return np.asarray(getattr(self._head.parts[0], "turn", _AHEAD))
 
     def box(self, part: ViewPart) -> np.ndarray | None:
         return part.vertices
@@ -172,6 +179,9 @@ class GpuEvaluator:
         ends = np.cumsum([0, *(high - low)])
         content = self._sums.weights[entries, 0].astype(np.float32), self._sums.ids[entries], ends
         return csr_matrix(content, shape=(len(ids), self._sums.points)), self._sums.share[vertices]
+
+    def rotation(self) -> np.ndarray:
+        return _AHEAD if self._turn is None else self._turn.matrix
 
     def box(self, part: ViewPart) -> np.ndarray | None:
         return None

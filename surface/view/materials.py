@@ -24,6 +24,9 @@ _DETAIL_TILES = 18
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
 _DETAIL_SIZE = 128
+#: A baked sky that hides nothing.
+_OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
+_LOWER_LASHES = 0.42
 
 
 @dataclass(frozen=True)
@@ -48,8 +51,9 @@ class Material:
     order: int = 0
 
 
-def programs(ctx: moderngl.Context, quality: str) -> dict[str, moderngl.Program]:
-    """Every program of a quality, by name."""
+def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, moderngl.Program]:
+    """Every program of a quality and a theme, by name."""
+    plates = {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"} if theme.seams else {}
     flat = ("flat.frag",)
     made = {
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
@@ -58,7 +62,9 @@ def programs(ctx: moderngl.Context, quality: str) -> dict[str, moderngl.Program]
         "background": build(ctx, ("background.vert",), ("background.frag",)),
     }
     if quality == "full":
-        made["skin"] = build(ctx, ("light.glsl", "skin.glsl", "skin.vert"), ("light.glsl", "skin.glsl", "skin.frag"))
+        made["skin"] = build(
+            ctx, ("light.glsl", "skin.glsl", "skin.vert"), ("light.glsl", "skin.glsl", "skin.frag"), defines=plates
+        )
     else:
         made["skin"] = build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), flat)
     return made
@@ -86,12 +92,16 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     albedo = attribute(part, "albedo", theme.albedo)[:, :3]
     if not theme.use_painted:
         albedo = np.tile(np.asarray(theme.albedo, np.float32), (len(albedo), 1))
+    gloss = attribute(part, "gloss", (0.3,))[:, :1]
+    if not theme.use_painted:  # what is wet on a face is darker on a mask
+        albedo = albedo * (1.0 - theme.lips * np.clip((gloss - 0.30) / 0.3, 0.0, 1.0))
     occlusion = attribute(part, "occlusion", (1.0,))[:, :1]
     packed = np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), np.clip(occlusion, 0.0, 1.0)])
-    gloss = attribute(part, "gloss", (0.3,))[:, :1]
+    thin = attribute(part, "thin", (0.0,))[:, :1]
     return {
         "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
-        "surface_uv_gloss": np.hstack([detail_uv(part), gloss, np.zeros_like(gloss)]).astype(np.float32),
+        "around": np.rint(attribute(part, "visible", _OPEN_SKY)[:, :4] * 255.0).astype(np.uint8),
+        "surface_uv_gloss": np.hstack([detail_uv(part), gloss, thin]).astype(np.float32),
     }
 
 
@@ -110,7 +120,12 @@ def detail_uv(part: ViewPart) -> np.ndarray:
 
 
 def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
-    return {"wrap": theme.wrap, "gloss_scale": theme.gloss, "detail_strength": 0.16 * theme.detail}
+    return {
+        "wrap": theme.wrap,
+        "through": theme.through,
+        "gloss_scale": theme.gloss,
+        "detail_strength": 0.16 * theme.detail,
+    }
 
 
 def _eye_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
@@ -121,6 +136,7 @@ def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[s
     return {
         "iris_colour": theme.iris,
         "sclera_colour": theme.sclera,
+        "glow": theme.glow,
         "iris_radius": 0.49,
         "pupil_radius": 0.185,
         **openings.eye(part),
@@ -139,12 +155,12 @@ def _inner(albedo: tuple[float, float, float], wrap: float, wetness: float, **op
     return Material("inner", static, uniforms, **options)
 
 
-def _hair(colour: str, fade: tuple[float, float, float, float]) -> Material:
-    """Lashes and brows; `colour` names the theme's, `fade` as in hair.frag."""
+def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0.0) -> Material:
+    """Lashes and brows; `colour` names the theme's, `fade` and `edges` as in hair.frag."""
     return Material(
         "hair",
-        lambda part, theme, openings: {"along": strip_uv(part)},
-        lambda part, theme, openings: {"albedo": getattr(theme, colour), "fade": fade},
+        lambda part, theme, openings: {"along": np.hstack([strip_uv(part), strip_strength(part, theme)])},
+        lambda part, theme, openings: {"albedo": getattr(theme, colour), "fade": fade, "edges": edges},
         two_sided=True,
         blended=True,
         order=2,
@@ -158,11 +174,23 @@ def strip_uv(part: ViewPart) -> np.ndarray:
     return np.clip(uv, 0.0, 1.0)
 
 
+def strip_strength(part: ViewPart, theme: Theme) -> np.ndarray:
+    """How strong each hair is, (m, 1): lashes of the lower lid are the fainter ones."""
+    strength = np.full((len(part.vertices), 1), theme.hair, np.float32)
+    if part.material == "lash":
+        strip = np.floor(np.asarray(part.uv)[:, 0] / 2.0)
+        height = {s: float(part.vertices[strip == s, 1].mean()) for s in np.unique(strip)}
+        middle = float(np.mean(list(height.values())))
+        lower = np.array([height[s] < middle for s in strip])
+        strength[lower] *= _LOWER_LASHES
+    return strength
+
+
 MATERIALS: dict[str, Material] = {
     "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
     "eye": Material("eye", _eye_static, _eye_uniforms, order=1),
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
-    "brow": _hair("brow", (0.80, 0.55, 0.22, 1.6)),
+    "brow": _hair("brow", (0.72, 0.50, 0.30, 2.4), 1.0),
     "teeth": _inner((0.72, 0.66, 0.54), 0.3, 0.30, order=3),
     "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.22, order=4),
     "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),

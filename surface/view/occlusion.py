@@ -81,7 +81,9 @@ def thinness(part: ViewPart) -> np.ndarray:
     from scipy.spatial import cKDTree
 
     vertices, normals = np.asarray(part.vertices, float), np.asarray(part.normals, float)
-    distance, near = cKDTree(vertices).query(vertices, k=min(_NEIGHBOURS, len(vertices)), distance_upper_bound=_THICK_MM)
+    distance, near = cKDTree(vertices).query(
+        vertices, k=min(_NEIGHBOURS, len(vertices)), distance_upper_bound=_THICK_MM
+    )
     there = np.append(vertices, [[0.0, 0.0, 0.0]], axis=0)[near] - vertices[:, None]
     away = np.append(normals, [[0.0, 0.0, 0.0]], axis=0)[near]
     facing = (away * normals[:, None]).sum(axis=2) < -0.4

@@ -23,7 +23,7 @@ def source(name: str) -> str:
     return resources.files("surface.view").joinpath("shaders", name).read_text(encoding="utf-8")
 
 
-def assemble(names: tuple[str, ...], defines: Mapping[str, int]) -> str:
+def assemble(names: tuple[str, ...], defines: Mapping[str, int | str]) -> str:
     """One shader's text: version line, defines, then the named files in order."""
     lines = [f"#define {key} {value}\n" for key, value in defines.items()]
     return VERSION + "".join(lines) + "\n".join(source(name) for name in names)
@@ -35,7 +35,7 @@ def build(
     fragment: tuple[str, ...],
     *,
     outputs: tuple[str, ...] = (),
-    defines: Mapping[str, int] | None = None,
+    defines: Mapping[str, int | str] | None = None,
 ) -> moderngl.Program:
     """Compile and link the named files.
 

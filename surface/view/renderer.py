@@ -66,7 +66,7 @@ class Renderer:
         self.evaluator = choose(ctx, head, evaluator)
         self.evaluator.pose(np.zeros(len(head.parameters)))
         self.openings = Openings(head.parts, self.evaluator.positions)
-        self._programs = materials.programs(ctx, quality)
+        self._programs = materials.programs(ctx, quality, self.theme)
         self._detail = materials.detail_texture(ctx)
         self._background = ctx.vertex_array(self._programs["background"], [])
         parts = sorted(head.parts, key=lambda part: materials.order(part.material))
@@ -105,6 +105,7 @@ class Renderer:
         target.depth_mask = True
         target.clear(depth=1.0)
         self._aim(camera, width / max(height, 1))
+        self._turn_lights(camera)
         self._detail.use(0)
         for buffers in self._parts:
             self._draw_part(buffers)
@@ -155,6 +156,15 @@ class Renderer:
         }
         for program in self._programs.values():
             put(program, shared)
+
+    def _turn_lights(self, camera: Camera) -> None:
+        """The lights as the head at rest would see them, for what was baked there."""
+        turn, back = self.theme.lights_follow * camera.yaw_deg, self.evaluator.rotation().T
+        at_rest = {
+            "key_at_rest": back @ light_direction(self.theme.key, turn),
+            "rim_at_rest": back @ light_direction(self.theme.rim, turn),
+        }
+        put(self._programs["skin"], at_rest)
 
     def _aim(self, camera: Camera, aspect: float) -> None:
         """Camera and light uniforms, sent only when the camera or the picture's shape changed."""

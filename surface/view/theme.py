@@ -36,6 +36,11 @@ class Theme:
     key, fill, rim : the three lights.
     sky, ground : the ambient light's upper and lower colour.
     background_top, background_bottom : sRGB colours of the gradient behind the head.
+    through : colour of light that comes through thin skin, times its strength.
+    glow : light of its own in the iris, times its colour.
+    hair : how strong lashes and brows are.
+    lips : how much darker a mask's lips are, 0..1.
+    seams : whether the shell shows the gaps between its plates.
     lights_follow : 0 keeps the lights with the world, 1 turns them with the camera.
     """
 
@@ -55,22 +60,37 @@ class Theme:
     ground: Colour = (0.115, 0.085, 0.072)
     background_top: Colour = (0.20, 0.23, 0.27)
     background_bottom: Colour = (0.42, 0.44, 0.46)
+    through: Colour = (0.52, 0.085, 0.035)
+    glow: float = 0.0
+    hair: float = 1.0
+    lips: float = 0.0
+    seams: bool = False
     lights_follow: float = 0.5
 
 
 THEMES: dict[str, Theme] = {
     "skin": Theme(),
     "mask": Theme(
-        albedo=(0.50, 0.51, 0.53),
+        albedo=(0.62, 0.625, 0.64),
         use_painted=False,
-        wrap=(0.12, 0.12, 0.12),
-        gloss=1.8,
+        wrap=(0.10, 0.10, 0.10),
+        gloss=1.5,
         detail=0.0,
-        iris=(0.025, 0.16, 0.22),
-        sclera=(0.50, 0.52, 0.55),
-        brow=(0.050, 0.055, 0.065),
-        lash=(0.030, 0.032, 0.038),
-        background_top=(0.10, 0.12, 0.15),
-        background_bottom=(0.27, 0.30, 0.34),
+        iris=(0.05, 0.55, 0.75),
+        sclera=(0.012, 0.014, 0.018),
+        brow=(0.030, 0.034, 0.042),
+        lash=(0.020, 0.022, 0.026),
+        key=Light(-38.0, 34.0, (1.02, 1.02, 1.04)),
+        fill=Light(52.0, 4.0, (0.10, 0.14, 0.19)),
+        rim=Light(150.0, 24.0, (0.75, 0.95, 1.10)),
+        sky=(0.15, 0.17, 0.20),
+        ground=(0.06, 0.07, 0.085),
+        through=(0.0, 0.0, 0.0),
+        glow=2.4,
+        hair=0.0,
+        lips=0.45,
+        seams=True,
+        background_top=(0.08, 0.10, 0.13),
+        background_bottom=(0.20, 0.23, 0.27),
     ),
 }

@@ -11,6 +11,7 @@ from surface.errors import ViewError
 from surface.view import materials
 from surface.view.offscreen import open_context
 from surface.view.programs import assemble, build, put, source
+from surface.view.theme import THEMES
 
 
 def test_text_begins_with_the_version_then_the_defines() -> None:
@@ -19,11 +20,12 @@ def test_text_begins_with_the_version_then_the_defines() -> None:
     assert text.index("key_direction") < text.index("WIDE")
 
 
+@pytest.mark.parametrize("theme", THEMES)
 @pytest.mark.parametrize("quality", ["full", "fast"])
-def test_every_program_compiles(gl: None, quality: str) -> None:
+def test_every_program_compiles(gl: None, quality: str, theme: str) -> None:
     ctx = open_context()
     try:
-        made = materials.programs(ctx, quality)
+        made = materials.programs(ctx, quality, THEMES[theme])
         assert {material.program for material in materials.MATERIALS.values()} <= set(made)
     finally:
         ctx.release()

@@ -2,6 +2,7 @@ uniform sampler2D detail;
 uniform mat3 eye_rotation;
 uniform vec3 iris_colour;
 uniform vec3 sclera_colour;
+uniform float glow;                   // of the iris itself
 uniform float iris_radius;            // sine of the iris' half angle
 uniform float pupil_radius;
 
@@ -15,6 +16,7 @@ vec3 sclera(vec3 d, float r) {
     float vein = texture(detail, d.xy * 0.55).w + texture(detail, d.yx * vec2(0.21, 0.9)).w - 1.0;
     float rim = smoothstep(0.60, 1.0, r);
     vec3 base = sclera_colour * mix(vec3(1.0), vec3(0.92, 0.70, 0.62), rim);
+    base = mix(base, base * vec3(1.02, 0.80, 0.76), smoothstep(0.45, 0.95, abs(d.x)));
     return base * (1.0 - clamp(vein, 0.0, 1.0) * (0.25 + rim) * vec3(0.05, 0.45, 0.50));
 }
 
@@ -66,7 +68,11 @@ void main() {
     fresnel = 0.03 + 0.5 * fresnel * fresnel * fresnel;
     lit += (key * key_colour + fill * fill_colour) * smoothstep(0.0, 1.2, v_lid.x);
     lit += fresnel * ambient(mirrored) * shade;
-    // Tears stand along the lower lid.
-    lit += (1.0 - smoothstep(0.15, 0.75, v_lid.y)) * 0.30 * key_colour * clamp(dot(n, key_direction) + 0.3, 0.0, 1.0);
+    // Tears stand along the lower lid, a bright line with a darker one above it.
+    float tears = 1.0 - smoothstep(0.12, 0.55, v_lid.y);
+    lit *= 1.0 - 0.25 * (smoothstep(0.25, 0.6, v_lid.y) - smoothstep(0.6, 1.3, v_lid.y));
+    lit += tears * 0.34 * key_colour * clamp(dot(n, key_direction) + 0.3, 0.0, 1.0);
+    float ring = smoothstep(0.50, 0.62, q) * (1.0 - smoothstep(0.80, 0.94, q));
+    lit += glow * iris_colour * (ring + 0.25 * (1.0 - smoothstep(0.0, 0.30, q)));
     colour = vec4(encode(lit), 1.0);
 }

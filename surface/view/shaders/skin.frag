@@ -8,6 +8,23 @@ in vec2 v_uv;
 
 out vec4 colour;
 
+#ifdef SEAMS
+// The shell of a mask is made of plates: gaps along curves in longitude and latitude of the skull.
+float gap(float away, float half_width) {
+    return 1.0 - smoothstep(half_width, half_width + max(0.006, 1.5 * fwidth(away)), abs(away));
+}
+
+float seams(vec2 at) {
+    float side = abs(at.x);
+    float plate = length(vec2(side / 0.98, (at.y + 0.10) / 0.94)) - 1.0;
+    float above = step(-0.62, at.y);
+    float cheek = step(0.46, side) * step(plate, 0.0) * gap(at.y + 0.34 + 0.5 * (side - 0.46), 0.004);
+    float crown = step(0.0, plate) * step(0.3, at.y) * gap(side - 0.16, 0.004);
+    float neck = gap(at.y + 1.16, 0.005) + gap(at.y + 1.30, 0.005);
+    return max(max(above * gap(plate, 0.006), cheek), max(crown, neck));
+}
+#endif
+
 void main() {
     vec4 grain = (texture(detail, v_uv) - 0.5) * detail_strength;
     vec3 n = normalize(v_normal_wide.xyz + grain.xyz);
@@ -16,5 +33,8 @@ void main() {
     narrow *= narrow;
     vec3 lit = v_diffuse * (1.0 + grain.w * vec3(0.7, 1.3, 1.5));
     lit += key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w);
+#ifdef SEAMS
+    lit *= 1.0 - 0.88 * min(seams(v_uv / DETAIL_PER_RADIAN), 1.0);
+#endif
     colour = vec4(encode(lit), 1.0);
 }

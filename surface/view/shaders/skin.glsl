@@ -1,10 +1,13 @@
 // How skin answers the lights, per vertex.
 #define WIDE_SHARPNESS 9.0      // the narrow lobe is the wide one to the fourth power
-#define WIDE 0.042
-#define NARROW 0.17
+#define WIDE 0.050
+#define NARROW 0.24
 
 uniform vec3 wrap;
+uniform vec3 through;           // colour of light that comes through thin skin
 uniform float gloss_scale;
+uniform vec3 key_at_rest;       // the lights as the head at rest would see them, for what was baked there
+uniform vec3 rim_at_rest;
 
 float grazing(vec3 n, vec3 v) {
     float edge = 1.0 - clamp(dot(n, v), 0.0, 1.0);
@@ -12,18 +15,27 @@ float grazing(vec3 n, vec3 v) {
     return edge * edge;
 }
 
-// Everything but the key light's highlights.
-vec3 diffuse(vec3 n, vec3 v, vec3 albedo, float occlusion) {
+// How much of a light reaches a vertex past the rest of the head; `around` as baked, 0..1 for -2..2.
+float reaching(vec4 around, vec3 light) {
+    float seen = dot(around - 0.5, vec4(4.0, 4.0 * light));
+    return smoothstep(0.05, 0.95, seen);
+}
+
+// Everything but the key light's highlights; `sun` is how much of the key light arrives.
+vec3 diffuse(vec3 n, vec3 v, vec3 albedo, float occlusion, float sun, float back, float thin) {
     // Blood colours what little light leaves a crevice: occlusion bites less in red.
     vec3 open = occlusion + (1.0 - occlusion) * (occlusion * vec3(0.60, 0.15, 0.05) + vec3(0.10, 0.035, 0.025));
-    float direct = 0.25 + 0.75 * occlusion;
+    // Light spreads into a shadow's edge under the skin, red the furthest.
+    vec3 lit = sun * mix(vec3(1.0), vec3(sun), 0.5 * (1.0 - wrap));
     float rim = dot(n, rim_direction);
-    vec3 light = key_colour * wrapped(dot(n, key_direction), wrap) * direct;
-    light += fill_colour * wrapped(dot(n, fill_direction), wrap);
-    light += rim_colour * wrapped(rim, wrap) * direct;
-    light += ambient(n);
-    vec3 sheen = 0.16 * ambient(n) + 0.10 * rim_colour * clamp(rim + 0.4, 0.0, 1.0);
-    return albedo * light * open + grazing(n, v) * occlusion * sheen;
+    vec3 light = key_colour * wrapped(dot(n, key_direction), wrap) * (0.12 + 0.88 * lit);
+    light += fill_colour * wrapped(dot(n, fill_direction), wrap) * open;
+    light += rim_colour * wrapped(rim, wrap) * back;
+    light += ambient(n) * open;
+    vec3 glow = key_colour * clamp(0.10 - dot(n, key_direction), 0.0, 1.0) + rim_colour * clamp(0.10 - rim, 0.0, 1.0);
+    light += thin * occlusion * occlusion * through * glow;
+    vec3 sheen = 0.16 * ambient(n) + 0.12 * rim_colour * back * clamp(rim + 0.4, 0.0, 1.0);
+    return albedo * light * mix(vec3(1.0), open, 0.35) + grazing(n, v) * occlusion * sheen;
 }
 
 // Scale of the key light's highlights: none in the shade, more at grazing angles.

@@ -5,7 +5,8 @@ uniform vec3 camera;
 in vec3 position;
 in vec3 normal;
 in vec4 albedo_occlusion;   // square root of the linear albedo, occlusion
-in vec4 surface_uv_gloss;   // detail texture coordinates, gloss
+in vec4 around;               // which way the surroundings lie, as baked
+in vec4 surface_uv_gloss;   // detail texture coordinates, gloss, how thin
 
 out vec3 v_diffuse;
 out vec4 v_normal_wide;     // normal, strength of the wide highlight
@@ -16,8 +17,9 @@ void main() {
     gl_Position = view_projection * vec4(position, 1.0);
     vec3 v = normalize(camera - position);
     vec3 albedo = albedo_occlusion.rgb * albedo_occlusion.rgb;
-    float strength = highlight(normal, v) * albedo_occlusion.a;
-    v_diffuse = diffuse(normal, v, albedo, albedo_occlusion.a);
+    float sun = reaching(around, key_at_rest);
+    float strength = highlight(normal, v) * albedo_occlusion.a * sun;
+    v_diffuse = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w);
     v_normal_wide = vec4(normal, WIDE * strength);
     v_half_narrow = vec4(normalize(key_direction + v), NARROW * surface_uv_gloss.z * strength);
     v_uv = surface_uv_gloss.xy;

@@ -5,6 +5,7 @@ uniform vec3 camera;
 in vec3 position;
 in vec3 normal;
 in vec4 albedo_occlusion;
+in vec4 around;               // which way the surroundings lie, as baked
 in vec4 surface_uv_gloss;
 
 out vec3 v_colour;
@@ -16,7 +17,9 @@ void main() {
     float wide = lobe(dot(normal, normalize(key_direction + v)), WIDE_SHARPNESS);
     float narrow = wide * wide;
     narrow *= narrow;
-    float shine = highlight(normal, v) * albedo_occlusion.a * (WIDE * wide + NARROW * narrow * surface_uv_gloss.z);
-    vec3 lit = diffuse(normal, v, albedo, albedo_occlusion.a) + shine * key_colour;
+    float sun = reaching(around, key_at_rest);
+    float shine = highlight(normal, v) * albedo_occlusion.a * sun * (WIDE * wide + NARROW * narrow * surface_uv_gloss.z);
+    vec3 lit = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w);
+    lit += shine * key_colour;
     v_colour = encode(lit);
 }
