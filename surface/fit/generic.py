@@ -76,18 +76,26 @@ def make_plan(mesh: FitMesh) -> Plan:
 
 
 def _pieces(mesh: FitMesh) -> tuple[NDArray[np.int64], Floats]:
-    """(f,) which connected piece a face belongs to, and each one's area."""
+    """(f,) which connected piece of one material a face belongs to, and each one's area."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    tri = triangles(mesh.faces)
-    n = len(mesh.vertices)
-    graph = coo_matrix((np.ones(2 * len(tri)), (tri[:, [0, 1]].ravel(), tri[:, [1, 2]].ravel())), shape=(n, n))
-    label: NDArray = connected_components(graph, directed=False)[1]
-    a, b, c = (mesh.vertices[tri[:, k]] for k in range(3))
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    sizes = np.bincount(label[tri[:, 0]], area, int(label.max()) + 1).astype(np.float64)
-    return label[mesh.faces[:, 0]].astype(np.int64), sizes
+    kinds = np.array([_kind(name) for name in mesh.pieces] or ["skin"])
+    known, kind_of = np.unique(kinds, return_inverse=True)
+    kind = kind_of.ravel()[mesh.piece] if len(mesh.piece) else np.zeros(len(mesh.faces), np.int64)
+    corner = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces) * len(known) + kind[:, None]
+    n = len(mesh.vertices) * len(known)
+    graph = coo_matrix((np.ones(3 * len(corner)), (corner[:, :3].ravel(), corner[:, 1:].ravel())), shape=(n, n))
+    label = connected_components(graph, directed=False)[1][corner[:, 0]]
+    label = np.unique(label, return_inverse=True)[1].ravel()
+    a, b, c, d = (mesh.vertices[mesh.faces[:, k]] for k in range(4))
+    area = 0.5 * np.linalg.norm(np.cross(c - a, np.where(mesh.faces[:, 3:] < 0, c, d) - b), axis=1)
+    return label.astype(np.int64), np.bincount(label, area)
+
+
+def _kind(name: str) -> str:
+    """What an object's or material's name says it is made of."""
+    return next((m for word, m in WORDS.items() if word in name.lower()), "skin")
 
 
 def _presence(mesh: FitMesh, label: NDArray, sizes: Floats, scale: float) -> Floats:
@@ -142,9 +150,13 @@ def _ball(points: Floats, height: float) -> tuple[Floats, float] | None:
 
 
 def _within(mesh: FitMesh, label: NDArray, eyes: Floats, radius: float) -> set[int]:
-    """Pieces that lie in a ball a little larger than the eye: cornea, iris, lens, tear film."""
+    """Pieces that lie in a ball a little larger than the eye, unless they are said to be skin or hair: cornea, iris."""
     near = (np.linalg.norm(mesh.vertices[:, None] - eyes, axis=2) < 1.3 * radius).any(axis=1)
-    return {int(k) for k in np.unique(label) if near[_vertices(mesh, label == k)].all()}
+    inside = {int(k) for k in np.unique(label) if near[_vertices(mesh, label == k)].all()}
+    names = {k: mesh.piece_of(int(np.argmax(label == k))).lower() for k in inside}
+    return {
+        k for k in inside if _kind(names[k]) == "skin" and not any(w in names[k] for w in ("skin", "socket", "lid"))
+    }
 
 
 def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[PartRecipe, list[Island]]]:
@@ -209,7 +221,7 @@ def _by_material(mesh: FitMesh, label: NDArray, pieces: list[int], scale: float)
     small: dict[str, list[int]] = {}
     for k in pieces:
         name = mesh.piece_of(int(np.argmax(label == k)))
-        material = next((m for word, m in WORDS.items() if word in name.lower()), "skin")
+        material = _kind(name)
         tiny = np.ptp(mesh.vertices[_vertices(mesh, label == k)], axis=0).max() < TOOTH_MM * scale
         if material == "skin" and tiny:
             small.setdefault(name, []).append(k)

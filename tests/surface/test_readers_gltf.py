@@ -2,6 +2,7 @@
 
 import base64
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,8 +47,7 @@ def test_vertices_doubled_along_a_seam_are_one_again(tmp_path):
     mesh = slit_sheet()
     right = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0
     uv = np.vstack([mesh.uv, mesh.uv + np.array([2.0, 0.0])])
-    cut = mesh.__class__(mesh.vertices, mesh.faces, uv, np.where(right[:, None], mesh.face_uv + len(mesh.uv), mesh.face_uv),
-                         mesh.names, mesh.deltas)  # fmt: skip
+    cut = replace(mesh, uv=uv, face_uv=np.where(right[:, None], mesh.face_uv + len(mesh.uv), mesh.face_uv))
     path = write(tmp_path, glb(cut))
     assert len(read_gltf(path).vertices) == len(mesh.vertices)
     assert len(np.unique(read_gltf(path).face_uv)) > len(mesh.vertices)  # -1 and both sides of the seam
