@@ -268,6 +268,7 @@ def test_10_a_port_in_use_is_told(family: str) -> None:
 def test_8_a_brown_out_is_told_and_pulses_come_back_where_they_were(family: str) -> None:
     with rig(family, margin_s=0.02) as (bus, board):
         settle(bus, [0.1, 0.1, 0.1], 0.02, measured=False)
+        cycle(bus, [0.1, 0.1, 0.1], 20)  # it has arrived
         before = outputs(board)
         board.fault("volts:*:3.0:for=0.15s")
         assert outputs(board) == []
