@@ -174,7 +174,9 @@ class BusReport:
 class Bus(ABC):
     """One wire with servos. Use it as a context manager; one thread only.
 
-    ``with bus:`` opens the port and, on every way out, stops the servos and closes it.
+    ``with bus:`` opens the port and, on every way out, stops the servos and closes it. A program that is killed
+    (SIGKILL) can stop nothing: servos with a bus watchdog stop by themselves then; for those without one
+    ``drivers/keeper.py`` says what is done, and pulses of hobby servos go on.
 
     Parameters
     ----------

@@ -25,7 +25,8 @@ from drivers.keeper import Keeper
 from drivers.protocol1 import startup
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.registers import Registers
-from drivers.protocol1.startup import Policy, Started
+from drivers.protocol1.settings import Started
+from drivers.protocol1.startup import Policy
 from drivers.protocol1.telemetry import Telemetry
 from drivers.wirebus import WireBus
 

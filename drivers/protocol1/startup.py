@@ -7,25 +7,20 @@ nothing but this program (or the power switch) ever tells them to let go.
 
 from __future__ import annotations
 
-import logging
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from drivers.bus import ServoSpec
 from drivers.dynamixel.packet1 import Error1, Packet1
 from drivers.dynamixel.tables import ControlTable, known_models, load_table, model_name
 from drivers.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel, together
 from drivers.protocol1.registers import TRIES, Registers
-
-log = logging.getLogger(__name__)
+from drivers.protocol1.settings import EEPROM_TRIES, Started, apply_settings, note, write_surely
 
 OUT_OF_TURN = 1 / 64
 """Share of a turn that a position may lie outside of it."""
-MULTI_TURN = 0x10
-"""Feetech's Phase: present positions leave the turn."""
-EEPROM_TRIES = 10
 OFF_RETRIES = 5
 RELAPSE_S = 0.25
 """Time in which a servo that was in trouble shows whether it still is."""
@@ -60,22 +55,6 @@ class Policy:
             raise ValueError(f"torque_limit: must be above 0, up to 1, got {self.torque_limit}")
 
 
-@dataclass
-class Started:
-    """What start-up found and did.
-
-    Attributes
-    ----------
-    ticks : present position by id, read after torque came on.
-    limits : lowest and highest step by id that the servo's own registers allow.
-    eeprom : one line for every permanent register written.
-    """
-
-    ticks: dict[int, int] = field(default_factory=dict)
-    limits: dict[int, tuple[int, int]] = field(default_factory=dict)
-    eeprom: list[str] = field(default_factory=list)
-
-
 # ---------------------------------------------------------------------- who is there
 
 
@@ -85,14 +64,11 @@ def identity(reply: Packet1, tables: Iterable[ControlTable]) -> tuple[int, int]:
     Families keep them at different addresses and in different byte orders; where no table gives the number of a
     known model, the first table's reading counts.
     """
-    known = known_models()
-    seen = []
+    readings = []
     for table in tables:
-        number = table["Model Number"].decode(reply.params[table["Model Number"].address :])
-        seen.append((number, reply.params[table["Firmware Version"].address]))
-        if number in known and load_table(number).lock == table.lock and load_table(number).protocol == 1:
-            break
-    return seen[-1] if seen[-1][0] in known else seen[0]
+        number, version = table["Model Number"], table["Firmware Version"]
+        readings.append((number.decode(reply.params[number.address :]), reply.params[version.address]))
+    return next((reading for reading in readings if reading[0] in known_models()), readings[0])
 
 
 def identify(registers: Registers, servos: Sequence[ServoSpec], started: Started) -> None:
@@ -135,7 +111,7 @@ def _greet(registers: Registers, servo: int, started: Started) -> Packet1:
             raise
     registers.tell(servo, "status_level", 2)
     reply = registers.hello(servo, tries=EEPROM_TRIES)
-    _tell_user(registers, servo, "Status Return Level", 0, 2, started)
+    note(registers, servo, "status_level", 0, 2, started)
     return reply
 
 
@@ -163,7 +139,7 @@ def bring_up(
     if faulted and not policy.reboot_faulted:
         raise _fault(registers, faulted)
     for servo in ids:
-        _settings(registers, servo, servo in held, started)
+        apply_settings(registers, servo, servo in held, started)
     low, high = registers.get_all(ids, "min_ticks"), registers.get_all(ids, "max_ticks")
     started.limits = {servo: (low[servo], high[servo]) for servo in ids}
     _prepare(registers, servos, policy)
@@ -185,7 +161,7 @@ def _take_over(registers: Registers, held: list[int], policy: Policy) -> list[in
     if not held or policy.takeover == "adopt":
         return held
     if policy.takeover == "release":
-        registers.each(held, lambda servo: _write_surely(registers, servo, "torque", 0, TRIES))
+        registers.each(held, lambda servo: write_surely(registers, servo, "torque", 0, TRIES))
         return []
     ids = ", ".join(map(registers.label, held))
     raise ServoRefused(
@@ -238,90 +214,6 @@ def _fault(registers: Registers, bad: Mapping[int, int]) -> ServoFault:
         port=registers.port.link.path,
         servo_ids=tuple(sorted(bad)),
     )
-
-
-def _settings(registers: Registers, servo: int, held: bool, started: Started) -> None:
-    """Permanent registers this driver relies on: read, and written only where they differ, with torque off."""
-    wanted = _wanted(registers, servo)
-    if not held:  # a delayed answer only costs time, so a servo that holds is left alone
-        wanted["return_delay"] = 0
-    present = {name: registers.get(servo, name) for name in wanted}
-    differing = {name: value for name, value in wanted.items() if present[name] != value}
-    feetech = "Response Level" in registers.tables[servo]
-    if differing:
-        name, value = next(iter(differing.items()))
-        if held:
-            raise _locked(registers, servo, name, present[name], value)
-        _write_surely(registers, servo, "torque", 0, TRIES)
-    for name, value in differing.items():
-        if feetech:
-            _write_surely(registers, servo, "lock", 0, TRIES)
-        _write_surely(registers, servo, name, value, EEPROM_TRIES)
-        _tell_user(registers, servo, registers.tables[servo].model, present[name], value, started, name)
-    if feetech and registers.get(servo, "lock") != 1:  # unlocked, its id and limits could be changed by a bad packet
-        _write_surely(registers, servo, "lock", 1, TRIES)
-
-
-def _wanted(registers: Registers, servo: int) -> dict[str, int]:
-    """Values of permanent registers by short name."""
-    table = registers.tables[servo]
-    last = table.ticks_per_turn - 1
-    feetech = "Response Level" in table
-    wanted = {"status_level": 1 if feetech else 2}
-    low, high = registers.get(servo, "min_ticks"), registers.get(servo, "max_ticks")
-    if low == high == 0:
-        wanted["max_ticks"] = last  # it would turn for ever
-    elif low == high == last:
-        wanted["min_ticks"] = 0  # MX: several turns
-    if registers.item(servo, "mode"):
-        wanted["mode"] = 0
-    if feetech and registers.get(servo, "phase") & MULTI_TURN and table.group_read:
-        wanted["phase"] = registers.get(servo, "phase") & ~MULTI_TURN
-    return wanted
-
-
-def _locked(registers: Registers, servo: int, name: str, old: int, new: int) -> ServoRefused:
-    return ServoRefused(
-        f"servo {registers.label(servo)} holds with torque, and {_vendor(registers, servo, name)} must change "
-        f"from {old} to {new}",
-        hint='support the head, then start with takeover="release"',
-        port=registers.port.link.path,
-        servo_ids=(servo,),
-    )
-
-
-def _vendor(registers: Registers, servo: int, name: str) -> str:
-    item = registers.item(servo, name)
-    return name if item is None else item.name
-
-
-def _write_surely(registers: Registers, servo: int, name: str, value: int, tries: int) -> None:
-    """Write until it reads back, without relying on acknowledgements, which a servo may have been told not to send.
-
-    Raises
-    ------
-    ServoRefused : it keeps another value. NoReply, CorruptReply
-    """
-    for _ in range(tries):
-        registers.tell(servo, name, value)
-        if registers.get(servo, name, tries) == value:  # it is deaf for a while after a permanent write
-            return
-    what = f"{_vendor(registers, servo, name)} = {value}"
-    raise ServoRefused(
-        f"servo {registers.label(servo)} did not take {what}",
-        hint="switch its power off and on: a locked servo opens only then",
-        port=registers.port.link.path,
-        servo_ids=(servo,),
-    )
-
-
-def _tell_user(
-    registers: Registers, servo: int, what: str, old: int, new: int, started: Started, name: str | None = None
-) -> None:
-    register = what if name is None else _vendor(registers, servo, name)
-    line = f"servo {registers.label(servo)}: {register} {old} -> {new}"
-    started.eeprom.append(line)
-    log.info("permanent setting written: %s", line)
 
 
 def speed_steps(servo: ServoSpec, registers: Registers) -> int:
