@@ -29,7 +29,7 @@ _STRAIGHT_MM = 0.02
 _RIDGE = 1e-3
 _SEED = 7
 _POINTS = 400  # spread over the skin, for saying what a head cannot show
-_NEAR = 12  # at most so many around each anchor, for solving
+_NEAR = 6  # at most so many around each anchor, for solving
 _NEAR_MM = 8.0
 
 
