@@ -114,16 +114,6 @@ class BoardBus(WireBus):
     def _close_link(self) -> None:
         self._port.close()
 
-    def _receive(self, count: int, wait_s: float) -> bytes:
-        """Up to ``count`` bytes, fewer when they do not come in time."""
-        end, data = time.monotonic() + wait_s, b""
-        while len(data) < count:
-            got = self._port.read(end)
-            data += got
-            if not got and time.monotonic() >= end:
-                break
-        return data
-
     def _wire_s(self, count: int) -> float:
         """Time of so many bytes on the wire."""
         return 10.0 * count / self._port.baud
