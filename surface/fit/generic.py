@@ -27,6 +27,7 @@ WORDS = {  # in the name of an object or material -> material of the part; the f
     "lash": "lash", "brow": "brow", "hair": "brow", "beard": "brow", "teeth": "teeth", "tooth": "teeth",
     "tongue": "tongue", "gum": "gums", "mouth": "mouth", "cavity": "mouth", "oral": "mouth",
 }  # fmt: skip
+KEPT = ("skin", "socket", "lid")  # what is called so is no part of an eyeball, however near it lies
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
 TOOTH_MM, TEETH = 24.0, 12  # so many pieces no larger than this are teeth
@@ -90,7 +91,7 @@ def _pieces(mesh: FitMesh) -> tuple[NDArray[np.int64], Floats]:
     label = np.unique(label, return_inverse=True)[1].ravel()
     a, b, c, d = (mesh.vertices[mesh.faces[:, k]] for k in range(4))
     area = 0.5 * np.linalg.norm(np.cross(c - a, np.where(mesh.faces[:, 3:] < 0, c, d) - b), axis=1)
-    return label.astype(np.int64), np.bincount(label, area)
+    return label.astype(np.int64), np.bincount(label, area).astype(np.float64)
 
 
 def _kind(name: str) -> str:
@@ -154,9 +155,7 @@ def _within(mesh: FitMesh, label: NDArray, eyes: Floats, radius: float) -> set[i
     near = (np.linalg.norm(mesh.vertices[:, None] - eyes, axis=2) < 1.3 * radius).any(axis=1)
     inside = {int(k) for k in np.unique(label) if near[_vertices(mesh, label == k)].all()}
     names = {k: mesh.piece_of(int(np.argmax(label == k))).lower() for k in inside}
-    return {
-        k for k in inside if _kind(names[k]) == "skin" and not any(w in names[k] for w in ("skin", "socket", "lid"))
-    }
+    return {k for k in inside if _kind(names[k]) == "skin" and not any(w in names[k] for w in KEPT)}
 
 
 def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[PartRecipe, list[Island]]]:
@@ -208,7 +207,7 @@ def _others(
             notes.append(f"{name!r}: left out: {why}")
             continue
         share = sum(_area(mesh, i) for i in islands) / max(skin_area, 1e-9)
-        points = int(np.clip(POINTS * share, LEAST * len(islands), POINTS))
+        points = int(np.clip(1.5 * POINTS * share, min(1.5 * LEAST * len(islands), POINTS), POINTS))
         title = f"{material if material != 'skin' else 'piece'}_{len(out) + 1}"
         out.append(_part(title, material, points, 0.34, 0.5, scale, islands, mesh))
         notes.append(f"{name!r}: {len(islands)} islands as {title}")
