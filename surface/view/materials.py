@@ -53,7 +53,9 @@ class Material:
 
 def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, moderngl.Program]:
     """Every program of a quality and a theme, by name."""
-    plates = {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"} if theme.seams else {}
+    plates: dict[str, int | str] = {}
+    if theme.seams:
+        plates = {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
     flat = ("flat.frag",)
     made = {
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),

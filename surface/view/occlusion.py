@@ -96,7 +96,7 @@ def _bake_all(
     parts: Sequence[ViewPart], directions: int = 96, resolution: int = 512, bias_mm: float = 1.2
 ) -> dict[str, np.ndarray]:
     """Part name -> (m, 5): the share of the surroundings seen, and the sky of :func:`fit_sky`."""
-    result = {part.name: np.tile(np.float32([1, 1, 0, 0, 0]), (len(part.vertices), 1)) for part in parts}
+    result = {part.name: np.tile(np.array([1, 1, 0, 0, 0], np.float32), (len(part.vertices), 1)) for part in parts}
     ctx = open_context()
     try:
         for company in _COMPANIES:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ball_head import BallHead, BallPart, ball, grid, values
 
-from surface.view.occlusion import bake, bake_head, lit, orthographic, spread
+from surface.view.occlusion import bake, bake_head, fit_sky, lit, orthographic, spread, thinness
 
 
 def plate(name: str, y: float, half: float, material: str = "skin") -> BallPart:
@@ -82,3 +82,39 @@ def test_lit_blends_over_neighbours() -> None:
     picture[:, 4:] = 1.0
     box = np.array([[0.5, 0.5, 0.5], [0.9, 0.5, 0.5], [0.1, 0.5, 0.5], [0.1, 0.5, 0.01]])
     assert lit(box, picture, 0.02) == pytest.approx([0.5, 1.0, 0.0, 1.0])
+
+
+def test_a_sky_on_one_side_is_found() -> None:
+    directions = spread(400)
+    one = np.column_stack([np.ones(400), directions])
+    seen = (directions[:, 0] > 0).astype(float)
+    normal = (one[:, :, None] * one[:, None, :]).sum(axis=0)[None]
+    sky = fit_sky(normal, (seen[:, None] * one).sum(axis=0)[None])[0]
+    towards = sky[0] + directions @ sky[1:]
+    assert towards[directions[:, 0] > 0.7].min() > 0.75
+    assert towards[directions[:, 0] < -0.7].max() < 0.25
+    assert sky[2:] == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_thin_plate_is_thin_and_a_ball_is_not() -> None:
+    head = BallHead()
+    ball = head.parts[1]  # an eyeball, 26 mm through
+    assert thinness(ball).max() == 0.0
+    ball.vertices[:] = _flattened(ball.rest)
+    assert thinness(ball).max() > 0.6
+
+
+def _flattened(points: np.ndarray) -> np.ndarray:
+    """Pressed to a tenth in z about their middle."""
+    middle = points.mean(axis=0)
+    return middle + (points - middle) * [1.0, 1.0, 0.1]
+
+
+def test_skin_gets_its_sky_and_its_thinness(gl: None) -> None:
+    head = BallHead()
+    baked = bake_head(head, values(jawOpen=1.0), directions=24, resolution=96)
+    face = baked["face/visible"]
+    assert face.shape == (len(head.parts[0].vertices), 4)
+    assert (face.min() >= 0.0, face.max() <= 1.0) == (True, True)
+    assert baked["face/thin"].shape == (len(face), 1)
+    assert "teeth/visible" not in baked

@@ -16,7 +16,8 @@ from ball_head import BallHead, values
 
 from surface.errors import ViewError
 from surface.view import run_window
-from surface.view.window import WindowReport
+from surface.view.viewpoint import Viewpoint
+from surface.view.window import WindowReport, _Window
 
 CHILD = """
 import json, sys
@@ -128,6 +129,28 @@ def test_without_imgui_bundle(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imgui_bundle", None)
     with pytest.raises(ViewError, match="imgui-bundle"):
         run_window(BallHead(), lambda: values())
+
+
+def test_a_kiosk_covers_the_screen(root: Path, tmp_path: Path, display: str) -> None:
+    done = child(root, tmp_path, display, seconds=0.4, kiosk=True)
+    assert done.returncode == 0, done.stderr
+    assert np.load(tmp_path / "shot.npy").shape[:2] == (480, 640)
+
+
+def test_a_minimised_window_still_asks_and_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    window = _Window(BallHead(), lambda: values(), Viewpoint(), "fast", "skin", "auto")
+    closed: list[bool] = []
+    rested: list[float] = []
+    monkeypatch.setattr(window, "close", lambda: closed.append(True))
+    monkeypatch.setattr("surface.view.window._pixels", lambda: (0, 0))
+    monkeypatch.setattr("surface.view.window.time.sleep", rested.append)
+    answers = iter([True, True, False])
+    window.keep_going = lambda: next(answers)
+    for _ in range(3):
+        window.ask()
+    assert len(rested) == 2
+    assert min(rested) >= 0.01
+    assert closed == [True]
 
 
 def test_report_rate() -> None:
