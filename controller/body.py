@@ -11,6 +11,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -22,6 +23,7 @@ from controller.busloop import BusLoop
 from controller.clock import Clock
 from controller.errors import OMOTE_ERRORS
 from controller.following import Puppet, Reflection
+from controller.insight import InsightWriter, insight_size
 from controller.linelink import LineLink
 from controller.links import open_links
 from controller.livelink import Take, TakePlayer
@@ -230,7 +232,7 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     body.start()
     try:
         _tell(pipe, Ready())
-        _wait(body, pipe, stop)
+        _wait(body, pipe, stop, _insight(orders, body, parameters))
     finally:
         body.stop()
     _tell(pipe, Report(body.report()))
@@ -246,12 +248,20 @@ def _body(orders: BodyOrders, stage: Stage, mailbox: Mailbox, parameters: Parame
     return Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path), record=record)
 
 
-def _wait(body: Body, pipe: Connection, stop: threading.Event) -> None:
+def _insight(orders: BodyOrders, body: Body, parameters: Parameters) -> Callable[[], None]:
+    """What tells main, now and then, more than the values."""
+    if orders.insight is None:
+        return lambda: None
+    return InsightWriter(Mailbox(orders.insight, insight_size(parameters)), body.state, body.reflection).publish
+
+
+def _wait(body: Body, pipe: Connection, stop: threading.Event, publish: Callable[[], None]) -> None:
     """Serve main until it says stop or is gone, a signal comes, or a bus gave up."""
     told = False
     while not stop.is_set():
         if pipe.poll(_POLL_S) and not _obey(body, pipe):
             return
+        publish()
         if body.finished and not told:
             _tell(pipe, Finished())
             told = True

@@ -148,7 +148,7 @@ class Mixer:
     """
 
     def __init__(self, parameters: Parameters, layers: Sequence[LayerSettings]) -> None:
-        ordered = sorted(layers, key=lambda layer: layer.priority)
+        ordered = by_priority(layers)
         if len({layer.name for layer in ordered}) < len(ordered):
             raise ValueError("layers must have different names")
         self._table = _Table(ordered, len(parameters))
@@ -216,6 +216,11 @@ class Mixer:
         np.greater(work, out, out=self._better)
         np.copyto(out, work, where=self._better)
         share *= self._better
+
+
+def by_priority(layers: Sequence[LayerSettings]) -> list[LayerSettings]:
+    """Layers in the order in which they are mixed, lowest priority first."""
+    return sorted(layers, key=lambda layer: layer.priority)
 
 
 def _only_finite(indices: Indices, values: Floats, count: int) -> tuple[NDArray[np.intp], Floats]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.expression import Vocabulary
+from controller.insight import Insight
 from controller.parameters import REGIONS, Parameters
 from controller.wire import Calm, Hold, Show
 
@@ -29,11 +30,17 @@ class Panel:
     parameters : the vocabulary.
     newest : gives the newest parameters, (p,) float64.
     tell : passes a wish to the body.
+    insight : who holds each parameter and what the servos show; nothing is said of it without.
     """
 
     def __init__(
-        self, parameters: Parameters, newest: Callable[[], NDArray[np.float64]], tell: Callable[[Wish], None]
+        self,
+        parameters: Parameters,
+        newest: Callable[[], NDArray[np.float64]],
+        tell: Callable[[Wish], None],
+        insight: Insight | None = None,
     ) -> None:
+        self._insight = insight
         self._parameters = parameters
         self._newest = newest
         self._tell = tell
@@ -48,10 +55,12 @@ class Panel:
 
         imgui.set_next_window_pos(imgui.ImVec2(12, 12), imgui.Cond_.first_use_ever)
         imgui.set_next_window_size(imgui.ImVec2(320, 640), imgui.Cond_.first_use_ever)
+        if self._insight is not None:
+            self._insight.refresh()
         if imgui.begin("omote")[0]:
             self._top(imgui)
             for region, members in self._members.items():
-                if imgui.collapsing_header(region):
+                if imgui.collapsing_header(f"{region}{self._away(region)}###{region}"):
                     self._sliders(imgui, members)
         imgui.end()
 
@@ -70,6 +79,20 @@ class Panel:
             if imgui.button(name, imgui.ImVec2(width, 0)):
                 self._tell(Show(name, self._intensity))
 
+    def _away(self, region: str) -> str:
+        """How far the servos of a region are from where they were wanted, for its title."""
+        away = None if self._insight is None else self._insight.away_deg(region)
+        return "" if away is None else f"   servos {away:.1f} deg away"
+
+    def _holder(self, imgui: Any, index: int) -> None:
+        """Which layer holds a parameter, and what the servos show of it."""
+        if self._insight is None:
+            return
+        measured = self._insight.measured(index)
+        shown = "" if measured is None else f"  servos {measured:.2f}"
+        imgui.same_line()
+        imgui.text_disabled(f"{self._insight.holder(index)}{shown}")
+
     def _sliders(self, imgui: Any, members: NDArray[np.intp]) -> None:
         values = self._newest()
         for index in map(int, members):
@@ -83,3 +106,4 @@ class Panel:
                 if imgui.small_button(f"x##{index}"):
                     self._held.discard(index)
                     self._tell(Hold(index, None))
+            self._holder(imgui, index)

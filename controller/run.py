@@ -12,7 +12,9 @@ from pathlib import Path
 from types import TracebackType
 
 from controller.errors import ControllerError
+from controller.insight import Insight, insight_size
 from controller.mailbox import Mailbox
+from controller.mixer import by_priority
 from controller.parameters import Parameters
 from controller.signals import interrupts_held
 from controller.sources import Voice, pump
@@ -49,6 +51,8 @@ class BodyProcess:
         from controller.body import body_main
 
         self.mailbox = Mailbox.create(len(parameters.names))
+        self._insights = Mailbox.create(insight_size(parameters))
+        self.insight = Insight(self._insights, [layer.name for layer in by_priority(stage.layers)], parameters)
         self.finished = False
         self.report: dict[str, object] = {}
         context = multiprocessing.get_context("spawn")
@@ -61,6 +65,7 @@ class BodyProcess:
             mirror,
             voice,
             str(record) if record else None,
+            self._insights.path,
         )
         self._process = context.Process(target=body_main, args=(orders, theirs), name="omote body")
         with interrupts_held():
@@ -168,6 +173,7 @@ class BodyProcess:
         finally:
             self._pipe.close()
             self.mailbox.close()
+            self._insights.close()
 
     def _stop_quietly(self) -> None:
         """Stop while another error is on its way out; that one is the one to tell."""

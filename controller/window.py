@@ -47,7 +47,7 @@ class WindowFace:
         self._hand = None if copy is None or settings.kiosk else Hand(head, copy, lambda: values.full, body.tell)
         self._settings = settings
         self._values = values
-        self._panel = Panel(PARAMETERS, lambda: values.full, body.tell)
+        self._panel = Panel(PARAMETERS, lambda: values.full, body.tell, getattr(body, "insight", None))
         self._log = FrameLog()
 
     def run(self, keep_going: Callable[[], bool]) -> None:

@@ -18,6 +18,7 @@ class BodyOrders:
     take : a recorded take to play instead of the links; None for none.
     mirror : leave the servos limp; the face shows where somebody moves them.
     voice : a voice that moves the mouth. record : file to write every command and tick to.
+    insight : path of the mailbox for what the panel shows besides; None for none.
     """
 
     stage: str
@@ -26,6 +27,7 @@ class BodyOrders:
     mirror: bool = False
     voice: Voice | None = None
     record: str | None = None
+    insight: str | None = None
 
 
 @dataclass(frozen=True)
