@@ -23,6 +23,7 @@ from controller.busloop import BusLoop
 from controller.clock import Clock
 from controller.errors import OMOTE_ERRORS
 from controller.following import Puppet, Reflection
+from controller.host import load_script
 from controller.insight import InsightWriter, insight_size
 from controller.linelink import LineLink
 from controller.links import open_links
@@ -31,6 +32,7 @@ from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS, Parameters
 from controller.recording import SUFFIX, Face, Recorder, Replay
 from controller.robot import RobotSettings
+from controller.show import Shows
 from controller.signals import ENDINGS, let_interrupts_through
 from controller.sources import Sources, Voice
 from controller.speech import layer_of, load_take
@@ -83,6 +85,9 @@ class Body:
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
         self.reflection = self._reflection(parameters)
         self.state.watch = self.reflection
+        self.state.shows = Shows(lambda name: load_script(name, parameters, stage.vocabulary), self.state)
+        if stage.settings.show is not None:
+            self.state.shows.start(stage.settings.show)
         self.puppet = Puppet(self.reflection, parameters) if mirror and self.reflection is not None else None
         player = TakePlayer(take, self.state, layer) if take is not None else None
         self.sources = Sources(self.state, player, self.puppet, voice)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ from controller.mixer import LayerSettings, Mixer
 from controller.motion import MotionLimiter
 from controller.parameters import Floats, Parameters
 
+if TYPE_CHECKING:
+    from controller.show import Shows
+
 StatusValue = str | int | float
 
 
@@ -31,11 +34,12 @@ class CommandSink(Protocol):
 
     Attributes
     ----------
-    parameters : the registry. vocabulary : the named expressions.
+    parameters : the registry. vocabulary : the named expressions. shows : plays scripts; None where none can be.
     """
 
     parameters: Parameters
     vocabulary: Vocabulary
+    shows: Shows | None
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         """Hold parameters at values, until released."""
@@ -100,7 +104,7 @@ class CommandState:
 
     Attributes
     ----------
-    watch : looks at the servos; None without any.
+    watch : looks at the servos; None without any. shows : plays scripts; None where none can be.
 
     Raises
     ------
@@ -130,6 +134,7 @@ class CommandState:
         self._speech = self.mixer["speech"]
         self._everything = np.ones(len(parameters), dtype=bool)
         self.watch: Watch | None = None
+        self.shows: Shows | None = None
         self._lock = threading.Lock()
         self._stamp_ns = 0
         self._now_s = 0.0

@@ -26,6 +26,7 @@ from controller.linewords import (
     Measured,
     Neutral,
     Ping,
+    Play,
     Read,
     Release,
     Request,
@@ -181,6 +182,10 @@ class Grammar:
                 return ["SUB", repr(rate), *self._words(question)]
             case Info(index):
                 return ["INFO", self._name(index)]
+            case Read(what, measured):
+                return ["READ", what, *(["MEASURED"] if measured else [])]
+            case Play(what, to):
+                return ["SHOW", what, *([to] if to else [])]
             case _:
                 return _plain_words(command)
 
@@ -210,8 +215,6 @@ def _plain_words(command: Command) -> list[str]:
             return ["PING", text] if text else ["PING"]
         case List(what):
             return ["LIST", what]
-        case Read(what, measured):
-            return ["READ", what, *(["MEASURED"] if measured else [])]
     return [{Hello: "HELLO", Status: "STATUS", Unsubscribe: "UNSUB"}[type(command)]]
 
 
@@ -235,6 +238,13 @@ def _gaze_at(given: Sequence[str]) -> GazeAt:
     if math.hypot(*at) < 1.0:
         raise LineError(Code.RANGE, "the point must be at least 1 mm from the middle between the eyes")
     return GazeAt(*at)
+
+
+def _show(_: Grammar, given: Sequence[str]) -> Play:
+    word = given[0].upper()
+    if (word == "SEEK") != (len(given) == 2):
+        raise LineError(Code.ARGUMENTS, f"usage: {USAGE['SHOW']}")
+    return Play(word, *given[1:]) if word in ("PLAY", "PAUSE", "STOP", "SEEK") else Play(given[0])
 
 
 def _read(_: Grammar, given: Sequence[str]) -> Read:
@@ -268,6 +278,7 @@ _RULES: dict[str, Rule] = {
     "GAZE": (1, 4, Grammar.read_gaze),
     "NEUTRAL": (0, 1, _neutral),
     "LIFE": (1, 1, lambda _, given: Live(in_range("amount", given[0], 0.0, 1.0))),
+    "SHOW": (1, 2, _show),
     "GET": (1, None, lambda g, given: Get(g.names_or_all(given))),
     "MEASURED": (1, None, lambda g, given: Measured(g.names_or_all(given))),
     "READ": (1, 2, _read),
@@ -292,6 +303,7 @@ USAGE = {
     "GAZE": "GAZE yaw_deg pitch_deg, GAZE AT x_mm y_mm z_mm, or GAZE OFF",
     "NEUTRAL": "NEUTRAL [seconds]",
     "LIFE": "LIFE amount",
+    "SHOW": "SHOW name, SHOW PLAY, SHOW PAUSE, SHOW STOP, or SHOW SEEK mark (or seconds)",
     "GET": "GET name ... or GET ALL",
     "MEASURED": "MEASURED name ... or MEASURED ALL",
     "READ": f"READ {', '.join(READINGS[:-1])} or {READINGS[-1]}, and MEASURED for what the servos show",

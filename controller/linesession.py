@@ -12,7 +12,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING
 
 from controller.commands import CommandSink
-from controller.errors import OMOTE_ERRORS
+from controller.errors import OMOTE_ERRORS, ParameterError
 from controller.linecommands import COMMANDS, MAX_RATE_HZ, Grammar
 from controller.lineprotocol import (
     MAX_LINE,
@@ -41,6 +41,7 @@ from controller.linewords import (
     Measured,
     Neutral,
     Ping,
+    Play,
     Read,
     Release,
     Request,
@@ -52,6 +53,7 @@ from controller.linewords import (
 
 if TYPE_CHECKING:
     from controller.reading import Readings
+    from controller.show import Shows
 
 
 class LineSession:
@@ -167,6 +169,8 @@ class LineSession:
                 sink.neutral(seconds, now_ns)
             case Live(amount):
                 sink.live(amount, now_ns)
+            case Play(what, to):
+                _play(sink.shows, what, to)
             case _:
                 return False
         return True
@@ -220,7 +224,8 @@ class LineSession:
         return text if math.isnan(full) else f"{text} full_scale_deg={full:g}"
 
     def _status(self) -> dict[str, str | int | float]:
-        return {**self._sink.status(), "accepted": self.accepted, "refused": self.refused.total()}
+        show = self._sink.shows.status() if self._sink.shows is not None else "off"
+        return {**self._sink.status(), "show": show, "accepted": self.accepted, "refused": self.refused.total()}
 
     def _list(self, what: str) -> tuple[str, ...]:
         if what == "HOLDERS":
@@ -250,9 +255,24 @@ def _receipt(command: Command) -> str:
             return "UNSUB"
         case Gaze() | GazeAt() | GazeOff():
             return "GAZE"
+        case Play(what, to):
+            return f"SHOW {what} {to}".rstrip()
         case Live(amount):
             return f"LIFE {number(amount)}"
     return "NEUTRAL"
+
+
+def _play(shows: Shows | None, what: str, to: str) -> None:
+    """Raises ConfigError or ParameterError: no shows here, no such script, mark or time."""
+    if shows is None:
+        raise ParameterError("no shows can be played here", hint="omote run plays them")
+    if what not in ("PLAY", "PAUSE", "STOP", "SEEK"):
+        shows.start(what)
+        return
+    try:
+        shows.act(what, float(to) if to else 0.0)
+    except ValueError:
+        shows.act(what, to)
 
 
 def _unzip(shown: list[tuple[str, float]]) -> tuple[list[str], list[float]]:

@@ -81,6 +81,17 @@ class Live:
 
 
 @dataclass(frozen=True)
+class Play:
+    """Play a script into the face, or go on, wait, stop or go elsewhere in it.
+
+    ``SHOW name``, ``SHOW PLAY``, ``SHOW PAUSE``, ``SHOW STOP``, ``SHOW SEEK mark|seconds``.
+    """
+
+    what: str
+    to: str = ""
+
+
+@dataclass(frozen=True)
 class Get:
     """Tell parameters. ``GET name ...``, ``GET ALL``."""
 
@@ -136,7 +147,7 @@ class List:
 
 
 Command = (
-    Hello | Ping | Set | Release | Expr | Gaze | GazeAt | GazeOff | Neutral | Live
+    Hello | Ping | Set | Release | Expr | Gaze | GazeAt | GazeOff | Neutral | Live | Play
     | Get | Read | Measured | Info | Status | Subscribe | Unsubscribe | List
 )  # fmt: skip
 

@@ -165,7 +165,7 @@ def _open(stream: IO[bytes]) -> wave.Wave_read:
     try:
         file = wave.Wave_read(stream)
     except (OSError, wave.Error, EOFError) as error:
-        raise TakeError(f"the stream is not WAV of PCM: {error}", hint=hint) from error
+        raise TakeError(f"the stream is not WAV of PCM: {str(error) or 'it ends too early'}", hint=hint) from error
     if file.getsampwidth() not in _KINDS or file.getframerate() < 1000:
         found = f"{8 * file.getsampwidth()} bit at {file.getframerate()} Hz"
         raise TakeError(f"the stream has {found}; 8, 16 or 32 bit PCM is heard", hint=hint)

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from controller.commands import CommandState, StatusValue, Watch
 from controller.errors import ControllerError
 from controller.expression import Vocabulary
 from controller.parameters import Floats, Parameters
+
+if TYPE_CHECKING:
+    from controller.show import Shows
 
 SUFFIX = ".rec"
 """What names of recordings end in."""
@@ -55,6 +58,7 @@ class Recorder:
         self.parameters: Parameters = state.parameters
         self.vocabulary: Vocabulary = state.vocabulary
         self.mixer, self.limiter = state.mixer, state.limiter
+        self.shows: Shows | None = None
         self._lock = threading.Lock()
         try:
             self._file: TextIO = path.open("w", encoding="ascii")

@@ -31,6 +31,8 @@ def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
     if take := report.get("take"):
         rate = f"{take['rows']} rows at {take['rate_hz']:.0f} Hz"
         found.append(("take", f"{take['played_s']:.1f} of {take['duration_s']:.1f} s played, {rate}"))
+    if voice := report.get("voice"):
+        found.append(("voice", f"{voice['heard_s']:.1f} s heard"))
     return found + [
         (f"link {link['port']}", f"{link['accepted']} lines accepted, {sum(link['refused'].values())} refused")
         for link in report.get("links", [])

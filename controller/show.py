@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import bisect
 import math
+import threading
+from collections.abc import Callable
 
 from controller.commands import CommandSink
 from controller.errors import ParameterError
@@ -95,3 +97,60 @@ class Show:
             said.append(line)
             self._next += 1
         return said
+
+
+Find = Callable[[str], Script]
+
+
+class Shows:
+    """The show that plays now; links change it from their threads, the control loop ticks it.
+
+    Parameters
+    ----------
+    find : the script of a name; raises ConfigError. sink : the face.
+    """
+
+    def __init__(self, find: Find, sink: CommandSink) -> None:
+        self._find, self._sink = find, sink
+        self._show: Show | None = None
+        self._lock = threading.RLock()  # a show may start another
+
+    def start(self, name: str) -> None:
+        """Play a script from its beginning. Raises ConfigError."""
+        show = Show(self._find(name), self._sink)
+        show.play()
+        with self._lock:
+            self._show = show
+
+    def act(self, what: str, to: str | float = 0.0) -> None:
+        """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s).
+
+        Raises
+        ------
+        ParameterError : there is no show, or no such mark or time.
+        """
+        with self._lock:
+            show = self._show
+            if show is None:
+                raise ParameterError("no show plays", hint="begin one: SHOW name")
+            if what == "SEEK":
+                show.seek(to)
+            elif what == "STOP":
+                self._show = None
+            else:
+                show.play() if what == "PLAY" else show.pause()
+
+    def tick(self, now_ns: int) -> None:
+        """Say what is due."""
+        with self._lock:
+            if self._show is not None:
+                self._show.tick(now_ns)
+
+    def status(self) -> str:
+        """``off``, or the script's name, where it is (s), and whether it waits: ``tour@12.3``, ``tour@12.3,paused``."""
+        with self._lock:
+            show = self._show
+            if show is None or show.finished:
+                return "off"
+            name = show.script.name.replace(" ", "_") or "show"
+            return f"{name}@{show.position_s:.1f}" + ("" if show.playing else ",paused")

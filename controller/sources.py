@@ -135,6 +135,8 @@ class Sources:
             self._player.tick(now_ns)
         if self._puppet is not None:
             self._puppet.tick(self._state, now_ns)
+        if self._state.shows is not None and begun:
+            self._state.shows.tick(now_ns)
 
     def report(self) -> dict[str, object]:
         """How far a take was played and a voice was heard (s); None without."""

@@ -63,6 +63,7 @@ class StageSettings(Settings):
     life: str = "natural"
     seed: Annotated[int, Field(ge=0)] = 0
     vocabularies: list[str] = []
+    show: str | None = None
     groups: dict[str, Annotated[float, Field(ge=-1, le=1)]] = {}
     layers: dict[str, dict[str, Any]] = {}
     face: FaceSettings = FaceSettings()
@@ -156,6 +157,8 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
     layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
     life = _collect(faults, "life", lambda: LifeSettings.named(settings.life, parameters))
+    if settings.show is not None:
+        _collect(faults, "show", lambda: load_script(str(settings.show), parameters, vocabulary))
     for i, link in enumerate(settings.links):
         if link.script is not None:
             _collect(faults, f"links[{i}].script", lambda name=link.script: load_script(name, parameters, vocabulary))

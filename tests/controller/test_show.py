@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
 
 from controller.commands import CommandState
 from controller.errors import ParameterError
+from controller.linesession import LineSession
 from controller.parameters import PARAMETERS as P
 from controller.script import Script
-from controller.show import Show
+from controller.show import Show, Shows
 
 STEPS = ((0.0, "EXPR smile"), (1.0, "SET jawOpen 0.5"), (2.0, "NEUTRAL 0"), (2.0, "EXPR anger"))
 SECOND = 10**9
@@ -68,3 +70,38 @@ def test_a_loop_begins_again_without_losing_time() -> None:
     show.play()
     assert run(show, 0.0, 3.3) == ["PING a", "PING b"] * 3 + ["PING a"]
     assert show.loops == 3 and show.position_s == pytest.approx(0.3) and not show.finished
+
+
+def test_a_show_is_steered_over_a_link() -> None:
+    state = CommandState(P)
+    session, values = LineSession(state, 0), P.neutral()
+
+    def say(line: str) -> str:
+        return session.feed(line.encode() + b"\n", 0).decode().strip()
+
+    assert say("SHOW tour").startswith("ERR 30 no shows can be played here")
+    script = Script(
+        ((0.0, "SET jawOpen 0.5"), (1.0, "SET jawOpen 1"), (2.0, "NEUTRAL 0")), 0.0, 0.0, "mine", {"end": 1.9}
+    )
+    shows = state.shows = Shows(lambda name: {"mine": script}[name], state)
+    assert say("SHOW PAUSE").startswith("ERR 30 no show plays")
+    assert say("SHOW mine") == "OK SHOW mine"
+
+    clock = itertools.count(0, 10_000_000)
+
+    def run(seconds: float) -> float:
+        for now_ns in itertools.islice(clock, round(seconds * 100)):
+            shows.tick(now_ns)
+            state.tick(now_ns, 0.01, values)
+        return float(values[P.index("jawOpen")])
+
+    assert run(0.8) == pytest.approx(0.5, abs=0.01)
+    assert say("SHOW PAUSE") == "OK SHOW PAUSE" and run(1.0) == pytest.approx(0.5, abs=0.01)
+    assert "show=mine@0.8,paused" in say("STATUS")
+    say("SHOW PLAY")
+    assert run(0.9) == pytest.approx(1.0, abs=0.01)
+    assert say("SHOW SEEK 0.9") == "OK SHOW SEEK 0.9" and "show=mine@0.9" in say("STATUS")
+    assert say("SHOW SEEK end") == "OK SHOW SEEK end" and run(0.9) == pytest.approx(0.0, abs=0.01)
+    assert "show=off" in say("STATUS")
+    assert "did you mean 'end'" in say("SHOW SEEK ent") and say("SHOW SEEK").startswith("ERR 21")
+    assert say("SHOW STOP") == "OK SHOW STOP" and say("SHOW STOP").startswith("ERR 30")
