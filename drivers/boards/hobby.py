@@ -78,15 +78,18 @@ class PulseScale:
     """
 
     def __init__(self, servos: Sequence[ServoSpec]) -> None:
-        self._curves = [_curve(servo) for servo in servos]
-        ends = np.array([[_bent(end, *curve) for end in (servo.min_rad, servo.max_rad)]
-                         for servo, curve in zip(servos, self._curves, strict=True)])  # fmt: skip
-        self.low_us, self.high_us = ends.min(axis=1), ends.max(axis=1)
-        self.us_per_rad = np.array([np.max(np.abs(np.diff(us) / np.diff(rad))) for rad, us in self._curves])
+        curves = [_curve(servo) for servo in servos]
+        self._rad, self._us = (_stacked([curve[side] for curve in curves]) for side in (0, 1))
+        self._sign = np.sign(self._us[:, -1] - self._us[:, 0])
+        ends = [self.pulses(np.array([getattr(s, end) for s in servos])) for end in ("min_rad", "max_rad")]
+        self.low_us, self.high_us = np.minimum(*ends), np.maximum(*ends)
+        self.us_per_rad = np.abs(np.diff(self._us) / np.diff(self._rad)).max(axis=1)
+        for i, servo in enumerate(servos):
+            _check_reach(servo, float(self.low_us[i]), float(self.high_us[i]))
 
     def pulses(self, angle_rad: Floats) -> Floats:
         """(n,) us for angles (n,) rad."""
-        return np.array([_bent(a, rad, us) for a, (rad, us) in zip(angle_rad, self._curves, strict=True)])
+        return _bent(angle_rad, self._rad, self._us)
 
     def steps(self, angle_rad: Floats, per_us: int) -> Indices:
         """(n,) whole steps of ``1 / per_us`` us for angles (n,) rad, never beyond the servos' limits."""
@@ -96,11 +99,12 @@ class PulseScale:
 
     def radians(self, pulse_us: Floats) -> Floats:
         """(n,) rad for pulses (n,) us; NaN for 0, which is no pulse."""
-        return np.array([self.radian(k, pulse) for k, pulse in enumerate(pulse_us)])
+        angles = _bent(self._sign * pulse_us, self._sign[:, None] * self._us, self._rad)
+        return np.where(pulse_us > 0.0, angles, math.nan)
 
     def radian(self, index: int, pulse_us: float) -> float:
         """The angle of one servo (rad) for a pulse; NaN for 0, which is no pulse."""
-        return _back(pulse_us, *self._curves[index])
+        return float(self.radians(np.full(len(self._sign), pulse_us))[index])
 
 
 def _curve(servo: ServoSpec) -> tuple[Floats, Floats]:
@@ -119,28 +123,30 @@ def _curve(servo: ServoSpec) -> tuple[Floats, Floats]:
             f"servo {servo.name!r} (id {servo.id}): its pulses must rise, or fall, with every angle",
             hint="give two or more points, as pulse = { deg = [-45, 45], us = [1000, 2000] }",
         )
-    _check_reach(servo, rad, us)
     return rad, us
 
 
-def _check_reach(servo: ServoSpec, rad: Floats, us: Floats) -> None:
-    for limit in (servo.min_rad, servo.max_rad):
-        pulse = _bent(limit, rad, us)
-        if not LOWEST_US <= pulse <= HIGHEST_US:
-            raise DriverError(
-                f"servo {servo.name!r} (id {servo.id}): {math.degrees(limit):g} degrees would be a pulse of "
-                f"{pulse:.0f} us, and none is outside {LOWEST_US:g} to {HIGHEST_US:g}",
-                hint="narrow limit_deg, or calibrate its pulses",
-            )
+def _check_reach(servo: ServoSpec, low_us: float, high_us: float) -> None:
+    if low_us < LOWEST_US or high_us > HIGHEST_US:
+        raise DriverError(
+            f"servo {servo.name!r} (id {servo.id}): its limits would be pulses of {low_us:.0f} to {high_us:.0f} us, "
+            f"and none is outside {LOWEST_US:g} to {HIGHEST_US:g}",
+            hint="narrow limit_deg, or calibrate its pulses",
+        )
 
 
-def _bent(x: float, at: Floats, gives: Floats) -> float:
-    """The curve through points at x; beyond its ends it goes on straight."""
-    k = min(max(int(np.searchsorted(at, x)) - 1, 0), len(at) - 2)
-    return float(gives[k] + (x - at[k]) * (gives[k + 1] - gives[k]) / (at[k + 1] - at[k]))
+def _stacked(rows: Sequence[Floats]) -> Floats:
+    """Points of several curves as (n, k): shorter ones go on straight."""
+    k = max(len(row) for row in rows)
+    return np.array([np.concatenate([row, row[-1] + (row[-1] - row[-2]) * np.arange(1, k - len(row) + 1)])
+                     for row in rows])  # fmt: skip
 
 
-def _back(pulse: float, rad: Floats, us: Floats) -> float:
-    if not pulse > 0.0:
-        return math.nan
-    return _bent(pulse, us, rad) if us[-1] > us[0] else _bent(-pulse, -us, rad)
+def _bent(x: Floats, at: Floats, gives: Floats) -> Floats:
+    """Each curve of points (n, k) at its own x (n,); beyond their ends they go on straight."""
+    rows = np.arange(len(x))
+    piece = (x[:, None] > at[:, 1:-1]).sum(axis=1)
+    start, end = at[rows, piece], at[rows, piece + 1]
+    low, high = gives[rows, piece], gives[rows, piece + 1]
+    out: Floats = low + (x - start) * (high - low) / (end - start)
+    return out

@@ -20,7 +20,8 @@ GROUP = 8
 class PulseTrack:
     """Between which pulses each of ``n`` outputs must be: those it was last seen at and those it was told since.
 
-    A board moves towards its targets and never beyond; so an answer outside is a damaged or a foreign one.
+    A board moves towards its targets, and beyond one only as far as it needs to stop; so an answer outside is a
+    damaged or a foreign one.
 
     Attributes
     ----------
@@ -40,11 +41,17 @@ class PulseTrack:
         self.goal_us = np.where(np.isfinite(goal_us), goal_us, self.goal_us)
         self._low, self._high = np.fmin(self._low, self.goal_us), np.fmax(self._high, self.goal_us)
 
-    def believes(self, index: int, pulse_us: float, slack_us: float) -> bool:
-        """Whether an output can be where an answer says; narrows the range when it has arrived."""
+    def believes(self, index: int, pulse_us: float, slack_us: float, stop_us: float = 0.0) -> bool:
+        """Whether an output can be where an answer says; narrows the range when it has arrived.
+
+        Parameters
+        ----------
+        slack_us : the board's own rounding. stop_us : the way it may need to stop.
+        """
         if not pulse_us:
             return True
-        if not self._low[index] - slack_us <= pulse_us <= self._high[index] + slack_us:
+        beyond = slack_us + stop_us
+        if not self._low[index] - beyond <= pulse_us <= self._high[index] + beyond:
             return False
         if abs(pulse_us - self.goal_us[index]) <= slack_us:
             self._low[index] = self._high[index] = self.goal_us[index]
@@ -71,6 +78,7 @@ class PulseBus(BoardBus):
         super().__init__(servos, **options)
         self._scale = PulseScale(self.servos)
         self._track = PulseTrack(len(self.servos))
+        self._stop_us = np.zeros(len(self.servos))  # way to stop, where the board limits the acceleration
         self._next = 0
         self._forgot = False
 
@@ -96,7 +104,7 @@ class PulseBus(BoardBus):
     def _take(self, group: Sequence[int], pulses: Iterable[float]) -> None:
         """What the board says of some servos. One that lost its pulses may have lost all it was set to."""
         for index, pulse in zip(group, pulses, strict=True):
-            if not self._track.believes(index, pulse, self.SLACK_US):
+            if not self._track.believes(index, pulse, self.SLACK_US, float(self._stop_us[index])):
                 self._report.count("corrupt", self.ids[index])
                 self._doubt()
                 return

@@ -118,11 +118,14 @@ class MaestroBus(PulseBus):
     def _limit_motion(self) -> None:
         """The board's own limits of speed and acceleration, a step above the servo's so that nothing trails."""
         out = b""
-        for servo, slope in zip(self.servos, self._scale.us_per_rad, strict=True):
-            speed = math.ceil(servo.max_speed_rad_s * slope / m.SPEED_US_S)
+        for index, (servo, slope) in enumerate(zip(self.servos, self._scale.us_per_rad, strict=True)):
+            speed = min(math.ceil(servo.max_speed_rad_s * slope / m.SPEED_US_S), m.MAX_SPEED)
             push = math.ceil(servo.max_accel_rad_s2 * slope / m.ACCELERATION_US_S2)
-            out += self._code.word(m.SET_SPEED, servo.id, min(speed, m.MAX_SPEED))
-            out += self._code.word(m.SET_ACCELERATION, servo.id, push if push <= m.MAX_ACCELERATION else 0)
+            push = push if push <= m.MAX_ACCELERATION else 0  # which is no limit
+            out += self._code.word(m.SET_SPEED, servo.id, speed)
+            out += self._code.word(m.SET_ACCELERATION, servo.id, push)
+            if push:
+                self._stop_us[index] = (speed * m.SPEED_US_S) ** 2 / (2.0 * push * m.ACCELERATION_US_S2)
         self._port.write(out)
         self._forgot = False
 

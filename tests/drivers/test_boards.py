@@ -369,7 +369,7 @@ def test_a_simple_line_head_starts_at_rest_and_takes_lines_it_has_room_for() -> 
     with SimulatedBus(servos, family="omote", options={"names": names, "simple": True}) as board:
         with open_bus("omote", servos, port=board.path, **QUICK) as bus:
             bus.start()
-            settle(bus, np.full(30, 0.3), 0.01, measured=False)
+            settle(bus, np.full(30, 0.3), 3e-4, measured=False)
             assert board.line.refused == 1  # GET, which it does not know
             assert [row["value"] for row in board.line.describe(0.0)] == pytest.approx(
                 [math.degrees(0.3)] * 30, abs=0.01
