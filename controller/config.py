@@ -82,8 +82,10 @@ def _keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[st
     for part in location:
         if isinstance(part, int):
             continue
-        field = current.model_fields.get(part) if hasattr(current, "model_fields") else None
-        current = _inner_model(field.annotation) if field else None
+        field = current.model_fields.get(part)
+        if field is None:  # the name of an entry of a table of tables
+            continue
+        current = _inner_model(field.annotation)
         if current is None:
             return []
     return list(current.model_fields)

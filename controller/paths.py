@@ -63,7 +63,7 @@ def _unknown(kind: str, name: str, folder: Path) -> ConfigError:
     guess = f", did you mean {close[0]!r}?" if close else ""
     listing = ", ".join(known) if known else "nothing"
     return ConfigError(
-        f"no {kind.removesuffix('s')} {name!r}{guess}",
+        f"no {kind.replace('ies', 'ys').removesuffix('s')} {name!r}{guess}",
         hint=f"give a path, or a name from {folder}: {listing}",
     )
 

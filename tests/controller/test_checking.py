@@ -10,7 +10,10 @@ from typer.testing import CliRunner
 
 from controller.checking import check_anything
 from controller.cli import app
-from controller.errors import TakeError
+from controller.commands import CommandState
+from controller.errors import ControllerError, TakeError
+from controller.parameters import PARAMETERS
+from controller.recording import Recorder
 from surface import DCPSurface, Domain, Slit, SurfaceFileError
 from surface.readers import NamedSurface, write_surfaces
 
@@ -57,3 +60,18 @@ def test_the_command_prints_it(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["check", str(tmp_path / "b.json")])
     assert result.exit_code == 0
     assert "surface cheek: 4 control points" in result.output
+
+
+def test_every_kind_of_file_is_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text("[smirk]\nweights = { mouthSmileLeft = 0.7 }\n[both]\nof = { smirk = 0.5 }")
+    (tmp_path / "script.toml").write_text('steps = ["0 EXPR smile", "1 NEUTRAL"]\nmarks = { end = 1 }')
+    with Recorder(CommandState(PARAMETERS), tmp_path / "a.rec") as state:
+        for i in range(50):
+            state.tick(10**9 + i * 10_000_000, 0.01, PARAMETERS.neutral())
+    assert check_anything(str(tmp_path / "own.toml")) == ["expressions own.toml: 2: good"]
+    assert check_anything(str(tmp_path / "script.toml")) == ["script script: 2 steps, 1 marks: good"]
+    assert check_anything(str(tmp_path / "a.rec"))[0].startswith("recording a.rec: 50 ticks, 0.5 s, all came out again")
+    text = (tmp_path / "a.rec").read_text().replace('["tick"', '["live",1.0,1000000000]\n["tick"', 1)
+    (tmp_path / "b.rec").write_text(text)
+    with pytest.raises(ControllerError, match="came out differently"):
+        check_anything(str(tmp_path / "b.rec"))

@@ -10,6 +10,7 @@ import pytest
 
 from controller.commands import CommandState
 from controller.errors import ParameterError
+from controller.expression import Expression, Vocabulary
 from controller.parameters import PARAMETERS as P
 
 JAW, SMILE = P.index("jawOpen"), P.index("mouthSmileLeft")
@@ -202,3 +203,22 @@ def test_gains_scale_a_layer_by_region(face: Face) -> None:
             face.state.set_gains("capture", wrong)
     with pytest.raises(KeyError):
         face.state.set_gains("cature", {})
+
+
+@pytest.mark.parametrize(("rule", "share"), [("keep", 1.0), ("blend", 0.5), ("block", 0.0)])
+def test_an_expression_holds_speech_and_gaze_back(rule: str, share: float) -> None:
+    plain, silent = Vocabulary.load(P), P.neutral()
+    shown = Expression("stern", silent, mouth=rule, gaze=rule)
+    state = CommandState(P, Vocabulary({"neutral": plain["neutral"], "stern": shown}))
+    now, values = 10**9, P.neutral()
+    state.expression("stern", 0.5, None, now)
+    state.gaze(0.8, 0.0, now)
+    mouth, mask = P.neutral(), P.indices(["jawOpen"])
+    mouth[JAW] = 0.8
+    for _ in range(200):
+        now += STEP_NS
+        state.write_layer("speech", mouth, np.isin(np.arange(len(P)), mask), now)
+        state.tick(now, 0.01, values)
+    assert values[JAW] == pytest.approx(0.8 * share, abs=0.01)
+    assert (values[P.index("headYaw")] > 0.05) == (share > 0.0)
+    assert "speech" in state.mixer.active or share == 0.0

@@ -11,7 +11,7 @@ from controller.commands import CommandState
 from controller.errors import ControllerError
 from controller.linesession import LineSession
 from controller.parameters import PARAMETERS as P
-from controller.recording import Recorder, replay
+from controller.recording import Recorder, Replay, replay
 
 STEP_NS = 10_000_000
 
@@ -102,3 +102,31 @@ def test_files_that_cannot_be_opened(tmp_path: Path) -> None:
         list(replay(tmp_path / "none", P))
     with pytest.raises(ControllerError, match="cannot be written"):
         Recorder(CommandState(P), tmp_path / "none" / "a")
+
+
+def test_a_replay_ticks_at_its_own_pace_whatever_the_clock(tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    recorded, out = perform(path, 2.0), P.neutral()
+    player = Replay(path, P)
+    rows = []
+    for i in range(400):  # a clock twice as fast
+        player.tick(7 * 10**9 + i * STEP_NS // 2, 0.005, out)
+        rows.append(out.copy())
+        if player.finished:
+            break
+    assert player.finished and player.ticks == 200 and player.played_s == pytest.approx(2.0, abs=0.05)
+    shown = {row.tobytes() for row in rows}
+    assert all(row.tobytes() in shown for row in recorded[::7])  # each recorded face was shown, bit by bit
+    np.testing.assert_array_equal(rows[-1], recorded[-1])
+
+
+def test_gains_and_captures_are_recorded(tmp_path: Path) -> None:
+    path, out = tmp_path / "a.rec", P.neutral()
+    with Recorder(CommandState(P), path) as state:
+        state.set_gains("capture", {"jaw": 0.5})
+        state.capture(np.full(len(P), 0.6), np.ones(len(P), dtype=bool), 10**9)
+        for i in range(60):
+            state.tick(10**9 + i * STEP_NS, 0.01, out)
+    *_, (_, values) = replay(path, P)
+    np.testing.assert_array_equal(values, out)
+    assert values[P.index("jawOpen")] == pytest.approx(0.3, abs=0.01)

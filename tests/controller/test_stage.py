@@ -59,3 +59,33 @@ def test_a_fault_is_named_with_its_key(tmp_path: Path, text: str, fault: str) ->
     with pytest.raises(ConfigError) as caught:
         load_stage(stage_file(tmp_path, body), PARAMETERS)
     assert fault in str(caught.value)
+
+
+def test_a_stage_has_layers_expressions_and_shows_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text("[smirk]\nweights = { mouthSmileLeft = 0.7 }")
+    text = 'name = "mine"\nvocabularies = ["own.toml"]\nshow = "tour"\nseed = 3\ncontrol_hz = 200\n'
+    text += "[layers.capture]\ngains = { brows = 0.5 }\n[layers.late]\npriority = 70\n"
+    stage = load_stage(stage_file(tmp_path, text), PARAMETERS)
+    state = stage.state(PARAMETERS)
+    assert state.vocabulary["smirk"].weights[PARAMETERS.index("mouthSmileLeft")] == 0.7
+    assert state.layer_names()[-1] == "late"
+    assert state.mixer["capture"].gain[PARAMETERS.index("browInnerUp")] == 0.5
+    assert stage.period_s == 0.005
+
+
+def test_faults_of_its_own_files_are_told_with_the_rest(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text("[a]\nof = { b = 1 }\n[b]\nof = { a = 1 }")
+    text = 'name = "mine"\nvocabularies = ["own.toml", "none.toml"]\nshow = "tuor"\nlife = "natral"\nhead = "nobody"\n'
+    with pytest.raises(ConfigError) as caught:
+        load_stage(stage_file(tmp_path, text + "[layers.capture]\ngain = 1\n"), PARAMETERS)
+    message = str(caught.value)
+    for part in (
+        "6 faults",
+        "vocabularies[1]: no vocabulary 'none.toml'",
+        "goes in a circle: a -> b -> a",
+        "show: no script 'tuor', did you mean 'tour'?",
+        "life: no life 'natral', did you mean 'natural'?",
+        "layers.capture.gain: unknown key, did you mean 'gains'?",
+        "head: no head 'nobody'",
+    ):
+        assert part in message
