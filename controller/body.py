@@ -89,9 +89,14 @@ class Body:
         if stage.settings.show is not None:
             self.state.shows.start(stage.settings.show)
         self.puppet = Puppet(self.reflection, parameters) if mirror and self.reflection is not None else None
-        player = TakePlayer(take, self.state, layer) if take is not None else None
-        self.sources = Sources(self.state, player, self.puppet, voice)
         self.live = take is None and replay is None
+        if self.live and stage.settings.take is not None:
+            path = stage.file(stage.settings.take)
+            take, layer = load_take(path, parameters), layer_of(path)
+        if self.live and voice is None and stage.settings.voice is not None:
+            voice = Voice(str(stage.file(stage.settings.voice)), stage.settings.voice_hz)
+        player = TakePlayer(take, self.state, layer) if take is not None else None
+        self.sources = Sources(self.state, player, self.puppet, voice, beside=self.live)
         self._mailbox = mailbox
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping = threading.Event()

@@ -96,6 +96,7 @@ class Sources:
     Parameters
     ----------
     state : the layers. player : plays a take. puppet : reads a limp head. voice : a voice to listen to.
+    beside : the take plays beside the links, and its end is not the end of the run.
 
     Attributes
     ----------
@@ -103,8 +104,15 @@ class Sources:
     """
 
     def __init__(
-        self, state: Face, player: TakePlayer | None = None, puppet: Puppet | None = None, voice: Voice | None = None
+        self,
+        state: Face,
+        player: TakePlayer | None = None,
+        puppet: Puppet | None = None,
+        voice: Voice | None = None,
+        *,
+        beside: bool = False,
     ) -> None:
+        self._beside = beside
         self._state, self._player, self._puppet, self._voice = state, player, puppet, voice
         self._listener: Listener | None = None
         self._stopped = False
@@ -115,7 +123,7 @@ class Sources:
     def finished(self) -> bool:
         """A take has been played to its end, or a voice that was all there is to play has ended."""
         if self._player is not None:
-            return self._player.finished
+            return self._player.finished and not self._beside
         return self.heard and self._voice is not None and self._voice.alone
 
     def begin(self) -> None:

@@ -21,6 +21,7 @@ from controller.parameters import Parameters
 from controller.paths import find_config
 from controller.picture import PictureSettings
 from controller.robot import RobotSettings, load_robot
+from controller.speech import load_take
 
 if TYPE_CHECKING:
     from surface.head import Head
@@ -64,6 +65,9 @@ class StageSettings(Settings):
     seed: Annotated[int, Field(ge=0)] = 0
     vocabularies: list[str] = []
     show: str | None = None
+    take: str | None = None
+    voice: str | None = None
+    voice_hz: Annotated[int, Field(ge=1000)] | None = None
     groups: dict[str, Annotated[float, Field(ge=-1, le=1)]] = {}
     layers: dict[str, dict[str, Any]] = {}
     face: FaceSettings = FaceSettings()
@@ -93,6 +97,11 @@ class Stage:
     layers: tuple[LayerSettings, ...]
     life: LifeSettings
     groups: tuple[tuple[Path, float], ...] = ()
+
+    def file(self, name: str) -> Path:
+        """A file the stage names: beside it, or a path."""
+        beside = self.path.parent / name
+        return beside if beside.exists() else Path(name)
 
     @property
     def period_s(self) -> float:
@@ -165,7 +174,10 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
     if faults:
         raise config_error(path, faults)
     worn = tuple(zip(groups, settings.groups.values(), strict=True))
-    return Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, worn)
+    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, worn)
+    if settings.take is not None:
+        load_take(stage.file(settings.take), parameters)
+    return stage
 
 
 def _files(faults: list[str], kind: str, names: list[str], path: Path) -> tuple[Path, ...]:

@@ -13,10 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from controller.body import Body
 from controller.commands import CommandState
 from controller.errors import TakeError
+from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS as P
 from controller.sources import PipeStream, Sources, Voice, pump
+from controller.stage import load_stage
 
 RATE = 8000
 JAW = P.index("jawOpen")
@@ -75,6 +78,25 @@ def test_standard_input_reaches_another_process_through_a_pipe(raw_hz: int | Non
         assert until(lambda: sources.finished)
         thread.join(2.0)
     assert jaw_of(state) > 0.3
+
+
+def test_a_stages_own_take_and_voice_play_beside_its_links(tmp_path: Path) -> None:
+    (tmp_path / "a.tsv").write_text("0.0\taa\n0.3\tsil\n")
+    (tmp_path / "a.wav").write_bytes(wav(0.1))
+    (tmp_path / "stage.toml").write_text('name = "mine"\ntake = "a.tsv"\nvoice = "a.wav"\n')
+    with Mailbox.create(len(P)) as mailbox:
+        body = Body(load_stage(str(tmp_path / "stage.toml"), P), P, mailbox)
+        body.start()
+        body.begin()
+        try:
+            most, sources = 0.0, body.sources
+            while not (sources.heard and sources._player is not None and sources._player.finished):
+                most = max(most, body.newest()[0][JAW])
+                time.sleep(0.01)
+            assert most > 0.1 and not body.finished
+            body.check()
+        finally:
+            body.stop()
 
 
 def test_a_pipe_that_closes_is_the_end() -> None:
