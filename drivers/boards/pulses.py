@@ -103,10 +103,13 @@ class PulseBus(BoardBus):
 
     def _take(self, group: Sequence[int], pulses: Iterable[float]) -> None:
         """What the board says of some servos. One that lost its pulses may have lost all it was set to."""
+        seen = np.zeros(len(self.servos))
+        seen[list(group)] = pulses = list(pulses)
+        angles = self._scale.radians(seen)
         for index, pulse in zip(group, pulses, strict=True):
             if not self._track.believes(index, pulse, self.SLACK_US, float(self._stop_us[index])):
                 self._report.count("corrupt", self.ids[index])
                 self._doubt()
                 return
             self._forgot |= bool(self._running and self._on[index] and not pulse)
-            self._note(index, self._scale.radian(index, pulse))
+            self._note(index, float(angles[index]))
