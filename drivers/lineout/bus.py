@@ -77,6 +77,9 @@ class LineOutBus(BoardBus):
     ) -> None:
         super().__init__(servos, port=port, clock=clock, **options)
         self._names = [_checked_name(servo) for servo in self.servos]
+        twice = sorted({name for name in self._names if self._names.count(name) > 1})
+        if twice:
+            raise DriverError(f"two servos are called {', '.join(twice)}", hint="give each a wire_name of its own")
         self._scales = _scales(self.servos)
         self._checked, self._heartbeat_s = checksum, heartbeat_s
         self._tag = 0
@@ -130,7 +133,7 @@ class LineOutBus(BoardBus):
             if time.monotonic() >= end:
                 raise NoReply(
                     f"no head answers in the line protocol on {self.path} at {self._port.baud} baud",
-                    hint="check its power, its cable, its baud rate, and that it runs a sketch as in docs/drivers.md",
+                    hint="check its power, its cable, its baud rate, and that it runs a sketch as in docs/boards.md",
                     port=self.path,
                     servo_ids=self.ids,
                 )

@@ -380,3 +380,8 @@ def test_a_simple_line_head_starts_at_rest_and_takes_lines_it_has_room_for() -> 
 def test_a_name_that_cannot_stand_in_a_line_is_told() -> None:
     with pytest.raises(DriverError, match="'jaw open' cannot be a name"):
         open_bus("omote", [replace(NAMED[0], wire_name="jaw open")], port="")
+
+
+def test_two_servos_of_one_name_are_told() -> None:
+    with pytest.raises(DriverError, match="two servos are called jaw"):
+        open_bus("omote", [NAMED[0], replace(NAMED[1], wire_name="jaw")], port="")
