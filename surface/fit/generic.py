@@ -207,7 +207,7 @@ def _others(
             notes.append(f"{name!r}: left out: {why}")
             continue
         share = sum(_area(mesh, i) for i in islands) / max(skin_area, 1e-9)
-        points = int(np.clip(1.5 * POINTS * share, min(1.5 * LEAST * len(islands), POINTS), POINTS))
+        points = int(np.clip(1.5 * POINTS * share, min(3 * LEAST * len(islands), POINTS), POINTS))
         title = f"{material if material != 'skin' else 'piece'}_{len(out) + 1}"
         out.append(_part(title, material, points, 0.34, 0.5, scale, islands, mesh))
         notes.append(f"{name!r}: {len(islands)} islands as {title}")

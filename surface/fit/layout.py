@@ -10,12 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.fit.chart import TILE
-from surface.fit.islands import Island, directed_edges
+from surface.fit.chart import NARROW, TILE
+from surface.fit.islands import Island, boundary_loops, directed_edges
 from surface.fit.mesh import FitMesh
 
 Floats = NDArray[np.float64]
 LARGE = 0.03  # of an island's area: what runs the other way round in (u, v) and is smaller is a fold, not a half
+TILT = 0.35  # rad; holes that lie steeper than this are no slits along u
 FLAT = 0.05  # sine of a slope below which a surface has no up
 SMALLEST = 0.12  # tiles are as large as their islands, but never smaller than this
 
@@ -97,7 +98,24 @@ def _upright(mesh: FitMesh, island: Island) -> Island:
     even = (axes * np.sqrt(np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-30)))) @ axes.T
     up = np.linalg.inv(even) @ (weight @ slope[:, :, 1]) / total
     c, s = up[::-1] / np.linalg.norm(up) if np.linalg.norm(up) > FLAT else (1.0, 0.0)
-    return Island(island.vertex, uv @ even.T @ np.array([[c, -s], [s, c]]).T, island.faces)
+    return _levelled(Island(island.vertex, uv @ even.T @ np.array([[c, -s], [s, c]]).T, island.faces))
+
+
+def _levelled(island: Island) -> Island:
+    """The island turned a little more, so that its flat holes, mouth and lids, lie along u as slits do."""
+    tilt, length = [], []
+    for loop in boundary_loops(island)[1:]:
+        across = island.uv[loop] - island.uv[loop].mean(axis=0)
+        (long, short), (along, _) = np.linalg.svd(across, full_matrices=False)[1:]
+        angle = float(np.arctan(along[1] / along[0])) if abs(along[0]) > 1e-9 else np.pi
+        if short < NARROW * long and abs(angle) < TILT:
+            tilt.append(angle)
+            length.append(long)
+    if not tilt:
+        return island
+    mean = float(np.average(tilt, weights=length))
+    c, s = np.cos(mean), np.sin(mean)
+    return Island(island.vertex, island.uv @ np.array([[c, s], [-s, c]]).T, island.faces)
 
 
 def _slopes(mesh: FitMesh, island: Island) -> tuple[Floats, Floats]:

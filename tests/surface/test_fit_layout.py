@@ -7,7 +7,7 @@ from meshfiles import remapped
 from slit_sheet import SIZE_MM, slit_sheet
 
 from surface.fit.chart import TILE
-from surface.fit.islands import find_islands
+from surface.fit.islands import boundary_loops, find_islands
 from surface.fit.layout import lay_out, separate, signed_areas
 
 
@@ -61,3 +61,15 @@ def test_a_sheet_without_height_keeps_its_direction():
     flat = replace(mesh, vertices=mesh.vertices[:, [0, 2, 1]] * [1, 0, 1])
     (island,) = lay_out(flat, find_islands(flat))
     np.testing.assert_allclose(np.ptp(island.uv, axis=0), [1, 1], atol=0.05)
+
+
+def test_slits_lie_along_u_on_a_lopsided_mesh():
+    mesh = slit_sheet()
+    lean = mesh.vertices + np.column_stack([0.15 * mesh.vertices[:, 1], 0 * mesh.uv[:, 0], 0.3 * mesh.vertices[:, 0]])
+    c, s = np.cos(0.8), np.sin(0.8)
+    turned = replace(mesh, vertices=lean, uv=mesh.uv @ np.array([[c, -s], [s, c]]).T)
+    (island,) = lay_out(turned, find_islands(turned))
+    slit = island.uv[boundary_loops(island)[1]]
+    assert np.ptp(slit[:, 1]) < 0.2 * np.ptp(slit[:, 0])
+    edge = np.linalg.svd(slit - slit.mean(axis=0))[2][0]
+    assert abs(edge[1] / edge[0]) < 1e-6
