@@ -90,11 +90,8 @@ class Body:
             self.state.shows.start(stage.settings.show)
         self.puppet = Puppet(self.reflection, parameters) if mirror and self.reflection is not None else None
         self.live = take is None and replay is None
-        if self.live and stage.settings.take is not None:
-            path = stage.file(stage.settings.take)
-            take, layer = load_take(path, parameters), layer_of(path)
-        if self.live and voice is None and stage.settings.voice is not None:
-            voice = Voice(str(stage.file(stage.settings.voice)), stage.settings.voice_hz)
+        if self.live:
+            take, layer, voice = _own(stage, parameters, voice)
         player = TakePlayer(take, self.state, layer) if take is not None else None
         self.sources = Sources(self.state, player, self.puppet, voice, beside=self.live)
         self._mailbox = mailbox
@@ -207,6 +204,17 @@ class Body:
             "links": [link.report() for link in self.links],
             "buses": [bus.report() for bus in self.buses],
         }
+
+
+def _own(stage: Stage, parameters: Parameters, voice: Voice | None) -> tuple[Take | None, str, Voice | None]:
+    """What a stage plays by itself: its take, the take's layer, and its voice unless there is one already."""
+    settings, take, layer = stage.settings, None, "capture"
+    if settings.take is not None:
+        path = stage.file(settings.take)
+        take, layer = load_take(path, parameters), layer_of(path)
+    if voice is None and settings.voice is not None:
+        voice = Voice(str(stage.file(settings.voice)), settings.voice_hz)
+    return take, layer, voice
 
 
 def body_main(orders: BodyOrders, pipe: Connection) -> None:

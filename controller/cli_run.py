@@ -26,6 +26,10 @@ DryRun = Annotated[
     bool,
     typer.Option("--dry-run", help="Open no port, move nothing; show what would be sent."),
 ]
+Mirror = Annotated[bool, typer.Option("--mirror", help="Motors off: the face follows a head that is moved by hand.")]
+VoiceSource = Annotated[
+    str | None, typer.Option("--voice", help="WAV that moves the mouth: a file or pipe, - for standard input.")
+]
 VoiceHz = Annotated[
     int | None,
     typer.Option("--voice-rate", min=1000, help="The voice is signed 16 bit mono PCM without a header, at this rate."),
@@ -71,13 +75,8 @@ def run(
     pictures: Pictures = None,
     no_face: NoFace = False,
     dry_run: DryRun = False,
-    mirror: Annotated[
-        bool, typer.Option("--mirror", help="Motors off: the face follows a head that is moved by hand.")
-    ] = False,
-    voice: Annotated[
-        str | None,
-        typer.Option("--voice", help="WAV that moves the mouth: a file or pipe, - for standard input."),
-    ] = None,
+    mirror: Mirror = False,
+    voice: VoiceSource = None,
     voice_hz: VoiceHz = None,
     record: Record = None,
     identity: Annotated[

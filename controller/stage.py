@@ -155,11 +155,9 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
         _collect(faults, "identity", lambda: check_identity(head, settings.identity))
     robots = [
         _collect(
-            faults,
-            f"robots[{i}]",
-            lambda robot=robot: load_robot(find_config("robots", robot, beside=path), parameters),
+            faults, f"robots[{i}]", lambda name=name: load_robot(find_config("robots", name, beside=path), parameters)
         )
-        for i, robot in enumerate(settings.robots)
+        for i, name in enumerate(settings.robots)
     ]
     more = _files(faults, "vocabularies", settings.vocabularies, path)
     groups = _files(faults, "groups", list(settings.groups), path)
