@@ -209,7 +209,7 @@ def test_6_18_a_servo_that_shuts_down_is_seen_and_stays_limp(head: Head, bus: Bu
     assert head.torques() == [True, False, True]
     assert head.wire.servo(2).goal == goal, "a goal could switch it on"
     report = bus.report()
-    assert report.errors_by_servo[2] == {"alert": 1, "torque_lost": 1}
+    assert {"alert": 1, "torque_lost": 1}.items() <= report.errors_by_servo[2].items()
     np.testing.assert_allclose(bus.read().position_rad[[0, 2]], 0.0, atol=3 * STEP_RAD)
 
 
