@@ -130,3 +130,21 @@ def test_servos_read_one_by_one_take_turns(tmp_path: Path) -> None:
         fresh = [bus.read().fresh.tolist() for _ in range(3)]
         assert fresh == [[True, True, False], [True, False, True], [False, True, True]]
         assert bus.read().age_s.max() < 1.0
+
+
+@pytest.mark.parametrize("how", ["hw:2:0x20", "mute:2"])
+def test_a_servo_in_trouble_is_looked_at_without_waiting_for_its_turn(tmp_path: Path, how: str) -> None:
+    """Without turns, torque is only asked of servos that raise an alert or come back from silence."""
+    servos = servos_of(*("sts3215",) * 3)
+    with (
+        SimulatedBus(servos, link=tmp_path / "by-id") as wire,
+        open_bus("feetech", servos, port=wire.path, slow_group=0, margin_s=0.05, watchdog_ms=0) as bus,
+    ):
+        bus.start()
+        wire.fault(how)
+        if how == "mute:2":
+            contract.read_until(bus, lambda state: bool(state.silent[1]))
+            wire.servo(2).put("Torque Enable", 0)
+            wire.clear()
+        contract.read_until(bus, lambda state: not state.torque[1])
+        assert bus.report().errors_by_servo[2]["torque_lost"] == 1
