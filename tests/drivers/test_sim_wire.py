@@ -36,6 +36,11 @@ def test_sync_read_takes_the_formula(baud: int, expected_ms: float):
     assert out[-1][0] - 1.0 == pytest.approx((14 + 24 + 24 * 15) * 10 / baud)
 
 
+def test_nine_servos_are_within_a_tenth_of_the_formula_by_the_simulated_clock():
+    out = transaction(POSITION + IDS[:9], I.SYNC_READ, 1_000_000)
+    assert (out[-1][0] - 1.0) * 1e3 == pytest.approx(1.58, rel=1e-6)
+
+
 def test_every_status_pays_the_return_delay_but_a_fast_reply_only_once():
     bits = 10 / 1_000_000
     slow = transaction(POSITION + IDS, I.SYNC_READ, 1_000_000, delay=250)
