@@ -17,9 +17,9 @@ from controller.capturing import Capturing
 from controller.channels import servo_specs
 from controller.keys import Keyboard
 from controller.robot import BusSettings, ChannelSettings, RobotSettings
+from controller.signals import stop_flag
 from drivers import open_bus
 from drivers.bus import Bus
-from drivers.shutdown import stop_on_signals
 
 Floats = NDArray[np.float64]
 
@@ -57,13 +57,14 @@ def run_calibration(
     ------
     DriverError, ControllerError
     """
+    ended = stack.enter_context(stop_flag())
     keyboard = stack.enter_context(Keyboard())
     wires = [_opened(stack, robot, bus, channels) for bus in robot.buses if any(c.bus == bus.name for c in channels)]
     state = Capturing(channels, all(wire.bus.measures for wire in wires), margin_deg)
     written = False
     title = f"{robot.name}, calibration {name!r}"
     with Live(state.picture(title), console=console, auto_refresh=False, screen=True) as live:
-        while not state.done:
+        while not (state.done or ended.is_set()):
             _cycle(wires, state)
             live.update(state.picture(title), refresh=True)
             for key in keyboard.keys(PERIOD_S):
@@ -80,7 +81,6 @@ def _opened(stack: ExitStack, robot: RobotSettings, bus: BusSettings, channels: 
     slow = [replace(spec, max_speed_rad_s=min(spec.max_speed_rad_s, SLOW_RAD_S)) for spec in specs]
     opened = open_bus(bus.kind, slow, **bus.options())
     stack.enter_context(opened)
-    stack.enter_context(stop_on_signals(opened.stop))
     return _Wire(opened, np.array(indices, dtype=np.intp))
 
 

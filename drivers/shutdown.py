@@ -4,15 +4,18 @@
 SIGTERM, SIGHUP, exit.
 
 A signal handler may interrupt a transaction half way, so it does not touch the bus itself: it raises, the
-transaction unwinds, and the clean-up runs on the way out with further signals held back. SIGKILL cannot be
-caught; the servos' own bus watchdog covers it.
+transaction unwinds, and the clean-up runs on the way out with further signals held back. What is raised while a
+destructor or a callback runs is lost in Python; that is noticed, and raised once more. SIGKILL cannot be caught; the
+servos' own bus watchdog covers it.
 """
 
 from __future__ import annotations
 
+import _thread
 import atexit
 import logging
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -25,6 +28,9 @@ from drivers.errors import DriverError
 log = logging.getLogger(__name__)
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+LOST_S = 0.01
+"""After this time a signal is raised once more that was lost."""
 
 
 class _Once:
@@ -65,7 +71,8 @@ def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
     atexit.register(at_exit)
     previous = _install(_raise_signal)
     try:
-        yield
+        with _raised_again_when_lost(previous):
+            yield
     finally:
         _install(_hold_back, previous)
         try:
@@ -74,6 +81,33 @@ def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
             atexit.unregister(at_exit)
             for number, handler in previous.items():
                 signal.signal(number, handler)
+
+
+@contextmanager
+def _raised_again_when_lost(numbers: Any) -> Iterator[None]:
+    """Raise for a signal once more where what was raised had nowhere to go, as in a destructor."""
+    if not numbers:
+        yield
+        return
+    before = sys.unraisablehook
+
+    def notice(lost: Any) -> None:
+        if not isinstance(lost.exc_value, KeyboardInterrupt | SystemExit):
+            before(lost)
+            return
+        number = signal.SIGINT
+        if isinstance(lost.exc_value, SystemExit):
+            number = signal.Signals(int(str(lost.exc_value.code)) - 128)
+        _install(_raise_signal, numbers)
+        again = threading.Timer(LOST_S, _thread.interrupt_main, [number])  # raised in here it would be lost as well
+        again.daemon = True
+        again.start()
+
+    sys.unraisablehook = notice
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 def _install(handler: Callable[[int, FrameType | None], None], only: Any = SIGNALS) -> dict[int, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -13,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.sim import SimulatedBus
+from drivers.sim import ServoView, SimulatedBus
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 
@@ -48,14 +49,14 @@ class Terminal:
         os.set_blocking(self.master, False)
         self.shown = ""
 
-    def until(self, text: str) -> None:
-        """Wait until a text was drawn after the last one that was waited for."""
+    def until(self, pattern: str) -> None:
+        """Wait until a pattern was drawn after the last one that was waited for."""
         end = time.monotonic() + 30
-        while text not in self.shown:
+        while not (found := re.search(pattern, self.shown)):
             assert time.monotonic() < end, self.shown[-2000:]
             self.drain()
             time.sleep(0.02)
-        self.shown = self.shown[self.shown.rindex(text) + len(text) :]
+        self.shown = self.shown[found.end() :]
 
     def press(self, keys: str) -> None:
         os.write(self.master, keys.encode())
@@ -75,6 +76,14 @@ class Terminal:
         with suppress(BlockingIOError, OSError):
             self.shown += os.read(self.master, 65536).decode("utf-8", "ignore")
 
+    def capture(self, servo: ServoView) -> None:
+        """Neutral, lowest and highest of the only channel, each seen before the hand moves on."""
+        for angle, key in ((5, "n"), (-10, "["), (18, "]")):
+            servo.place(degrees(angle))
+            self.until(rf" {angle}\.0 ")
+            self.press(key)
+            self.until(rf" {angle}\.0 [^\n]* {angle}\.0 ")
+
 
 def degrees(value: float) -> float:
     return 2048 + value * 4096 / 360
@@ -92,11 +101,7 @@ def test_a_head_is_calibrated_by_hand_and_by_keys_and_saved(tmp_path: Path) -> N
         robot = tmp_path / "pair.toml"
         robot.write_text(ROBOT.format(port=head.path))
         servo, terminal = head.servo(1), Terminal(str(robot), "--name", "desk", "--margin", "0")
-        for angle, shown, key in ((5, "5.0", "n"), (-10, "-10.0", "["), (18, "18.0", "]")):
-            servo.place(degrees(angle))
-            terminal.until(shown)
-            terminal.press(key)
-        terminal.until("18.0")
+        terminal.capture(servo)
         assert not servo.torque
         terminal.press("h")
         wait(lambda: servo.torque)
@@ -119,10 +124,8 @@ def test_a_calibration_that_exists_is_not_replaced_without_a_yes(tmp_path: Path)
         robot.write_text(ROBOT.format(port=head.path))
         old.write_text("precious")
         servo, terminal = head.servo(1), Terminal(str(robot), "--name", "desk")
-        for angle, shown, key in ((5, "5.0", "n"), (-10, "-10.0", "["), (18, "18.0", "]s")):
-            servo.place(degrees(angle))
-            terminal.until(shown)
-            terminal.press(key)
+        terminal.capture(servo)
+        terminal.press("s")
         terminal.until("replace")
         terminal.press("n")
         terminal.until("not saved")
@@ -136,7 +139,7 @@ def test_a_calibration_that_exists_is_not_replaced_without_a_yes(tmp_path: Path)
     assert "precious" not in old.read_text()
 
 
-def test_a_killed_calibration_leaves_the_motors_off(tmp_path: Path) -> None:
+def test_a_calibration_that_is_told_to_end_leaves_the_motors_off(tmp_path: Path) -> None:
     with SimulatedBus([1], link=tmp_path / "port") as head:
         robot = tmp_path / "pair.toml"
         robot.write_text(ROBOT.format(port=head.path))
@@ -145,5 +148,6 @@ def test_a_killed_calibration_leaves_the_motors_off(tmp_path: Path) -> None:
         terminal.press("h")
         wait(lambda: head.servo(1).torque)
         terminal.process.terminate()
-        assert terminal.end() == 143
+        assert terminal.end() == 0
+        assert not list(tmp_path.glob("*.calibration.toml"))
         assert not head.servo(1).torque

@@ -31,6 +31,12 @@ with stop_on_signals(stop):
         raise RuntimeError("in the loop")
     if sys.argv[1] == "exit":
         sys.exit(5)
+    class Busy:
+        def __del__(self):
+            print("ready", flush=True)
+            time.sleep(1.0)
+    while sys.argv[1] == "destructor":
+        Busy()
 """
 
 
@@ -46,9 +52,11 @@ def run(root: Path, how: str, send: int | None = None) -> tuple[int, str]:
     assert child.stdout.readline() == "ready\n"
     if send is not None:
         child.send_signal(send)
-    with child.stdout as stream:
-        out = stream.read()
-    return child.wait(timeout=20), out
+    try:
+        out, _ = child.communicate(timeout=20)
+    finally:
+        child.kill()
+    return child.returncode, out
 
 
 @pytest.mark.parametrize(
@@ -60,10 +68,13 @@ def run(root: Path, how: str, send: int | None = None) -> tuple[int, str]:
         ("sleep", signal.SIGTERM, 143),
         ("sleep", signal.SIGHUP, 129),
         ("sleep", signal.SIGINT, -signal.SIGINT),
+        ("destructor", signal.SIGTERM, 143),
+        ("destructor", signal.SIGINT, -signal.SIGINT),
     ],
 )
 def test_every_way_out_stops_exactly_once(root: Path, how: str, send: int | None, code: int) -> None:
-    assert run(root, how, send) == (code, "stopped 1\n")
+    status, out = run(root, how, send)
+    assert (status, out.replace("ready\n", "")) == (code, "stopped 1\n")
 
 
 def test_handlers_are_put_back() -> None:
