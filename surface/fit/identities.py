@@ -37,7 +37,7 @@ TABLE = Path(__file__).with_name("identities.toml")
 LEAST_MM = 0.01
 LID_V, ROWS = 0.03, 9  # how far a lid reaches outside the hole in the skin, in v; where it is looked at
 SHORT_MM = 1.0  # lids that have less far to go than this, at the corners, are changed less
-TRIES, LEEWAY = 5, (-0.4, 0.6)  # of scaling a blink; how much at most
+TRIES, STEP, LEEWAY = 7, 0.6, (-0.4, 0.6)  # of scaling a blink; by what share of the gap; how much at most
 NEAR = 8  # mesh vertices whose displacement a hair or a tooth follows
 SAME_FIT_MM = 0.5  # control points of a head that was fitted to another mesh lie further off than this, RMS
 
@@ -139,7 +139,7 @@ def fit_identities(
 ) -> list[Identity]:  # fmt: skip
     """Groups of control points that move the head as ``fields`` move the mesh."""
     base = prepare(mesh, recipe)
-    others = [_at_rest(mesh, recipe, field) for field in fields.values()]
+    others = [prepare(mesh.moved(mesh.vertices + field, mesh.deltas), recipe) for field in fields.values()]
     shifts = np.stack([o.vertices - base.vertices for o in others])
     eyes = eyes_of(base, recipe)[0]
     eye_shifts = np.stack([eyes_of(o, recipe)[0] - eyes for o in others])
@@ -170,14 +170,6 @@ def _part_moves(
     return out
 
 
-def _at_rest(mesh: FitMesh, recipe: Recipe, field: Floats) -> FitMesh:
-    """The face that a field makes, lips closed and lids seated, without the shapes that this does not need."""
-    closing = [k for k, n in enumerate(mesh.names) if n == "mouthClose"]
-    names = tuple(mesh.names[k] for k in closing)
-    other = mesh.moved(mesh.vertices + field, mesh.deltas).with_shapes(names, mesh.deltas[closing])
-    return prepare(other, replace(recipe, frown={}))
-
-
 def _rims(mesh: FitMesh, chart: Chart, eye: Floats) -> tuple[Floats, Floats]:
     """(u, v), (c, ROWS, 2), of the upper and the lower lid: columns by x, rows from the edge of the hole outwards."""
     middles = [np.linalg.norm(mesh.vertices[ids].mean(axis=0) - eye) for ids in chart.loop_vertices]
@@ -200,12 +192,15 @@ def close_lids(head: HeadData, identity: Identity, lids: list[tuple[Floats, Floa
         edges = basis(net, np.vstack([upper, lower]).reshape(-1, 2))
         open_, closed = (_edge_heights(head, edges, len(upper), {name: v}) for v in (0.0, 1.0))
         x, travel = open_[0], open_[1] - closed[1]
-        share = np.zeros(len(x))
+        share = best = np.zeros(len(x))
+        least = np.inf
         for _ in range(TRIES):
             trial = with_identities(head, {"": _with_change(head, identity, name, x, share)}, {"": 1.0}, "")
             wider = _edge_heights(trial, edges, len(upper), {name: 1.0})[1] - closed[1]
-            share = np.clip(share + wider * travel / (travel**2 + SHORT_MM**2), *LEEWAY)
-        identity = _with_change(head, identity, name, x, share)
+            if (off := float(np.abs(wider).max())) < least:
+                least, best = off, share
+            share = np.clip(share + STEP * wider * travel / (travel**2 + SHORT_MM**2), *LEEWAY)
+        identity = _with_change(head, identity, name, x, best)
     return identity
 
 

@@ -1,4 +1,4 @@
-"""Mesh files made for tests: GLB with morph targets (plain or sparse), OBJ with shapes; and other layouts of one mesh."""
+"""Mesh files made for tests: GLB with morph targets, OBJ with shapes; and other layouts of one mesh."""
 
 from __future__ import annotations
 
