@@ -52,11 +52,11 @@ class Terminal:
     def until(self, pattern: str) -> None:
         """Wait until a pattern was drawn after the last one that was waited for."""
         end = time.monotonic() + 30
-        while not (found := re.search(pattern, self.shown)):
-            assert time.monotonic() < end, self.shown[-2000:]
+        while not (found := re.search(pattern, plain := re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", self.shown))):
+            assert time.monotonic() < end, plain[-2000:]
             self.drain()
             time.sleep(0.02)
-        self.shown = self.shown[found.end() :]
+        self.shown = plain[found.end() :]
 
     def press(self, keys: str) -> None:
         os.write(self.master, keys.encode())
