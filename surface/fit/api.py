@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.fit.chart import Chart, make_chart
+from surface.fit.finish import finish_head
 from surface.fit.generic import Plan, make_plan
 from surface.fit.islands import Island, find_islands
 from surface.fit.joins import find_seams
@@ -22,8 +23,9 @@ from surface.fit.refine import Fitted, fit_chart
 from surface.fit.relax import open_flat_holes
 from surface.fit.report import FitReport, PartReport, measure
 from surface.fit.rigging import find_jaw
-from surface.fit.seat import close_lips, seat_lids, strengthen
+from surface.fit.seat import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.strokes import make_paint
+from surface.fit.wrinkles import deepened
 from surface.head.data import HeadData, Neck, PartData
 from surface.head.file import save_data
 from surface.head.meshes import pack, tessellate
@@ -105,7 +107,8 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         name, _provenance(recipe), _neck(mesh, recipe), body.eyes, body.radius, body.jaw,
         parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
     )  # fmt: skip
-    head = replace(head, parts=[_with_mesh(p, head) for p in parts])
+    head = finish_head(head, mesh, charts, recipe)
+    head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
     left_out = loaded.named.left_out
     report = FitReport(name, reports, sorted(sources), loaded.named.missing, left_out, [*loaded.notes, *plan.notes])
     return FitResult(head, report, fitted_parts)
@@ -142,6 +145,8 @@ def _still(mesh: FitMesh) -> FitMesh:
 def prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
     """The mesh as the recipe wants it: lips closed, blinks strengthened, lids seated on anatomical eyeballs."""
     mesh = strengthen(close_lips(mesh, recipe.lips_close), "eyeBlink", recipe.blink)
+    if recipe.frown:
+        mesh = draw_brows(mesh, **recipe.frown)
     balls = recipe.eyeballs(mesh)
     return mesh if balls is None else seat_lids(mesh, *balls, recipe.seated)
 
@@ -183,7 +188,7 @@ def _with_mesh(part: PartData, head: HeadData) -> PartData:
     surface = make_surface(part)
     if part.follows == "skin":
         lively = SkinRig(part, head).apply(read_pose(np.array([LIVELY.get(n, 0.0) for n in NAMES])))
-        surface = surface.with_points(lively)
+        surface = surface.with_points(deepened(part, lively))
     return replace(part, mesh=pack(tessellate(part, surface), part.budget))
 
 

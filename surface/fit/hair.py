@@ -85,19 +85,19 @@ def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: 
         at + reach * (0.55 * LASH_LEAN * away + 0.12 * LASH_LIFT * up),
         at + reach * (LASH_LEAN * away + LASH_LIFT * up),
     ]
-    return fit_strip(np.stack(rows, axis=2), 10, 3, [_comb(hairs, lean=0.012)])
+    return fit_strip(np.stack(rows, axis=2), 10, 3, [_comb(hairs, lean=0.012, thick=0.42 if upper else 0.36)])
 
 
-def _comb(hairs: int, *, lean: float) -> Floats:
-    """One closed line: a thin continuous root, and hairs that taper to points."""
-    rng = np.random.default_rng(5)
+def _comb(hairs: int, *, lean: float, thick: float) -> Floats:
+    """One closed line: a thin continuous root, and hairs that taper to points; ``thick`` in their distances."""
+    rng, root = np.random.default_rng(5), 0.22 * thick
     tops = []
     for k in range(hairs):
         s = (k + 0.5) / hairs
-        half = 0.42 / hairs
-        tip = 1.0 - 0.25 * rng.random()
-        shift = lean * (2 * s - 1) * 4 + 0.3 * (rng.random() - 0.5) / hairs
-        tops += [(s - half, 0.09), (s + shift, tip), (s + half, 0.09)]
+        half = thick / hairs
+        tip = 1.0 - 0.35 * rng.random()
+        shift = lean * (2 * s - 1) * 4 + 0.6 * (rng.random() - 0.5) / hairs
+        tops += [(s - half, root), (s + shift, tip), (s + half, root)]
     line = np.array([(0.0, 0.0), *tops, (1.0, 0.0)])
     return np.clip(line, 0.0, 1.0)
 

@@ -22,7 +22,7 @@ from surface.head.data import Jaw, PartData
 Floats = NDArray[np.float64]
 STILL = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
 LASH_ROOT = 0.0145  # how far outside the hole in the skin the lashes stand, in v
-LASH_MM, LOWER_LASH_MM = 8.0, 4.0
+LASH_MM, LOWER_LASH_MM = 8.0, 3.2
 BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
 
 
@@ -57,7 +57,7 @@ def teeth_part(mesh: FitMesh, part: PartRecipe, body: Body) -> tuple[PartData, P
     low, high = part.vertices[0]
     teeth = split_teeth(mesh, np.flatnonzero((first >= low) & (first < high)))
     chart, crowns = crown_chart(mesh, teeth, part.follows != "jaw")
-    wish = replace(part.wish, points=part.wish.points * len(teeth), coarse=0.4, deepest=1, neutral_mm=0.08)
+    wish = replace(part.wish, points=part.wish.points * len(teeth), coarse=0.4, deepest=2, neutral_mm=0.08)
     fitted = fit_chart(crowns, chart, wish)
     return skin_part(part, chart, fitted, body), measure(part.name, chart, fitted, ())
 
@@ -85,7 +85,7 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], bod
         for upper in (True, False):
             root, along = _lid_line(rim, upper=upper, inner_first=is_left)
             length = (LASH_MM if upper else LOWER_LASH_MM) * _length_profile(along)
-            lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=28 if upper else 18))
+            lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=28 if upper else 16))
     return [_strips_part("brows", "brow", brows, body), _strips_part("lashes", "lash", lashes, body)]
 
 

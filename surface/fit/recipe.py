@@ -57,6 +57,9 @@ class Recipe:
     source: dict[str, str] = field(default_factory=dict)
     paint: list[dict[str, Any]] = field(default_factory=list)
     hair: dict[str, Any] = field(default_factory=dict)
+    frown: dict[str, Any] = field(default_factory=dict)
+    wrinkles: list[dict[str, Any]] = field(default_factory=list)
+    mends: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def seated(self) -> NDArray[np.int64]:
@@ -100,6 +103,9 @@ def _read(table: dict[str, Any]) -> Recipe:
         source=table["source"],
         paint=table["paint"],
         hair=table["hair"],
+        frown=table["frown"],
+        wrinkles=table["wrinkles"],
+        mends=table["mends"],
     )
 
 

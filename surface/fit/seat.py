@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from surface.fit.mesh import FitMesh
 
 Floats = NDArray[np.float64]
+LID_MM = (0.1, 1.2)  # a lid that lies on the eyeball is this far above it: its inner edge, its skin
+FRONT_MM = (0.0, 5.0)  # in front of an eyeball's centre: where lids begin to lie on it, and where they do
 HELD = 0.93  # of the radius: further out a sphere's front is too steep to seat a lid on
 
 
@@ -35,13 +37,35 @@ def fit_sphere(points: Floats) -> tuple[Floats, float]:
 def seat_lids(mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: NDArray[np.int64]) -> FitMesh:
     """Move the chosen vertices so that what touched the old eyeballs touches the new ones."""
     rest = mesh.vertices.copy()
-    rest[vertices] = _warp(mesh.vertices[vertices], old, new)
+    warped = _warp(mesh.vertices[vertices], old, new)
+    thick = np.clip(_above(warped, new), *LID_MM)
+    rest[vertices] = _lift(warped, new, thick)
     deltas = mesh.deltas.copy()
     for k, delta in enumerate(mesh.deltas):
         moved = np.flatnonzero(np.abs(delta[vertices]).max(axis=1) > 1e-4)
         at = vertices[moved]
-        deltas[k, at] = _warp(mesh.vertices[at] + delta[at], old, new) - rest[at]
+        deltas[k, at] = _lift(_warp(mesh.vertices[at] + delta[at], old, new), new, thick[moved]) - rest[at]
     return mesh.moved(rest, deltas)
+
+
+def _from_eye(points: Floats, ball: Eyeball) -> tuple[Floats, Floats]:
+    """Offsets (m, 3) of points from the eye on their side, and that eye's centre (m, 3)."""
+    side = np.where(points[:, 0] >= 0, 1.0, -1.0)
+    centre = np.array(ball.centre) * np.column_stack([side, np.ones_like(side), np.ones_like(side)])
+    return points - centre, centre
+
+
+def _above(points: Floats, ball: Eyeball) -> Floats:
+    """(m,) height of points above the eyeball on their side."""
+    return np.linalg.norm(_from_eye(points, ball)[0], axis=1) - ball.radius
+
+
+def _lift(points: Floats, ball: Eyeball, thick: Floats) -> Floats:
+    """Points in front of an eyeball moved away from its centre until they are ``thick (m,)`` above it."""
+    offset, centre = _from_eye(points, ball)
+    length = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
+    lack = np.maximum(ball.radius + thick - length, 0.0) * _smooth(offset[:, 2], *FRONT_MM)
+    return centre + offset * (1.0 + lack / length)[:, None]
 
 
 def _warp(points: Floats, old: Eyeball, new: Eyeball) -> Floats:
@@ -86,3 +110,27 @@ def strengthen(mesh: FitMesh, prefix: str, factor: float) -> FitMesh:
     """Scale the shapes whose names begin with ``prefix``."""
     scale = np.array([factor if n.startswith(prefix) else 1.0 for n in mesh.names])
     return mesh.moved(mesh.vertices, mesh.deltas * scale[:, None, None])
+
+
+def draw_brows(
+    mesh: FitMesh, prefix: str, centre: tuple[float, float], reach: tuple[float, float], move: tuple[float, ...]
+) -> FitMesh:
+    """Let the shapes whose names begin with ``prefix`` draw the heads of the brows further, as the corrugator does.
+
+    Parameters
+    ----------
+    centre : (x, y) of the left brow's head, mm; reach : how far around it skin follows, in x and y, mm.
+    move : (3,) of the left brow's head, mm; the right one's is its mirror image.
+    """
+    deltas = mesh.deltas.copy()
+    for k, name in enumerate(mesh.names):
+        if not name.startswith(prefix):
+            continue
+        side = -1.0 if name.endswith(("_R", "Right")) else 1.0
+        x = side * mesh.vertices[:, 0]
+        weight = np.exp(
+            -0.5 * (((x - centre[0]) / reach[0]) ** 2 + ((mesh.vertices[:, 1] - centre[1]) / reach[1]) ** 2)
+        )
+        weight *= _smooth(mesh.vertices[:, 2], 60.0, 90.0) * _smooth(x, -6.0, centre[0])
+        deltas[k] += weight[:, None] * np.array(move) * [side, 1.0, 1.0]
+    return mesh.moved(mesh.vertices, deltas)

@@ -18,6 +18,8 @@ from surface.head.data import Contact, HeadData, PartData
 Floats = NDArray[np.float64]
 MEET = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
 SOFT_MM = 0.1
+PRESS_MM = (0.05, 0.15)  # so deep they may overlap: triangles cut about that off the round of both sides
+FAR_MM = 30.0  # sides further apart than this are not brought together
 PASSES, AGAIN_MM = 2, 0.4  # the second pass takes what bending left over of more than that
 LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
 TOUCH_MM = 0.05  # what rests on the eyeball keeps this far away
@@ -66,10 +68,19 @@ class Feeler:
                 break
         return self.push
 
+    def closing(self, points: Floats, overlap_mm: float) -> Floats:
+        """Displacements (n, 3) of control points (n, 3) that bring parted sides together to overlap a little."""
+        self._place(points)
+        find_overlap(self._samples[:, :, : self._meeting], PRESS_MM[self.radius > 0], FAR_MM, self._overlap)
+        apart = np.minimum(2.0 * np.sqrt(FAR_MM * self._overlap) - FAR_MM - overlap_mm, 0.0)
+        moved = np.array(points)
+        move_points(self.ids, apart.ravel(), self._away, self.eye, self.radius, False, moved)
+        return moved - points
+
     def _part(self, points: Floats) -> float:
         """Move the sides apart where they overlap; returns the deepest overlap, mm."""
         self._place(points)
-        find_overlap(self._samples[:, :, : self._meeting], SOFT_MM, self._overlap)
+        find_overlap(self._samples[:, :, : self._meeting], PRESS_MM[self.radius > 0], SOFT_MM, self._overlap)
         self.push += self._overlap
         move_points(self.ids, self._overlap.ravel(), self._away, self.eye, self.radius, False, points)
         return float(self._overlap.max())

@@ -48,11 +48,12 @@ def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sig
 
 
 @kernel
-def find_overlap(samples: Floats, soft: float, push: Floats) -> None:
+def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> None:
     """How far the sides of an opening must give way, ``push (2, k)``, from ``samples (2, k, m, 3)``.
 
     Side 0 is the upper one. Every column of a side is held against the other side at the same x; where the two
-    profiles lie at one depth, the upper must not be lower. ``soft`` mm before they meet they begin to give way.
+    profiles lie at one depth, the upper must not be lower by more than ``press`` mm; ``soft`` mm before that they
+    begin to give way.
     """
     _, columns, rows, _ = samples.shape
     heights, depths = np.empty(rows), np.empty(rows)
@@ -75,6 +76,7 @@ def find_overlap(samples: Floats, soft: float, push: Floats) -> None:
             for j in range(rows):
                 worst = max(worst, overlap_at(own[k, j, 1], own[k, j, 2], heights, depths, sign))
                 worst = max(worst, overlap_at(heights[j], depths[j], own[k, :, 1], own[k, :, 2], -sign))
+            worst -= press
             near = min(max(worst + soft, 0.0), 2.0 * soft)
             push[side, k] = worst if worst > soft else near * near / (4.0 * soft)
 

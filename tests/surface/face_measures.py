@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -64,7 +65,7 @@ def rim(part, loop: np.ndarray) -> np.ndarray:
     ids = np.unique(border_edges(part.mesh.triangles))
     steps = np.concatenate([loop, loop[:1]])
     fine = np.concatenate([a + np.linspace(0, 1, 16, endpoint=False)[:, None] * (b - a)
-                           for a, b in zip(steps, steps[1:], strict=False)])  # fmt: skip
+                           for a, b in pairwise(steps)])  # fmt: skip
     distance, at = cKDTree(fine).query(part.mesh.uv[ids])
     near = distance < 2e-3
     return ids[near][np.argsort(at[near])]
@@ -207,3 +208,26 @@ def lips_gap(head: Head, step: float = 0.1) -> float:
     skin = window.depth(head.part("face"))
     back = window.depth(*(head.part(n) for n in ("cavity", "teeth_upper", "teeth_lower", "tongue")))
     return float(((back > skin) & np.isfinite(skin)).sum(axis=0).max() * step)
+
+
+def inside(points: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """(m,) which points (m, 2) lie in a closed polygon (k, 2), by the even-odd rule."""
+    odd = np.zeros(len(points), bool)
+    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        crosses = (a[1] > points[:, 1]) != (b[1] > points[:, 1])
+        height = b[1] - a[1] if b[1] != a[1] else 1e-18
+        odd ^= crosses & (points[:, 0] < a[0] + (points[:, 1] - a[1]) / height * (b[0] - a[0]))
+    return odd
+
+
+def poke(head: Head, ring: np.ndarray, window: Window, *names: str) -> float:
+    """How far parts stand out of the face, seen from the front, outside the opening with the rim ``ring`` (ids)."""
+    face = head.part("face")
+    skin, own = window.depth(face), window.depth(*(head.part(n) for n in names))
+    out = np.argwhere(np.isfinite(skin) & np.isfinite(own) & (own > skin + LEAST_MM))
+    if not len(out):
+        return 0.0
+    at = out[:, ::-1] * window.step + [window.x[0], window.y[0]]
+    beside = ~inside(at, face.vertices[ring, :2].astype(float))
+    rows = out[beside]
+    return float((own[rows[:, 0], rows[:, 1]] - skin[rows[:, 0], rows[:, 1]]).max(initial=0.0))

@@ -1,0 +1,159 @@
+"""The shipped head, measured: lips and lids meet and do not cross, nothing stands out where it should not."""
+
+import itertools
+
+import numpy as np
+import pytest
+from face_measures import Window, crossing, eye_cut, eye_opening, lips_gap, poke, rim, sides
+
+from surface.head import NAMES, Head
+
+EYES = ("eye_left", "eye_right")
+MOUTH = ("teeth_upper", "teeth_lower", "gums_upper", "gums_lower")
+HARD = [
+    ("mouthPucker", "mouthShrugLower"), ("mouthLeft", "mouthShrugLower"), ("mouthRollLower", "mouthRollUpper"),
+    ("mouthLeft", "mouthRollLower"), ("jawOpen", "mouthClose"), ("mouthSmileLeft", "mouthDimpleLeft"),
+    ("eyeBlinkLeft", "eyeSquintLeft"), ("eyeBlinkLeft", "cheekSquintLeft"), ("eyeBlinkLeft", "eyeLookOutLeft"),
+    ("eyeBlinkLeft", "mouthSmileLeft"), ("jawOpen", "mouthPucker"), ("mouthRollLower", "mouthShrugLower"),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def head(root) -> Head:
+    return Head.load(root / "configs" / "heads" / "ict")
+
+
+@pytest.fixture(scope="module")
+def loops(head) -> list[np.ndarray]:
+    return head.data.parts[0].loops
+
+
+@pytest.fixture(scope="module")
+def lips(head, loops):
+    return sides(head, loops[1], "cavity", 14.0)
+
+
+@pytest.fixture(scope="module")
+def lids(head, loops):
+    return sides(head, loops[2], "sockets", 8.0)
+
+
+def looking(yaw: float, pitch: float) -> dict[str, float]:
+    return {f"{s}Eye{a}": v for s in ("left", "right") for a, v in (("Yaw", yaw), ("Pitch", pitch))}
+
+
+@pytest.mark.parametrize("pitch", [-1.0, -0.5, 0.0, 0.5, 1.0])
+@pytest.mark.parametrize("yaw", [-0.86, 0.0, 0.86])
+def test_a_blink_closes_both_eyes_at_every_gaze(head, yaw, pitch):
+    head.pose(head.values(looking(yaw, pitch) | {"eyeBlinkLeft": 1, "eyeBlinkRight": 1}))
+    widest = 0.6 if pitch == 1.0 else 0.3  # straight down the cornea stands right in the lids' gap
+    assert max(eye_opening(head, side)[0] for side in (0, 1)) < widest
+
+
+@pytest.mark.parametrize("pitch", [-1.0, 0.0, 1.0])
+def test_lids_do_not_cut_the_eyeball_at_any_gaze(head, pitch):
+    for yaw in (-0.86, 0.0, 0.86):
+        head.pose(head.values(looking(yaw, pitch)))
+        assert max(eye_cut(head, side, "face") for side in (0, 1)) < 0.5
+
+
+def test_eyes_at_rest_are_calm(head):
+    head.pose(head.values({}))
+    iris = 0.49 * head.data.eye_radius
+    for side in (0, 1):
+        height, top, bottom = eye_opening(head, side)
+        assert 8.5 < height < 10.5
+        assert 1.0 < iris - top < 2.4  # the upper lid lies over the iris
+        assert bottom == pytest.approx(-iris, abs=0.6)  # and the lower one touches it
+
+
+def test_the_upper_lid_follows_the_gaze(head):
+    tops = []
+    for pitch in (-1.0, 0.0, 1.0):
+        head.pose(head.values(looking(0, pitch)))
+        tops.append(eye_opening(head, 0)[1])
+    assert tops[0] > tops[1] + 2.5 and tops[2] < tops[1] - 4.0
+
+
+@pytest.mark.parametrize("jaw", [0.0, 0.3, 0.6, 1.0])
+def test_lips_meet_at_rest_and_over_an_open_jaw(head, jaw):
+    head.pose(head.values({"jawOpen": jaw, "mouthClose": jaw}))
+    assert lips_gap(head) < 0.3
+
+
+def test_no_two_parameters_push_lips_or_lids_into_each_other(head, lips, lids):
+    mouth = [n for n in NAMES[:52] if n.startswith(("mouth", "jaw")) and not n.endswith("Right")]
+    pairs = list(itertools.combinations_with_replacement(mouth, 2))
+    chosen = np.random.default_rng(4).choice(len(pairs), 60, replace=False)
+    for one, other in [*HARD, *(pairs[i] for i in chosen)]:
+        head.pose(head.values({one: 1.0, other: 1.0}))
+        assert crossing(*lips)[0] < 0.85, (one, other)
+        assert crossing(*lids)[0] < 0.85, (one, other)
+
+
+def mixture(rng: np.random.Generator) -> np.ndarray:
+    values = np.zeros(59)
+    values[rng.choice(59, 6, replace=False)] = rng.uniform(0, 1, 6)
+    values[52:55] = 0.0
+    return values
+
+
+def test_no_seam_opens_in_random_mixtures(head):
+    rng = np.random.default_rng(11)
+    for _ in range(500):
+        head.pose(mixture(rng))
+        for z in head._zippers:
+            if z.first is not z.second:
+                a, b = z.first.vertices, z.second.vertices
+                edge = a[z.low] + z.share[:, None] * (a[z.high] - a[z.low])
+                assert np.abs(b[z.ids] - edge).max(initial=0.0) < 0.1
+
+
+def test_eyes_and_teeth_do_not_poke_through_the_skin(head, loops):
+    face = head.part("face")
+    rings = [rim(face, loop) for loop in loops[1:4]]
+    mouth = Window((-32.0, 32.0), (-80.0, -5.0), 0.8)
+    rng = np.random.default_rng(7)
+    for k in range(60):
+        values = np.eye(59)[k] if k < 52 else mixture(rng)
+        head.pose(values)
+        assert poke(head, rings[0], mouth, *MOUTH) < 0.5, NAMES[k] if k < 52 else values
+        for side, x in enumerate((31.8, -31.8)):
+            assert poke(head, rings[1 + side], Window((x - 16, x + 16), (22.0, 50.0), 0.8), EYES[side]) < 0.5
+
+
+def test_wrinkles_are_not_there_at_rest_and_set_in_softly(head):
+    rules = {r.group: r for r in head.data.rules}
+    folds = {g.name: g for g in head.data.parts[0].groups if g.name.startswith("wrinkle")}
+    assert {"wrinkleForehead", "wrinkleFrownLeft", "wrinkleFrownRight", "wrinkleEyeLeft", "wrinkleCheekLeft"} <= {
+        *folds
+    }
+    part, drivers = head.part("face"), head.part("face").rig._drivers
+    for name, fold in folds.items():
+        assert name in rules
+        full = {n: 1.0 for term in rules[name].terms for n in term}
+        amounts = []
+        for share in (0.0, 0.25, 0.5):
+            head.pose(head.values({n: share * v for n, v in full.items()}))
+            amounts.append(drivers.amounts(_shapes(head, full, share))[drivers.names.index(name)])
+        assert amounts[0] == 0 and amounts[1] < 0.5 * amounts[2]
+        head.pose(head.values(full))
+        deep, flat = part.control_points, part.control_points.copy()
+        flat[fold.ids] -= fold.moves * drivers.amounts(_shapes(head, full, 1.0))[drivers.names.index(name)]
+        uv = np.column_stack([k[:, 2] for k in (head.data.parts[0].knots_u, head.data.parts[0].knots_v)])[fold.ids]
+        sunk = part.surface.with_points(deep).evaluate(uv) - part.surface.with_points(flat).evaluate(uv)
+        assert 0.25 < np.quantile(np.linalg.norm(sunk, axis=1), 0.9) < 1.2, name
+
+
+def _shapes(head: Head, given: dict[str, float], share: float) -> np.ndarray:
+    return head.values({n: share * v for n, v in given.items()})[:52]
+
+
+def test_brows_come_down_and_together(head):
+    head.pose(head.values({}))
+    brows = head.part("brows")
+    rest = brows.vertices.copy()
+    inner = (np.abs(rest[:, 0]) < 18) & (rest[:, 0] > 0)
+    head.pose(head.values({"browDownLeft": 1, "browDownRight": 1}))
+    move = (brows.vertices - rest)[inner].mean(axis=0)
+    assert move[0] < -3.0 and move[1] < -2.5
