@@ -12,6 +12,8 @@ FORBIDDEN = {
     "surface": {"drivers", "controller", "serial", "dynamixel_sdk", "pydantic", "typer"},
     "drivers": {"surface", "controller", "moderngl", "numba", "scipy", "pydantic", "typer"},
 }
+COMPILED = {"drivers/kernels.py": {"numba"}}
+"""Loaded by whoever drives a bus and by nobody else, so that looking for ports stays quick."""
 
 
 def imported(path: Path) -> set[str]:
@@ -29,7 +31,8 @@ def imported(path: Path) -> set[str]:
 def test_room_imports_nothing_from_above(room: str) -> None:
     files = sorted((ROOT / room).rglob("*.py"))
     assert files
-    wrong = {str(f.relative_to(ROOT)): imported(f) & FORBIDDEN[room] for f in files}
+    wrong = {name: imported(ROOT / name) & FORBIDDEN[room] for name in (str(f.relative_to(ROOT)) for f in files)}
+    wrong = {name: found - COMPILED.get(name, set()) for name, found in wrong.items()}
     assert {name: found for name, found in wrong.items() if found} == {}
 
 
