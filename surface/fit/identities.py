@@ -37,7 +37,7 @@ TABLE = Path(__file__).with_name("identities.toml")
 LEAST_MM = 0.01
 LID_V, ROWS = 0.03, 9  # how far a lid reaches outside the hole in the skin, in v; where it is looked at
 SHORT_MM = 1.0  # lids that have less far to go than this, at the corners, are changed less
-TRIES, STEP, LEEWAY = 7, 0.6, (-0.4, 0.6)  # of scaling a blink; by what share of the gap; how much at most
+TRIES, STEP, LEEWAY = 9, 0.5, (-0.4, 0.6)  # of scaling a blink; by what share of the gap; how much at most
 NEAR = 8  # mesh vertices whose displacement a hair or a tooth follows
 SAME_FIT_MM = 0.5  # control points of a head that was fitted to another mesh lie further off than this, RMS
 
@@ -197,7 +197,7 @@ def close_lids(head: HeadData, identity: Identity, lids: list[tuple[Floats, Floa
         for _ in range(TRIES):
             trial = with_identities(head, {"": _with_change(head, identity, name, x, share)}, {"": 1.0}, "")
             wider = _edge_heights(trial, edges, len(upper), {name: 1.0})[1] - closed[1]
-            if (off := float(np.abs(wider).max())) < least:
+            if (off := float((wider + 0.2 * np.abs(wider)).max())) < least:
                 least, best = off, share
             share = np.clip(share + STEP * wider * travel / (travel**2 + SHORT_MM**2), *LEEWAY)
         identity = _with_change(head, identity, name, x, best)
