@@ -106,9 +106,7 @@ class BusLoop:
             if self.limp:
                 self.bus.stop()
                 if not self.bus.measures:
-                    log.warning(
-                        "bus %s does not measure its servos: the face cannot follow", self.settings.name
-                    )
+                    log.warning("bus %s does not measure its servos: the face cannot follow", self.settings.name)
             self._resume()
         except BaseException:
             self.bus.close()
