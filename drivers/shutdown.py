@@ -11,7 +11,6 @@ servos' own bus watchdog covers it.
 
 from __future__ import annotations
 
-import _thread
 import atexit
 import logging
 import signal
@@ -20,7 +19,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import Any
 
 from drivers.errors import DriverError
@@ -28,10 +27,6 @@ from drivers.errors import DriverError
 log = logging.getLogger(__name__)
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-
-LOST_S = 0.01
-"""After this time a signal is raised once more that was lost."""
-
 
 class _Once:
     """Calls a function the first time only, whichever thread comes first."""
@@ -92,22 +87,46 @@ def _raised_again_when_lost(numbers: Any) -> Iterator[None]:
     before = sys.unraisablehook
 
     def notice(lost: Any) -> None:
-        if not isinstance(lost.exc_value, KeyboardInterrupt | SystemExit):
+        number = _signal_of(lost.exc_value)
+        if number is None or threading.current_thread() is not threading.main_thread():
             before(lost)
-            return
-        number = signal.SIGINT
-        if isinstance(lost.exc_value, SystemExit):
-            number = signal.Signals(int(str(lost.exc_value.code)) - 128)
-        _install(_raise_signal, numbers)
-        again = threading.Timer(LOST_S, _thread.interrupt_main, [number])  # raised in here it would be lost as well
-        again.daemon = True
-        again.start()
+        else:
+            _raise_in(_interrupted(lost.exc_traceback), number)
 
     sys.unraisablehook = notice
     try:
         yield
     finally:
         sys.unraisablehook = before
+
+
+def _signal_of(error: BaseException | None) -> int | None:
+    """The signal for which :func:`_raise_signal` raised this, if it did."""
+    if isinstance(error, KeyboardInterrupt):
+        return signal.SIGINT
+    if isinstance(error, SystemExit) and isinstance(error.code, int) and error.code - 128 in SIGNALS:
+        return error.code - 128
+    return None
+
+
+def _interrupted(traceback: TracebackType | None) -> FrameType | None:
+    """What was running when the destructor or callback came, of which the error is."""
+    if traceback is None:
+        return sys._getframe(1).f_back
+    return traceback.tb_frame.f_back
+
+
+def _raise_in(frame: FrameType | None, number: int) -> None:
+    """Raise for a signal at the next line of a frame: where we are now, it would be lost as well."""
+    if frame is None:
+        return
+
+    def trace(*_: Any) -> None:
+        sys.settrace(None)
+        _raise_signal(number, None)
+
+    sys.settrace(lambda *_: None)  # a frame is traced only while its thread is
+    frame.f_trace = trace
 
 
 def _install(handler: Callable[[int, FrameType | None], None], only: Any = SIGNALS) -> dict[int, Any]:

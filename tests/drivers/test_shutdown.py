@@ -34,29 +34,29 @@ with stop_on_signals(stop):
     class Busy:
         def __del__(self):
             print("ready", flush=True)
-            time.sleep(1.0)
+            time.sleep(0.2)
     while sys.argv[1] == "destructor":
         Busy()
 """
 
 
 def run(root: Path, how: str, send: int | None = None) -> tuple[int, str]:
-    child = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-c", PROGRAM, how],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
         cwd=root,
-    )
-    assert child.stdout is not None
-    assert child.stdout.readline() == "ready\n"
-    if send is not None:
-        child.send_signal(send)
-    try:
-        out, _ = child.communicate(timeout=20)
-    finally:
-        child.kill()
-    return child.returncode, out
+    ) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "ready\n"
+        if send is not None:
+            child.send_signal(send)
+        try:
+            status = child.wait(timeout=20)
+        finally:
+            child.kill()
+        return status, child.stdout.read()
 
 
 @pytest.mark.parametrize(
