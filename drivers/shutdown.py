@@ -28,6 +28,7 @@ log = logging.getLogger(__name__)
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
+
 class _Once:
     """Calls a function the first time only, whichever thread comes first."""
 
