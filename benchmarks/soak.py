@@ -94,9 +94,8 @@ class Head:
         self.clock, self.random, self.result = VirtualClock(), random.Random(seed), Soak()
         self.chain = SimulatedChain([SimulatedServo(i) for i in IDS], seed=seed)
         specs = [ServoSpec(i, f"servo{i}", "xl330-m288", -1.2, 1.2, SPEED_RAD_S, 60.0) for i in IDS]
-        self.bus = open_bus("dynamixel", specs, port="virtual", clock=self.clock, reboot_faulted=True, margin_s=0.01)
-        port = self.bus._port
-        port.link, port.clock, port.sleep = VirtualLink(self.chain, self.clock), self.clock, self.clock.sleep
+        link = VirtualLink(self.chain, self.clock)
+        self.bus = open_bus("dynamixel", specs, port=link, clock=self.clock, reboot_faulted=True, margin_s=0.01)
         self._sent: np.ndarray | None = None
         self._sent_s = 0.0
         self._next_fault_s, self._calm_s = FAULT_EVERY_S, 0.0

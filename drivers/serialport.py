@@ -55,7 +55,11 @@ class SerialPort:
     Attributes
     ----------
     tap : called with (sent, bytes) for everything that passes, or None.
+    clock, sleep : the time of this port's deadlines, and the way to let it pass.
     """
+
+    clock: Callable[[], float] = staticmethod(time.monotonic)
+    sleep: Callable[[float], object] = staticmethod(time.sleep)
 
     def __init__(self, path: str | os.PathLike[str], baud: int = 1_000_000) -> None:
         self.path = os.fspath(path)
@@ -240,6 +244,11 @@ class SerialPort:
             message = f"no port {self.path}"
             return PortMissing(message, hint="`omote ports` lists what is plugged in", port=self.path)
         return PortError(f"cannot open port {self.path}: {error}", hint="try `omote ports`", port=self.path)
+
+
+def link_to(port: str | os.PathLike[str] | SerialPort, baud: int) -> SerialPort:
+    """The port of a path or URL; one that is a port already (:class:`drivers.sim.virtual.VirtualLink`) as it is."""
+    return SerialPort(port, baud) if isinstance(port, str | os.PathLike) else port
 
 
 def latency_s(path: str | os.PathLike[str], sys_root: str | os.PathLike[str] = "/sys") -> float | None:

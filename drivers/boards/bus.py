@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.bus import BusState, Floats, ServoInfo, ServoSpec, frozen
 from drivers.errors import BusError, NoReply, PortLost
-from drivers.serialport import SerialPort, reply_margin_s
+from drivers.serialport import SerialPort, link_to, reply_margin_s
 from drivers.wirebus import WireBus
 
 log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ class BoardBus(WireBus):
     Parameters
     ----------
     servos : the servos in the order of all arrays.
-    port : device path, or URL.
+    port : device path, or URL; or a :class:`~drivers.sim.virtual.VirtualLink`, with its clock.
     baud : rate of the port.
     margin_s : longest wait for an answer beyond its time on the wire; None takes it from what the port is.
     stagger_s : pause between switching servos on.
@@ -52,7 +52,7 @@ class BoardBus(WireBus):
         self,
         servos: Iterable[ServoSpec],
         *,
-        port: str,
+        port: str | SerialPort,
         baud: int = 115_200,
         margin_s: float | None = None,
         stagger_s: float = STAGGER_S,
@@ -60,12 +60,13 @@ class BoardBus(WireBus):
     ) -> None:
         super().__init__(servos, clock=clock)
         n = len(self.servos)
-        self._port = SerialPort(port, baud)
+        self._port = link_to(port, baud)
         self._margin_s, self._margin_set = margin_s or 0.0, margin_s is not None
         self._stagger_s = stagger_s
         self._position, self._position_s = np.full(n, math.nan), np.full(n, -math.inf)
         self._on = np.zeros(n, dtype=bool)
         self._silent = False
+        self._mute: list[int] = []  # servos that a board answers nothing about, longest not asked first
         self._told: dict[str, float] = {}
 
     # ------------------------------------------------------------------ hooks
@@ -108,6 +109,7 @@ class BoardBus(WireBus):
     def _open_link(self) -> None:
         self._port.open()
         self._silent = False
+        self._mute = []
         if not self._margin_set:
             self._margin_s = reply_margin_s(self._port.path)
 
@@ -150,7 +152,7 @@ class BoardBus(WireBus):
         goal[index] = rest[index]
         self._go(goal)
         if self._stagger_s:
-            time.sleep(self._stagger_s)
+            self._port.sleep(self._stagger_s)
 
     def _switch_off(self) -> None:
         """Pulses off for every servo, each by itself and asked after where the board can say."""
@@ -219,7 +221,6 @@ class BoardBus(WireBus):
             log.warning("the board on %s answers again", self.path)
         else:
             self._say(f"the board on {self.path} does not answer")
-        self._report.silent = self.ids if self._silent else ()
 
     def _say(self, message: str) -> None:
         """Log a fault, and the same one not again for a while."""
@@ -230,7 +231,9 @@ class BoardBus(WireBus):
 
     def _state(self) -> BusState:
         n, now = len(self.servos), self._clock()
-        unknown, none = frozen(np.full(n, math.nan)), np.zeros(n, dtype=np.uint8)
+        unknown, none, silent = frozen(np.full(n, math.nan)), np.zeros(n, dtype=np.uint8), np.full(n, self._silent)
+        silent[self._mute] = True
+        self._report.silent = tuple(servo for servo, mute in zip(self.ids, silent, strict=True) if mute)
         return BusState(
             time_s=now,
             position_rad=frozen(self._position),
@@ -239,7 +242,7 @@ class BoardBus(WireBus):
             fresh=frozen(np.zeros(n), bool),
             age_s=frozen(now - self._position_s),
             error=frozen(none, np.uint8),
-            silent=frozen(np.full(n, self._silent), bool),
+            silent=frozen(silent, bool),
             voltage_v=unknown,
             temperature_c=unknown,
             hardware_error=frozen(none, np.uint8),

@@ -7,7 +7,6 @@ before the board has answered that question alone, into silence.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 from drivers.serialport import SerialPort
@@ -71,7 +70,7 @@ class Conversation:
 
     def _settle(self) -> bool:
         """Bring the conversation back to a known place."""
-        if time.monotonic() < self._next_s:
+        if self._port.clock() < self._next_s:
             return False
         self.stray += self._port.drain()
         self._port.write(self._probe)
@@ -83,23 +82,23 @@ class Conversation:
             self._answer = data
         else:
             self.stray += len(data)
-            self._next_s = time.monotonic() + RETRY_S
+            self._next_s = self._port.clock() + RETRY_S
         return self._settled
 
     def _quiet(self) -> bytes:
         """What else comes until nothing has come for a margin."""
-        data, end = b"", time.monotonic() + 10 * self._margin_s()
-        while got := self._port.read(min(time.monotonic() + self._margin_s(), end)):
+        data, end = b"", self._port.clock() + 10 * self._margin_s()
+        while got := self._port.read(min(self._port.clock() + self._margin_s(), end)):
             data += got
-            if time.monotonic() >= end:
+            if self._port.clock() >= end:
                 break
         return data
 
     def _receive(self, sent: int, count: int) -> bytes:
-        end, data = time.monotonic() + 10.0 * (sent + count) / self._port.baud + self._margin_s(), b""
+        end, data = self._port.clock() + 10.0 * (sent + count) / self._port.baud + self._margin_s(), b""
         while len(data) < count:
             got = self._port.read(end)
             data += got
-            if not got and time.monotonic() >= end:
+            if not got and self._port.clock() >= end:
                 break
         return data

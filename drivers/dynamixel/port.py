@@ -6,13 +6,11 @@ See drivers/dynamixel/sdk.py for the list of faults that the numbers S1 to S14 r
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable
 
 from dynamixel_sdk import port_handler
 
 from drivers.errors import DriverError
-from drivers.serialport import SerialPort, reply_margin_s
+from drivers.serialport import SerialPort, link_to, reply_margin_s
 
 NAP_LEAST_S = 0.0005
 """A shorter sleep costs more than it saves."""
@@ -25,30 +23,28 @@ class Port(port_handler.PortHandler):
 
     Parameters
     ----------
-    path : device path.
+    path : device path, URL, or a :class:`~drivers.sim.virtual.VirtualLink`.
     baud : any rate the adapter takes.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
-    clock, sleep : monotonic seconds, and the way to let them pass.
 
     Attributes
     ----------
+    clock, sleep : monotonic seconds, and the way to let them pass.
     suspects : ids that did not answer when they should have; see :class:`~drivers.dynamixel.sdk.Packets`.
     stray : replies thrown away.
     """
 
     def __init__(
         self,
-        path: str,
+        path: str | SerialPort,
         baud: int = 1_000_000,
         margin_s: float | None = None,
-        clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], object] = time.sleep,
     ) -> None:
-        self.clock, self.sleep = clock, sleep
+        self.link = link_to(path, baud)
+        self.clock, self.sleep = self.link.clock, self.link.sleep
         self._busy = threading.Lock()
-        super().__init__(path)
+        super().__init__(self.link.path)
         self.baudrate = baud
-        self.link = SerialPort(path, baud)
         self.suspects: set[int] = set()
         self.stray = 0
         self.deadline_s = 0.0

@@ -124,13 +124,13 @@ class LineOutBus(BoardBus):
         return self._radians(values)
 
     def _greet(self) -> Answer:
-        end = time.monotonic() + HELLO_S
+        end = self._port.clock() + HELLO_S
         while True:
             self._port.write(b"\n")  # ends whatever half line the head may have got before
             answer = self._exchange(["HELLO"], HELLO_AGAIN_S)
             if answer is not None and answer.ok:
                 return answer
-            if time.monotonic() >= end:
+            if self._port.clock() >= end:
                 raise NoReply(
                     f"no head answers in the line protocol on {self.path} at {self._port.baud} baud",
                     hint="check its power, its cable, its baud rate, and that it runs a sketch as in docs/boards.md",
@@ -240,8 +240,8 @@ class LineOutBus(BoardBus):
     def _exchange(self, words: Sequence[str], wait_s: float) -> Answer | None:
         """Send a line and wait for its answer; None when it does not come."""
         tag = self._tell(words, {})
-        end = time.monotonic() + wait_s + self._margin_s
-        while tag not in self._answers and time.monotonic() < end:
+        end = self._port.clock() + wait_s + self._margin_s
+        while tag not in self._answers and self._port.clock() < end:
             self._listen(end)
         self._waiting.pop(tag, None)
         return self._answers.pop(tag, None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple, Protocol
@@ -183,7 +182,7 @@ class Exchanges:
             if not data:
                 box.take(reader.flush())
                 break
-            late += time.monotonic() > port.deadline_s
+            late += port.link.clock() > port.deadline_s
             box.take(reader.feed(data))
         port.stray += box.stray
         replies = box.unique()

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import threading
-import time
 
 from drivers.errors import DriverError
-from drivers.serialport import SerialPort, reply_margin_s
+from drivers.serialport import SerialPort, link_to, reply_margin_s
 
 BITS_PER_BYTE = 10
 
@@ -16,19 +15,19 @@ class Port:
 
     Parameters
     ----------
-    path : device path.
+    path : device path, URL, or a :class:`~drivers.sim.virtual.VirtualLink`.
     baud : any rate the adapter takes.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
     """
 
-    def __init__(self, path: str, baud: int = 1_000_000, margin_s: float | None = None) -> None:
-        self.link = SerialPort(path, baud)
+    def __init__(self, path: str | SerialPort, baud: int = 1_000_000, margin_s: float | None = None) -> None:
+        self.link = link_to(path, baud)
         self.baudrate = baud
         self.suspects: set[int] = set()
         self.stray = 0
         self.deadline_s = self._free_s = 0.0
         self._margin_s = margin_s
-        self.margin_s = reply_margin_s(path) if margin_s is None else margin_s
+        self.margin_s = reply_margin_s(self.link.path) if margin_s is None else margin_s
         self._busy = threading.Lock()
 
     @property
@@ -63,12 +62,12 @@ class Port:
 
     def transmit(self, packet: bytes) -> None:
         """Hand bytes to the system, and keep count of when the last of them will have left."""
-        self._free_s = max(time.monotonic(), self._free_s) + len(packet) * BITS_PER_BYTE / self.baudrate
+        self._free_s = max(self.link.clock(), self._free_s) + len(packet) * BITS_PER_BYTE / self.baudrate
         self.link.write(packet)
 
     def expect(self, size: int) -> None:
         """Deadline for so many bytes of reply to what was sent: time on the wire, both ways, plus the margin."""
-        begin_s = max(time.monotonic(), self._free_s)
+        begin_s = max(self.link.clock(), self._free_s)
         self.deadline_s = begin_s + size * BITS_PER_BYTE / self.baudrate + self.margin_s
 
     @property

@@ -8,8 +8,7 @@ nothing but this program (or the power switch) ever tells them to let go.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers.bus import ServoSpec
@@ -123,7 +122,6 @@ def bring_up(
     servos: Sequence[ServoSpec],
     policy: Policy,
     started: Started,
-    sleep: Callable[[float], None] = time.sleep,
 ) -> Started:
     """Start identified servos where they stand; fills and returns `started`.
 
@@ -134,7 +132,7 @@ def bring_up(
     ids = [servo.id for servo in servos]
     held = [servo for servo, on in registers.get_all(ids, "torque").items() if on]
     held = _take_over(registers, held, policy)
-    _wait_for_voltage(registers, ids, policy, sleep)
+    _wait_for_voltage(registers, ids, policy)
     faulted = _faults(registers, ids)
     if faulted and not policy.reboot_faulted:
         raise _fault(registers, faulted)
@@ -146,7 +144,7 @@ def bring_up(
     try:
         _torque_on(registers, ids, started)
         if faulted:
-            sleep(RELAPSE_S)  # a cause that is still there shuts it down again
+            registers.port.link.sleep(RELAPSE_S)  # a cause that is still there shuts it down again
             registers.get_all(ids, "voltage")
         if faulted := _faults(registers, ids):
             raise _fault(registers, faulted)
@@ -172,16 +170,17 @@ def _take_over(registers: Registers, held: list[int], policy: Policy) -> list[in
     )
 
 
-def _wait_for_voltage(registers: Registers, ids: Sequence[int], policy: Policy, sleep: Callable[[float], None]) -> None:
+def _wait_for_voltage(registers: Registers, ids: Sequence[int], policy: Policy) -> None:
+    link = registers.port.link
     if policy.min_voltage_v is None:
         need = registers.get_all(ids, "min_voltage")
     else:
         need = dict.fromkeys(ids, round(10 * policy.min_voltage_v))
-    deadline = time.monotonic() + policy.voltage_wait_s
+    deadline = link.clock() + policy.voltage_wait_s
     while low := {i: v for i, v in registers.get_all(ids, "voltage").items() if v < need[i]}:
-        if time.monotonic() > deadline:
+        if link.clock() > deadline:
             break
-        sleep(0.1)
+        link.sleep(0.1)
     if not low:
         return
     worst = min(low, key=lambda servo: low[servo] - need[servo])

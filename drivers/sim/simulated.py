@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -29,14 +29,14 @@ START_S = 20.0
 class ServoView:
     """One servo of a running bus, seen from another thread: always up to date, never in the middle of a packet."""
 
-    def __init__(self, chain: Chain, device_id: int) -> None:
-        self._chain, self._servo = chain, chain.servo(device_id)
+    def __init__(self, chain: Chain, device_id: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._chain, self._servo, self._clock = chain, chain.servo(device_id), clock
 
     @property
     def position_ticks(self) -> int:
         """Present Position."""
         with self._chain.lock:
-            return self._servo.position_ticks(time.monotonic())
+            return self._servo.position_ticks(self._clock())
 
     @property
     def goal(self) -> int:
@@ -48,7 +48,7 @@ class ServoView:
     def torque(self) -> bool:
         """Whether the motor is on."""
         with self._chain.lock:
-            self._servo.look(time.monotonic())
+            self._servo.look(self._clock())
             return self._servo.torque
 
     @property
@@ -60,22 +60,22 @@ class ServoView:
     def register(self, name: str) -> int:
         """Value of a register; KeyError where the model has none of that name."""
         with self._chain.lock:
-            return self._servo.register(name, time.monotonic())
+            return self._servo.register(name, self._clock())
 
     def put(self, name: str, value: int) -> None:
         """Set a register whatever its access, as it could have been left by somebody else."""
         with self._chain.lock:
-            self._servo.force(name, value, time.monotonic())
+            self._servo.force(name, value, self._clock())
 
     def place(self, position: float) -> None:
         """Move the limp shaft by hand, ticks; ValueError while the motor holds it."""
         with self._chain.lock:
-            self._servo.place(position, time.monotonic())
+            self._servo.place(position, self._clock())
 
     def latch(self, bits: int) -> None:
         """Latch hardware errors."""
         with self._chain.lock:
-            self._servo.latch(bits, time.monotonic())
+            self._servo.latch(bits, self._clock())
 
 
 class SimulatedBus:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from drivers.boards.pulses import PulseBus
+from drivers.boards.pulses import GROUP, PulseBus
 from drivers.bus import Floats, ServoSpec
 from drivers.errors import DriverError
 from drivers.text.scales import ValueScale
@@ -23,6 +23,10 @@ log = logging.getLogger(__name__)
 
 TIME_MS = (1, 1000)
 """Shortest and longest time that a line may give the board for its moves."""
+MISSES = 2
+"""So many answers in a row that do not come make a servo silent."""
+RETRY_S = 1.0
+"""Silent servos are asked about once in this time."""
 
 
 class TextBus(PulseBus):
@@ -76,7 +80,8 @@ class TextBus(PulseBus):
         self._main = next(iter(self._scales.values()))
         self._sent = np.full(len(self.servos), math.nan)
         self._refresh = 0
-        self._sent_s = -math.inf
+        self._sent_s = self._retry_s = -math.inf
+        self._missed = np.zeros(len(self.servos), dtype=int)
 
     def far_end(self) -> dict[str, Any]:
         """What a simulated board has to be set to."""
@@ -87,7 +92,8 @@ class TextBus(PulseBus):
     def _open_link(self) -> None:
         super()._open_link()
         self._sent[:] = math.nan
-        self._sent_s = -math.inf
+        self._sent_s = self._retry_s = -math.inf
+        self._missed[:] = 0
 
     def _begin(self) -> Floats:
         """A board that is not asked, or does not answer yet, may put out anything: every servo begins at its rest."""
@@ -146,29 +152,50 @@ class TextBus(PulseBus):
             here = self._limits.target if self._running else self._position
             self._position = np.where(np.isnan(self._sent), here, self._main.radians(self._sent))
             return
-        group = self._turn()
+        group = self._asked_now()
+        if not group:
+            return
         self._port.drain()
         self._port.write("".join(self._query.fill(self._named(index)) for index in group).encode())
         answers = self._answers(group)
-        self._heard(bool(answers))
-        for index in group:
-            if index not in answers:
-                self._report.count("no_reply", self.ids[index])
-                continue
-            self._take([index], [answers[index]])
+        lost = [self.ids[index] for index in group if index not in answers and self._miss(index)]
+        self._heard(bool(answers) or len(self._mute) < len(self.servos))
+        if lost and not self._silent:
+            self._say(f"the board on {self.path} does not answer about {', '.join(map(str, lost))}")
+        for index, pulse in answers.items():
+            self._missed[index] = 0
+            self._take([index], [pulse])
+
+    def _asked_now(self) -> list[int]:
+        """The servos to ask in this cycle; those that are never answered about once a second, and by themselves."""
+        now = self._clock()
+        if self._mute and now >= self._retry_s:
+            self._retry_s = now + RETRY_S
+            group, self._mute = self._mute[:GROUP], self._mute[GROUP:]
+            return group
+        return [index for index in self._turn() if index not in self._mute]
+
+    def _miss(self, index: int) -> bool:
+        """A servo that was asked about without an answer; whether nobody waits for it from now on."""
+        self._report.count("no_reply", self.ids[index])
+        self._missed[index] += 1
+        if self._missed[index] >= MISSES:
+            self._mute.append(index)
+            self._retry_s = self._clock() + RETRY_S
+        return bool(self._missed[index] == MISSES)
 
     def _answers(self, group: list[int]) -> dict[int, float]:
         """Pulses (us) by index that answers bring; what is no answer is thrown away."""
         pattern, found, data = self._answer, dict[int, float](), b""
         if pattern is None:
             return found
-        end = time.monotonic() + self._margin_s + self._wire_s(32 * len(group))
+        end = self._port.clock() + self._margin_s + self._wire_s(32 * len(group))
         while len(found) < len(group):
             got = self._port.read(end)
             *lines, data = (data + got).split(pattern.end)
             for line in lines:
                 found.update(self._answered(pattern, (line + pattern.end).decode("latin-1"), group))
-            if not got and time.monotonic() >= end:
+            if not got and self._port.clock() >= end:
                 break
         return found
 

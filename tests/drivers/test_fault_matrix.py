@@ -92,10 +92,10 @@ class Rig:
         self.clock = VirtualClock()
         self.chain = SimulatedChain([SimulatedServo(i) for i in IDS])
         specs = [ServoSpec(i, f"servo{i}", "xl330-m288", -1.0, 1.0, SPEED, 60.0) for i in IDS]
-        bus = open_bus("dynamixel", specs, port="virtual", clock=self.clock, margin_s=MARGIN_S)
+        link = VirtualLink(self.chain, self.clock)
+        bus = open_bus("dynamixel", specs, port=link, clock=self.clock, margin_s=MARGIN_S)
         assert isinstance(bus, DynamixelBus)
-        self.bus, port = bus, bus._port
-        port.link, port.clock, port.sleep = VirtualLink(self.chain, self.clock), self.clock, self.clock.sleep
+        self.bus = bus
         self.last: np.ndarray | None = None
         self.stalls: list[float] = []
 
