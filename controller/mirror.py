@@ -40,6 +40,7 @@ class Mirror:
         self.readable = np.array([_is_monotonic(row[keep]) for row, keep in zip(steps, real, strict=True)])
         self._solvers: dict[bytes, BoundedSolver] = {}
         self._last = parameters.neutral()
+        self._solver(self.readable)  # what is compiled is compiled now, not while a bus waits
 
     def read(self, angles_rad: Floats, fresh: NDArray[np.bool_] | None = None) -> Floats:
         """Parameters (P,) that show ``angles_rad`` : (n,) best.

@@ -131,6 +131,7 @@ class BoundedSolver:
         self._gram += max(ridge, least) * np.eye(n)
         self._sparsity, self._tolerance = float(sparsity), float(tolerance)
         self.rounds = 0
+        self.solve(np.zeros(m))  # compiles, which may take seconds, before a bus waits for an answer
 
     def solve(self, wanted: Floats, start: Floats | None = None) -> Floats:
         """The best (n,) values for ``wanted`` : (m,).

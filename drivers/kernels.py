@@ -2,6 +2,9 @@
 
 Between the last byte of a reply and the first byte of the next goal the wire is idle: what is done there is done
 here, in one call each, because after every wait for the wire the interpreter starts cold.
+
+The types stand with each kernel so that it is compiled on import, before a port is opened: compiled at its first call,
+on a new machine, it would hold up a bus under torque for longer than the servos' watchdog waits.
 """
 
 from __future__ import annotations
@@ -9,17 +12,24 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import int64, njit, types
 
 from drivers.dynamixel.packet import crc16
 
 CRC_TABLE = np.array([crc16(bytes((byte,))) for byte in range(256)], np.uint16)
 """CRC-16 of each single byte, (256,)."""
 
-_kernel: Any = njit(cache=True, nogil=True)
+_BYTES = types.Array(types.uint8, 1, "C", readonly=True)
+_HEADS = types.Array(types.uint8, 2, "C", readonly=True)
+_STATES, _STEPS, _REALS = types.int64[::1], types.int32[::1], types.float64[::1]
+_REAL = types.float64
 
 
-@_kernel
+def _kernel(*parameters: Any) -> Any:
+    return njit([parameters], cache=True, nogil=True)
+
+
+@_kernel(_BYTES, int64, int64, int64)
 def crc_span(data, begin, end, state):  # type: ignore[no-untyped-def]
     """CRC-16 of ``data[begin:end]`` (uint8), continuing from `state`."""
     for at in range(begin, end):
@@ -27,7 +37,7 @@ def crc_span(data, begin, end, state):  # type: ignore[no-untyped-def]
     return state
 
 
-@_kernel
+@_kernel(_BYTES, int64, _HEADS, _STATES, int64)
 def check_replies(data, begin, heads, states, size):  # type: ignore[no-untyped-def]
     """Whether status packets lie side by side from `begin` on, each of `size` bytes, with right heads and CRCs.
 
@@ -48,7 +58,7 @@ def check_replies(data, begin, heads, states, size):  # type: ignore[no-untyped-
     return True
 
 
-@_kernel
+@_kernel(_BYTES, int64, _BYTES, int64, int64)
 def check_joint(data, begin, ids, size, state):  # type: ignore[no-untyped-def]
     """CRC behind the parts of a joint reply from `begin` on, each of `size` bytes; -1 where one is damaged.
 
@@ -68,7 +78,7 @@ def check_joint(data, begin, ids, size, state):  # type: ignore[no-untyped-def]
     return state
 
 
-@_kernel
+@_kernel(*[_REALS] * 4)
 def clip_targets(wanted, low, high, target):  # type: ignore[no-untyped-def]
     """Finite targets, inside their limits, into `target`; all (n,) float64. Returns how many were not, of each."""
     refused = clipped = 0
@@ -81,7 +91,7 @@ def clip_targets(wanted, low, high, target):  # type: ignore[no-untyped-def]
     return refused, clipped
 
 
-@_kernel
+@_kernel(_REALS, _REALS, _REAL, _REAL, _REALS, _REALS)
 def spend_travel(target, speed, elapsed_s, burst_s, saved, last):  # type: ignore[no-untyped-def]
     """Move `last` towards `target` as far as saved-up travel allows; all (n,) float64. Returns how many fell short."""
     short = 0
@@ -94,7 +104,7 @@ def spend_travel(target, speed, elapsed_s, burst_s, saved, last):  # type: ignor
     return short
 
 
-@_kernel
+@_kernel(*[_REALS] * 5, *[_STEPS] * 5, _REALS)
 def to_steps(angle_rad, sign, zero_rad, center, rad_per_tick, low, high, lowest, highest, goals, sent):  # type: ignore[no-untyped-def]
     """Angles to the nearest steps within limits, into `goals` (n,) int32, and back into `sent` (n,) float64.
 
@@ -108,7 +118,7 @@ def to_steps(angle_rad, sign, zero_rad, center, rad_per_tick, low, high, lowest,
         sent[i] = sign[i] * ((step - center[i]) * rad_per_tick[i] - zero_rad[i])
 
 
-@_kernel
+@_kernel(*[_REALS] * 4, _REAL, *[_REALS] * 4, types.float64[:, ::1])
 def to_si(ticks, speed, current, seen_s, now_s, sign, zero_rad, center, rad_per_tick, out):  # type: ignore[no-untyped-def]
     """Angle, speed, current and age of n servos into the rows of `out`, (4, n) float64."""
     for i in range(ticks.shape[0]):
