@@ -23,6 +23,7 @@ from controller.solve import BoundedSolver
 
 if TYPE_CHECKING:
     from surface.head import Head
+    from surface.head.part import HeadPart
 
 _LEVELS = 4
 _STRAIGHT_MM = 0.02
@@ -294,30 +295,29 @@ def load_anchors(
     anchors = [channel.anchor for channel in channels if channel.anchor is not None]
     keys = [f"channels[{i}].anchor" for i, channel in enumerate(robot.channels) if channel.anchor is not None]
     _check(keys, anchors, head, where or robot.name)
-    part = anchors[0].part
-    own = np.array([_place(anchor, robot.landmarks, head) for anchor in anchors])
-    spread = skin_points(head, part, _POINTS, _SEED)
-    skin = sample_skin(head, part, np.concatenate([own, _close_to(own, head, part), spread]))
+    part = head.part(anchors[0].part)
+    vertices = part.surface.evaluate(part.mesh.uv)  # the mesh's own positions are rough, the part's may be posed
+    own = np.array([_place(anchor, robot.landmarks, part, vertices) for anchor in anchors])
+    spread = skin_points(head, part.name, _POINTS, _SEED)
+    skin = sample_skin(head, part.name, np.concatenate([own, _close_to(own, part, vertices), spread]))
     _check_like(keys, anchors, first(skin, len(own)), where or robot.name)
     return AnchorMap(channels, skin, head_order(head.parameters, parameters), parameters)
 
 
-def _close_to(own: Floats, head: Head, part: str) -> Floats:
+def _close_to(own: Floats, part: HeadPart, vertices: Floats) -> Floats:
     """(j, 2) the vertices closest to each of the points ``own`` : (k, 2)."""
-    mesh, surface = head.part(part).mesh, head.part(part).surface
-    away = [np.linalg.norm(mesh.vertices - at, axis=1) for at in surface.evaluate(own)]
+    away = [np.linalg.norm(vertices - at, axis=1) for at in part.surface.evaluate(own)]
     chosen = np.unique(np.concatenate([np.argsort(a)[:_NEAR][np.sort(a)[:_NEAR] < _NEAR_MM] for a in away]))
-    return np.asarray(mesh.uv[chosen], dtype=np.float64)
+    return np.asarray(part.mesh.uv[chosen], dtype=np.float64)
 
 
-def _place(anchor: AnchorSettings, landmarks: Mapping[str, list[float]], head: Head) -> Floats:
+def _place(anchor: AnchorSettings, landmarks: Mapping[str, list[float]], part: HeadPart, vertices: Floats) -> Floats:
     """(2,) point (u, v) of an anchor."""
     point = landmarks[anchor.point] if isinstance(anchor.point, str) else anchor.point
     if len(point) == 2:
         return np.array(point)
-    part = head.part(anchor.part)
-    away = np.linalg.norm(part.mesh.vertices - np.array(point), axis=1)
-    return np.asarray(part.mesh.uv[int(np.argmin(away))], dtype=np.float64)
+    nearest = int(np.argmin(np.linalg.norm(vertices - np.array(point), axis=1)))
+    return np.asarray(part.mesh.uv[nearest], dtype=np.float64)
 
 
 def _check(keys: Sequence[str], anchors: Sequence[AnchorSettings], head: Head, where: str) -> None:

@@ -87,6 +87,14 @@ def test_the_sampled_skin_goes_where_the_head_goes(head: Head, solved: AnchorMap
     assert away.max() < 1.0  # mm; arcs and lids meet between the samples
 
 
+def test_anchors_lie_where_their_landmarks_say(robot: RobotSettings, solved: AnchorMap) -> None:
+    wanted = [robot.landmarks[c.anchor.point] for c in anchored(robot) if c.anchor and isinstance(c.anchor.point, str)]
+    own = solved.skin.rest[: len(wanted)]
+    assert np.linalg.norm(own - wanted, axis=1).max() < 2.0  # mm
+    left, right = (own[[n.endswith(side) for n in solved.names]] for side in ("Left", "Right"))
+    assert np.abs(left * [-1, 1, 1] - right).max() < 1.0
+
+
 def test_one_anchor_is_pulled_as_far_as_the_skin_goes(tmp_path: Path, head: Head) -> None:
     robot = written(tmp_path, ROBOT.replace("[0, 1, 0] }", "[0, 1, 0], reach_mm = 90 }"))
     one = load_anchors(robot, head, P)
