@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +21,7 @@ from drivers.errors import BusError, DriverError, NoReply, PortBusy, PortLost, P
 from drivers.sim import SimulatedBus
 from drivers.sim.virtual import VirtualBus
 from tests.drivers.contract import BusContract, pause, settle
+from tests.drivers.programs import program
 
 SERVOS = (
     ServoSpec(1, "jaw", "rc-180", -0.6, 0.4, 8.0, 200.0),
@@ -188,28 +187,15 @@ def test_3_every_way_out_switches_all_off(family: str, how: str) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_3_signals_switch_all_off(number: int, tmp_path: Path, root: Path) -> None:
-    program = """
-import sys, time
-from drivers import open_bus
-from drivers.shutdown import stop_on_signals
-from tests.drivers.test_boards import QUICK, SERVOS
-bus = open_bus("maestro", SERVOS, port=sys.argv[1], **QUICK)
-with bus, stop_on_signals(bus.close):
-    bus.start()
-    print("ready", flush=True)
-    while True:
-        bus.write([0.1, 0.1, 0.1])
-        time.sleep(0.01)
-"""
-    with SimulatedBus(SERVOS, link=tmp_path / "board", family="maestro", options={"limits_us": (500, 2500)}) as board:
-        child = subprocess.Popen([sys.executable, "-c", program, board.path], stdout=subprocess.PIPE,
-                                 stderr=subprocess.DEVNULL, cwd=root)  # fmt: skip
-        with child:
-            assert child.stdout is not None
-            assert child.stdout.readline() == b"ready\n"
-            assert len(outputs(board)) == 3
-            child.send_signal(number)
+def test_3_signals_switch_all_off(number: int) -> None:
+    with (
+        SimulatedBus(SERVOS, family="maestro", options={"limits_us": (500, 2500)}) as board,
+        program("maestro", SERVOS, board.path, **QUICK) as child,
+    ):
+        assert len(outputs(board)) == 3
+        assert child.pid is not None
+        os.kill(child.pid, number)
+        child.join(20)
         assert outputs(board) == []
 
 

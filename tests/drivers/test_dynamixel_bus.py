@@ -5,9 +5,8 @@ Numbers are those of the fault list in docs/drivers.md. See test_telemetry.py an
 
 from __future__ import annotations
 
+import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,7 +18,9 @@ from drivers import open_bus
 from drivers.bus import Bus
 from drivers.errors import NoReply, PortBusy, PortLost, PortMissing, ServoFault
 from drivers.sim import SimulatedBus
+from drivers.sim.virtual import VirtualBus
 from tests.drivers.contract import SERVOS, BusContract, read_until, settle
+from tests.drivers.programs import RAISE, program
 
 CALM = {"margin_s": 0.5, "watchdog_ms": 0}
 IDS = [servo.id for servo in SERVOS]
@@ -46,8 +47,8 @@ class TestDynamixelBus(BusContract):
 
 class TestDynamixelBusFastReads(BusContract):
     @pytest.fixture
-    def bus(self, wire: SimulatedBus) -> Bus:
-        return open_bus("dynamixel", SERVOS, port=wire.path, fast=True, **CALM)
+    def bus(self) -> Bus:
+        return VirtualBus(SERVOS).bus(fast=True, **CALM)
 
 
 def torques(wire: SimulatedBus) -> list[bool]:
@@ -126,58 +127,26 @@ def test_unplugging_in_the_middle_of_switching_off_is_told(wire: SimulatedBus) -
 
 # ---------------------------------------------------------------------------- 3: every way out
 
-PROGRAM = """
-import sys, time
-import numpy as np
-from drivers import open_bus
-from drivers.shutdown import stop_on_signals
-from tests.drivers.contract import SERVOS
-bus = open_bus("dynamixel", SERVOS, port=sys.argv[1], margin_s=0.5, watchdog_ms=int(sys.argv[3]))
-bus.open()
-with stop_on_signals(bus.close):
-    bus.start()
-    for k in range(100000):
-        bus.write(np.full(3, 0.2 * np.sin(k / 10)))
-        bus.read()
-        if k == 3:
-            print("ready", flush=True)
-        if k == 5 and sys.argv[2] == "raise":
-            raise RuntimeError("in the loop")
-        time.sleep(0.005)
-"""
+
+@pytest.mark.parametrize("how", [RAISE, "SIGINT", "SIGTERM", "SIGHUP"])
+def test_every_way_out_switches_all_servos_off(wire: SimulatedBus, how: str) -> None:
+    with program("dynamixel", SERVOS, wire.path, how, **CALM) as child:
+        if how != RAISE:
+            assert child.pid is not None
+            os.kill(child.pid, getattr(signal, how))
+        child.join(20)
+        assert child.exitcode not in (0, None)
+        assert torques(wire) == [False] * 3
 
 
-def run(root: Path, wire: SimulatedBus, how: str, watchdog_ms: int = 0) -> subprocess.Popen[str]:
-    child = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, wire.path, how, str(watchdog_ms)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        cwd=root,
-    )
-    assert child.stdout is not None
-    with child.stdout as stream:
-        assert stream.readline() == "ready\n"
-    return child
-
-
-@pytest.mark.parametrize("how", ["raise", "SIGINT", "SIGTERM", "SIGHUP"])
-def test_every_way_out_switches_all_servos_off(root: Path, wire: SimulatedBus, how: str) -> None:
-    child = run(root, wire, how)
-    if how != "raise":
-        child.send_signal(getattr(signal, how))
-    assert child.wait(timeout=20) != 0
-    assert torques(wire) == [False] * 3
-
-
-def test_the_servos_stop_by_themselves_when_the_program_is_killed(root: Path, wire: SimulatedBus) -> None:
-    child = run(root, wire, "run", watchdog_ms=400)
-    child.kill()
-    child.wait(timeout=20)
-    wait_until(lambda: all(wire.servo(i).register("Bus Watchdog") == 255 for i in IDS))
-    rest = [wire.servo(i).position_ticks for i in IDS]
-    time.sleep(0.2)
-    assert [wire.servo(i).position_ticks for i in IDS] == rest
+def test_the_servos_stop_by_themselves_when_the_program_is_killed(wire: SimulatedBus) -> None:
+    with program("dynamixel", SERVOS, wire.path, margin_s=0.5, watchdog_ms=400) as child:
+        child.kill()
+        child.join(20)
+        wait_until(lambda: all(wire.servo(i).register("Bus Watchdog") == 255 for i in IDS))
+        rest = [wire.servo(i).position_ticks for i in IDS]
+        time.sleep(0.2)
+        assert [wire.servo(i).position_ticks for i in IDS] == rest
     with open_bus("dynamixel", SERVOS, port=wire.path, **CALM) as bus:
         bus.start()
         settle(bus, [0.1, 0.1, 0.1])

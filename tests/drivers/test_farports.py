@@ -26,7 +26,7 @@ LINKS = ["socket://127.0.0.1:0", "memory://head"]
 class TestOverTcp(BusContract):
     @pytest.fixture
     def bus(self) -> Bus:
-        return open_bus("simulated", SERVOS, transport="tcp", margin_s=0.5, watchdog_ms=0)
+        return open_bus("simulated", SERVOS, transport="tcp", process=False, margin_s=0.5, watchdog_ms=0)
 
 
 class TestWithinTheProcess(BusContract):

@@ -13,6 +13,7 @@ import pytest
 from drivers import open_bus
 from drivers.bus import Bus
 from drivers.sim import SimulatedBus
+from drivers.sim.virtual import VirtualBus
 from tests.drivers import contract
 from tests.drivers.contract import BusContract, settle
 
@@ -29,19 +30,20 @@ class Family(BusContract):
     KIND: ClassVar[str] = "feetech"
 
     @pytest.fixture
-    def wire(self, tmp_path: Path) -> Iterator[SimulatedBus]:
-        with SimulatedBus(self.SERVOS, link=tmp_path / "by-id") as simulated:
-            yield simulated
-
-    @pytest.fixture
-    def bus(self, wire: SimulatedBus) -> Bus:
-        return open_bus(self.KIND, self.SERVOS, port=wire.path, **CALM)
+    def bus(self) -> Bus:
+        return VirtualBus(self.SERVOS, self.KIND).bus(**CALM)
 
 
 class TestFeetechSts(Family):
     MODELS = ("sts3215",) * 3
     SERVOS = servos_of(*MODELS)
     VOLTS = 7.4
+
+    @pytest.fixture
+    def bus(self, tmp_path: Path) -> Iterator[Bus]:
+        """Over a real pseudo-terminal, in time that passes by itself."""
+        with SimulatedBus(self.SERVOS, link=tmp_path / "by-id") as wire:
+            yield open_bus(self.KIND, self.SERVOS, port=wire.path, **CALM)
 
 
 class TestFeetechScs(Family):
@@ -76,26 +78,19 @@ def test_simulated_servos_come_with_the_driver_and_need_no_keeper() -> None:
         assert bus._keeper is None
 
 
-def test_everybody_is_found_when_nobody_is_named(tmp_path: Path) -> None:
+def test_everybody_is_found_when_nobody_is_named() -> None:
     servos = servos_of(*("scs0009",) * 3)
-    with (
-        SimulatedBus(servos, link=tmp_path / "by-id", faults=["baud:7:57600"]) as wire,
-        open_bus("feetech", servos, port=wire.path, margin_s=0.002) as bus,
-    ):
-        bus._port.margin_s = 0.002
-        assert {1, 2} >= {info.id for info in bus.discover()}
-        bus._port.margin_s = 0.3
+    with VirtualBus(servos, "feetech", faults=["baud:7:57600"]).bus(margin_s=0.002) as bus:
+        assert [info.id for info in bus.discover()] == [1, 2]
         assert [info.id for info in bus.discover([0, 1, 2, 7])] == [1, 2]
 
 
 @pytest.mark.parametrize(("model", "tells"), [("sts3215", True), ("ax-12a", False)])
-def test_load_and_motion_are_told_where_the_model_does(tmp_path: Path, model: str, tells: bool) -> None:
+def test_load_and_motion_are_told_where_the_model_does(model: str, tells: bool) -> None:
     servos = servos_of(*(model,) * 3)
     kind = "feetech" if tells else "dynamixel"
-    with (
-        SimulatedBus(servos, link=tmp_path / "by-id") as wire,
-        open_bus(kind, servos, port=wire.path, **CALM) as bus,
-    ):
+    wire = VirtualBus(servos, kind)
+    with wire.bus(**CALM) as bus:
         bus.start()
         assert np.isnan(bus.load).all()
         settle(bus, [0.4, -0.3, 0.4], 0.011)
@@ -108,24 +103,20 @@ def test_load_and_motion_are_told_where_the_model_does(tmp_path: Path, model: st
         assert np.sign(state.velocity_rad_s).tolist() == [-1, 1, -1]
 
 
-def test_positions_alone_are_shorter_and_the_rest_comes_in_turn(tmp_path: Path) -> None:
+def test_positions_alone_are_shorter_and_the_rest_comes_in_turn() -> None:
     servos = servos_of("sts3215", "scs0009", "sts3215")
-    with (
-        SimulatedBus(servos, link=tmp_path / "by-id") as wire,
-        open_bus("feetech", servos, port=wire.path, feedback="position", **CALM) as bus,
-    ):
+    wire = VirtualBus(servos, "feetech")
+    with wire.bus(feedback="position", **CALM) as bus:
         bus.start()
         state = contract.read_until(bus, lambda s: bool(np.isfinite(s.voltage_v + s.temperature_c).all()))
         assert state.fresh.all()
         np.testing.assert_allclose(state.voltage_v, [7.4, 6.0, 7.4], atol=0.2)
 
 
-def test_servos_read_one_by_one_take_turns(tmp_path: Path) -> None:
+def test_servos_read_one_by_one_take_turns() -> None:
     servos = servos_of(*("ax-12a",) * 3)
-    with (
-        SimulatedBus(servos, link=tmp_path / "by-id") as wire,
-        open_bus("dynamixel", servos, port=wire.path, singles=2, **CALM) as bus,
-    ):
+    wire = VirtualBus(servos, "dynamixel")
+    with wire.bus(singles=2, **CALM) as bus:
         bus.start()
         fresh = [bus.read().fresh.tolist() for _ in range(3)]
         assert fresh == [[True, True, False], [True, False, True], [False, True, True]]
@@ -133,13 +124,11 @@ def test_servos_read_one_by_one_take_turns(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("how", ["hw:2:0x20", "mute:2"])
-def test_a_servo_in_trouble_is_looked_at_without_waiting_for_its_turn(tmp_path: Path, how: str) -> None:
+def test_a_servo_in_trouble_is_looked_at_without_waiting_for_its_turn(how: str) -> None:
     """Without turns, torque is only asked of servos that raise an alert or come back from silence."""
     servos = servos_of(*("sts3215",) * 3)
-    with (
-        SimulatedBus(servos, link=tmp_path / "by-id") as wire,
-        open_bus("feetech", servos, port=wire.path, slow_group=0, margin_s=0.05, watchdog_ms=0) as bus,
-    ):
+    wire = VirtualBus(servos, "feetech")
+    with wire.bus(slow_group=0, margin_s=0.05, watchdog_ms=0) as bus:
         bus.start()
         wire.fault(how)
         if how == "mute:2":

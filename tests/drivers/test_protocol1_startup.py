@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +14,9 @@ from drivers import check_model, open_bus
 from drivers.bus import Bus
 from drivers.errors import CorruptReply, DriverError, NoReply, ServoFault, ServoRefused, WrongModel
 from drivers.sim import SimulatedBus
+from drivers.sim.virtual import VirtualBus
 from tests.drivers import contract
+from tests.drivers.programs import program
 
 CALM = {"margin_s": 0.05, "watchdog_ms": 0}
 
@@ -31,15 +30,16 @@ def kind_of(model: str) -> str:
 
 
 class Head:
-    """A simulated wire of one model, and drivers for it."""
+    """Simulated servos of one model in time that does not pass by itself, and drivers for them."""
 
-    def __init__(self, model: str, link: Path) -> None:
+    def __init__(self, model: str) -> None:
         self.model, self.servos = model, servos_of(model)
-        self.wire = SimulatedBus(self.servos, link=link)
+        self.wire = VirtualBus(self.servos, kind_of(model), driver=CALM)
 
     def bus(self, model: str = "", **options: object) -> Bus:
         servos = servos_of(model) if model else self.servos
-        return open_bus(kind_of(self.model), servos, port=self.wire.path, **(CALM | options))
+        link, clock = self.wire.link, self.wire.clock
+        return open_bus(kind_of(self.model), servos, port=link, clock=clock, **(CALM | options))
 
     def registers(self, name: str) -> list[int]:
         return [self.wire.servo(servo.id).register(name) for servo in self.servos]
@@ -51,10 +51,8 @@ class Head:
 
 
 @pytest.fixture
-def head(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Head]:
-    whole = Head(request.param, tmp_path / "by-id")
-    with whole.wire:
-        yield whole
+def head(request: pytest.FixtureRequest) -> Head:
+    return Head(request.param)
 
 
 def over(*models: str) -> pytest.MarkDecorator:
@@ -73,7 +71,7 @@ def test_5_an_old_goal_is_no_jump(head: Head) -> None:
         view.place(low)
     with head.bus() as bus:
         bus.start()
-        time.sleep(0.1)
+        head.wire.clock.sleep(0.1)
         assert head.registers("Present Position") == [low] * 3
         assert head.registers("Goal Position") == [low] * 3
         assert bus.read().torque.all()
@@ -195,7 +193,7 @@ def test_6_a_servo_in_trouble_is_not_switched_on_unless_told_to(head: Head) -> N
 def test_6_a_servo_that_stays_in_trouble_leaves_nobody_on(head: Head) -> None:
     head.wire.fault("temp:2:95")
     with head.bus(reboot_faulted=True) as bus:
-        time.sleep(0.12)
+        head.wire.clock.sleep(0.12)
         with pytest.raises(ServoFault):
             bus.start()
         assert not any(head.wire.servo(servo.id).torque for servo in head.servos)
@@ -320,41 +318,17 @@ def test_17_a_position_outside_one_turn_is_never_a_goal(
 
 # ---------------------------------------------------------------------------- 3: every way out
 
-PROGRAM = """
-import sys, time
-import numpy as np
-from drivers import open_bus
-from drivers.shutdown import stop_on_signals
-from tests.drivers.test_protocol1_startup import kind_of, servos_of
-bus = open_bus(kind_of(sys.argv[2]), servos_of(sys.argv[2]), port=sys.argv[1], margin_s=0.5)
-bus.open()
-with stop_on_signals(bus.close):
-    bus.start()
-    for k in range(100000):
-        bus.write(np.full(3, 0.2 * np.sin(k / 10)))
-        bus.read()
-        if k == 3:
-            print("ready", flush=True)
-        time.sleep(0.005)
-"""
 
-
-@pytest.mark.parametrize(("head", "how"), [("sts3215", "SIGTERM"), ("ax-12a", "SIGKILL")], indirect=["head"])
-def test_3_every_way_out_switches_all_servos_off(root: Path, head: Head, how: str) -> None:
+@pytest.mark.parametrize(("model", "how"), [("sts3215", "SIGTERM"), ("ax-12a", "SIGKILL")])
+def test_3_every_way_out_switches_all_servos_off(model: str, how: str) -> None:
     """A keeper sees to it where the program cannot: these servos have no watchdog."""
-    child = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, head.wire.path, head.model],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        cwd=root,
-    )
-    assert child.stdout is not None
-    with child.stdout as stream:
-        assert stream.readline() == "ready\n"
-    child.send_signal(getattr(signal, how))
-    assert child.wait(timeout=20) != 0
-    end = time.monotonic() + (5.0 if how == "SIGKILL" else 0.0)
-    while any(head.wire.servo(servo.id).torque for servo in head.servos):
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    servos = servos_of(model)
+    with SimulatedBus(servos) as wire, program(kind_of(model), servos, wire.path, margin_s=0.5) as child:
+        assert child.pid is not None
+        os.kill(child.pid, getattr(signal, how))
+        child.join(20)
+        assert child.exitcode not in (0, None)
+        end = time.monotonic() + (10.0 if how == "SIGKILL" else 0.0)
+        while any(wire.servo(servo.id).torque for servo in servos):
+            assert time.monotonic() < end
+            time.sleep(0.01)

@@ -1,4 +1,4 @@
-"""kind = "simulated": the contract over servos in a child process, and what only this driver does."""
+"""kind = "simulated": the contract over servos of its own, and what only this driver does, in a child process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CALM = {"margin_s": 0.5, "watchdog_ms": 0}
 class TestSimulatedBus(BusContract):
     @pytest.fixture
     def bus(self) -> Bus:
-        return open_bus("simulated", SERVOS, **CALM)
+        return open_bus("simulated", SERVOS, process=False, **CALM)
 
 
 def test_the_port_can_be_given_a_name(tmp_path: Path) -> None:

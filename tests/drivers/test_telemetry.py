@@ -5,17 +5,15 @@ Numbers are those of the fault list in docs/drivers.md.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from drivers import open_bus
 from drivers.bus import Bus
 from drivers.dynamixel.telemetry import PROBE_S
-from drivers.sim import SimulatedBus
-from tests.drivers.contract import SERVOS, read_until, settle
+from drivers.sim.virtual import VirtualBus
+from tests.drivers.contract import SERVOS, pause, read_until, settle
 
 MARGIN_S = 0.1
 CALM = {"margin_s": MARGIN_S, "watchdog_ms": 0}
@@ -23,14 +21,13 @@ FIRST, SECOND, THIRD = range(3)
 
 
 @pytest.fixture
-def wire() -> Iterator[SimulatedBus]:
-    with SimulatedBus(SERVOS) as simulated:
-        yield simulated
+def wire() -> VirtualBus:
+    return VirtualBus(SERVOS)
 
 
 @pytest.fixture
-def bus(wire: SimulatedBus) -> Iterator[Bus]:
-    with open_bus("dynamixel", SERVOS, port=wire.path, **CALM) as running:
+def bus(wire: VirtualBus) -> Iterator[Bus]:
+    with wire.bus(**CALM) as running:
         running.start()
         yield running
 
@@ -39,21 +36,22 @@ def bus(wire: SimulatedBus) -> Iterator[Bus]:
 
 
 @pytest.mark.parametrize("how", ["mute:2", "silent:2"])
-def test_a_silent_servo_costs_the_others_nothing_but_a_bounded_wait(wire: SimulatedBus, bus: Bus, how: str) -> None:
+def test_a_silent_servo_costs_the_others_nothing_but_a_bounded_wait(wire: VirtualBus, bus: Bus, how: str) -> None:
     bus.read()
     wire.fault(how)
     state = bus.read()
     assert state.fresh.tolist() == [True, False, True]
     bus.read()
     waits = []
-    for _ in range(25):
-        start = time.monotonic()
+    for _ in range(50):
+        wire.clock.sleep(0.05)
+        start = wire.clock()
         state = bus.read()
-        waits.append(time.monotonic() - start)
+        waits.append(wire.clock() - start)
         assert state.fresh.tolist() == [True, False, True]
         assert state.silent.tolist() == [False, True, False]
         assert state.age_s[SECOND] > 0
-    assert sum(wait > MARGIN_S for wait in waits) <= 1 + sum(waits) / PROBE_S
+    assert sum(wait > MARGIN_S for wait in waits) <= 1 + 50 * 0.05 / PROBE_S + sum(waits) / PROBE_S
     report = bus.report()
     assert report.silent == (2,)
     assert report.errors == {"no_reply": 1}
@@ -65,7 +63,7 @@ def test_a_silent_servo_costs_the_others_nothing_but_a_bounded_wait(wire: Simula
     bus.stop()
 
 
-def test_the_last_known_position_of_a_silent_servo_stays_and_is_marked(wire: SimulatedBus, bus: Bus) -> None:
+def test_the_last_known_position_of_a_silent_servo_stays_and_is_marked(wire: VirtualBus, bus: Bus) -> None:
     settle(bus, [0.3, 0.3, 0.3])
     wire.fault("mute:2")
     for _ in range(3):
@@ -77,9 +75,9 @@ def test_the_last_known_position_of_a_silent_servo_stays_and_is_marked(wire: Sim
 
 
 @pytest.mark.parametrize(("fast", "at_once"), [(True, [False, True, True]), (False, [False, False, False])])
-def test_nobody_answers_behind_a_silent_servo(wire: SimulatedBus, fast: bool, at_once: list[bool]) -> None:
+def test_nobody_answers_behind_a_silent_servo(wire: VirtualBus, fast: bool, at_once: list[bool]) -> None:
     """A joint reply that is cut off is asked for plainly at once; where a plain one is, the next cycle has them."""
-    with open_bus("dynamixel", SERVOS, port=wire.path, fast=fast, **CALM) as bus:
+    with wire.bus(fast=fast, **CALM) as bus:
         bus.start()
         bus.read()
         wire.fault("mute:1", "chain-stop")
@@ -91,7 +89,7 @@ def test_nobody_answers_behind_a_silent_servo(wire: SimulatedBus, fast: bool, at
 
 
 @pytest.mark.parametrize("mute", [1, 2, 7])
-def test_a_servo_that_cuts_off_a_joint_reply_costs_the_others_nothing(wire: SimulatedBus, bus: Bus, mute: int) -> None:
+def test_a_servo_that_cuts_off_a_joint_reply_costs_the_others_nothing(wire: VirtualBus, bus: Bus, mute: int) -> None:
     bus.read()
     wire.fault(f"mute:{mute}")
     others = [servo.id != mute for servo in SERVOS]
@@ -101,7 +99,7 @@ def test_a_servo_that_cuts_off_a_joint_reply_costs_the_others_nothing(wire: Simu
     wire.clear()
 
 
-def test_when_all_supply_is_gone_and_back_all_return_at_once(wire: SimulatedBus, bus: Bus) -> None:
+def test_when_all_supply_is_gone_and_back_all_return_at_once(wire: VirtualBus, bus: Bus) -> None:
     bus.read()
     wire.fault("mute:*")
     state = read_until(bus, lambda s: bool(s.silent.all()))
@@ -114,7 +112,7 @@ def test_when_all_supply_is_gone_and_back_all_return_at_once(wire: SimulatedBus,
 # ---------------------------------------------------------------------------- 6, 7, 8: alerts and lost torque
 
 
-def test_an_overload_is_seen_while_the_others_move_on(wire: SimulatedBus, bus: Bus) -> None:
+def test_an_overload_is_seen_while_the_others_move_on(wire: VirtualBus, bus: Bus) -> None:
     bus.read()
     wire.fault("hw:2:0x20")
     assert bus.read().error[SECOND] & 0x80
@@ -128,17 +126,17 @@ def test_an_overload_is_seen_while_the_others_move_on(wire: SimulatedBus, bus: B
 
 
 def settle_others(bus: Bus, target: float) -> None:
-    end = time.monotonic() + 10
-    while time.monotonic() < end:
+    end = bus._clock() + 10
+    while bus._clock() < end:
         bus.write(np.full(3, target))
         state = bus.read()
         if np.abs(state.position_rad[[FIRST, THIRD]] - target).max() < 0.01:
             return
-        time.sleep(0.005)
+        pause(bus)
     raise AssertionError(state.position_rad)
 
 
-def test_data_with_the_alert_bit_is_used(wire: SimulatedBus, bus: Bus) -> None:
+def test_data_with_the_alert_bit_is_used(wire: VirtualBus, bus: Bus) -> None:
     wire.fault("alert:2")
     state = settle(bus, [0.2, 0.2, 0.2])
     assert state.fresh.all()
@@ -148,7 +146,7 @@ def test_data_with_the_alert_bit_is_used(wire: SimulatedBus, bus: Bus) -> None:
     assert read_until(bus, lambda s: not s.error.any()).fresh.all()
 
 
-def test_torque_that_goes_without_a_word_is_noticed(wire: SimulatedBus, bus: Bus) -> None:
+def test_torque_that_goes_without_a_word_is_noticed(wire: VirtualBus, bus: Bus) -> None:
     bus.read()
     wire.servo(7).put("Torque Enable", 0)
     cycles = 0
@@ -164,7 +162,7 @@ def test_torque_that_goes_without_a_word_is_noticed(wire: SimulatedBus, bus: Bus
 @pytest.mark.parametrize(
     "fault", ["crc:2:every=3", "flip:2:every=3", "short:2:every=3", "noise:2:every=3", "wrongid:2:9:every=4"]
 )
-def test_damaged_answers_cost_a_cycle_and_give_no_wrong_value(wire: SimulatedBus, bus: Bus, fault: str) -> None:
+def test_damaged_answers_cost_a_cycle_and_give_no_wrong_value(wire: VirtualBus, bus: Bus, fault: str) -> None:
     settle(bus, [0.3, 0.3, 0.3])
     wire.fault(fault)
     stale = 0
@@ -178,7 +176,7 @@ def test_damaged_answers_cost_a_cycle_and_give_no_wrong_value(wire: SimulatedBus
     wire.clear()
 
 
-def test_a_servo_that_answers_under_anothers_id_gives_nobody_a_wrong_value(wire: SimulatedBus, bus: Bus) -> None:
+def test_a_servo_that_answers_under_anothers_id_gives_nobody_a_wrong_value(wire: VirtualBus, bus: Bus) -> None:
     settle(bus, [0.3, -0.3, 0.1])
     wire.fault("wrongid:1:7:every=3")
     for _ in range(12):
@@ -186,8 +184,8 @@ def test_a_servo_that_answers_under_anothers_id_gives_nobody_a_wrong_value(wire:
     wire.clear()
 
 
-def test_late_answers_are_never_taken_for_others(wire: SimulatedBus) -> None:
-    with open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.03, watchdog_ms=0) as bus:
+def test_late_answers_are_never_taken_for_others(wire: VirtualBus) -> None:
+    with wire.bus(margin_s=0.03, watchdog_ms=0) as bus:
         bus.start()
         settle(bus, [0.3, -0.2, 0.1])
         wire.fault("late:2:36ms:every=3")
@@ -201,16 +199,16 @@ def test_late_answers_are_never_taken_for_others(wire: SimulatedBus) -> None:
         read_until(bus, lambda s: bool(s.fresh.all()))
 
 
-def test_an_adapter_that_echoes_loses_nothing(wire: SimulatedBus) -> None:
+def test_an_adapter_that_echoes_loses_nothing(wire: VirtualBus) -> None:
     wire.fault("echo")
-    with open_bus("dynamixel", SERVOS, port=wire.path, **CALM) as bus:
+    with wire.bus(**CALM) as bus:
         bus.start()
         state = settle(bus, [0.2, 0.2, 0.2])
         assert state.fresh.all()
         assert bus.report().errors == {}
 
 
-def test_header_bytes_in_the_data_are_read_right(wire: SimulatedBus, bus: Bus) -> None:
+def test_header_bytes_in_the_data_are_read_right(wire: VirtualBus, bus: Bus) -> None:
     bus.stop()
     wire.servo(2).place(0x100 * 8 + 0xFD)
     wire.servo(7).place(4095)
@@ -222,11 +220,11 @@ def test_header_bytes_in_the_data_are_read_right(wire: SimulatedBus, bus: Bus) -
 # ---------------------------------------------------------------------------- fast reads
 
 
-def test_servos_that_ignore_fast_reads_are_read_plainly(wire: SimulatedBus) -> None:
+def test_servos_that_ignore_fast_reads_are_read_plainly(wire: VirtualBus) -> None:
     for servo in wire.chain.servos:
         servo.table.fast_read = False
     try:
-        with open_bus("dynamixel", SERVOS, port=wire.path, fast=True, **CALM) as bus:
+        with wire.bus(fast=True, **CALM) as bus:
             bus.start()
             state = read_until(bus, lambda s: bool(s.fresh.all()))
             assert not state.silent.any()
@@ -241,7 +239,7 @@ def test_mixed_models_share_a_wire() -> None:
         type(SERVOS[0])(2, "eye", "xl320", -0.5, 0.5, 5.0, 100.0),
         type(SERVOS[0])(3, "neck", "xm430-w350", -0.5, 0.5, 4.0, 100.0),
     ]
-    with SimulatedBus(servos) as wire, open_bus("dynamixel", servos, port=wire.path, **CALM) as bus:
+    with VirtualBus(servos).bus(**CALM) as bus:
         bus.start()
         state = settle(bus, [0.2, 0.2, 0.2], tolerance=0.02)
         assert np.isnan(state.current_a).tolist() == [False, True, False]
