@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from PIL import Image
+from typer.testing import CliRunner
+
+from controller.cli import app, main
 
 COMMANDS = [
     ("demo",),
@@ -32,18 +37,37 @@ COMMANDS = [
 ]
 
 
-def omote(*words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run ``omote WORDS`` as a process of its own."""
-    command = [sys.executable, "-c", "from controller.cli import main; main()", *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=cwd, check=False)
+Omote = Callable[..., "Said"]
+
+
+class Said(NamedTuple):
+    """What a command left: its exit code and what it wrote."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def omote(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Omote:
+    """Runs ``omote WORDS`` in a folder, by the entry point of the command but in this process."""
+
+    def run(*words: str, cwd: Path | None = None) -> Said:
+        monkeypatch.setattr(sys, "argv", ["omote", *words])
+        if cwd is not None:
+            monkeypatch.chdir(cwd)
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        return Said(code, *capsys.readouterr())
+
+    return run
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_every_command_has_help_with_an_example(command: tuple[str, ...]) -> None:
-    from typer.testing import CliRunner
-
-    from controller.cli import app
-
     result = CliRunner().invoke(app, [*command, "--help"])
     assert result.exit_code == 0
     assert f"Example: omote {' '.join(command)}" in " ".join(result.output.split())
@@ -72,7 +96,7 @@ def test_every_command_has_help_with_an_example(command: tuple[str, ...]) -> Non
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
 )
 def test_wrong_input_is_one_message_with_the_next_step(
-    tmp_path: Path, words: tuple[str, ...], message: str, hint: str
+    omote: Omote, tmp_path: Path, words: tuple[str, ...], message: str, hint: str
 ) -> None:
     result = omote(*words, cwd=tmp_path)
     said = " ".join(result.stderr.split())
@@ -84,7 +108,15 @@ def test_wrong_input_is_one_message_with_the_next_step(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_missing_or_busy_port_ends_a_run_with_one_message(tmp_path: Path) -> None:
+def test_a_process_of_its_own_ends_with_that_code_and_says_it_on_stderr() -> None:
+    command = [sys.executable, "-c", "from controller.cli import main; main()", "run", "nope"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert result.returncode == 1
+    assert result.stdout == ""
+    assert result.stderr.startswith("error: ")
+
+
+def test_a_missing_or_busy_port_ends_a_run_with_one_message(omote: Omote, tmp_path: Path) -> None:
     stage = tmp_path / "stage.toml"
     stage.write_text('name = "mine"\n[[links]]\nport = "/dev/not-there"\n')
     result = omote("run", str(stage), "--headless", "--seconds", "2")
@@ -96,7 +128,7 @@ def test_a_missing_or_busy_port_ends_a_run_with_one_message(tmp_path: Path) -> N
     assert "Traceback" not in said
 
 
-def test_a_damaged_head_is_one_message(tmp_path: Path, root: Path) -> None:
+def test_a_damaged_head_is_one_message(omote: Omote, tmp_path: Path, root: Path) -> None:
     head = tmp_path / "head"
     head.mkdir()
     shipped = root / "configs/heads/ict"
@@ -108,7 +140,7 @@ def test_a_damaged_head_is_one_message(tmp_path: Path, root: Path) -> None:
     assert "Traceback" not in result.stderr
 
 
-def test_render_draws_what_it_is_told(tmp_path: Path) -> None:
+def test_render_draws_what_it_is_told(omote: Omote, tmp_path: Path) -> None:
     pictures = []
     for name, words in (("rest", ()), ("open", ("--set", "jawOpen=0.8"))):
         out = tmp_path / f"{name}.png"
@@ -120,7 +152,7 @@ def test_render_draws_what_it_is_told(tmp_path: Path) -> None:
     assert (np.abs(pictures[1] - pictures[0]).max(axis=2) > 24).mean() > 0.01
 
 
-def test_check_names_what_is_good() -> None:
+def test_check_names_what_is_good(omote: Omote) -> None:
     for name, said in (("demo", "stage demo"), ("head24", "24 channels"), ("ict", "59 parameters")):
         result = omote("check", name)
         assert result.returncode == 0, result.stderr
@@ -128,7 +160,7 @@ def test_check_names_what_is_good() -> None:
         assert "good" in result.stdout
 
 
-def test_dry_run_opens_nothing_and_lists_every_channel() -> None:
+def test_dry_run_opens_nothing_and_lists_every_channel(omote: Omote) -> None:
     result = omote("run", "demo", "--dry-run")
     assert result.returncode == 0, result.stderr
     assert "no port was opened" in result.stdout
