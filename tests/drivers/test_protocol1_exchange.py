@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import os
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable
 
 import pytest
 
@@ -18,6 +16,7 @@ from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.layout import layout_of
 from drivers.protocol1.port import Port
 from drivers.protocol1.registers import NAMES, item_of, window
+from drivers.sim.virtual import VirtualClock
 
 MARGIN_S = 0.2
 MODELS = ("sts3215", "scs0009", "ax-12a", "mx1-28")
@@ -25,52 +24,56 @@ Answer = Callable[[Packet1], list["bytes | tuple[float, bytes]"]]
 
 
 class FarEnd:
-    """A pseudo-terminal that answers every instruction packet with what ``answer`` returns."""
+    """A port in virtual time, behind which ``answer`` says what comes back for every packet, one after the other."""
 
     def __init__(self) -> None:
         self.answer: Answer = lambda packet: []
         self.packets: list[Packet1] = []
-        self._master, self._slave = os.openpty()
-        self.path = os.ttyname(self._slave)
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
+        self.path, self.baud, self.is_open = "virtual", 1_000_000, False
+        self.clock = VirtualClock(1.0)
+        self._reader = Reader1()
+        self._coming: deque[tuple[float, bytes]] = deque()
 
-    def _serve(self) -> None:
-        reader = Reader1()
-        while True:
-            try:
-                data = os.read(self._master, 4096)
-            except OSError:
-                return
-            if data == b"bye":
-                return
-            for packet in reader.feed(data):
-                self.packets.append(packet)
-                for piece in self.answer(packet):
-                    delay, piece = piece if isinstance(piece, tuple) else (0.0, piece)
-                    time.sleep(delay)
-                    os.write(self._master, piece)
+    def open(self) -> None:
+        self.is_open = True
 
     def close(self) -> None:
-        os.write(self._slave, b"bye")
-        self._thread.join(5)
-        os.close(self._master)
-        os.close(self._slave)
+        self.is_open = False
+
+    def write(self, data: bytes) -> None:
+        for packet in self._reader.feed(data):
+            self.packets.append(packet)
+            at_s = max(self.clock(), self._coming[-1][0] if self._coming else 0.0)
+            for piece in self.answer(packet):
+                delay, piece = piece if isinstance(piece, tuple) else (0.0, piece)
+                at_s += delay
+                self._coming.append((at_s, piece))
+
+    def read(self, deadline_s: float) -> bytes:
+        if self._coming and self._coming[0][0] <= max(deadline_s, self.clock()):
+            at_s, data = self._coming.popleft()
+            self.clock.wait_until(at_s)
+            return data
+        self.clock.wait_until(deadline_s)
+        return b""
+
+    def drain(self) -> int:
+        count = 0
+        while data := self.read(0.0):
+            count += len(data)
+        return count
 
 
 @pytest.fixture
-def wire() -> Iterator[FarEnd]:
-    far_end = FarEnd()
-    yield far_end
-    far_end.close()
+def wire() -> FarEnd:
+    return FarEnd()
 
 
 @pytest.fixture
-def port(wire: FarEnd) -> Iterator[Port]:
-    link = Port(wire.path, margin_s=MARGIN_S)
+def port(wire: FarEnd) -> Port:
+    link = Port(wire, margin_s=MARGIN_S)  # type: ignore[arg-type]
     link.openPort()
-    yield link
-    link.closePort()
+    return link
 
 
 def status(data: bytes, servo: int = 1, flags: int = 0) -> bytes:
@@ -221,9 +224,6 @@ def test_rows_that_fill_no_packet_are_sent_in_several(wire: FarEnd, port: Port) 
     packets.write_group(port, 42, 2, rows)
     packets.send(port, encode(1, Instruction1.PING))
     port.is_using = False
-    end = time.monotonic() + 5
-    while len(wire.packets) < 3 and time.monotonic() < end:
-        time.sleep(0.001)
     assert [packet.params for packet in wire.packets[:2]] == [b"\x2a\x02" + rows[:12], b"\x2a\x02" + rows[12:]]
     with pytest.raises(ValueError, match="whole rows"):
         packets.write_group(port, 42, 2, rows[:-1])
@@ -242,12 +242,12 @@ def test_a_refusal_is_an_answer_where_the_family_has_them(wire: FarEnd, port: Po
     assert Exchanges().ask(port, 1, Instruction1.READ, b"\x38\x04", 4).missing == (1,)
 
 
-def test_the_deadline_counts_what_is_still_leaving(port: Port) -> None:
+def test_the_deadline_counts_what_is_still_leaving(wire: FarEnd, port: Port) -> None:
     port.baudrate = 9600
-    before = time.monotonic()
+    before = wire.clock()
     port.transmit(encode(1, Instruction1.WRITE, bytes(90)))
     port.expect(10)
-    assert port.deadline_s - before == pytest.approx((96 + 10) * 10 / 9600 + MARGIN_S, abs=0.05)
+    assert port.deadline_s - before == pytest.approx((96 + 10) * 10 / 9600 + MARGIN_S)
 
 
 def test_a_second_thread_in_a_transaction_is_told(port: Port) -> None:

@@ -5,8 +5,6 @@ Numbers are those of the fault list in docs/drivers.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,7 @@ from drivers.dynamixel import startup
 from drivers.dynamixel.startup import Policy
 from drivers.dynamixel.tables import load_table
 from drivers.errors import BusError, CorruptReply, NoReply, ServoFault, ServoRefused, WrongModel
-from drivers.sim import SimulatedBus
+from drivers.sim.virtual import VirtualBus
 from tests.drivers.contract import SERVOS, settle
 
 CALM = {"margin_s": 0.1, "watchdog_ms": 0}
@@ -24,20 +22,19 @@ IDS = [servo.id for servo in SERVOS]
 
 
 @pytest.fixture
-def wire() -> Iterator[SimulatedBus]:
-    with SimulatedBus(SERVOS) as simulated:
-        yield simulated
+def wire() -> VirtualBus:
+    return VirtualBus(SERVOS, driver=CALM)
 
 
-def bus_on(wire: SimulatedBus, **options: object) -> Bus:
-    return open_bus("dynamixel", SERVOS, port=wire.path, **{**CALM, **options})
+def bus_on(wire: VirtualBus, **options: object) -> Bus:
+    return open_bus("dynamixel", SERVOS, port=wire.link, clock=wire.clock, **{**CALM, **options})
 
 
-def torques(wire: SimulatedBus) -> list[bool]:
+def torques(wire: VirtualBus) -> list[bool]:
     return [wire.servo(i).torque for i in IDS]
 
 
-def refuses(wire: SimulatedBus, kind: type[BusError], match: str, **options: object) -> BusError:
+def refuses(wire: VirtualBus, kind: type[BusError], match: str, **options: object) -> BusError:
     """Start-up fails with this error, and no servo is on afterwards."""
     with bus_on(wire, **options) as bus:
         with pytest.raises(kind, match=match) as caught:
@@ -50,7 +47,7 @@ def refuses(wire: SimulatedBus, kind: type[BusError], match: str, **options: obj
 # ---------------------------------------------------------------------------- 5: no jump
 
 
-def test_an_old_goal_is_not_executed(wire: SimulatedBus) -> None:
+def test_an_old_goal_is_not_executed(wire: VirtualBus) -> None:
     for servo, position in zip(IDS, (1500, 2500, 2100), strict=True):
         wire.servo(servo).put("Goal Position", 2048)
         wire.servo(servo).place(position)
@@ -64,7 +61,7 @@ def test_an_old_goal_is_not_executed(wire: SimulatedBus) -> None:
         assert [wire.servo(i).goal for i in IDS] == before
 
 
-def test_the_first_targets_ramp_from_a_pose_moved_by_hand(wire: SimulatedBus) -> None:
+def test_the_first_targets_ramp_from_a_pose_moved_by_hand(wire: VirtualBus) -> None:
     wire.servo(1).place(1700)
     with bus_on(wire) as bus:
         bus.start()
@@ -77,7 +74,7 @@ def test_the_first_targets_ramp_from_a_pose_moved_by_hand(wire: SimulatedBus) ->
 # ---------------------------------------------------------------------------- 9: who is there
 
 
-def test_a_missing_servo_is_named_and_nothing_is_written(wire: SimulatedBus) -> None:
+def test_a_missing_servo_is_named_and_nothing_is_written(wire: VirtualBus) -> None:
     wire.fault("mute:2")
     error = refuses(wire, NoReply, r'"brow" \(id 2\)')
     assert error.servo_ids == (2,)
@@ -85,27 +82,27 @@ def test_a_missing_servo_is_named_and_nothing_is_written(wire: SimulatedBus) -> 
     assert not any(wire.servo(i).eeprom_writes for i in IDS)
 
 
-def test_all_missing_servos_are_named_at_once(wire: SimulatedBus) -> None:
+def test_all_missing_servos_are_named_at_once(wire: VirtualBus) -> None:
     wire.fault("mute:1", "mute:7")
     assert refuses(wire, NoReply, "ids 1, 7").servo_ids == (1, 7)
 
 
 def test_another_model_is_refused() -> None:
     others = [ServoSpec(i, "x", "xl430-w250" if i == 2 else "xl330-m288", -1, 1, 5, 50) for i in IDS]
-    with SimulatedBus(others) as wire:
-        error = refuses(wire, WrongModel, "is xl430-w250, configured is xl330-m288")
-        assert error.servo_ids == (2,)
-        assert torques(wire) == [False] * 3
+    wire = VirtualBus(others)
+    error = refuses(wire, WrongModel, "is xl430-w250, configured is xl330-m288")
+    assert error.servo_ids == (2,)
+    assert torques(wire) == [False] * 3
 
 
-def test_two_servos_with_one_id_are_diagnosed(wire: SimulatedBus) -> None:
+def test_two_servos_with_one_id_are_diagnosed(wire: VirtualBus) -> None:
     wire.fault("dup:2")
     error = refuses(wire, CorruptReply, "id 2")
     assert "two servos may have this id" in error.hint
     assert torques(wire) == [False] * 3
 
 
-def test_a_servo_at_another_baud_rate_is_silent_and_the_hint_says_so(wire: SimulatedBus) -> None:
+def test_a_servo_at_another_baud_rate_is_silent_and_the_hint_says_so(wire: VirtualBus) -> None:
     wire.fault("baud:2:57600")
     assert "baud" in refuses(wire, NoReply, "at 1000000 baud").hint
 
@@ -113,12 +110,12 @@ def test_a_servo_at_another_baud_rate_is_silent_and_the_hint_says_so(wire: Simul
 # ---------------------------------------------------------------------------- 3: somebody holds already
 
 
-def held(wire: SimulatedBus) -> None:
+def held(wire: VirtualBus) -> None:
     for i in IDS:
         wire.servo(i).put("Torque Enable", 1)
 
 
-def test_servos_that_hold_are_taken_over_without_letting_go(wire: SimulatedBus) -> None:
+def test_servos_that_hold_are_taken_over_without_letting_go(wire: VirtualBus) -> None:
     killed = bus_on(wire)
     killed.open()
     killed.start()
@@ -132,7 +129,7 @@ def test_servos_that_hold_are_taken_over_without_letting_go(wire: SimulatedBus) 
     assert torques(wire) == [False] * 3
 
 
-def test_taking_over_can_be_refused_or_let_go_first(wire: SimulatedBus) -> None:
+def test_taking_over_can_be_refused_or_let_go_first(wire: VirtualBus) -> None:
     held(wire)
     assert refuses(wire, ServoRefused, "hold with torque already", takeover="refuse").servo_ids == tuple(IDS)
     assert torques(wire) == [True] * 3
@@ -141,7 +138,7 @@ def test_taking_over_can_be_refused_or_let_go_first(wire: SimulatedBus) -> None:
         assert torques(wire) == [True] * 3
 
 
-def test_a_servo_that_holds_with_wrong_settings_is_not_dropped(wire: SimulatedBus) -> None:
+def test_a_servo_that_holds_with_wrong_settings_is_not_dropped(wire: VirtualBus) -> None:
     wire.servo(2).put("Operating Mode", 4)
     held(wire)
     error = refuses(wire, ServoRefused, "Operating Mode must change from 4 to 3")
@@ -152,7 +149,7 @@ def test_a_servo_that_holds_with_wrong_settings_is_not_dropped(wire: SimulatedBu
 # ---------------------------------------------------------------------------- 15: permanent settings
 
 
-def test_permanent_settings_are_written_only_when_they_differ_and_said(wire: SimulatedBus) -> None:
+def test_permanent_settings_are_written_only_when_they_differ_and_said(wire: VirtualBus) -> None:
     wire.servo(2).put("Drive Mode", 13)
     wire.servo(2).put("Operating Mode", 4)
     with bus_on(wire) as bus:
@@ -171,14 +168,14 @@ def test_permanent_settings_are_written_only_when_they_differ_and_said(wire: Sim
     assert [dict(wire.servo(i).eeprom_writes) for i in IDS] == counts
 
 
-def test_servos_that_are_deaf_after_a_permanent_write_are_waited_for(wire: SimulatedBus) -> None:
+def test_servos_that_are_deaf_after_a_permanent_write_are_waited_for(wire: VirtualBus) -> None:
     wire.fault("eeprom-busy:*:60ms")
     with bus_on(wire, margin_s=0.03) as bus:
         bus.start()
         assert torques(wire) == [True] * 3
 
 
-def test_a_goal_write_cannot_switch_torque_on_by_itself(wire: SimulatedBus) -> None:
+def test_a_goal_write_cannot_switch_torque_on_by_itself(wire: VirtualBus) -> None:
     wire.servo(1).put("Drive Mode", 8)
     with bus_on(wire) as bus:
         bus.start()
@@ -188,7 +185,7 @@ def test_a_goal_write_cannot_switch_torque_on_by_itself(wire: SimulatedBus) -> N
 # ---------------------------------------------------------------------------- 6, 8: supply and latched errors
 
 
-def test_too_little_voltage_is_waited_for_and_then_told(wire: SimulatedBus) -> None:
+def test_too_little_voltage_is_waited_for_and_then_told(wire: VirtualBus) -> None:
     wire.fault("volts:2:3.2")
     error = refuses(wire, ServoFault, r'"brow" \(id 2\) reads 3.2 V, needs 3.5 V', voltage_wait_s=0.2)
     assert error.servo_ids == (2,)
@@ -197,14 +194,14 @@ def test_too_little_voltage_is_waited_for_and_then_told(wire: SimulatedBus) -> N
     assert error.servo_ids == tuple(IDS)
 
 
-def test_a_supply_that_comes_up_in_time_is_enough(wire: SimulatedBus) -> None:
+def test_a_supply_that_comes_up_in_time_is_enough(wire: VirtualBus) -> None:
     wire.fault("volts:2:3.6:for=0.4s")
     with bus_on(wire, min_voltage_v=4.5) as bus:
         bus.start()
         assert torques(wire) == [True] * 3
 
 
-def test_a_latched_error_needs_leave_to_reboot(wire: SimulatedBus) -> None:
+def test_a_latched_error_needs_leave_to_reboot(wire: VirtualBus) -> None:
     wire.servo(2).latch(0x20)
     error = refuses(wire, ServoFault, r'"brow" \(id 2\) 0x20')
     assert error.servo_ids == (2,)
@@ -216,7 +213,7 @@ def test_a_latched_error_needs_leave_to_reboot(wire: SimulatedBus) -> None:
         settle(bus, [0.1, 0.1, 0.1])
 
 
-def test_a_voltage_error_that_leaves_torque_alone_is_no_reason_to_reboot(wire: SimulatedBus) -> None:
+def test_a_voltage_error_that_leaves_torque_alone_is_no_reason_to_reboot(wire: VirtualBus) -> None:
     wire.servo(2).put("Shutdown", 52)
     wire.servo(2).latch(0x01)
     with bus_on(wire) as bus:
@@ -229,7 +226,7 @@ def test_a_voltage_error_that_leaves_torque_alone_is_no_reason_to_reboot(wire: S
 
 @pytest.mark.parametrize("position", [5568, -300, -(2**31)])
 def test_a_position_outside_one_turn_is_refused(
-    wire: SimulatedBus, position: int, monkeypatch: pytest.MonkeyPatch
+    wire: VirtualBus, position: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     servo = wire.chain.servo(2)
     monkeypatch.setattr(servo, "position_ticks", lambda now: position)
@@ -245,7 +242,7 @@ def test_a_position_outside_one_turn_is_refused(
     assert torques(wire) == [False] * 3
 
 
-def test_goals_stay_inside_the_servos_own_limits(wire: SimulatedBus) -> None:
+def test_goals_stay_inside_the_servos_own_limits(wire: VirtualBus) -> None:
     wire.servo(1).put("Max Position Limit", 2148)
     with bus_on(wire) as bus:
         bus.start()
@@ -258,7 +255,7 @@ def test_goals_stay_inside_the_servos_own_limits(wire: SimulatedBus) -> None:
 # ---------------------------------------------------------------------------- what is set before torque
 
 
-def test_speed_acceleration_and_watchdog_are_set(wire: SimulatedBus) -> None:
+def test_speed_acceleration_and_watchdog_are_set(wire: VirtualBus) -> None:
     with bus_on(wire, watchdog_ms=2000) as bus:
         bus.start()
         servo = wire.servo(1)
@@ -269,7 +266,7 @@ def test_speed_acceleration_and_watchdog_are_set(wire: SimulatedBus) -> None:
         assert servo.register("Bus Watchdog") == 0
 
 
-def test_a_watchdog_somebody_left_tripped_is_cleared(wire: SimulatedBus) -> None:
+def test_a_watchdog_somebody_left_tripped_is_cleared(wire: VirtualBus) -> None:
     wire.servo(1).put("Bus Watchdog", 255)
     with bus_on(wire) as bus:
         bus.start()
@@ -281,7 +278,7 @@ def test_the_watchdogs_period_is_rounded_up(period: int, steps: int) -> None:
     assert Policy(watchdog_ms=period).watchdog_steps == steps
 
 
-def test_a_status_level_somebody_changed_is_put_back(wire: SimulatedBus) -> None:
+def test_a_status_level_somebody_changed_is_put_back(wire: VirtualBus) -> None:
     wire.servo(2).put("Status Return Level", 0)
     with bus_on(wire) as bus:
         bus.start()
@@ -292,7 +289,7 @@ def test_a_status_level_somebody_changed_is_put_back(wire: SimulatedBus) -> None
 
 
 @pytest.mark.parametrize("mute", [1, 2, 7])
-def test_a_dead_servo_does_not_keep_the_others_on(wire: SimulatedBus, mute: int) -> None:
+def test_a_dead_servo_does_not_keep_the_others_on(wire: VirtualBus, mute: int) -> None:
     bus = bus_on(wire, margin_s=0.05)
     bus.open()
     bus.start()
@@ -305,7 +302,7 @@ def test_a_dead_servo_does_not_keep_the_others_on(wire: SimulatedBus, mute: int)
     wire.clear()
 
 
-def test_a_servo_whose_answers_are_lost_is_off_and_reported(wire: SimulatedBus) -> None:
+def test_a_servo_whose_answers_are_lost_is_off_and_reported(wire: VirtualBus) -> None:
     bus = bus_on(wire, margin_s=0.05)
     bus.open()
     bus.start()
@@ -316,7 +313,7 @@ def test_a_servo_whose_answers_are_lost_is_off_and_reported(wire: SimulatedBus) 
     assert torques(wire) == [False] * 3
 
 
-def test_lost_answers_are_asked_for_again_when_switching_off(wire: SimulatedBus) -> None:
+def test_lost_answers_are_asked_for_again_when_switching_off(wire: VirtualBus) -> None:
     with bus_on(wire, margin_s=0.05) as bus:
         bus.start()
         wire.fault("drop:*:every=3")
@@ -325,7 +322,7 @@ def test_lost_answers_are_asked_for_again_when_switching_off(wire: SimulatedBus)
     assert torques(wire) == [False] * 3
 
 
-def test_a_torque_that_does_not_come_on_leaves_nobody_on(wire: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_torque_that_does_not_come_on_leaves_nobody_on(wire: VirtualBus, monkeypatch: pytest.MonkeyPatch) -> None:
     wire.servo(7).latch(0x20)  # as if it happened after the check
     monkeypatch.setattr(startup, "_clear_faults", lambda *_: [])
     error = refuses(wire, ServoFault, r'did not switch their motor on: "neck" \(id 7\) \(hardware error 0x20\)')
@@ -338,7 +335,7 @@ def test_a_policy_nobody_knows_is_named() -> None:
         Policy(takeover="maybe")
 
 
-def test_old_firmware_is_not_asked_for_what_it_lacks(wire: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_firmware_is_not_asked_for_what_it_lacks(wire: VirtualBus, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     original = startup.Registers.get
     monkeypatch.setattr(
