@@ -16,25 +16,29 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def test_a_run_with_a_window_draws_and_reports(tmp_path: Path) -> None:
-    report = tmp_path / "r.json"
-    program = "from controller.cli import main; main()"
-    command = [
-        "xvfb-run",
-        "-a",
-        sys.executable,
-        "-c",
-        program,
-        "run",
-        "demo",
-        "--seconds",
-        "3",
-        "--report",
-        str(report),
-    ]
+STAGE = """
+name = "small"
+robots = ["head24"]
+[face]
+size = [320, 240]
+quality = "fast"
+"""
+
+
+def shown(program: str, *words: str) -> str:
+    """What a Python program writes that opens its window on a virtual display."""
+    command = ["xvfb-run", "-a", sys.executable, "-c", program, *words]
     environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
-    result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=90, check=False)
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
     assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_a_run_with_a_window_draws_and_reports(tmp_path: Path) -> None:
+    report, stage = tmp_path / "r.json", tmp_path / "small.toml"
+    stage.write_text(STAGE)
+    program = "from controller.cli import main; main()"
+    shown(program, "run", str(stage), "--seconds", "1", "--report", str(report))
     measured = json.loads(report.read_text())
     assert measured["face"]["renderer"] == "window"
     assert measured["face"]["frames"] > 3
@@ -66,7 +70,7 @@ class Body:
 
 with Mailbox.create(len(P)) as mailbox:
     values = HeadValues(mailbox, P, head.parameters)
-    face = WindowFace(head, FaceSettings(size=(640, 480)), values, Body(), stage.load_head)
+    face = WindowFace(head, FaceSettings(size=(320, 240), quality="fast"), values, Body(), stage.load_head)
     assert face._hand.handles.wait(60.0)
     panel = face._panel
 
@@ -91,10 +95,6 @@ with Mailbox.create(len(P)) as mailbox:
 
 
 def test_points_are_dragged_with_the_mouse() -> None:
-    command = ["xvfb-run", "-a", sys.executable, "-c", DRAG]
-    environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
-    result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
-    assert result.returncode == 0, result.stderr
-    told = json.loads(result.stdout)
+    told = json.loads(shown(DRAG))
     assert told["mouthSmileLeft"] > 0.1 and told["mouthSmileLeft"] > 3 * told.get("mouthSmileRight", 0.0)
     assert told["reshaped"] is True
