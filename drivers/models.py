@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drivers.errors import DriverError
 
-FEETECH = ("sts", "sms", "scs")
+FEETECH = ("sts", "sm", "scs")
 """What the names of Feetech's models begin with."""
 
 

@@ -10,7 +10,7 @@ from drivers.sim.faults import Fault
 from drivers.sim.line import Line
 from drivers.sim.replies import Reply
 
-FAULTS = ("echo", "unplug", "mute", "silent", "late", "drop", "flip", "noise", "short", "volts")
+FAULTS = ("echo", "slow-reader", "unplug", "mute", "silent", "late", "drop", "flip", "noise", "short", "volts")
 """Faults of a board. Ids are channels; ``mute`` and ``volts`` are the board's, so write ``*``."""
 BROWN_OUT_V = 4.0
 

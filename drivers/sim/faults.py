@@ -77,6 +77,9 @@ KINDS: dict[str, Kind] = {
     "eeprom-busy": Kind("servo", "deaf for VALUE after each permanent write", _seconds, 0.02),
     "echo": Kind("bus", "the adapter gives back every byte it was sent"),
     "chain-stop": Kind("bus", "nobody answers behind a silent servo"),
+    "slow-reader": Kind(
+        "bus", "what comes back reaches the host in bursts, one every VALUE (a starved reader)", _seconds, 0.2
+    ),
     "unplug": Kind("bus", "the port goes away; for= brings it back, as=PATH under another name"),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
@@ -9,6 +10,7 @@ from typing import Any, Protocol
 
 from drivers.sim.faults import KINDS, Fault, FaultSet
 from drivers.sim.replies import Reply
+from drivers.sim.wire import Timed
 
 
 class Reader(Protocol):
@@ -41,6 +43,7 @@ class Line(ABC):
     faults : the faults that are set.
     line_baud : bit rate of the port, or None while unknown.
     echo : the adapter gives back what it was sent.
+    burst_s : what comes back reaches the host in bursts so far apart; 0: as it comes.
     on_unplug : called with (fault, begins) when the port goes away or comes back.
     packets : packets handled.
     lock : held while a packet is handled; hold it to look at the devices from another thread.
@@ -49,6 +52,7 @@ class Line(ABC):
     def __init__(self, seed: int = 0, kinds: Iterable[str] = KINDS) -> None:
         self.line_baud: int | None = None
         self.echo = False
+        self.burst_s = 0.0
         self.on_unplug: Callable[[Fault, bool], None] = lambda fault, begins: None
         self.packets = 0
         self.lock = threading.RLock()
@@ -94,6 +98,12 @@ class Line(ABC):
         if now_s >= self.faults.next_change_s:
             self.faults.advance(now_s)
 
+    def heard(self, timed: list[Timed]) -> list[Timed]:
+        """When the host gets to read what arrives at some times."""
+        if not self.burst_s:
+            return timed
+        return [(math.ceil(time_s / self.burst_s) * self.burst_s, data) for time_s, data in timed]
+
     def set_line_baud(self, baud: int | None) -> None:
         """The port's bit rate was changed."""
         self.line_baud = baud
@@ -102,5 +112,7 @@ class Line(ABC):
         """A fault that is not about replies begins or ends."""
         if fault.kind == "echo":
             self.echo = begins
+        elif fault.kind == "slow-reader":
+            self.burst_s = fault.value if begins else 0.0
         elif fault.kind == "unplug":
             self.on_unplug(fault, begins)

@@ -139,7 +139,7 @@ class PortServer:
 
     def _send(self, timed: list[Timed]) -> None:
         """Write what is due, keep the rest in order."""
-        for time_s, data in timed:
+        for time_s, data in self.chain.heard(timed):
             if self._queue or time_s > time.monotonic():
                 self._queue.append((time_s, data))
             else:

@@ -129,7 +129,7 @@ class VirtualLink:
 
     def _hand_over(self, packet: Any, now_s: float) -> None:
         at_s = self._timing.arrival(now_s, self._line.size(packet), self.baud)
-        self._coming += self._timing.deliveries(self._line.handle(packet, at_s), self.baud)
+        self._coming += self._line.heard(self._timing.deliveries(self._line.handle(packet, at_s), self.baud))
 
     def _due(self) -> float:
         """When the next thing happens."""

@@ -31,7 +31,7 @@ SERVOS = (
 NAMED = tuple(replace(servo, model="parameter") for servo in SERVOS)
 TEXTS = {"template": "S{ch},{us}\n", "off": "D{ch}\n"}
 ASKED = TEXTS | {"query": "?{ch}\n", "answer": "{ch}={us}\n"}
-NOISY = ("noise:*:5:p=0.3", "flip:*:p=0.3", "drop:*:p=0.2", "short:*:1:p=0.3", "late:*:70ms:p=0.2")
+NOISY = ("noise:*:5:p=0.3", "flip:*:p=0.3", "drop:*:p=0.2", "short:*:1:p=0.3", "late:*:70ms:p=0.2", "slow-reader:50ms")
 QUICK = {"stagger_s": 0.0, "margin_s": 0.05}
 FAMILIES: dict[str, tuple[str, tuple[ServoSpec, ...], dict[str, Any]]] = {
     "maestro": ("maestro", SERVOS, {}),
@@ -283,6 +283,41 @@ def test_19_an_echo_is_told(family: str) -> None:
     board.fault("echo")
     with board.bus() as bus, pytest.raises(NoReply):
         bus.start()
+
+
+@pytest.mark.parametrize("family", ["maestro", "micro", "pololu", "ssc32"])
+def test_4_a_channel_that_cannot_be_confirmed_leaves_no_other_on(family: str) -> None:
+    sick = FAMILIES[family][1][1].id
+    board = far_end(family, margin_s=0.02)
+    bus = board.bus()
+    with pytest.raises(NoReply, match=rf"not confirmed off.*: {sick} \(brow\)") as caught, bus:
+        bus.start()
+        cycle(bus, [0.1, 0.1, 0.1], 5)
+        board.fault(f"silent:{sick}")
+    assert caught.value.servo_ids == (sick,)
+    assert outputs(board) == []
+    assert not bus.is_open
+
+
+def test_4_a_name_that_a_head_keeps_leaves_no_other_on() -> None:
+    board = far_end("omote", margin_s=0.02)
+    bus = board.bus()
+    with pytest.raises(NoReply, match=r"not confirmed off.*: 2 \(brow\)") as caught, bus:
+        bus.start()
+        cycle(bus, [0.1, 0.1, 0.1], 5)
+        del board.line.values["brow"]
+    assert caught.value.servo_ids == (2,)
+    assert outputs(board) == []
+
+
+def test_4_a_mute_text_board_is_told_to_let_go_of_every_servo() -> None:
+    board = far_end("asked", margin_s=0.02)
+    with board.bus() as bus:
+        bus.start()
+        board.fault("silent:*")
+        cycle(bus, [0.1, 0.1, 0.1], 5)
+    board.clock.sleep(0.2)
+    assert outputs(board) == []
 
 
 def test_the_maestro_says_what_is_wrong_with_it(caplog: pytest.LogCaptureFixture) -> None:

@@ -201,6 +201,11 @@ ROWS = (
     Row(14, f"wrongid:{SICK}:4:every=3", lambda rig, state: len(errors(rig)) > 0),
     Row(15, "eeprom-busy:*:20ms", lambda rig, state: bool(state.fresh.all()) and not rig.bus.report().errors),
     Row(18, f"temp:{SICK}:75", latched(0x04)),
+    Row(
+        13,
+        "slow-reader:200ms",
+        lambda rig, state: not state.fresh.any() and set(rig.bus.report().errors) == {"no_reply"},
+    ),
     Row(19, "echo", lambda rig, state: bool(state.fresh.all()) and not rig.bus.report().errors),
 )
 

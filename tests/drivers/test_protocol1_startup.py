@@ -62,9 +62,9 @@ def over(*models: str) -> pytest.MarkDecorator:
 # ---------------------------------------------------------------------------- 5: an old goal
 
 
-@over("sts3215", "scs0009", "ax-12a", "mx1-28")
+@over("sts3215", "sm8512bl", "scs0009", "scs15", "ax-12a", "mx1-28")
 def test_5_an_old_goal_is_no_jump(head: Head) -> None:
-    low, high = (300, 700) if head.model in ("ax-12a", "scs0009") else (1800, 2300)
+    low, high = (300, 700) if head.model in ("ax-12a", "scs0009", "scs15") else (1800, 2300)
     for servo in head.servos:
         view = head.wire.servo(servo.id)
         view.put("Goal Position", high)
@@ -103,14 +103,14 @@ def test_9_another_model_moves_nothing(head: Head) -> None:
         assert head.untouched()
 
 
-@over("sts3032")
+@over("sts3032", "scs15")
 def test_a_model_whose_number_nobody_knows_is_any_that_no_other_has(head: Head) -> None:
     with head.bus() as bus:
         bus.start()
-        assert [info.model for info in bus.discover([1])] == ["sts3032"]
+        assert [info.model for info in bus.discover([1])] == [head.model]
         bus.stop()
         head.wire.servo(2).put("Model Number", 777)
-        with pytest.raises(WrongModel, match="is sts3215, configured is sts3032"):
+        with pytest.raises(WrongModel, match=f"is sts3215, configured is {head.model}"):
             bus.start()
 
 

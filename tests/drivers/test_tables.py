@@ -198,6 +198,8 @@ LEGACY = {
         {"Baud Rate": (4, 34), "CCW Angle Limit": (8, 4095), "P Gain": (28, 32), "Goal Acceleration": (73, 0)},
     ),
     "sts3215": (777, 1, {"ID": (5, 1), "Homing Offset": (31, 0), "Goal Position": (42, 0), "Lock": (55, 1)}),
+    "sm8512bl": (11272, 1, {"Goal Position": (42, 0), "Lock": (55, 1), "Max Position Limit": (11, 4095)}),
+    "scs15": (65551, 1, {"Lock": (48, 1), "Max Position Limit": (11, 1023), "Temperature Limit": (13, 80)}),
     "scs0009": (1284, 1, {"Lock": (48, 1), "Protective Torque": (37, 40), "Present Position": (56, 0)}),
 }
 
