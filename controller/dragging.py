@@ -207,7 +207,9 @@ def _differences(points: Floats, jaw: NDArray):  # type: ignore[no-untyped-def]
 
 def wear(head: Head, shape: Reshape, amount: float = 1.0) -> None:
     """Move a head's control points by ``amount`` of a reshape; every pose goes on from there."""
-    head.part(shape.part).rig.rest[shape.ids] += amount * shape.moves  # type: ignore[attr-defined]
+    rig = head.part(shape.part).rig  # type: ignore[attr-defined]
+    rig.rest[shape.ids] += amount * shape.moves
+    rig.wake()
 
 
 def save_group(path: Path, name: str, shape: Reshape) -> None:

@@ -178,7 +178,9 @@ class Handles:
 
     def _shape(self, moves: Floats) -> None:
         self._moves = moves
-        np.add(self._rest, moves, out=self._head.part(PART).rig.rest)  # type: ignore[attr-defined]
+        rig = self._head.part(PART).rig  # type: ignore[attr-defined]
+        np.add(self._rest, moves, out=rig.rest)
+        rig.wake()
 
     def _moved_by_hand(self, model: _Model) -> Floats:
         return np.asarray(model.basis @ self._moves)

@@ -6,32 +6,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.jit import kernel
+from surface.lanes import fma, load, store3, zero
 
 Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
 # The cornea stands out of the eyeball: its sphere's centre and radius, in eyeball radii, as surface.fit.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
 
 
 @kernel
 def place_samples(
-    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats, points: Floats, eye: Floats, radius: float,
-    out: Floats,
+    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats32, points: Floats, eye: Floats, radius: float,
+    room: Floats32, out: Floats,
 ) -> None:  # fmt: skip
     """Samples ``out (s, 3)`` of a surface as (x, height, depth), from control points ``points (n, 3)``.
 
-    Sample s is the sum of ``share`` times the points ``ids`` between ``start[s]`` and ``start[s + 1]``. Height and
-    depth are y and z, or, with a ``radius`` > 0, the arc above the eyeball's middle and the distance from it.
+    Eight samples at a time: those of tile t are the sums of eight ``share`` each times the points ``ids`` between
+    ``start[t]`` and ``start[t + 1]``; ``room (24,)`` is for them. Height and depth are y and z, or, with a ``radius``
+    > 0, the arc above the eyeball's middle and the distance from it.
     """
-    for s in range(len(start) - 1):
-        x, y, z = -eye[0], -eye[1], -eye[2]
-        for k in range(start[s], start[s + 1]):
-            i = ids[k]
-            x += share[k] * points[i, 0]
-            y += share[k] * points[i, 1]
-            z += share[k] * points[i, 2]
-        out[s, 0] = x
-        out[s, 1] = radius * np.arctan2(y, z) if radius > 0.0 else y
-        out[s, 2] = np.sqrt(x * x + y * y + z * z) if radius > 0.0 else z
+    for tile in range(len(start) - 1):
+        x, y, z = zero(), zero(), zero()
+        for k in range(start[tile], start[tile + 1]):
+            i, w = ids[k], load(share, 8 * k)
+            x = fma(w, np.float32(points[i, 0] - eye[0]), x)
+            y = fma(w, np.float32(points[i, 1] - eye[1]), y)
+            z = fma(w, np.float32(points[i, 2] - eye[2]), z)
+        store3(room, 0, x, y, z)
+        for s in range(8 * tile, min(8 * tile + 8, len(out))):
+            at = 3 * (s - 8 * tile)
+            a, b, c = room[at], room[at + 1], room[at + 2]
+            out[s, 0] = a
+            out[s, 1] = radius * np.arctan2(b, c) if radius > 0.0 else b
+            out[s, 2] = np.sqrt(a * a + b * b + c * c) if radius > 0.0 else c
 
 
 @kernel
@@ -44,6 +51,20 @@ def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sig
             continue
         t = (depth - a) / (b - a)
         worst = max(worst, sign * (heights[j] + t * (heights[j + 1] - heights[j]) - height))
+    return worst
+
+
+@kernel
+def deepest(heights: Floats, depths: Floats, others: Floats, at: Floats, sign: float, least: float) -> float:
+    """How far two profiles, ``heights`` at ``depths`` and ``others`` at ``at``, overlap; -1e9 where that is no more
+    than ``least`` at any depth."""
+    most = others.max() - heights.min() if sign > 0.0 else heights.max() - others.min()
+    if most <= least:
+        return -1e9
+    worst = -1e9
+    for j in range(len(heights)):
+        worst = max(worst, overlap_at(heights[j], depths[j], others, at, sign))
+        worst = max(worst, overlap_at(others[j], at[j], heights, depths, -sign))
     return worst
 
 
@@ -72,11 +93,7 @@ def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> No
             for j in range(rows):
                 heights[j] = other[at, j, 1] + t * (other[at + 1, j, 1] - other[at, j, 1])
                 depths[j] = other[at, j, 2] + t * (other[at + 1, j, 2] - other[at, j, 2])
-            worst = -1e9
-            for j in range(rows):
-                worst = max(worst, overlap_at(own[k, j, 1], own[k, j, 2], heights, depths, sign))
-                worst = max(worst, overlap_at(heights[j], depths[j], own[k, :, 1], own[k, :, 2], -sign))
-            worst -= press
+            worst = deepest(own[k, :, 1], own[k, :, 2], heights, depths, sign, press - soft) - press
             near = min(max(worst + soft, 0.0), 2.0 * soft)
             push[side, k] = worst if worst > soft else near * near / (4.0 * soft)
 
@@ -90,7 +107,7 @@ def find_sinking(samples: Floats, size: float, thick: Floats, axis: Floats, sink
     for s in range(len(samples)):
         x, depth = samples[s, 0], samples[s, 2]
         sinking[s] = 0.0
-        if depth < 1e-6 or depth > 1.5 * size:
+        if depth < 1e-6 or depth > size * (CORNEA_AT + CORNEA_RADIUS) + thick[s]:
             continue
         across = np.sqrt(max(depth * depth - x * x, 0.0))
         y, z = across * np.sin(samples[s, 1] / size), across * np.cos(samples[s, 1] / size)

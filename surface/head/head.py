@@ -16,6 +16,7 @@ from surface.head.meshes import make_surface, tessellate, unpack
 from surface.head.paint import paint_part
 from surface.head.parameters import NAMES, read_pose, rotation
 from surface.head.part import HeadPart, RigidPart, SkinPart, Turn
+from surface.head.rules import Drivers
 from surface.head.seams import Zipper
 from surface.head.shade import apply_shade, read_shade
 
@@ -36,7 +37,8 @@ class Head:
 
     def __init__(self, data: HeadData, where: str = "head") -> None:
         self.data = data
-        self.parts: tuple[HeadPart, ...] = tuple(_make_part(p, data, where) for p in data.parts)
+        drivers = Drivers(data.rules, where)
+        self.parts: tuple[HeadPart, ...] = tuple(_make_part(p, data, drivers, where) for p in data.parts)
         by_name = {p.name: p for p in self.parts}
         self._zippers = [Zipper(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams]
         for zipper in self._zippers:
@@ -131,7 +133,7 @@ class Head:
         return [part.place_points(pose) for part in self.parts], Turn(rotation(*pose.head), self.data.neck.pivot)
 
 
-def _make_part(part: PartData, head: HeadData, where: str) -> HeadPart:
+def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> HeadPart:
     if part.follows != "skin" and part.follows not in RIGID:
         raise HeadFileError(
             f"{where}: part {part.name!r}: follows: {part.follows!r} is not one of skin, {', '.join(RIGID)}"
@@ -144,7 +146,7 @@ def _make_part(part: PartData, head: HeadData, where: str) -> HeadPart:
     attributes = paint_part(head.paint, part.name, mesh.uv, where)
     attributes |= _eye_directions(part, head, mesh.vertices)
     if part.follows == "skin":
-        return SkinPart(part, head, mesh, surface, attributes)
+        return SkinPart(part, head, mesh, surface, attributes, drivers)
     return RigidPart(part, head, mesh, surface, attributes)
 
 

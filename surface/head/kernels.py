@@ -12,6 +12,48 @@ Floats32 = NDArray[np.float32]
 
 
 @kernel
+def add_moves(
+    amounts: Floats, start: NDArray[np.int64], ids: NDArray[np.int32], moves: Floats32, points: Floats
+) -> None:
+    """Add to ``points (n, 3)`` the rows of ``moves`` from ``start[g]`` to ``start[g + 1]``, by ``amounts[g]``, for
+    every group g that acts; ``ids`` says which points they move."""
+    for g in range(amounts.shape[0]):
+        amount = amounts[g]
+        if amount == 0.0:
+            continue
+        for k in range(start[g], start[g + 1]):
+            i = ids[k]
+            points[i, 0] += amount * moves[k, 0]
+            points[i, 1] += amount * moves[k, 1]
+            points[i, 2] += amount * moves[k, 2]
+
+
+@kernel
+def mix_rows(amounts: Floats, rows: Floats, rest: Floats, least: Floats, out: Floats) -> None:
+    """Write ``rest (k,)`` plus ``amounts (g,) @ rows (g, k)``, nowhere less than ``least (k,)``, to ``out (k,)``."""
+    out[:] = rest
+    for g in range(amounts.shape[0]):
+        if amounts[g] != 0.0:
+            for k in range(out.shape[0]):
+                out[k] += amounts[g] * rows[g, k]
+    for k in range(out.shape[0]):
+        out[k] = max(out[k], least[k])
+
+
+@kernel
+def carry(
+    rest: Floats32, rest_normals: Floats32, linear: Floats32, shift: Floats32, vertices: Floats32, normals: Floats32
+) -> None:
+    """Write ``linear (3, 3) @ p + shift (3,)`` of every row of ``rest (m, 3)``, and its normal's ``linear @ n``."""
+    for i in range(rest.shape[0]):
+        x, y, z = rest[i, 0], rest[i, 1], rest[i, 2]
+        p, q, r = rest_normals[i, 0], rest_normals[i, 1], rest_normals[i, 2]
+        for c in range(3):
+            vertices[i, c] = linear[c, 0] * x + linear[c, 1] * y + linear[c, 2] * z + shift[c]
+            normals[i, c] = linear[c, 0] * p + linear[c, 1] * q + linear[c, 2] * r
+
+
+@kernel
 def swing_jaw(
     rest: Floats, share: Floats, turn: Floats, shift: Floats, full_turn: Floats, full_shift: Floats,
     amount: float, undo: Floats, points: Floats,
@@ -106,22 +148,19 @@ def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at
 
 @kernel
 def zip_border(
-    source: Floats32, target: Floats32, ids: NDArray[np.int64], low: NDArray[np.int64], high: NDArray[np.int64],
-    share: Floats32,
+    vertices: Floats32, normals: Floats32, to_vertices: Floats32, to_normals: Floats32, ids: NDArray[np.int64],
+    low: NDArray[np.int64], high: NDArray[np.int64], share: Floats32,
 ) -> None:  # fmt: skip
-    """Put rows ``ids`` of ``target (m, 3)`` between rows ``low`` and ``high`` of ``source``, at ``share`` of it."""
+    """Put rows ``ids`` of ``to_vertices (m, 3)`` between rows ``low`` and ``high`` of ``vertices``, at ``share`` of
+    the way; normals alike, to length 1 where they have any."""
     for k in range(ids.shape[0]):
+        i, a, b, t = ids[k], low[k], high[k], share[k]
+        square = np.float32(0.0)
         for c in range(3):
-            a = source[low[k], c]
-            target[ids[k], c] = a + share[k] * (source[high[k], c] - a)
-
-
-@kernel
-def unit_rows(array: Floats32, ids: NDArray[np.int64]) -> None:
-    """Scale rows ``ids`` of ``array (m, 3)`` to length 1; rows without length stay."""
-    for i in ids:
-        x, y, z = array[i, 0], array[i, 1], array[i, 2]
-        length = np.sqrt(x * x + y * y + z * z)
-        if length > 1e-12:
+            to_vertices[i, c] = vertices[a, c] + t * (vertices[b, c] - vertices[a, c])
+            to_normals[i, c] = normals[a, c] + t * (normals[b, c] - normals[a, c])
+            square += to_normals[i, c] ** 2
+        if square > 1e-24:
+            scale = 1.0 / np.sqrt(square)
             for c in range(3):
-                array[i, c] /= length
+                to_normals[i, c] *= scale

@@ -7,6 +7,7 @@ eyeLook shapes; both add up to one gaze, which turns the eyeball and moves the l
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import atan2, cos, hypot, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,41 +74,44 @@ def read_pose(values: NDArray[np.float64]) -> Pose:
         raise ValueError(f"values has shape {v.shape}, expected ({len(NAMES)},)")
     if np.isnan(v).any():
         raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
-    v = np.clip(v, _LOW, 1.0)
-    v[_JAW] = max(v[_JAW], TONGUE_NEEDS * v[_TONGUE])
-    angle = v[_ANGLE]
-    shapes = v[: len(SHAPES)].copy()
-    gaze = np.array([_gaze(v, side, angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)])
+    v = np.minimum(np.maximum(v, _LOW), 1.0)
+    jaw = v[_JAW] = max(float(v[_JAW]), TONGUE_NEEDS * float(v[_TONGUE]))
+    shapes, angle = v[: len(SHAPES)], v[_ANGLE]
+    gaze = np.array([_gaze(v[_LOOK[side]].tolist(), side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)])
     for side in (0, 1):
-        outward = gaze[side, 0] * (1 - 2 * side)
-        shapes[_LOOK[side]] = np.maximum([gaze[side, 1], -outward, outward, -gaze[side, 1]], 0.0)
+        yaw, pitch = gaze[side]
+        outward = yaw * (1 - 2 * side)
+        shapes[_LOOK[side]] = max(pitch, 0.0), max(-outward, 0.0), max(outward, 0.0), max(-pitch, 0.0)
         shapes[_OPENERS[side]] *= 1.0 - shapes[_BLINK[side]]  # a closing lid ends closed, wherever it started
-    jaw = float(v[_JAW])
     shapes[_CLOSE] = min(shapes[_CLOSE], jaw)
     closed = float(shapes[_CLOSE] / jaw) if jaw > 0 else 0.0
     return Pose(shapes, jaw, closed, angle[:3] * HEAD_RAD, gaze * EYE_RAD)
 
 
-def _gaze(v: NDArray[np.float64], side: int, angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes together."""
-    down, inward, outward, up = v[_LOOK[side]]
-    yaw = angle[0] + (outward - inward) * (1 - 2 * side)
-    return np.clip([yaw, angle[1] + down - up], -1.0, 1.0)
+def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float, float]:
+    """Yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes (down, in, out, up) together."""
+    down, inward, outward, up = look
+    yaw, pitch = yaw + (outward - inward) * (1 - 2 * side), pitch + down - up
+    return min(max(yaw, -1.0), 1.0), min(max(pitch, -1.0), 1.0)
 
 
 def rotation(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]:
     """(3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
-    (cy, cp, cr), (sy, sp, sr) = np.cos([yaw, pitch, roll]), np.sin([yaw, pitch, roll])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_x = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
-    about_z = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
-    return about_y @ about_x @ about_z
+    cy, cp, cr, sy, sp, sr = cos(yaw), cos(pitch), cos(roll), sin(yaw), sin(pitch), sin(roll)
+    return np.array(
+        [
+            [cy * cr + sy * sp * sr, sy * sp * cr - cy * sr, sy * cp],
+            [cp * sr, cp * cr, -sp],
+            [cy * sp * sr - sy * cr, sy * sr + cy * sp * cr, cy * cp],
+        ]
+    )
 
 
 def rotation_vector(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,) axis times angle of a rotation by less than 180 degrees."""
-    axis = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
-    sine = 0.5 * float(np.linalg.norm(axis))
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    axis = (h - f, c - g, d - b)
+    sine = 0.5 * hypot(*axis)
     if sine < 1e-9:
         return np.zeros(3)
-    return axis / (2 * sine) * float(np.arctan2(sine, 0.5 * (np.trace(matrix) - 1)))
+    return np.array(axis) * (atan2(sine, 0.5 * (a + e + i - 1)) / (2 * sine))

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from surface.dcp import DCPSurface
 from surface.deformation import Deformation
 from surface.head.data import HeadData, PartData
-from surface.head.kernels import turn_head
+from surface.head.kernels import carry, turn_head
 from surface.head.meshes import make_surface as make_surface
 from surface.head.parameters import Pose, rotation_vector
-from surface.head.rig import SkinRig, rigid_motion
+from surface.head.rig import SkinRig, motion_asks, rigid_motion
+from surface.head.rules import Drivers
 from surface.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -115,16 +116,26 @@ class SkinPart(HeadPart):
     """A part whose control points move one by one; vertices follow by Eq. (2)."""
 
     def __init__(
-        self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface, attributes: Mapping[str, Floats32]
+        self,
+        data: PartData,
+        head: HeadData,
+        mesh: Mesh,
+        surface: DCPSurface,
+        attributes: Mapping[str, Floats32],
+        drivers: Drivers | None = None,
     ) -> None:
         super().__init__(data, mesh, surface, attributes)
-        self.rig = SkinRig(data, head)
+        self.rig, self._version = SkinRig(data, head, drivers), 0
         self.deformation = Deformation(surface, mesh)
         self.vertices[:], self.normals[:] = self.deformation.vertices, self.deformation.normals
         self._share[:] = head.neck.share(self.vertices.astype(np.float64))
 
     def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
-        self.deformation.set_points(self.rig.apply(pose))
+        points = self.rig.apply(pose)
+        if self._version == self.rig.version:
+            return [], self.deformation.vertices, self.deformation.normals
+        self._version = self.rig.version
+        self.deformation.set_points(points)
         return self.deformation.changed, self.deformation.vertices, self.deformation.normals
 
     @property
@@ -148,19 +159,20 @@ class RigidPart(HeadPart):
         super().__init__(data, mesh, surface, attributes)
         self._head = head
         self._rest, self._rest_normals = self.vertices.copy(), self.normals.copy()
-        self._now, self._now_normals = self._rest.copy(), self._rest_normals.copy()
         self._linear, self._shift = np.eye(3), np.zeros(3)
+        self._asked: tuple[object, ...] = ()
 
-    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
-        linear, shift = rigid_motion(self.follows, self._head, pose)
-        if np.array_equal(linear, self._linear) and np.array_equal(shift, self._shift):
-            return [], self._now, self._now_normals
-        self._linear, self._shift = linear, shift
-        matrix = np.ascontiguousarray(linear.T, np.float32)
-        np.dot(self._rest, matrix, out=self._now)
-        self._now += shift.astype(np.float32)
-        np.dot(self._rest_normals, matrix, out=self._now_normals)
-        return [(0, len(self._now))], self._now, self._now_normals
+    def pose(self, pose: Pose, turn: Turn) -> None:
+        """Move to a pose; ``turn`` is the head's rotation, which a rigid part takes as a whole."""
+        asked = (*motion_asks(self.follows, self._head, pose), turn.matrix.tobytes())
+        self._turn, self.changed = turn, []
+        if asked == self._asked:
+            return
+        self._asked, self.changed = asked, [(0, len(self._rest))]
+        self._linear, self._shift = rigid_motion(self.follows, self._head, pose)
+        linear = (turn.matrix @ self._linear).astype(np.float32)
+        shift = (turn.matrix @ (self._shift - turn.pivot) + turn.pivot).astype(np.float32)
+        carry(self._rest, self._rest_normals, linear, shift, self.vertices, self.normals)
 
     @property
     def control_points(self) -> Floats:

@@ -7,37 +7,50 @@ from numpy.typing import NDArray
 
 from surface.head.contact import LID_MM, Feeler, Follower
 from surface.head.data import HeadData, Jaw, PartData
-from surface.head.kernels import keep_on_eyeball, swing_jaw
+from surface.head.kernels import keep_on_eyeball, mix_rows, swing_jaw
 from surface.head.meshes import make_surface
+from surface.head.moves import Moves
 from surface.head.parameters import SHAPES, Pose, rotation
 from surface.head.rules import Drivers
 
 Floats = NDArray[np.float64]
+_PLACE = {name: i for i, name in enumerate(SHAPES)}
 
 
 class SkinRig:
     """Control points of one deforming part.
 
-    Apply functions write into buffers made here; nothing grows while a face runs.
+    Apply functions write into buffers made here; nothing grows while a face runs. What a pose asks of the part is
+    worked out again only where it differs from the pose before.
 
     Parameters
     ----------
     part : its groups may name any of :data:`SHAPES` and the head's rules; others are left out.
     head : pivots, the jaw's path, rules, contacts.
+    drivers : the head's, where several parts share them.
+
+    Attributes
+    ----------
+    rest : (n, 3) float64, control points at rest; whoever changes them calls :meth:`wake`.
+    points : (n, 3) float64, control points of the last pose.
+    version : grows whenever ``points`` is worked out anew.
     """
 
-    def __init__(self, part: PartData, head: HeadData) -> None:
+    def __init__(self, part: PartData, head: HeadData, drivers: Drivers | None = None) -> None:
         n = len(part.points)
         self.rest = np.ascontiguousarray(part.points, np.float64)
-        self._drivers = Drivers(head.rules)
-        self.used, self._moves = _stack(part, self._drivers.names)
+        self._drivers = drivers or Drivers(head.rules)
+        self._moves = Moves(part, self._drivers.names)
         self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
+        self._swings, self._whole = bool(self._open.any()), jaw_path(head.jaw, 1.0)
         self._undo = _undo_share(part)
         self._feelers, self._followers = _contacts(part, head)
-        self._lids = Lids(part, head, self._moves.reshape(len(self.used), n, 3))
-        self._amounts = np.zeros(len(self.used), np.float32)
-        self._linear = np.zeros(3 * n, np.float32)
+        self._lids = Lids(part, head, self._moves)
+        self._amounts = np.zeros(len(self._moves.used))
+        self._asked: tuple[object, ...] = ()
+        self._pushes: dict[str, Floats] = {}
         self.points = np.zeros((n, 3))
+        self.version = 0
 
     def apply(self, pose: Pose) -> Floats:
         """Positions (n, 3) of all control points before the head turns.
@@ -45,23 +58,43 @@ class SkinRig:
         The array is the rig's own and is overwritten each time. A part whose opening has contacts leaves what
         they ask for in ``pose.pushes``.
         """
-        self._amounts[:] = self._drivers.amounts(pose.shapes)[self.used]
-        np.dot(self._amounts, self._moves, out=self._linear)
-        np.add(self.rest, self._linear.reshape(-1, 3), out=self.points)
-        if pose.jaw > 0:
+        np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
+        asked = self._asks(pose)
+        if asked != self._asked:
+            self._asked = asked
+            self._express(pose)
+            self.version += 1
+        pose.pushes.update(self._pushes)
+        return self.points
+
+    def wake(self) -> None:
+        """Work everything out anew at the next pose: the points at rest have been changed."""
+        self._asked = ()
+
+    def _asks(self, pose: Pose) -> tuple[object, ...]:
+        """All that the part's points depend on, to compare with the pose before."""
+        jaw = (pose.jaw, pose.closed) if self._swings else ()
+        gaze = pose.gaze.tobytes() if self._feelers else b""
+        pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
+        return self._amounts.tobytes(), jaw, gaze, *pushes
+
+    def _express(self, pose: Pose) -> None:
+        """Groups, jaw, lids and contacts, one after the other."""
+        np.copyto(self.points, self.rest)
+        self._moves.add(self._amounts, self.points)
+        if pose.jaw > 0 and self._swings:
             turn, shift = jaw_path(self._jaw, pose.jaw)
-            full_turn, full_shift = jaw_path(self._jaw, 1.0)
+            full_turn, full_shift = self._whole
             undo = self._undo * pose.closed
             swing_jaw(self.rest, self._open, turn, shift, full_turn * pose.jaw, full_shift * pose.jaw,
                       pose.jaw, undo, self.points)  # fmt: skip
         self._lids.apply(self._amounts, self.points)
         for feeler in self._feelers:
             axis = optical_axis(pose.gaze[max(feeler.contact.eye, 0)])
-            pose.pushes[feeler.contact.name] = feeler.apply(axis, self.points)
+            self._pushes[feeler.contact.name] = feeler.apply(axis, self.points)
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], self.points)
-        return self.points
 
 
 class Lids:
@@ -69,24 +102,24 @@ class Lids:
 
     Parameters
     ----------
-    part : its ``lids`` say which points and how closely; head : the eyes; moves : (g, n, 3) of its groups.
+    part : its ``lids`` say which points and how closely; head : the eyes; moves : what its groups do.
     """
 
-    def __init__(self, part: PartData, head: HeadData, moves: NDArray[np.float32]) -> None:
+    def __init__(self, part: PartData, head: HeadData, moves: Moves) -> None:
         self._ids = np.flatnonzero(part.lids).astype(np.int64)
         self._hold = np.abs(part.lids[self._ids])
         self._eye = head.eyes[(part.lids[self._ids] < 0).astype(int)]
         from_eye = part.points[self._ids] - self._eye
         self._rest = np.linalg.norm(from_eye, axis=1)
-        self._moves = np.linalg.norm(from_eye + moves[:, self._ids], axis=2) - self._rest
+        self._moves = np.linalg.norm(from_eye + moves.at(self._ids), axis=2) - self._rest
+        self._radius = self._rest.copy()
         self._least = np.minimum(self._rest, head.eye_radius + LID_MM)
 
-    def apply(self, amounts: NDArray[np.float32], points: Floats) -> None:
+    def apply(self, amounts: Floats, points: Floats) -> None:
         """Set the distance of the lids' points among ``points (n, 3)``; ``amounts (g,)`` of the groups."""
         if len(self._ids):
-            radius = self._rest + amounts.astype(np.float64) @ self._moves
-            np.maximum(radius, self._least, out=radius)
-            keep_on_eyeball(self._ids, self._eye, self._hold, radius, points)
+            mix_rows(amounts, self._moves, self._rest, self._least, self._radius)
+            keep_on_eyeball(self._ids, self._eye, self._hold, self._radius, points)
 
 
 def optical_axis(gaze: Floats) -> Floats:
@@ -105,16 +138,6 @@ def _contacts(part: PartData, head: HeadData) -> tuple[list[Feeler], list[tuple[
             follower = Follower(contact, part.points, make_surface(opening), head)
             followers.append((contact.name, follower))
     return feelers, followers
-
-
-def _stack(part: PartData, names: tuple[str, ...]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Indices into ``names`` of the part's groups, and their displacements (g, 3 n)."""
-    groups = [g for g in part.groups if g.name in names]
-    moves = np.zeros((len(groups), len(part.points), 3), np.float32)
-    for row, g in zip(moves, groups, strict=True):
-        row[g.ids] = g.moves
-    used = np.array([names.index(g.name) for g in groups], np.int64)
-    return used, moves.reshape(len(groups), 3 * len(part.points))
 
 
 def _undo_share(part: PartData) -> Floats:
@@ -136,6 +159,16 @@ def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
     return turn, centre - turn @ centre + amount * np.array(jaw.glide)
 
 
+def motion_asks(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
+    """All that the motion of a part fixed to skull, jaw or an eye depends on, before the head turns."""
+    if follows == "jaw":
+        return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))
+    if follows in ("left_eye", "right_eye"):
+        yaw, pitch = pose.gaze[int(follows == "right_eye")]
+        return float(yaw), float(pitch)
+    return ()
+
+
 def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
     """Linear part (3, 3) and shift (3,) of a part that is fixed to skull, jaw or an eye, before the head turns.
 
@@ -145,7 +178,7 @@ def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floa
     if follows == "jaw":
         linear, shift = jaw_path(head.jaw, pose.jaw)
         for name, tilt in head.jaw.tilts.items():
-            amount = pose.shapes[SHAPES.index(name)]
+            amount = pose.shapes[_PLACE[name]]
             linear, shift = linear + amount * tilt[:, :3], shift + amount * tilt[:, 3]
     elif follows in ("left_eye", "right_eye"):
         side = int(follows == "right_eye")

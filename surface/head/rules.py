@@ -36,9 +36,16 @@ class Drivers:
         self._first = np.cumsum([0, *(len(r.terms) for r in rules)])[:-1]
         self._power = np.array([r.power for r in rules])
         self._amounts = np.zeros(len(self.names))
+        self._of: Floats | None = None
 
     def amounts(self, shapes: Floats) -> Floats:
-        """(52 + r,) from the shapes (52,); the array is overwritten each time."""
+        """(52 + r,) from the shapes (52,); the array is overwritten each time.
+
+        Asked again for the very same array, as by the parts of one head, it gives what it has.
+        """
+        if shapes is self._of:
+            return self._amounts
+        self._of = shapes
         self._amounts[: len(SHAPES)] = shapes
         if len(self._power):
             terms = np.clip(self._mix @ shapes, 0.0, 1.0)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.head.data import Seam
-from surface.head.kernels import nearest_on_line, unit_rows, zip_border
+from surface.head.kernels import nearest_on_line, zip_border
 from surface.head.part import HeadPart
 
 NEAR = 2e-3  # in (u, v): a vertex nearer than this to the seam's polyline is on it
@@ -71,9 +71,7 @@ class Zipper:
         if not len(self.ids) or not (self.first.changed or self.second.changed):
             return
         one, two = self.first, self.second
-        zip_border(one.vertices, two.vertices, self.ids, self.low, self.high, self.share)
-        zip_border(one.normals, two.normals, self.ids, self.low, self.high, self.share)
-        unit_rows(two.normals, self.ids)
+        zip_border(one.vertices, one.normals, two.vertices, two.normals, self.ids, self.low, self.high, self.share)
         self.second.touch()
 
 
