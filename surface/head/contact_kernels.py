@@ -1,5 +1,6 @@
 """Loops over the two sides of an opening, compiled."""
 
+# mypy: disable-error-code="call-arg, var-annotated"
 from __future__ import annotations
 
 import numpy as np
