@@ -1,16 +1,14 @@
-"""``omote ports``, ``scan`` and ``simulate``."""
+"""``omote ports``, ``scan``, ``set-id`` and ``monitor``; ``simulate`` is in cli_simulate."""
 
 from __future__ import annotations
 
-import time
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from controller.errors import ConfigError
+from controller import cli_simulate
 
 console = Console(highlight=False)
 
@@ -21,14 +19,7 @@ def register(app: typer.Typer) -> None:
     app.command()(scan)
     app.command("set-id")(set_id)
     app.command()(monitor)
-    simulators = typer.Typer(no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
-    simulators.command("dynamixel")(simulate_dynamixel)
-    simulators.command("feetech")(simulate_feetech)
-    simulators.command("maestro")(simulate_maestro)
-    simulators.command("ssc32")(simulate_ssc32)
-    simulators.command("robot")(simulate_robot)
-    simulators.command("host")(simulate_host)
-    app.add_typer(simulators, name="simulate")
+    cli_simulate.register(app)
 
 
 def ports() -> None:
@@ -143,138 +134,3 @@ def monitor(
             only_listen(port, baud, protocol, console, going, model)
         else:
             ask(port, baud, protocol, console, going, rate)
-
-
-def parse_ids(text: str) -> list[int]:
-    """``1-3,7`` as [1, 2, 3, 7].
-
-    Raises
-    ------
-    ConfigError
-        naming the part that is no id or range of ids.
-    """
-    ids: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not first.isdigit() or (dash and not last.isdigit()):
-            raise ConfigError(f"--ids {text}: {part.strip()!r} is no id", hint="for example --ids 1,3,7-9")
-        ids += range(int(first), int(last or first) + 1)
-    wrong = [i for i in ids if i > 252]
-    if wrong or not ids or len(set(ids)) != len(ids):
-        raise ConfigError(f"--ids {text}: ids go from 0 to 252, each once", hint="for example --ids 1-24")
-    return ids
-
-
-Link = Annotated[Path | None, typer.Option("--link", help="Make this path a link to the pseudo-terminal.")]
-Tcp = Annotated[
-    str | None, typer.Option("--tcp", metavar="HOST:PORT", help="Listen here; clients open socket://HOST:PORT.")
-]
-Wire = Annotated[bool, typer.Option("--wire", help="Bytes take the time they take at the baud rate.")]
-Faults = Annotated[
-    list[str] | None, typer.Option("--fault", metavar="SPEC", help="Fault to inject, for example mute:7; repeatable.")
-]
-
-Look = Annotated[bool, typer.Option("--watch", help="Show the servos and the decoded traffic while it runs.")]
-Control = Annotated[Path | None, typer.Option("--control", help="Socket that takes faults while it runs.")]
-
-
-def _where(link: Path | None, tcp: str | None) -> Path | str | None:
-    """Where to serve: a link to a pseudo-terminal, or a TCP address."""
-    if link is not None and tcp is not None:
-        raise ConfigError("--link and --tcp do not go together", hint="run it twice for two ports")
-    return link if tcp is None else f"socket://{tcp}"
-
-
-def simulate_dynamixel(
-    ids: Annotated[str, typer.Option("--ids", help="Ids of the servos: 1-24 or 1,3,7-9.")] = "1-24",
-    model: Annotated[str, typer.Option(help="Model of the servos.")] = "xl330-m288",
-    baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
-) -> None:
-    """Serve simulated Dynamixel servos until interrupted; prints `ready PATH`. AX and MX models speak Protocol 1.0.
-
-    Example: omote simulate dynamixel --ids 1-24 --model xl330-m288 --link /tmp/head
-    """
-    from controller.simulating import SimulatedId, serve_servos
-
-    servos = [SimulatedId(i, model) for i in parse_ids(ids)]
-    serve_servos(servos, baud, _where(link, tcp), wire, fault or [], console, control, watch)
-
-
-def simulate_feetech(
-    ids: Annotated[str, typer.Option("--ids", help="Ids of the servos: 1-24 or 1,3,7-9.")] = "1-6",
-    model: Annotated[str, typer.Option(help="Model of the servos.")] = "sts3215",
-    baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
-) -> None:
-    """Serve simulated Feetech STS or SCS servos until interrupted; prints `ready PATH`.
-
-    Example: omote simulate feetech --ids 1-6 --model sts3215 --link /tmp/arm
-    """
-    from controller.simulating import SimulatedId, serve_servos
-
-    servos = [SimulatedId(i, model) for i in parse_ids(ids)]
-    serve_servos(servos, baud, _where(link, tcp), wire, fault or [], console, control, watch)
-
-
-def simulate_maestro(link: Link = None, tcp: Tcp = None, fault: Faults = None, watch: Look = False) -> None:
-    """Serve a simulated Pololu Maestro until interrupted; prints `ready PATH`.
-
-    Example: omote simulate maestro --link /tmp/maestro
-    """
-    from controller.simulating import serve_board
-    from drivers.sim import Maestro
-
-    serve_board(Maestro(now_s=time.monotonic()), 115_200, _where(link, tcp), False, fault or [], console, watch)
-
-
-def simulate_ssc32(link: Link = None, tcp: Tcp = None, fault: Faults = None, watch: Look = False) -> None:
-    """Serve a simulated Lynxmotion SSC-32 until interrupted; prints `ready PATH`.
-
-    Example: omote simulate ssc32 --link /tmp/ssc32
-    """
-    from controller.simulating import serve_board
-    from drivers.sim import Ssc32
-
-    serve_board(Ssc32(now_s=time.monotonic()), 115_200, _where(link, tcp), False, fault or [], console, watch)
-
-
-def simulate_robot(
-    robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],
-    bus: Annotated[str | None, typer.Option("--bus", help="Name of the bus; the first without it.")] = None,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    fault: Faults = None,
-    watch: Look = False,
-) -> None:
-    """Serve the simulated servos or board of a robot file, until interrupted; prints `ready PATH`.
-
-    Example: omote simulate robot head24 --link /tmp/head
-    """
-    from controller.simulating import serve_robot
-
-    serve_robot(robot, bus, _where(link, tcp), wire, fault or [], console, watch)
-
-
-def simulate_host(
-    script: Annotated[str, typer.Argument(help="Script: a name from configs/scripts.")] = "tour",
-    link: Link = None,
-) -> None:
-    """Serve a simulated robot host that writes omote line protocol, until interrupted; prints `ready PATH`.
-
-    Example: omote simulate host tour --link /tmp/robot
-    """
-    from controller.simulating import serve_host
-
-    serve_host(script, link, console)

@@ -40,45 +40,59 @@ class SimulatedId:
     model: str
 
 
-def serve_servos(
-    servos: list[SimulatedId],
-    baud: int,
-    link: Where,
-    wire: bool,
-    faults: list[str],
-    console: Console,
-    control: Path | None = None,
-    watch: bool = False,
-) -> None:
+@dataclass(frozen=True)
+class Serving:
+    """Where and how something is served.
+
+    Attributes
+    ----------
+    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT``.
+    wire : bytes take the time they take at the baud rate. latency_s : a USB adapter's latency timer besides.
+    faults : faults to inject, see docs/simulated-buses.md.
+    control : path of a socket that takes faults while it runs.
+    watch : show the servos and the traffic while it runs.
+    """
+
+    link: Where = None
+    wire: bool = False
+    latency_s: float = 0.0
+    faults: tuple[str, ...] = ()
+    control: Path | None = None
+    watch: bool = False
+
+
+def serve_servos(servos: list[SimulatedId], baud: int, how: Serving, console: Console) -> None:
     """Serve simulated servos; prints ``ready PATH`` and returns when interrupted.
 
     Parameters
     ----------
     servos : ids and models; the model decides the protocol.
     baud : rate the servos listen at.
-    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT``.
-    wire : bytes take the time they take at ``baud``.
-    faults : faults to inject, see docs/simulated-buses.md.
-    control : path of a socket that takes faults while it runs.
-    watch : show the servos and the traffic while it runs.
     """
     from drivers.dynamixel.tables import load_table
-    from drivers.sim import serve_dynamixel
+    from drivers.sim.serve import make_chain, make_servos
     from drivers.traffic import Decoder1, Decoder2
 
     tables = {servo.id: load_table(servo.model) for servo in servos}
     decoder = (Decoder1 if any(table.protocol == 1 for table in tables.values()) else Decoder2)(tables)
+    now_s = time.monotonic()
+    _serve(make_chain(make_servos(servos, 0, baud, now_s), now_s, 0), baud, how, console, decoder)
 
-    with _watching(decoder if watch else None, console) as look:
+
+def _serve(line: Line, baud: int, how: Serving, console: Console, decoder: Decoder) -> None:
+    from drivers.sim import serve
+
+    line.faults.add(how.faults, time.monotonic())
+    with _watching(decoder if how.watch else None, console) as look:
         _until_stopped(
-            lambda stop: serve_dynamixel(
-                servos,
+            lambda stop: serve(
+                line,
+                how.link,
+                lambda path: _say_ready(path, console),
                 baud=baud,
-                link=link,
-                wire=wire,
-                faults=faults,
-                on_ready=lambda path: _say_ready(path, console),
-                commands=control,
+                wire=how.wire,
+                latency_s=how.latency_s,
+                commands=how.control,
                 stop=stop,
                 on_server=look,
             )
@@ -116,21 +130,12 @@ def _say_ready(path: str, console: Console) -> None:
     console.print(f"ready {path}", soft_wrap=True)
 
 
-def serve_board(
-    line: Line, baud: int, link: Where, wire: bool, faults: list[str], console: Console, watch: bool = False
-) -> None:
-    """Serve a simulated board; prints ``ready PATH`` and returns when interrupted. Parameters as `serve_servos`."""
-    from drivers.sim import Maestro, serve
+def serve_board(line: Line, baud: int, how: Serving, console: Console) -> None:
+    """Serve a simulated board; prints ``ready PATH`` and returns when interrupted."""
+    from drivers.sim import Maestro
     from drivers.traffic import HexDecoder, TextDecoder
 
-    line.faults.add(faults, time.monotonic())
-    decoder = HexDecoder() if isinstance(line, Maestro) else TextDecoder()
-    with _watching(decoder if watch else None, console) as look:
-        _until_stopped(
-            lambda stop: serve(
-                line, link, lambda path: _say_ready(path, console), baud=baud, wire=wire, stop=stop, on_server=look
-            )
-        )
+    _serve(line, baud, how, console, HexDecoder() if isinstance(line, Maestro) else TextDecoder())
 
 
 def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSettings]]:
@@ -149,16 +154,13 @@ def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSett
     return chosen, robot.on_bus(chosen.name)
 
 
-def serve_robot(
-    name: str, bus: str | None, link: Where, wire: bool, faults: list[str], console: Console, watch: bool = False
-) -> None:
-    """Serve what is on a bus of a robot file (:func:`robot_bus`); further parameters as `serve_servos`."""
+def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> None:
+    """Serve what is on a bus of a robot file (:func:`robot_bus`)."""
     chosen, channels = robot_bus(name, bus)
     if chosen.family in BOARDS:
-        serve_board(_board(chosen, channels), chosen.baud, link, wire, faults, console, watch)
+        serve_board(_board(chosen, channels), chosen.baud, how, console)
         return
-    servos = [SimulatedId(channel.id, channel.model) for channel in channels]
-    serve_servos(servos, chosen.baud, link, wire, faults, console, watch=watch)
+    serve_servos([SimulatedId(channel.id, channel.model) for channel in channels], chosen.baud, how, console)
 
 
 def _board(bus: BusSettings, channels: list[ChannelSettings]) -> Line:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import signal
+import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 import serial
+from typer.testing import CliRunner
 
 from controller.errors import ConfigError
 from controller.simulating import robot_bus
@@ -50,6 +53,8 @@ def test_any_program_can_open_the_servos(tmp_path: Path) -> None:
         (("dynamixel", "--ids", "1", "--model", "ax-12a"), "FFFF010201FB", "FFFF010200FC"),
         (("maestro",), "A1", "0000"),  # get errors: none
         (("ssc32",), "510D", "2E"),  # Q: nothing moves
+        (("text", "--query", r"?{ch}\n", "--answer", r"{ch}={us}\n"), b"#2P1500\r?2\n".hex(), b"2=1500\n".hex()),
+        (("omote", "--names", "jawOpen"), b"SET jawOpen 0.5\n".hex(), b"OK SET 1\n".hex()),
     ],
 )
 def test_every_family_answers(tmp_path: Path, words: tuple[str, ...], asked: str, answer: str) -> None:
@@ -99,3 +104,39 @@ def test_a_robot_file_says_which_servos(root: Path) -> None:
     with pytest.raises(ConfigError, match="no bus called 'neck'") as caught:
         robot_bus("head24", "neck")
     assert "head" in caught.value.hint
+
+
+def test_boards_take_their_time_on_the_wire_and_faults_at_a_socket(tmp_path: Path) -> None:
+    link, control = tmp_path / "board", tmp_path / "board.ctl"
+    with (
+        served("ssc32", "--link", str(link), "--baud", "2400", "--wire", "--control", str(control)),
+        serial.Serial(str(link), 2400, timeout=2) as port,
+        socket.socket(socket.AF_UNIX) as commands,
+    ):
+        began = time.monotonic()
+        port.write(b"VER\r")
+        assert port.read(15) == b"SSC32-V2.50USB\r"
+        assert time.monotonic() - began >= 19 * 10 / 2400
+        commands.connect(str(control))
+        commands.sendall(b"fault mute:*\n")
+        assert commands.recv(100).startswith(b"ok")
+        port.timeout = 0.3
+        port.write(b"VER\r")
+        assert port.read(15) == b""
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("maestro", "--latency", "16"), "--latency is part of the time on the wire"),
+        (("maestro", "--channels", "7"), "--channels 7"),
+        (("text", "--template", "S{ch}"), "holds no value"),
+        (("dynamixel", "--ids", "1-x"), "'1-x' is no id"),
+    ],
+)
+def test_what_cannot_be_simulated_is_told(words: tuple[str, ...], why: str) -> None:
+    from controller.cli import app
+
+    result = CliRunner().invoke(app, ["simulate", *words])
+    assert result.exit_code != 0
+    assert why in f"{result.output}{result.exception}"
