@@ -19,7 +19,8 @@ def test_sparse_is_dense():
     np.testing.assert_array_equal(moves.used, [0, 1])
     points = np.ones((25, 3))
     moves.add(np.array([0.5, 2.0]), points)
-    want = np.ones((25, 3)) + [0, 0, 3]
+    want = np.ones((25, 3))
+    want[:, 2] += 3.0
     want[[3, 7]] += 2.0 * np.array([[1, 2, 3], [4, 5, 6]])
     np.testing.assert_allclose(points, want, atol=1e-12)
     np.testing.assert_array_equal(moves.at(np.array([7]))[:, 0], [[0, 0, 6], [4, 5, 6]])
