@@ -25,7 +25,7 @@ def export_with_progress(
     from surface.export import export_head
     from surface.head import Head
 
-    still = Still.parse(settings, expressions, "64x64", {}, head, identity)
+    still = Still.parse(settings, expressions, head=head, identity=identity)
     pose = {name: float(v) for name, v in zip(PARAMETERS.names, still.values, strict=True) if v}
     with console.status("exporting"):
         loaded = Head.load(still.head, still.identity)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -109,19 +110,8 @@ class Stage:
         return 1.0 / self.settings.control_hz
 
     def load_head(self) -> Head:
-        """The head as the stage wants it: identities mixed in, groups worn.
-
-        Raises
-        ------
-        SurfaceError : the head cannot be read. ConfigError : a group does not fit it.
-        """
-        from controller.dragging import load_group, wear
-        from surface.head import Head
-
-        head = Head.load(self.head, self.settings.identity)
-        for path, amount in self.groups:
-            wear(head, load_group(path, head)[1], amount)
-        return head
+        """The head as the stage wants it; see :func:`load_head`."""
+        return load_head(self.head, self.settings.identity, self.groups)
 
     def state(self, parameters: Parameters, seed: int | None = None, period_s: float | None = None) -> CommandState:
         """A face of its own, as the stage wants it; nothing is commanded yet."""
@@ -133,6 +123,22 @@ class Stage:
             seed=self.settings.seed if seed is None else seed,
             period_s=period_s or self.period_s,
         )
+
+
+def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]]) -> Head:
+    """A head with identities mixed in and groups worn, each by its amount.
+
+    Raises
+    ------
+    SurfaceError : the head cannot be read. ConfigError : a group does not fit it.
+    """
+    from controller.dragging import load_group, wear
+    from surface.head import Head
+
+    head = Head.load(folder, identity)
+    for path, amount in groups:
+        wear(head, load_group(path, head)[1], amount)
+    return head
 
 
 def load_stage(name: str, parameters: Parameters) -> Stage:

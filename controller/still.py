@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,10 @@ from controller.identity import check_identity, parse_identity
 from controller.parameters import PARAMETERS
 from controller.paths import find_config
 from controller.picture import PictureSettings, checked
+from controller.stage import FaceSettings, load_head, load_stage
+
+if TYPE_CHECKING:
+    from surface.head import Head
 
 
 @dataclass(frozen=True)
@@ -28,37 +33,60 @@ class Still:
     values : (p,) float64, the full parameter vector.
     size : width and height (pixels).
     look : theme, camera and the rest.
-    head : folder of the head. identity : variations of it to mix in, by name.
+    head : folder of the head. identity : variations of it to mix in, by name. groups : group files it wears.
+    vocabulary : the named expressions.
     """
 
     values: NDArray[np.float64]
     size: tuple[int, int]
     look: PictureSettings
     head: Path
-    identity: dict[str, float] = field(default_factory=dict)
+    identity: dict[str, float]
+    groups: tuple[tuple[Path, float], ...]
+    vocabulary: Vocabulary
 
     @classmethod
     def parse(
-        cls, settings: list[str], expressions: list[str], size: str, look: Mapping[str, object], head: str,
-        identity: str | None = None,
+        cls, settings: list[str], expressions: list[str], size: str | None = None,
+        look: Mapping[str, object] | None = None, head: str | None = None, identity: str | None = None, *,
+        stage: str | None = None, vocabularies: Sequence[str] = (), groups: Sequence[str] = (),
     ) -> Still:  # fmt: skip
-        """Read the words of a command line.
+        """Read the words of a command line; what they leave open is as the stage has it, if there is one.
 
         Raises
         ------
         ParameterError, ConfigError
             naming the word that is wrong and what would be right.
         """
+        base = load_stage(stage, PARAMETERS) if stage else None
+        files = [*(base.vocabularies if base else ()), *(find_config("vocabularies", name) for name in vocabularies)]
+        vocabulary = Vocabulary.load(PARAMETERS, more=files)
         values = PARAMETERS.neutral()
         for word in expressions:
-            _add_expression(values, word)
+            _add_expression(vocabulary, values, word)
         for word in settings:
             index, value = parse_setting(word)
             values[index] = value
-        picture = checked(PictureSettings(), look)
-        folder, wanted = find_config("heads", head), parse_identity(identity)
+        folder = base.head if base and head is None else find_config("heads", head or "ict")
+        wanted = dict(base.settings.identity) if base and identity is None else parse_identity(identity)
         check_identity(folder, wanted)
-        return cls(values, parse_size(size), picture, folder, wanted)
+        worn = (*(base.groups if base else ()), *(parse_group(word) for word in groups))
+        face = base.settings.face if base else FaceSettings()
+        width_height = parse_size(size or "800x800") if size or base is None else face.size
+        return cls(values, width_height, checked(face, look or {}), folder, wanted, worn, vocabulary)
+
+    def load_head(self) -> Head:
+        """The head with its identity and groups; see :func:`controller.stage.load_head`."""
+        return load_head(self.head, self.identity, self.groups)
+
+
+def parse_group(word: str) -> tuple[Path, float]:
+    """``FILE=AMOUNT`` as path and amount, -1 to 1; a file alone counts 1."""
+    name, equals, text = word.rpartition("=")
+    amount = parse_number(f"--group {word}", text) if equals else 1.0
+    if not -1.0 <= amount <= 1.0:
+        raise ParameterError(f"--group {word}: the amount goes from -1 to 1")
+    return find_config("groups", name if equals else word), amount
 
 
 def parse_setting(word: str) -> tuple[int, float]:
@@ -94,23 +122,21 @@ def parse_size(text: str) -> tuple[int, int]:
     return size
 
 
-def _add_expression(values: NDArray[np.float64], word: str) -> None:
+def _add_expression(vocabulary: Vocabulary, values: NDArray[np.float64], word: str) -> None:
     name, equals, text = word.partition("=")
     intensity = parse_number(f"--expression {word}", text) if equals else 1.0
     if not 0.0 <= intensity <= 1.0:
         raise ParameterError(f"--expression {word}: the intensity goes from 0 to 1")
-    values += _vector(Vocabulary.load(PARAMETERS).expand(name, intensity))
+    values += _vector(vocabulary.expand(name, intensity))
     np.clip(values, PARAMETERS.low, PARAMETERS.high, out=values)
 
 
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
-    from surface.head import Head
     from surface.view.offscreen import Offscreen
     from surface.view.sheet import write_png
 
-    head = Head.load(still.head, still.identity)
-    look = still.look
+    head, look = still.load_head(), still.look
     with Offscreen(head, still.size, quality=look.quality, theme=look.make_theme(), evaluator=look.evaluator) as screen:
         picture = screen.render(for_head(still.values, head.parameters), look.make_camera())
     write_png(picture, out)
@@ -122,9 +148,9 @@ def for_head(values: NDArray[np.float64], wanted: tuple[str, ...]) -> NDArray[np
     return np.array([values[place[name]] if name in place else 0.0 for name in wanted])
 
 
-def sheet_poses() -> list[tuple[str, NDArray[np.float64]]]:
+def sheet_poses(vocabulary: Vocabulary | None = None) -> list[tuple[str, NDArray[np.float64]]]:
     """Label and full parameter vector of every picture of the sheet: expressions first, then every parameter."""
-    vocabulary = Vocabulary.load(PARAMETERS)
+    vocabulary = vocabulary or Vocabulary.load(PARAMETERS)
     poses = [(name, _vector(vocabulary.expand(name, 1.0))) for name in vocabulary.names]
     for index, name in enumerate(PARAMETERS.names):
         two_sided = PARAMETERS.low[index] < 0
@@ -143,12 +169,10 @@ def _vector(values: dict[int, float]) -> NDArray[np.float64]:
 
 def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Draw every parameter and every named expression on one sheet (PNG); ``progress(done, total)`` is told."""
-    from surface.head import Head
     from surface.view.sheet import contact_sheet, write_png
 
-    head = Head.load(still.head, still.identity)
-    entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses()]
-    look = still.look
+    head, look = still.load_head(), still.look
+    entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]
     page = contact_sheet(
         head, entries, views=[look.make_camera()], quality=look.quality, theme=look.make_theme(), progress=progress
     )
