@@ -9,11 +9,26 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from numba import njit
 
+
+def _leave_scipy() -> None:
+    """Keep numba from importing scipy's linear algebra, 0.4 s, before a kernel asks for it; none here does."""
+    from numba.np import linalg
+
+    ask = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        import_module("numba.np.arraymath")  # asks once, when it is imported; products of matrices ask again
+    finally:
+        linalg.ensure_blas = ask
+
+
+_leave_scipy()
 SHARED = ("apply.py", "binding.py", "blends.py", "kernels.py", "lanes.py", "updates.py")
 
 
