@@ -5,6 +5,8 @@ A blending function of degree p is given by its own p + 2 knots, 0 <= p <= 7. It
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -32,7 +34,7 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
     Raises
     ------
     ValueError
-        For bad knots, an unknown derivative or an unknown side.
+        For bad knots, samples that are not finite, an unknown derivative or an unknown side.
     """
     from . import blends
 
@@ -41,7 +43,9 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
         raise ValueError(f"derivative: must be 0, 1 or 2, not {derivative!r}")
     if side not in ("left", "right"):
         raise ValueError(f'side: must be "left" or "right", not {side!r}')
-    samples = np.ascontiguousarray(np.atleast_1d(np.asarray(x, dtype=np.float64)))
+    samples = _row(np.atleast_1d(x), "x")
+    if not np.isfinite(samples).all():
+        raise ValueError(f"x[{int(np.argmin(np.isfinite(samples)))}]: must be finite")
     out = np.zeros((len(samples), 3))
     blends.blend_samples(row, row.shape[1] - 2, samples, side == "left", out)
     return out[:, derivative].copy()
@@ -69,8 +73,10 @@ def pad_knots(knots: object, name: str, n: int) -> tuple[Floats, Ints]:
     if isinstance(knots, np.ndarray) and knots.ndim == 2 and knots.dtype != object:
         padded = np.array(knots, dtype=np.float64, order="C")
         degrees = np.full(len(padded), padded.shape[1] - 2, dtype=np.int64)
+    elif not isinstance(knots, Iterable):
+        raise ValueError(f"{name}: not {n} sequences of knots but {knots!r}")
     else:
-        padded, degrees = _stack(list(knots), name)  # type: ignore[call-overload]
+        padded, degrees = _stack(list(knots), name)
     if len(padded) != n:
         raise ValueError(f"{name}: {len(padded)} knot vectors for {n} points")
     check_knots(padded, degrees, name)
@@ -79,21 +85,25 @@ def pad_knots(knots: object, name: str, n: int) -> tuple[Floats, Ints]:
 
 def _stack(rows: list, name: str) -> tuple[Floats, Ints]:
     """Rows of different lengths into one padded array."""
-    lengths = np.zeros(len(rows), dtype=np.int64)
-    for i, row in enumerate(rows):
-        try:
-            lengths[i] = len(row)
-        except TypeError:
-            raise ValueError(f"{name}[{i}]: not a sequence of knots but {row!r}") from None
+    flat = [_row(row, f"{name}[{i}]") for i, row in enumerate(rows)]
+    lengths = np.array([len(row) for row in flat], dtype=np.int64)
     _check_degrees(lengths - 2, name)
     width = int(lengths.max(initial=2))
     columns = np.minimum(np.arange(width), lengths[:, None] - 1)
     offsets = np.cumsum(lengths) - lengths
+    every = np.concatenate(flat) if flat else np.zeros(0)
+    return every[offsets[:, None] + columns], lengths - 2
+
+
+def _row(row: ArrayLike, name: str) -> Floats:
+    """One knot vector."""
     try:
-        flat = np.concatenate([np.asarray(row, dtype=np.float64) for row in rows]) if rows else np.zeros(0)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: knot vectors must be flat sequences of numbers ({error})") from None
-    return flat[offsets[:, None] + columns], lengths - 2
+        values = np.asarray(row, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: must be numbers, got {row!r:.60}") from None
+    if values.ndim != 1:
+        raise ValueError(f"{name}: not a flat sequence of numbers but {row!r:.60}")
+    return np.ascontiguousarray(values)
 
 
 def _check_degrees(degrees: Ints, name: str) -> None:
@@ -120,3 +130,24 @@ def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
     if not spread.all():
         i = int(np.argmin(spread))
         raise ValueError(f"{name}[{i}]: fewer than two distinct knots (all are {padded[i, 0]})")
+
+
+def check_padded(knots: ArrayLike, degrees: ArrayLike, axis: str, n: int) -> tuple[Floats, Ints]:
+    """Clean copies of knots ``(n, w)`` and degrees ``(n,)`` that belong to n points along ``axis``.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument (``knots_u``, ``degrees_u``, ...) and the index.
+    """
+    rows = np.array(knots, dtype=np.float64, order="C", ndmin=2)
+    p = np.array(degrees, dtype=np.int64, ndmin=1)
+    for name, given in (("knots", rows), ("degrees", p)):
+        if len(given) != n:
+            raise ValueError(f"{name}_{axis}: {len(given)} rows for {n} points")
+    short = p + 2 > rows.shape[1]
+    if short.any():
+        i = int(np.argmax(short))
+        raise ValueError(f"degrees_{axis}[{i}]: {p[i]} needs more knots than the {rows.shape[1]} per row")
+    check_knots(rows, p, f"knots_{axis}")
+    return np.take_along_axis(rows, np.minimum(np.arange(rows.shape[1]), p[:, None] + 1), 1), p

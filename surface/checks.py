@@ -9,13 +9,16 @@ from .basis import Floats, Ints
 
 
 def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:
-    """(m,) int64 copy of the wanted limits; ``ValueError`` for others than 0 to 3."""
-    sides = np.zeros(len(samples), dtype=np.int64)
-    if side is not None:
-        sides[:] = side
-        if ((sides < 0) | (sides > 3)).any():
-            raise ValueError("side: must be 0, 1, 2 or 3")
-    return sides
+    """(m,) int64 copy of the wanted limits; ``ValueError`` for another shape or others than 0 to 3."""
+    if side is None:
+        return np.zeros(len(samples), dtype=np.int64)
+    wanted = numbers(side, "side")
+    if wanted.shape not in ((), (len(samples),)):
+        raise ValueError(f"side: shape {wanted.shape}, expected {(len(samples),)}")
+    bad = ~np.isin(wanted, (0, 1, 2, 3))
+    if bad.any():
+        raise ValueError(f"side[{int(np.argmax(bad))}]: must be 0, 1, 2 or 3, not {wanted.flat[np.argmax(bad)]:g}")
+    return np.broadcast_to(wanted, len(samples)).astype(np.int64)
 
 
 def numbers(values: ArrayLike, name: str) -> Floats:
@@ -60,13 +63,56 @@ def check_weights(weights: ArrayLike, name: str = "weights") -> Floats:
     return w
 
 
+def check_length(weights: Floats, n: int) -> None:
+    """``ValueError`` unless there is one weight per point."""
+    if len(weights) != n:
+        raise ValueError(f"weights: {len(weights)} weights for {n} points")
+
+
+def integers(ids: ArrayLike) -> Ints:
+    """(k,) int64; ``ValueError`` for anything else."""
+    if type(ids) is np.ndarray and ids.dtype == np.int64 and ids.ndim == 1 and ids.flags.c_contiguous:
+        return ids
+    try:
+        which = np.ascontiguousarray(ids)
+    except ValueError:
+        raise ValueError(f"ids: needs a flat sequence of integers, got {ids!r:.60}") from None
+    if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
+        raise ValueError(f"ids: needs a flat sequence of integers, got shape {which.shape} of {which.dtype}")
+    return which.astype(np.int64, copy=False)
+
+
+def check_ids(ids: ArrayLike, n: int) -> Ints:
+    """(k,) int64 numbers of control points; ``ValueError`` for the first that is not one of ``n``."""
+    which = integers(ids)
+    bad = (which < 0) | (which >= n)
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise ValueError(f"ids[{k}]: {which[k]} is not a control point (0 to {n - 1})")
+    return which
+
+
 def check_uv(uv: ArrayLike, name: str = "uv") -> Floats:
     """(m, 2) float64; ``ValueError`` for another shape or NaN."""
-    samples = np.ascontiguousarray(np.asarray(uv, dtype=np.float64))
+    fast = isinstance(uv, np.ndarray) and uv.dtype == np.float64
+    samples = np.ascontiguousarray(uv) if fast else numbers(uv, name)
     if samples.ndim != 2 or samples.shape[1] != 2:
         raise ValueError(f"{name}: shape {samples.shape}, expected (m, 2)")
     good = np.isfinite(samples).all(axis=1)
     if not good.all():
         i = int(np.argmin(good))
         raise ValueError(f"{name}[{i}]: must be finite, got {samples[i].tolist()}")
+    return samples
+
+
+def check_inside(
+    samples: Floats, rect: tuple[float, float, float, float], closed: tuple[object, object], name: str = "uv"
+) -> Floats:
+    """``samples (m, 2)``; ``ValueError`` for the first outside ``rect``, whose closed directions have no outside."""
+    for axis, word in enumerate("uv"):
+        low, high = rect[2 * axis], rect[2 * axis + 1]
+        out = (samples[:, axis] < low) | (samples[:, axis] > high)
+        if closed[axis] is None and out.any():
+            i = int(np.argmax(out))
+            raise ValueError(f"{name}[{i}]: {word} = {samples[i, axis]} is outside the domain, {low} to {high}")
     return samples

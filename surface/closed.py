@@ -11,6 +11,7 @@ import numpy as np
 from .basis import Floats
 
 Interval = tuple[float, float] | None
+MOST_PERIODS = 16  # that knots may reach over: each takes a copy of every point
 
 
 def check_closed(closed: tuple[Interval, Interval]) -> tuple[Interval, Interval]:
@@ -20,7 +21,10 @@ def check_closed(closed: tuple[Interval, Interval]) -> tuple[Interval, Interval]
         if interval is None:
             out.append(None)
             continue
-        start, end = map(float, interval)
+        try:
+            start, end = map(float, interval)
+        except (TypeError, ValueError):
+            raise ValueError(f"{name}: needs (start, end), got {interval!r}") from None
         if not np.isfinite([start, end]).all() or not start < end:
             raise ValueError(f"{name}: needs finite start < end, got {interval}")
         out.append((start, end))
@@ -30,11 +34,14 @@ def check_closed(closed: tuple[Interval, Interval]) -> tuple[Interval, Interval]
 def shifts_of(knots: tuple[Floats, Floats], closed: tuple[Interval, Interval]) -> Floats:
     """(b, 2): shifts in u and v of all copies that may reach the closed intervals, (0, 0) first."""
     along = []
-    for rows, interval in zip(knots, closed, strict=True):
+    for name, rows, interval in zip(("closed_u", "closed_v"), knots, closed, strict=True):
         if interval is None:
             along.append([0.0])
             continue
         period = interval[1] - interval[0]
+        reach = max(interval[1], float(rows[:, -1].max())) - min(interval[0], float(rows[:, 0].min()))
+        if not reach <= MOST_PERIODS * period:
+            raise ValueError(f"{name}: knots reach over {reach:g}, more than {MOST_PERIODS} periods of {period:g}")
         lowest = min(-1, int(np.floor((interval[0] - rows[:, -1].max()) / period)))
         highest = max(1, int(np.ceil((interval[1] - rows[:, 0].min()) / period)))
         along.append([0.0, *(k * period for k in range(lowest, highest + 1) if k)])

@@ -7,17 +7,16 @@ expression for a CG robot using real-time surface modification", Eq. 1).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .basis import Floats, Ints, check_knots, pad_knots
-from .bins import Bins, build_bins
-from .checks import check_points, check_sides, check_uv, check_weights
-from .closed import Interval, check_closed, shifts_of, wrap
+from .basis import Floats, Ints, check_padded, pad_knots
+from .checks import check_inside, check_length, check_points, check_sides, check_uv, check_weights
+from .closed import Interval, wrap
+from .controlpoints import ControlPoints
 from .progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from .refine import Refinement
 
 
-class DCPSurface:
+class DCPSurface(ControlPoints):
     """A surface of scattered control points; immutable.
 
     Parameters
@@ -64,32 +63,10 @@ class DCPSurface:
         closed_v: Interval = None,
     ) -> None:
         xyz, w = check_points(points), check_weights(weights)
-        if len(w) != len(xyz):
-            raise ValueError(f"weights: {len(w)} weights for {len(xyz)} points")
+        check_length(w, len(xyz))
         ku, pu = pad_knots(knots_u, "knots_u", len(xyz))
         kv, pv = pad_knots(knots_v, "knots_v", len(xyz))
         self._set(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
-
-    def _set(
-        self,
-        points: Floats,
-        weights: Floats,
-        knots: tuple[Floats, Floats],
-        degrees: tuple[Ints, Ints],
-        closed: tuple[Interval, Interval],
-    ) -> None:
-        """Keep arrays; of a closed direction also shifted copies of every point, block after block."""
-        self._n = len(points)
-        self._closed = check_closed(closed)
-        self._shifts = shifts_of(knots, self._closed)
-        blocks = len(self._shifts)
-        self._points, self._weights = np.tile(points, (blocks, 1)), np.tile(weights, blocks)
-        moved = [np.concatenate([knots[k] + shift[k] for shift in self._shifts]) for k in range(2)]
-        self._ku, self._kv = moved
-        self._pu, self._pv = (np.tile(p, blocks) for p in degrees)
-        self._lazy_bins: Bins | None = None
-        for array in (self._points, self._weights, self._ku, self._kv, self._pu, self._pv):
-            array.flags.writeable = False
 
     @classmethod
     def from_nurbs(
@@ -129,20 +106,18 @@ class DCPSurface:
         points, weights : (n, 3), (n,) float64
         knots_u, knots_v : (n, w) float64, row i holds ``degrees[i] + 2`` knots and repeats the last one
         degrees_u, degrees_v : (n,) int
+
+        Raises
+        ------
+        ValueError
+            As the constructor.
         """
         xyz, w = check_points(points), check_weights(weights)
-        sides = []
-        for name, rows, degrees in (("u", knots_u, degrees_u), ("v", knots_v, degrees_v)):
-            knots = np.array(rows, dtype=np.float64, order="C", ndmin=2)
-            p = np.array(degrees, dtype=np.int64, ndmin=1)
-            if len(knots) != len(xyz) or len(p) != len(xyz) or len(w) != len(xyz):
-                raise ValueError(f"knots_{name}, degrees_{name}, weights: need one row per point ({len(xyz)})")
-            if (p + 2 > knots.shape[1]).any():
-                raise ValueError(f"degrees_{name}: needs more knots than the {knots.shape[1]} per row")
-            check_knots(knots, p, f"knots_{name}")
-            sides.append((np.take_along_axis(knots, np.minimum(np.arange(knots.shape[1]), p[:, None] + 1), 1), p))
+        ku, pu = check_padded(knots_u, degrees_u, "u", len(xyz))
+        kv, pv = check_padded(knots_v, degrees_v, "v", len(xyz))
+        check_length(w, len(xyz))
         surface = cls.__new__(cls)
-        surface._set(xyz, w, (sides[0][0], sides[1][0]), (sides[0][1], sides[1][1]), (closed_u, closed_v))
+        surface._set(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
         return surface
 
     def with_points(self, points: ArrayLike) -> DCPSurface:
@@ -156,76 +131,6 @@ class DCPSurface:
         surface._lazy_bins = self.bins
         return surface
 
-    @property
-    def n(self) -> int:
-        """How many control points."""
-        return self._n
-
-    @property
-    def closed(self) -> tuple[Interval, Interval]:
-        """(start, end) of u and of v where they are joined, None where they are not."""
-        return self._closed
-
-    @property
-    def shifts(self) -> Floats:
-        """(b, 2) float64: shifts in u and v of the copies of a closed surface, (0, 0) first."""
-        return self._shifts
-
-    @property
-    def points(self) -> Floats:
-        """(n, 3) float64, read-only."""
-        return self._points[: self._n]
-
-    @property
-    def weights(self) -> Floats:
-        """(n,) float64, read-only."""
-        return self._weights[: self._n]
-
-    @property
-    def knots_u(self) -> Sequence[Floats]:
-        """n arrays of degree + 2 knots, read-only."""
-        return [row[: p + 2] for row, p in zip(self.padded[0], self.degrees[0], strict=True)]
-
-    @property
-    def knots_v(self) -> Sequence[Floats]:
-        """n arrays of degree + 2 knots, read-only."""
-        return [row[: p + 2] for row, p in zip(self.padded[1], self.degrees[1], strict=True)]
-
-    @property
-    def degrees(self) -> tuple[Ints, Ints]:
-        """Degrees in u and v, (n,) int64 each, read-only."""
-        return self._pu[: self._n], self._pv[: self._n]
-
-    @property
-    def padded(self) -> tuple[Floats, Floats]:
-        """Knots in u and v, (n, w) float64 each, read-only; rows repeat their last knot."""
-        return self._ku[: self._n], self._kv[: self._n]
-
-    @property
-    def supports(self) -> Floats:
-        """(n, 4) float64: u0, u1, v0, v1 of every point's subdomain."""
-        return self.all_supports[: self._n]
-
-    @property
-    def all_supports(self) -> Floats:
-        """As :attr:`supports`, with the shifted copies of a closed surface after them; what :attr:`bins` lists."""
-        return np.stack([self._ku[:, 0], self._ku[:, -1], self._kv[:, 0], self._kv[:, -1]], axis=1)
-
-    @property
-    def rect(self) -> tuple[float, float, float, float]:
-        """u0, u1, v0, v1 of the smallest rectangle that holds every subdomain, or of the closed interval."""
-        ends = []
-        for knots, closed in zip(self.padded, self._closed, strict=True):
-            ends.append(closed or (float(knots[:, 0].min()), float(knots[:, -1].max())))
-        return (*ends[0], *ends[1])
-
-    @property
-    def bins(self) -> Bins:
-        """Control points by region of (u, v); built at the first evaluation."""
-        if self._lazy_bins is None:
-            self._lazy_bins = build_bins(self._ku, self._kv)
-        return self._lazy_bins
-
     def evaluate(self, uv: ArrayLike, side: ArrayLike | None = None) -> Floats:
         """Points of the surface.
 
@@ -237,28 +142,34 @@ class DCPSurface:
         Returns
         -------
         (m, 3) float64, NaN rows where nothing covers (u, v)
+
+        Raises
+        ------
+        ValueError
+            For another shape, numbers that are not finite, a place outside :attr:`rect` (a closed direction has no
+            outside), or another side; names the argument and the index.
         """
-        return self.sample(uv, side)[2]
+        return self.sample(self._inside(uv), side)[2]
 
     def covered(self, uv: ArrayLike) -> np.ndarray:
-        """(m,) bool: does any control point cover (u, v)?"""
+        """(m,) bool: does any control point cover ``uv (m, 2)``? False outside :attr:`rect`, too."""
         return self.sample(uv, None)[1] >= 0
 
     def derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
-        """S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; as :meth:`evaluate`."""
-        out = self.sample_derivatives(uv, side)[1]
+        """S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; arguments as :meth:`evaluate`."""
+        out = self.sample_derivatives(self._inside(uv), side)[1]
         return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()
 
     def second_derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
-        """S_uu, S_uv and S_vv, each (m, 3) float64, NaN rows where nothing covers."""
-        out = self.sample_derivatives(uv, side, second=True)[1]
+        """S_uu, S_uv and S_vv, each (m, 3) float64, NaN rows where nothing covers; arguments as :meth:`evaluate`."""
+        out = self.sample_derivatives(self._inside(uv), side, second=True)[1]
         return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
 
     def curvatures(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats]:
         """Gaussian and mean curvature, each (m,) float64; see :func:`surface.curvature.curvatures`."""
         from .curvature import curvatures
 
-        return curvatures(self, uv, side)
+        return curvatures(self, self._inside(uv), side)
 
     def insert_knot(self, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement:
         """The same surface with one more knot, exactly.
@@ -303,7 +214,7 @@ class DCPSurface:
         """
         from .matrix import basis_matrix
 
-        return basis_matrix(self, uv, derivative, side)
+        return basis_matrix(self, self._inside(uv), derivative, side)
 
     def tessellate(
         self,
@@ -368,10 +279,13 @@ class DCPSurface:
 
         return Deformation(self, mesh, normals=normals, threads=threads, progress=progress)
 
+    def _inside(self, uv: ArrayLike) -> Floats:
+        return check_inside(check_uv(uv), self.rect, self._closed)
+
     def sample_derivatives(
         self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False
     ) -> tuple[Ints, Floats]:
-        """Derivatives, and the limits that were taken.
+        """Derivatives, and the limits that were taken; places outside :attr:`rect` are uncovered, not refused.
 
         Returns
         -------
@@ -387,7 +301,7 @@ class DCPSurface:
         return sides, out
 
     def sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
-        """Checked samples, the side really used (-1: uncovered) and S."""
+        """Checked samples, the side really used (-1: uncovered) and S; as :meth:`sample_derivatives`."""
         from . import kernels
 
         samples = wrap(check_uv(uv), self._closed)
@@ -395,11 +309,3 @@ class DCPSurface:
         out = np.zeros((len(samples), 3))
         kernels.sample(*self.arrays(), *self.bin_arrays(), samples, sides, out)
         return samples, sides, out
-
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """Knots in u and v, degrees, points and weights, shifted copies included; what the kernels take."""
-        return self._ku, self._kv, self._pu, self._pv, self._points, self._weights
-
-    def bin_arrays(self) -> tuple[np.ndarray, ...]:
-        """The arrays of :attr:`bins`, as the kernels take them."""
-        return self.bins.grid, self.bins.shape, self.bins.start, self.bins.ids

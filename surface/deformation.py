@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .basis import pad_knots
+from .basis import Floats, pad_knots
+from .checks import check_ids, check_weights, integers, numbers
 from .lists import build_lists
 from .mesh import Mesh
 from .progress import Progress, silent
@@ -40,6 +41,11 @@ class Deformation:
     threads : how many threads compute everything anew; updates of parts use one
     progress : is called with a stage and the part that is done, 0 to 1
 
+    Raises
+    ------
+    ValueError
+        For no thread at all, or a mesh whose lists name points that the surface does not have.
+
     Notes
     -----
     One object belongs to one thread at a time. Nothing is allocated by :meth:`move` and :meth:`set_positions`
@@ -57,6 +63,8 @@ class Deformation:
     ) -> None:
         if threads < 1:
             raise ValueError(f"threads: must be at least 1, not {threads}")
+        if mesh.list_ids.max(initial=-1) >= len(surface.shifts) * surface.n:
+            raise ValueError(f"mesh: was made from another surface: this one has {surface.n} points")
         self.mesh = mesh
         self._threads = threads
         self._pool: ThreadPoolExecutor | None = None
@@ -144,7 +152,7 @@ class Deformation:
         ValueError
             For ids out of range, wrong shapes or numbers that are not finite; nothing is changed then.
         """
-        step = np.asarray(delta, dtype=np.float64)
+        step = _rows(delta, "delta")
         if step.shape == (3,):
             step = np.broadcast_to(step, (np.size(ids), 3))
         self._place(ids, step, "delta", True)
@@ -171,14 +179,10 @@ class Deformation:
         ValueError
             For ids out of range, wrong shapes or weights that are not positive and finite.
         """
-        which = self._check_ids(ids)
-        w = np.asarray(weights, dtype=np.float64)
+        which = check_ids(ids, self._n)
+        w = check_weights(weights)
         if w.shape != which.shape:
             raise ValueError(f"weights: shape {w.shape}, expected {which.shape}")
-        good = np.isfinite(w) & (w > 0)
-        if not good.all():
-            i = int(np.argmin(good))
-            raise ValueError(f"weights[{i}]: must be positive and finite, got {w[i]}")
         which, w = self._copies(which), np.tile(w, len(self._shifts))
         self._weights[which] = w
         cells = [self._rewrite(int(i)) for i in which]
@@ -194,7 +198,7 @@ class Deformation:
         """
         from .relist import change_knots
 
-        index = int(self._check_ids([index])[0])
+        index = int(check_ids([index], self._n)[0])
         rows = [pad_knots([k], name, 1) for k, name in ((knots_u, "knots_u"), (knots_v, "knots_v"))]
         self._apply(change_knots(self, index, [r[0][0] for r in rows], [int(r[1][0]) for r in rows]))
 
@@ -228,14 +232,14 @@ class Deformation:
             done.result()
 
     def _place(self, ids: ArrayLike, rows: ArrayLike, name: str, relative: bool) -> None:
-        which, target = _integers(ids), np.ascontiguousarray(rows, dtype=np.float64)
+        which, target = integers(ids), _rows(rows, name)
         n, count = self._n, len(which)
         if target.shape != (count, 3):
             raise ValueError(f"{name}: shape {target.shape}, expected {(count, 3)}")
         if count > n:  # ids that stand several times: the last position counts, moves add up
             which, target = _gathered(which, target, relative, n)
         if len(self._shifts) > 1:
-            which = self._copies(self._check_ids(which))
+            which = self._copies(check_ids(which, self._n))
             target = np.tile(target, (len(self._shifts), 1))
         table = self._addresses() if self._table is None else self._table
         found = self._call(table, which, target, relative, self._most, LIMIT, BIAS, GAP, self._sign)
@@ -314,23 +318,11 @@ class Deformation:
         """Points and their shifted copies, block after block."""
         return np.concatenate([which + block * self._n for block in range(len(self._shifts))])
 
-    def _check_ids(self, ids: ArrayLike) -> np.ndarray:
-        which = _integers(ids)
-        bad = (which < 0) | (which >= self._n)
-        if bad.any():
-            k = int(np.argmax(bad))
-            raise ValueError(f"ids[{k}]: {which[k]} is not a control point (0 to {self._n - 1})")
-        return which
 
-
-def _integers(ids: ArrayLike) -> np.ndarray:
-    """(k,) int64."""
-    if type(ids) is np.ndarray and ids.dtype == np.int64 and ids.ndim == 1 and ids.flags.c_contiguous:
-        return ids
-    which = np.ascontiguousarray(ids)
-    if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
-        raise ValueError(f"ids: needs a flat sequence of integers, got shape {which.shape} of {which.dtype}")
-    return which.astype(np.int64, copy=False)
+def _rows(rows: ArrayLike, name: str) -> Floats:
+    """Float64 numbers in order, not copied where they are that already."""
+    fast = isinstance(rows, np.ndarray) and rows.dtype.kind == "f"
+    return np.ascontiguousarray(rows, dtype=np.float64) if fast else numbers(rows, name)
 
 
 def _gathered(which: np.ndarray, rows: np.ndarray, relative: bool, n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .basis import Floats
+from .checks import numbers
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Slit:
     def __post_init__(self) -> None:
         if self.axis not in ("u", "v"):
             raise ValueError(f'Slit.axis: must be "u" or "v", not {self.axis!r}')
-        if not np.isfinite([self.at, self.start, self.end]).all() or not self.start < self.end:
+        ends = numbers([self.at, self.start, self.end], "Slit")
+        if not np.isfinite(ends).all() or not self.start < self.end:
             raise ValueError(f"Slit: needs finite at and start < end, got {self}")
 
     def holds(self, uv: Floats) -> np.ndarray:
@@ -47,13 +49,15 @@ class Domain:
     ----------
     rect : u0, u1, v0, v1
     loops : closed polylines ``(k, 2)``; (u, v) is inside where it is inside an odd number of them, so outlines,
-        holes and several islands may stand in any order. No loops: the whole rectangle.
-    slits : segments across which the surface is cut
+        holes and several islands may stand in any order; the rectangle cuts off what reaches beyond it. No loops:
+        the whole rectangle.
+    slits : segments across which the surface is cut; one that reaches beyond the rectangle cuts through its border
 
     Raises
     ------
     ValueError
-        For an empty rectangle, loops of fewer than three points, or numbers that are not finite.
+        For an empty rectangle, loops of fewer than three points, slits of another type, or numbers that are not
+        finite; names the argument and the index.
     """
 
     rect: tuple[float, float, float, float]
@@ -62,9 +66,14 @@ class Domain:
     segments: Floats = field(init=False, repr=False, compare=False, default_factory=lambda: np.zeros((0, 4)))
 
     def __post_init__(self) -> None:
+        if np.shape(self.rect) != (4,):
+            raise ValueError(f"rect: needs (u0, u1, v0, v1), got {self.rect!r}")
         u0, u1, v0, v1 = self.rect
         if not np.isfinite(self.rect).all() or not (u0 < u1 and v0 < v1):
             raise ValueError(f"rect: needs finite u0 < u1 and v0 < v1, got {tuple(self.rect)}")
+        for i, slit in enumerate(self.slits):
+            if not isinstance(slit, Slit):
+                raise ValueError(f"slits[{i}]: must be a Slit, not {slit!r}")
         loops = tuple(_check_loop(loop, i) for i, loop in enumerate(self.loops))
         object.__setattr__(self, "loops", loops)
         object.__setattr__(self, "slits", tuple(self.slits))
@@ -112,7 +121,7 @@ def _signed_area(ring: Floats) -> float:
 
 def _check_loop(loop: ArrayLike, index: int) -> Floats:
     """A loop as (k, 2) float64 without repeated points."""
-    ring = np.array(loop, dtype=np.float64)
+    ring = numbers(loop, f"loops[{index}]")
     if ring.ndim != 2 or ring.shape[1] != 2:
         raise ValueError(f"loops[{index}]: shape {ring.shape}, expected (k, 2)")
     if not np.isfinite(ring).all():

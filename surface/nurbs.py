@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .basis import Floats
+from .basis import MAX_DEGREE, Floats
+from .checks import numbers
 
 
 def nurbs_arrays(
@@ -32,25 +33,42 @@ def nurbs_arrays(
     Raises
     ------
     ValueError
-        If shapes do not fit together.
+        For shapes that do not fit together, a degree that is no whole number from 0 to 7, numbers that are not
+        finite, weights that are not positive, knots that decrease; names the argument and the index.
     """
-    net = np.asarray(control_points, dtype=np.float64)
+    net = numbers(control_points, "control_points")
     if net.ndim != 3 or net.shape[2] != 3:
         raise ValueError(f"control_points: shape {net.shape}, expected (nu, nv, 3)")
+    if not net.size:
+        raise ValueError(f"control_points: empty, shape {net.shape}")
+    _check_grid(np.isfinite(net).all(axis=2), net, "control_points", "finite")
     nu, nv = net.shape[:2]
-    w = np.ones((nu, nv)) if weights is None else np.asarray(weights, dtype=np.float64)
+    w = np.ones((nu, nv)) if weights is None else numbers(weights, "weights")
     if w.shape != (nu, nv):
         raise ValueError(f"weights: shape {w.shape}, expected {(nu, nv)}")
-    local_u = _windows(knots_u, "knots_u", nu, degree_u)
-    local_v = _windows(knots_v, "knots_v", nv, degree_v)
+    _check_grid(np.isfinite(w) & (w > 0), w, "weights", "positive and finite")
+    local_u = _windows(knots_u, "u", nu, degree_u)
+    local_v = _windows(knots_v, "v", nv, degree_v)
     return net.reshape(-1, 3), w.ravel(), np.repeat(local_u, nv, axis=0), np.tile(local_v, (nu, 1))
 
 
-def _windows(knots: ArrayLike, name: str, count: int, degree: int) -> Floats:
+def _check_grid(good: np.ndarray, values: Floats, name: str, wanted: str) -> None:
+    if not good.all():
+        i, j = np.argwhere(~good)[0]
+        raise ValueError(f"{name}[{i}, {j}]: must be {wanted}, got {values[i, j].tolist()}")
+
+
+def _windows(knots: ArrayLike, axis: str, count: int, degree: int) -> Floats:
     """(count, degree + 2): the knots each blending function along one direction stands on."""
-    row = np.asarray(knots, dtype=np.float64)
+    if degree != int(degree) or not 0 <= degree <= MAX_DEGREE:
+        raise ValueError(f"degree_{axis}: must be a whole number from 0 to {MAX_DEGREE}, not {degree}")
+    row = numbers(knots, f"knots_{axis}")
     if row.shape != (count + degree + 1,):
         raise ValueError(
-            f"{name}: shape {row.shape}, expected ({count + degree + 1},): {count} points of degree {degree}"
+            f"knots_{axis}: shape {row.shape}, expected ({count + degree + 1},): {count} points of degree {degree}"
         )
+    falls = ~(np.diff(row) >= 0)
+    if falls.any():
+        k = int(np.argmax(falls)) + 1
+        raise ValueError(f"knots_{axis}[{k}]: {row[k]} after {row[k - 1]}; knots must be finite and not decrease")
     return np.lib.stride_tricks.sliding_window_view(row, degree + 2).copy()

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .basis import Floats, Ints
+from .checks import check_ids
 
 if TYPE_CHECKING:
     from .dcp import DCPSurface
@@ -71,15 +72,16 @@ def insert_knot(surface: DCPSurface, axis: str, value: float, ids: ArrayLike | N
         raise ValueError(f'axis: must be "u" or "v", not {axis!r}')
     if not np.isfinite(value):
         raise ValueError(f"value: must be finite, not {value}")
+    k = "uv".index(axis)
+    low, high = surface.rect[2 * k], surface.rect[2 * k + 1]
+    if surface.closed[k] is None and not low <= value <= high:
+        raise ValueError(f"value: {axis} = {value} is outside the domain, {low} to {high}")
     pieces = _pieces(surface)
     chosen = np.ones(surface.n, dtype=bool)
     if ids is not None:
-        which = np.asarray(ids)
-        if which.size and (which.min() < 0 or which.max() >= surface.n):
-            raise ValueError(f"ids: must be 0 to {surface.n - 1}")
+        which = check_ids(ids, surface.n)
         chosen[:] = False
         chosen[which] = True
-    k = "uv".index(axis)
     for shift in np.unique(surface.shifts[:, k]):
         pieces = _split(pieces, k, np.full(len(pieces.parent), value - shift), chosen[pieces.parent])
     return _join(surface, pieces)
@@ -87,6 +89,8 @@ def insert_knot(surface: DCPSurface, axis: str, value: float, ids: ArrayLike | N
 
 def refine(surface: DCPSurface, region: tuple[float, float, float, float]) -> Refinement:
     """See :meth:`surface.DCPSurface.refine`."""
+    if np.shape(region) != (4,):
+        raise ValueError(f"region: needs (u0, u1, v0, v1), got {region!r}")
     u0, u1, v0, v1 = region
     if not np.isfinite(region).all() or not (u0 < u1 and v0 < v1):
         raise ValueError(f"region: needs finite u0 < u1 and v0 < v1, got {tuple(region)}")

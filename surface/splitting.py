@@ -108,7 +108,7 @@ class SplitTests:
         uv = self.lattice.uv(x, y)
         side = inner_side(uv, uv[:, 4], self.domain)
         first, back = keys.number(self.lattice.key(x, y) * 4 + side)
-        corners = self.surface.evaluate(uv.reshape(-1, 2)[first], side=side.reshape(-1)[first])[back]
+        corners = self.surface.sample(uv.reshape(-1, 2)[first], side.reshape(-1)[first])[2][back]
         worst = _chord_errors(corners)
         self._add_anchors(level, cells, corners, worst)
         held = np.isfinite(corners[:, :, 0])
@@ -148,7 +148,7 @@ def _anchors(surface: DCPSurface, domain: Domain) -> tuple[Floats, Floats]:
         middle = (knots[k][:, 0] + knots[k][:, -1]) / 2
         uv[:, k] = np.where(degrees[k] > 0, total / np.maximum(degrees[k], 1), middle)  # Greville abscissa
     uv = uv[domain.inside(uv)]
-    points = surface.evaluate(uv)
+    points = surface.sample(uv, None)[2]
     covered = np.isfinite(points[:, 0])
     return uv[covered], points[covered]
 

@@ -12,7 +12,7 @@ from .domain import Domain
 from .mesh import Mesh
 from .progress import Progress, between, silent
 from .quadtree import Lattice, Leaves
-from .splitting import SplitTests, inner_side
+from .splitting import MOST_CELLS, SplitTests, inner_side
 from .trim import Flat, trim
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def tessellate(
 ) -> Mesh:
     """See :meth:`surface.DCPSurface.tessellate`."""
     _check_limits(max_points, chord_error, max_depth, min_depth)
+    _check_sizes(loop_error, roots)
     where = Domain.of(surface) if domain is None else domain
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0))) or 1.0
     if max_points is None and chord_error is None:
@@ -68,13 +69,25 @@ def _check_limits(max_points: int | None, chord_error: float | None, max_depth: 
         raise ValueError(f"min_depth, max_depth: need 0 <= {min_depth} <= {max_depth} <= 20")
 
 
+def _check_sizes(loop_error: float | None, roots: tuple[int, int] | None) -> None:
+    if loop_error is not None and not loop_error > 0:
+        raise ValueError(f"loop_error: must be positive, not {loop_error}")
+    if roots is None:
+        return
+    if np.shape(roots) != (2,) or not all(int(count) == count >= 1 for count in roots):
+        raise ValueError(f"roots: needs two whole numbers of 1 or more, got {roots!r}")
+    if roots[0] * roots[1] > MOST_CELLS:
+        raise ValueError(f"roots: {roots[0]} x {roots[1]} cells are more than {MOST_CELLS}")
+
+
 def _lengths(surface: DCPSurface, domain: Domain) -> tuple[float, float]:
     """Mean length on the surface per unit of u and of v."""
     u0, u1, v0, v1 = domain.rect
     steps = (np.arange(24) + 0.5) / 24
     uv = np.stack(np.meshgrid(u0 + steps * (u1 - u0), v0 + steps * (v1 - v0)), axis=-1).reshape(-1, 2)
     uv = uv[domain.inside(uv)]
-    _, su, sv = surface.derivatives(uv)
+    out = surface.sample_derivatives(uv)[1]
+    su, sv = out[:, 1], out[:, 2]
     found = np.isfinite(su).all(axis=1) & np.isfinite(sv).all(axis=1)
     if not found.any():
         return 1.0, 1.0

@@ -104,11 +104,12 @@ def test_derivatives_agree_with_differences(seed: int) -> None:
 
 def test_uncovered_is_nan_and_masked() -> None:
     surface = DCPSurface([[1.0, 2.0, 3.0]], [2.0], [[0, 0, 1, 1]], [[0, 1, 2]])
-    uv = [[0.5, 1.0], [1.5, 1.0], [0.0, 0.5], [1.0, 1.0], [0.5, 0.0]]
-    assert surface.covered(uv).tolist() == [True, False, False, False, False]
-    assert np.isnan(surface.evaluate(uv)).all(axis=1).tolist() == [False, True, True, True, True]
+    assert surface.covered([[1.5, 1.0]]).tolist() == [False]
+    uv = [[0.5, 1.0], [0.0, 0.5], [1.0, 1.0], [0.5, 0.0]]
+    assert surface.covered(uv).tolist() == [True, False, False, False]
+    assert np.isnan(surface.evaluate(uv)).all(axis=1).tolist() == [False, True, True, True]
     assert np.isnan(surface.derivatives(uv)[1][1]).all()
-    assert surface.basis_matrix(uv).sum(axis=1).ravel().tolist() == [[1, 0, 0, 0, 0]]
+    assert surface.basis_matrix(uv).sum(axis=1).ravel().tolist() == [[1, 0, 0, 0]]
 
 
 def test_limits_from_both_sides_of_a_slit() -> None:
@@ -131,7 +132,10 @@ BAD = {
     r"knots_u\[0\]: 1 knots": (np.zeros((1, 3)), [1], [[0]], [[3, 4]]),
     r"knots_u\[0\]: 10 knots": (np.zeros((1, 3)), [1], [range(10)], [[3, 4]]),
     "knots_u: 1 knot vectors for 2": (np.zeros((2, 3)), [1, 1], [[0, 1]], [[0, 1]] * 2),
-    r"knots_u\[0\]: not a sequence": (np.zeros((1, 3)), [1], [3], [[0, 1]]),
+    r"knots_u\[0\]: not a flat sequence": (np.zeros((1, 3)), [1], [3], [[0, 1]]),
+    r"knots_u\[1\]: must be numbers, got \[0, 'x'\]": (np.zeros((2, 3)), [1, 1], [[0, 1], [0, "x"]], [[0, 1]] * 2),
+    "knots_u: not 1 sequences of knots but None": (np.zeros((1, 3)), [1], None, [[0, 1]]),
+    r"points\[0\]: must be numbers": ([["a", 0, 0]], [1], [[0, 1]], [[0, 1]]),
 }
 
 
@@ -139,6 +143,49 @@ BAD = {
 def test_bad_arguments_are_named(message: str) -> None:
     with pytest.raises(ValueError, match=message):
         DCPSurface(*BAD[message])
+
+
+@pytest.mark.parametrize("name", ["evaluate", "derivatives", "second_derivatives", "curvatures", "basis_matrix"])
+def test_places_outside_the_domain_and_wrong_samples_are_named(name: str) -> None:
+    surface = scattered(20, 1)
+    call = getattr(surface, name)
+    u0, u1, v0, v1 = surface.rect
+    assert not surface.covered([[u1 + 1, v0]]).any()
+    call([[u0, v0], [u1, v1]])
+    for uv, message in (
+        ([[u0, v0], [u1 + 1e-9, v0]], r"uv\[1\]: u = .* is outside the domain"),
+        ([[u0, v0 - 1]], r"uv\[0\]: v = .* is outside the domain"),
+        ([[u0, v0], [np.nan, v0]], r"uv\[1\]: must be finite"),
+        ([[u0, v0], [u0]], r"uv\[1\]: shape \(1,\), expected \(2,\)"),
+        ([u0, v0], r"uv: shape \(2,\)"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call(uv)
+    for side, message in (([4], r"side\[0\]: must be 0, 1, 2 or 3, not 4"), ([0, 0], r"side: shape \(2,\)")):
+        with pytest.raises(ValueError, match=message):
+            call([[u0, v0]], side=side)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"degree_u": 8}, "degree_u: must be a whole number from 0 to 7"),
+        ({"degree_v": 1.5}, "degree_v: must be a whole number"),
+        ({"knots_u": [0, 0, 2, 1]}, r"knots_u\[3\]: 1.0 after 2.0"),
+        ({"knots_v": [0, np.nan, 1, 1]}, r"knots_v\[1\]: nan after 0.0"),
+        ({"knots_v": [0, 1]}, r"knots_v: shape \(2,\), expected \(4,\)"),
+        ({"knots_v": [1, 1, 1, 1]}, r"knots_v\[0\]: fewer than two distinct"),
+        ({"control_points": [[[0, 0, 0], [0, np.inf, 0]]] * 2}, r"control_points\[0, 1\]: must be finite"),
+        ({"control_points": np.zeros((0, 2, 3)), "knots_u": [0, 1]}, "control_points: empty"),
+        ({"weights": [[1, 1], [0, 1]]}, r"weights\[1, 0\]: must be positive and finite, got 0.0"),
+        ({"weights": [1, 1]}, r"weights: shape \(2,\), expected \(2, 2\)"),
+    ],
+)
+def test_bad_nets_are_named(change: dict, message: str) -> None:
+    good = {"degree_u": 1, "degree_v": 1, "knots_u": [0, 0, 1, 1], "knots_v": [0, 0, 1, 1]}
+    net = {"control_points": np.zeros((2, 2, 3)), "weights": np.ones((2, 2))}
+    with pytest.raises(ValueError, match=message):
+        DCPSurface.from_nurbs(**(good | net | change))
 
 
 def test_published_arrays_are_read_only() -> None:

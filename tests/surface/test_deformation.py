@@ -152,6 +152,12 @@ BAD = {
     r"ids\[0\]: -1 is not": lambda d: d.set_positions([-1], np.zeros((1, 3))),
     "ids: needs a flat sequence of integers": lambda d: d.move([0.5], np.zeros((1, 3))),
     r"delta: shape \(2, 3\), expected \(1, 3\)": lambda d: d.move([1], np.zeros((2, 3))),
+    r"delta\[1\]: shape \(1,\), expected \(3,\)": lambda d: d.move([1, 2], [[0, 0, 0], [0]]),
+    r"delta\[0\]: must be numbers": lambda d: d.move([1], [["up", 0, 0]]),
+    r"ids: needs a flat sequence of integers, got \[\[1": lambda d: d.move([[1], [1, 2]], np.zeros((2, 3))),
+    r"weights\[0\]: must be numbers": lambda d: d.set_weights([1], ["a"]),
+    r"knots_v\[0\]: not a flat sequence": lambda d: d.set_knots(3, [0, 1, 2], None),
+    r"ids\[0\]: 999 is not": lambda d: d.set_knots(999, [0, 1, 2], [0, 1, 2]),
     r"xyz\[0\]: must be finite": lambda d: d.set_positions([1], [[0, np.nan, 0]]),
     r"weights\[1\]: must be positive": lambda d: d.set_weights([1, 2], [1, 0]),
     r"weights: shape \(1,\)": lambda d: d.set_weights([1, 2], [1]),
@@ -191,6 +197,11 @@ def test_two_threads_give_the_same(sheet: tuple[DCPSurface, Mesh], monkeypatch: 
     assert np.array_equal(one.normals, two.normals)
     with pytest.raises(ValueError, match="threads"):
         surface.deformation(mesh, threads=0)
+
+
+def test_a_mesh_of_a_larger_surface_is_refused(sheet: tuple[DCPSurface, Mesh]) -> None:
+    with pytest.raises(ValueError, match="mesh: was made from another surface: this one has 16 points"):
+        shapes.hills(4).deformation(sheet[1])
 
 
 def test_published_arrays_are_read_only(sheet: tuple[DCPSurface, Mesh]) -> None:

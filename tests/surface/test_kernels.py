@@ -20,12 +20,12 @@ def test_runs_equal_single_samples(seed: int, order: str) -> None:
     assert len(uv) > 2 * RUN
     side = np.random.default_rng(seed).integers(0, 4, len(uv))
     taken, out = surface.sample_derivatives(uv, side, second=True)
-    points = surface.evaluate(uv, side)
+    points = surface.sample(uv, side)[2]
     for k in range(0, len(uv), 7):
         alone, single = surface.sample_derivatives(uv[k : k + 1], side[k : k + 1], second=True)
         assert alone[0] == taken[k]
         assert np.array_equal(single[0], out[k], equal_nan=True)
-        assert np.array_equal(surface.evaluate(uv[k : k + 1], side[k : k + 1])[0], points[k], equal_nan=True)
+        assert np.array_equal(surface.sample(uv[k : k + 1], side[k : k + 1])[2][0], points[k], equal_nan=True)
     assert (taken < 0).any()
     assert (taken >= 0).any()
 

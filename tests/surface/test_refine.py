@@ -77,7 +77,13 @@ def test_full_multiplicity_makes_a_slit() -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "name"),
-    [(("w", 0.5), "axis"), (("u", np.nan), "value"), (("u", 0.5, [999]), "ids")],
+    [
+        (("w", 0.5), "axis"),
+        (("u", np.nan), "value"),
+        (("v", 1.5), "value: v = 1.5 is outside the domain"),
+        (("u", 0.5, [1, 999]), r"ids\[1\]: 999"),
+        (("u", 0.5, [0.5]), "ids"),
+    ],
 )
 def test_bad_arguments_are_named(arguments: tuple, name: str) -> None:
     with pytest.raises(ValueError, match=name):
@@ -87,3 +93,5 @@ def test_bad_arguments_are_named(arguments: tuple, name: str) -> None:
 def test_bad_regions_are_named() -> None:
     with pytest.raises(ValueError, match="region"):
         shapes.hills(8).refine((0.5, 0.5, 0, 1))
+    with pytest.raises(ValueError, match="region: needs"):
+        shapes.hills(8).refine((0, 1))  # type: ignore[arg-type]

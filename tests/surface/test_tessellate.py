@@ -88,6 +88,37 @@ def test_a_slit_cuts_and_nothing_straddles_it() -> None:
     assert (v[used_below].max(axis=1) <= 0.5).all()
 
 
+def test_beyond_its_ends_a_slit_is_one_surface() -> None:
+    surface = shapes.hills(16)
+    for _ in range(4):  # points within the slit's length end at it, the others reach across
+        s = surface.supports
+        within = (s[:, 0] > 0.25) & (s[:, 1] < 0.75) & (s[:, 2] < 0.5) & (s[:, 3] > 0.5)
+        surface = surface.insert_knot("v", 0.5, np.flatnonzero(within)).surface
+    lower = np.flatnonzero(surface.supports[:, 3] == 0.5)
+    points = surface.points.copy()
+    points[lower, 2] -= 5
+    surface = surface.with_points(points)
+    slit = Slit("u", 0.5, 0.25, 0.75)
+    u = np.linspace(0, 1, 101)
+    line = np.stack([u, np.full(101, 0.5)], axis=1)
+    apart = np.linalg.norm(surface.evaluate(line) - surface.evaluate(line, side=np.full(101, 2)), axis=1)
+    assert apart[slit.holds(line)].max() > 1
+    assert apart[~slit.holds(line)].max() < 1e-12
+    mesh = surface.tessellate(chord_error=0.2, domain=Domain((0, 1, 0, 1), slits=[slit]))
+    beyond = (mesh.uv[:, 1] == 0.5) & ~slit.holds(mesh.uv)
+    assert len(np.unique(mesh.uv[beyond], axis=0)) == beyond.sum() > 4
+
+
+def test_loops_and_slits_may_reach_beyond_the_rectangle() -> None:
+    surface = shapes.hills(12)
+    diamond = [[0.5, -0.3], [1.3, 0.5], [0.5, 1.3], [-0.3, 0.5]]
+    mesh = surface.tessellate(chord_error=0.5, domain=Domain((0, 1, 0, 1), [diamond]))
+    assert shapes.uv_areas(mesh).sum() == pytest.approx(0.92, abs=1e-12)
+    slit = Slit("u", 0.5, 0.25, 1.5)
+    cut = surface.tessellate(chord_error=0.5, domain=Domain((0, 1, 0, 1), slits=[slit]))
+    assert ((cut.uv == [1, 0.5]).all(axis=1)).sum() == 2  # the cut runs through the border
+
+
 def test_loops_are_followed_within_the_error() -> None:
     surface, domain = shapes.hills(), shapes.face_like()
     for error in (0.2, 0.05):
@@ -159,6 +190,10 @@ def test_the_rim_of_what_is_covered_is_followed() -> None:
         ({"max_depth": 21}, "max_depth"),
         ({"min_depth": 5, "max_depth": 3}, "min_depth"),
         ({"max_points": 1, "max_depth": 20}, "max_depth"),
+        ({"loop_error": 0.0}, "loop_error"),
+        ({"roots": (0, 1)}, "roots"),
+        ({"roots": (1.5, 1)}, "roots"),
+        ({"roots": (10**9, 1)}, "roots"),
     ],
 )
 def test_limits_out_of_range_are_named(limits: dict, name: str) -> None:
