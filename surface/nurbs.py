@@ -46,7 +46,7 @@ def nurbs_arrays(
     w = np.ones((nu, nv)) if weights is None else numbers(weights, "weights")
     if w.shape != (nu, nv):
         raise ValueError(f"weights: shape {w.shape}, expected {(nu, nv)}")
-    _check_grid(np.isfinite(w) & (w > 0), w, "weights", "positive and finite")
+    _check_grid(np.asarray(np.isfinite(w) & (w > 0)), w, "weights", "positive and finite")
     local_u = _windows(knots_u, "u", nu, degree_u)
     local_v = _windows(knots_v, "v", nv, degree_v)
     return net.reshape(-1, 3), w.ravel(), np.repeat(local_u, nv, axis=0), np.tile(local_v, (nu, 1))

@@ -3,7 +3,9 @@
 Read are ``<Geometry>`` elements of the types in :data:`KINDS`, all of a file. Coefficients stand with the first
 direction running fastest. A box of a hierarchy holds lower left and upper right corner in numbers of the distinct
 knots of its own level; a place has the level of the finest box that holds it. Levels halve every span of the one
-before unless the file gives each (``manualLevels``). Coefficients in the plane (``geoDim="2"``) get z = 0.
+before unless the file gives each (``manualLevels``). A knot vector of ``mode="uniform"`` only tells how many
+functions stand on equal steps from 0 to 1. Coefficients in the plane (``geoDim="2"``) get z = 0. Rational hierarchical
+splines and bases that call themselves periodic are refused: G+Smo writes neither.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from .xmltree import Element
 KINDS = ("TensorBSpline2", "TensorNurbs2", "HBSpline2", "THBSpline2")
 MOST_LEVELS = 16
 MOST_CELLS = 1 << 24
+MOST_FUNCTIONS = 1 << 14  # along one direction, where a file only says how many
 LARGEST = 1e100  # of knots: their products stay numbers
 CLOSE = 1e-14  # of the range of the knots
 
@@ -43,7 +46,10 @@ def _surface(element: Element, number: int) -> NamedSurface:
     kind = element.get("type")
     name = element.attributes.get("label") or f"{kind} {element.attributes.get('id', number)}"
     if kind not in KINDS:
-        raise element.place.error(f'type="{kind}" is no surface omote reads', hint=f"use {', '.join(KINDS)}")
+        hint = f"use {', '.join(KINDS)}"
+        if kind.startswith("Rational"):
+            hint = "give every weight 1 and save a THBSpline2, or insert knots until it is a TensorNurbs2"
+        raise element.place.error(f'type="{kind}" is no surface omote reads', hint=hint)
     if element.all("transform"):
         raise element.place.error("has a <transform>, which is not read", hint="apply it to the coefficients")
     basis = element.first("Basis")
@@ -77,12 +83,24 @@ def _level(element: Element) -> Level:
     sides = element.all("Basis")
     if len(sides) != 2:
         raise element.place.error(f"has {len(sides)} directions, a surface has 2")
+    for each in (element, *sides):
+        _check_open(each)
     degrees, knots = zip(*(_knots(side.first("KnotVector")) for side in sides), strict=True)
     return Level((degrees[0], degrees[1]), (knots[0], knots[1]))
 
 
+def _check_open(element: Element) -> None:
+    """G+Smo itself writes periodic bases as plain knots; a mark that says otherwise is not to be overlooked."""
+    if element.attributes.get("periodic", "-1").strip().lower() not in ("-1", "false"):
+        raise element.place.error("is periodic, which is not read", hint="unclamp it into an open knot vector")
+
+
 def _knots(element: Element) -> tuple[int, Floats]:
+    _check_open(element)
     p = element.integer("degree", 0, MAX_DEGREE)
+    if element.attributes.get("mode") == "uniform":
+        count = element.integer("csize", p + 1, MOST_FUNCTIONS)
+        return p, np.concatenate([[0.0] * p, np.linspace(0, 1, count - p + 1), [1.0] * p])
     knots = element.numbers()
     if len(knots) < 2 * p + 2:
         raise element.place.error(f"holds {len(knots)} knots, degree {p} needs {2 * p + 2} at least")
@@ -98,8 +116,6 @@ def _knots(element: Element) -> tuple[int, Floats]:
     if (steps[steps > 0] < CLOSE * np.ptp(knots)).any():
         k = int(np.argmax((steps > 0) & (steps < CLOSE * np.ptp(knots))))
         raise element.place.error(f"knots {k} and {k + 1} are too close to tell apart")
-    if element.attributes.get("periodic", "-1") not in ("-1", "false"):
-        raise element.place.error("is periodic, which is not read", hint="unclamp it into an open knot vector")
     return p, knots
 
 

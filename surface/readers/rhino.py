@@ -71,8 +71,11 @@ def _nurbs(place: Place, shape: Any) -> tuple[DCPSurface, Domain | None]:
         table[..., 3] = 1.0
     degrees = form.Degree(0), form.Degree(1)
     sides = [_Side(p, knots.ToList()) for p, knots in zip(degrees, (form.KnotsU, form.KnotsV), strict=True)]
-    if not (np.isfinite(table).all() and (table[..., 3] > 0).all()):
-        raise place.error("has control points that are not finite, or weights that are not positive")
+    bad = ~(np.isfinite(table).all(axis=2) & (table[..., 3] > 0))
+    if bad.any():
+        i, j = np.argwhere(bad)[0]
+        why = f"control point ({i}, {j}) is {table[i, j].tolist()} (x, y, z, weight): not finite, or no positive weight"
+        raise place.error(why)
     net, weights = table[..., :3] / table[..., 3:], table[..., 3]
     try:
         points, w, ku, kv = nurbs_arrays(*degrees, sides[0].full, sides[1].full, net, weights)

@@ -49,10 +49,13 @@ def read(path: Path) -> list[NamedSurface]:
     """The surface of a file; ``SurfaceFileError`` names the line."""
     place = Place(path)
     file = parse(place, read_text(path, errors="replace"))  # comments may be in any encoding
-    if file.header.get("degree") != "3":
-        raise place.error(f'"degree" is {file.header.get("degree", "missing")}; T-splines of degree 3 are read')
-    if file.header.get("force-bezier-end-conditions") != "1":
-        raise place.error("has no Bezier end conditions; closed forms and other ends are not read", hint=HINT)
+    if file.lines.get("degree", (1, ""))[1] != "3":
+        line, words = file.lines.get("degree", (1, "missing"))
+        raise file.error(line, f'"degree" is {words}; T-splines of degree 3 are read')
+    if file.lines.get("force-bezier-end-conditions", (1, ""))[1] != "1":
+        line, words = file.lines.get("force-bezier-end-conditions", (1, "missing"))
+        why = f'"force-bezier-end-conditions" is {words}: closed forms and other ends are not read, only Bezier ends'
+        raise file.error(line, why, HINT)
     if not file.links or not file.grips:
         raise place.error('has no links ("l") or no grips ("0g")')
     mesh = TMesh(file)
@@ -69,9 +72,11 @@ def read(path: Path) -> list[NamedSurface]:
 def _anchors(file: TsmFile, mesh: TMesh) -> dict[int, Anchor]:
     """By grip number, where each grip stands."""
     out: dict[int, Anchor] = {}
+    held = dict.fromkeys(mesh.uv, 0)
     for number, (_, own, vertex) in enumerate(file.owners):
         if own and number in file.grips:
             out[number] = Anchor(mesh.uv[vertex], (0, 0))
+            held[vertex] += 1
     for line, vertex, counts, grips in file.extras:
         for (first, second), grip in zip(_slots(counts), grips, strict=True):
             sides = [mesh.side(vertex, side) for side in (first, second) if side is not None]
@@ -80,11 +85,14 @@ def _anchors(file: TsmFile, mesh: TMesh) -> dict[int, Anchor]:
             if grip in out or not mesh.allows(anchor):
                 raise file.error(line, f"grip {grip} stands where Bezier ends have none", HINT)
             out[grip] = anchor
+            held[vertex] += 1
     missing = sorted(set(file.grips) - set(out))
     if missing:
         raise file.error(file.grips[missing[0]][0], f"grip {missing[0]} has no place in the mesh", HINT)
-    if len(out) != sum(mesh.grips_at(uv) for uv in mesh.uv.values()):
-        raise file.place.error("some vertices on the outline lack their extra grips", hint=HINT)
+    if any(held[vertex] != mesh.grips_at(uv) for vertex, uv in mesh.uv.items()):
+        vertex = next(v for v, uv in mesh.uv.items() if held[v] != mesh.grips_at(uv))
+        why = f"vertex {vertex} has {held[vertex]} grips, {mesh.grips_at(mesh.uv[vertex])} stand there with Bezier ends"
+        raise file.error(file.vertex_lines[vertex], why, HINT)
     return out
 
 
@@ -109,6 +117,7 @@ class TMesh:
         self._file = file
         self._direction: dict[int, int] = {}
         self.uv: dict[int, tuple[float, float]] = {}
+        self._check_stars()
         self._spread()
         us, vs = (np.array([uv[axis] for uv in self.uv.values()]) for axis in range(2))
         self._rect = us.min(), us.max(), vs.min(), vs.max()
@@ -116,6 +125,19 @@ class TMesh:
         self._snap()
         self._check_outline()
         self._lines = [self._edges_across(axis) for axis in range(2)]
+
+    def _check_stars(self) -> None:
+        """Corners around a vertex of the plane make 360 degrees, that of the outside included."""
+        quarters = dict.fromkeys(self._file.vertices, 0)
+        for link in self._file.links.values():
+            quarters[link.vertex] += 1 + link.turn  # left 90, straight 180, right 270 degrees
+        for vertex, count in quarters.items():
+            if count != 4:
+                why = f"vertex {vertex} is a star point: {90 * count} degrees around it; star points are not read"
+                raise self._file.error(self._file.vertex_lines[vertex], why, HINT)
+        if all(link.face >= 0 for link in self._file.links.values()):
+            line = next(iter(self._file.links.values())).line
+            raise self._file.error(line, "no link borders the outside: the form is closed, which is not read", HINT)
 
     def _spread(self) -> None:
         """Walk from link to link; what comes to another place by another way does not fit the plane."""
@@ -137,7 +159,9 @@ class TMesh:
                 if self._settle(other, direction, end):
                     queue.append(other)
         if len(self._direction) != len(file.links):
-            raise file.place.error("has several pieces; one T-spline a file is read", hint=HINT)
+            apart = min(set(file.links) - set(self._direction))
+            why = f"link {apart} belongs to another piece than link {first}; one T-spline a file is read"
+            raise file.error(file.links[apart].line, why, HINT)
 
     def _settle(self, number: int, direction: int, uv: tuple[float, float]) -> bool:
         """Give a link its direction and its vertex a place; False if they had them."""
@@ -146,7 +170,10 @@ class TMesh:
         known = self._direction.get(number)
         size = 1e-9 * sum(self._file.edges.values())
         if (known is not None and known != direction) or max(abs(a - b) for a, b in zip(there, uv, strict=True)) > size:
-            why = f"vertex {link.vertex} fits no plane: a star point, a closed form, or intervals that do not add up"
+            why = (
+                f"vertex {link.vertex} comes to lie at two places: the form closes on itself, which is not read, or "
+                "its knot intervals do not add up"
+            )
             raise self._file.error(link.line, why, HINT)
         self._direction[number] = direction
         return known is None

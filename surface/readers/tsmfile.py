@@ -36,8 +36,9 @@ class TsmFile:
 
     Attributes
     ----------
-    header : word to the rest of its line
+    lines : word of the header to its line and the rest of it
     links, edges, vertices : by number: link, knot interval, (link, compass word)
+    vertex_lines : by number the line of a vertex
     creases : edge numbers with their lines
     grips : (line, [x, y, z, weight]) by number
     owners : (line, is it the vertex' own?, vertex) of every grip in order, deleted ones too
@@ -45,10 +46,11 @@ class TsmFile:
     """
 
     place: Place
-    header: dict[str, str] = field(default_factory=dict)
+    lines: dict[str, tuple[int, str]] = field(default_factory=dict)
     links: dict[int, Link] = field(default_factory=dict)
     edges: dict[int, float] = field(default_factory=dict)
     vertices: dict[int, tuple[int, str]] = field(default_factory=dict)
+    vertex_lines: dict[int, int] = field(default_factory=dict)
     creases: list[tuple[int, int]] = field(default_factory=list)
     grips: dict[int, tuple[int, list[float]]] = field(default_factory=dict)
     owners: list[tuple[int, bool, int]] = field(default_factory=list)
@@ -97,6 +99,7 @@ def _entity(out: TsmFile, line: int, kind: str, number: int, rest: list[str]) ->
         if rest[1] not in COMPASS:
             raise out.error(line, f"{rest[1]!r} is no compass point ({', '.join(COMPASS)})")
         out.vertices[number] = _integers(out, line, rest[:1])[0], rest[1]
+        out.vertex_lines[number] = line
     elif kind == "0g":
         out.grips[number] = line, _floats(out, line, rest)
         if out.grips[number][1][3] <= 0:
@@ -122,7 +125,7 @@ def _other(out: TsmFile, line: int, kind: str, rest: list[str]) -> None:
             raise out.error(line, f"lists {len(grips)} grips, which does not fit its counts {counts}")
         out.extras.append((line, values[0], counts, grips))
     else:
-        out.header.setdefault(kind, " ".join(rest))
+        out.lines.setdefault(kind, (line, " ".join(rest)))
 
 
 def _check(out: TsmFile, grips: int) -> None:
@@ -137,7 +140,7 @@ def _check(out: TsmFile, grips: int) -> None:
                 raise out.error(link.line, f'refers to "{kind}" {number}, which the file does not have')
     for vertex, (leaving, _) in out.vertices.items():
         if leaving not in out.links or out.links[leaving].vertex != vertex:
-            raise out.place.error(f'"v" {vertex} names link {leaving}, which does not leave it')
+            raise out.error(out.vertex_lines[vertex], f'"v" {vertex} names link {leaving}, which does not leave it')
     _check_owners(out)
     if len(out.owners) != grips:
         raise out.place.error(f'has {grips} grips ("0g") and {len(out.owners)} owners ("0m gv", "0m gvp")')

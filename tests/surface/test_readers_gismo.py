@@ -175,6 +175,15 @@ def test_a_bilinear_patch_has_its_corners_where_the_file_says(tmp_path: Path) ->
     assert np.array_equal(again.surface.points, item.surface.points)
 
 
+def test_uniform_knots_may_be_left_to_the_reader(tmp_path: Path) -> None:
+    coefs = np.random.default_rng(6).normal(size=(36, 3))
+    written = geometry("TensorBSpline2", tensor(), coefs)
+    short = written.replace(f'degree="2">{OPEN}', 'degree="2" mode="uniform" csize="6">')
+    assert short != written
+    (a,), (b,) = (read_surface(save(tmp_path, text)) for text in (written, short))
+    assert np.array_equal(a.surface.evaluate(GRID), b.surface.evaluate(GRID))
+
+
 def quarter() -> str:
     """A quarter of a cylinder of radius 2."""
     coefs = np.array([[2, 0, 0], [2, 2, 0], [0, 2, 0], [2, 0, 1], [2, 2, 1], [0, 2, 1.0]])
@@ -212,6 +221,10 @@ BAD = {
     "none": ("<xml></xml>", "holds no surface"),
     "kind": (FLAT.replace("TensorBSpline2", "TrimmedSurface"), "line 3 <Geometry>.*no surface omote reads"),
     "type": (FLAT.replace('type="TensorBSpline2"', ""), 'line 3 <Geometry>.*no attribute "type"'),
+    "rational hierarchy": (THB.replace("THBSpline", "RationalTHBSpline"), 'type="RationalTHBSpline2" is no surface'),
+    "periodic": (FLAT.replace('KnotVector degree="2"', 'KnotVector periodic="0" degree="2"', 1), "line 6 .*periodic"),
+    "periodic side": (FLAT.replace('index="1"', 'index="1" periodic="true"', 1), "line 7 <Basis>: is periodic"),
+    "uniform": (FLAT.replace("Vector degree", 'Vector mode="uniform" csize="2" degree', 1), 'csize="2" must be'),
     "transform": (FLAT.replace("<coefs", "<transform/><coefs"), "transform"),
     "NaN": (FLAT.replace("0.0 0.0 0.0\n", "0.0 nan 0.0\n", 1), "<coefs>: holds nan"),
     "word": (FLAT.replace("0.0 0.0 0.0\n", "0.0 x 0.0\n", 1), "<coefs>: holds what is not a number"),

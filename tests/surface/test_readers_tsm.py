@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -166,6 +167,28 @@ def changed(start: str, new: str, nth: int = 0) -> str:
     return GOOD.replace(line_of(GOOD, start, nth) + "\n", new and new + "\n", 1)
 
 
+def twice() -> str:
+    """Two separate squares in one file."""
+    writer = Writer([(0.0, 1.0, 0.0, 1.0), (3.0, 4.0, 0.0, 1.0)])
+    return writer.text()
+
+
+def bare() -> str:
+    """The first corner's extra grips deleted."""
+    numbers = line_of(GOOD, "0m cg").split()[-3:]
+    text, kept = [], 0
+    owner = [x for x in GOOD.splitlines() if x.startswith(("0m gv", "0m gvp"))]
+    for line in GOOD.splitlines():
+        if line.startswith("0g"):
+            text.append("0g" if str(kept) in numbers else line)
+            kept += 1
+        elif line != line_of(GOOD, "0m cg"):
+            text.append(line)
+    assert len(owner) == kept
+    return "\n".join(text) + "\n"
+
+
+TWICE, BARE = twice(), bare()
 LINKS = line_of(GOOD, "l ").split()
 BAD = {
     "empty": ("", "line 1: is no T-spline"),
@@ -173,18 +196,23 @@ BAD = {
     "truncated": (GOOD[: GOOD.index("\nl ") + 60], r"line \d+: (\"l\" needs 7 values|refers to \"l\")"),
     "cut off": (GOOD[: GOOD.index("0g ")], "the file does not have"),
     "left out": (changed("0m cg", "0m cg 0 4 1 0 0 1 1 -1 3"), "leaves grips out"),
-    "degree": (GOOD.replace("degree 3", "degree 2"), '"degree" is 2'),
-    "ends": (GOOD.replace("conditions 1", "conditions 0"), "Bezier end conditions"),
+    "degree": (GOOD.replace("degree 3", "degree 2"), 'line 3: "degree" is 2'),
+    "ends": (GOOD.replace("conditions 1", "conditions 0"), "line 7: .*closed forms and other ends are not read"),
+    "no ends": (GOOD.replace("force-bezier-end-conditions 1\n", ""), "line 1: .*is missing"),
     "no links": (HEAD, "has no links"),
     "NaN": (changed("0g ", "0g nan 0 0 1"), r"line \d+: numbers must be finite"),
     "word": (changed("0g ", "0g x 0 0 1"), r"line \d+: needs numbers"),
     "weight": (changed("0g ", "0g 0 0 0 -1"), "weight must be positive, not -1"),
     "values": (changed("0g ", "0g 0 0 0"), '"0g" needs 4 values, has 3'),
     "interval": (changed("e ", "e 0 0"), "interval must be positive"),
-    "sum": (changed("e ", "e 0 1.5"), "fits no plane"),
+    "sum": (changed("e ", "e 0 1.5"), r"line \d+: vertex \d comes to lie at two places"),
     "whole": (changed("l ", "l 0 x 0 0 0 0 0"), "needs whole numbers"),
     "turn": (changed("l ", " ".join([*LINKS[:-1], "5"])), "turn must be 0, 1 or 2"),
-    "star": (changed("l ", " ".join([*LINKS[:-1], "2"])), "fits no plane: a star point"),
+    "star": (changed("l ", " ".join([*LINKS[:-1], "2"])), r"line \d+: vertex 0 is a star point: 540 degrees"),
+    "closed": (re.sub(r"^(l \S+ \S+ \S+ \S+) -1 ", r"\1 0 ", GOOD, flags=re.M), "form is closed"),
+    "leaving": (changed("v ", "v 1 EAST"), r'line \d+: "v" 0 names link 1'),
+    "pieces": (TWICE, r"line \d+: link \d+ belongs to another piece"),
+    "bare corner": (BARE, r"line \d+: vertex 0 has 1 grips, 4 stand there"),
     "link": (changed("l ", " ".join([*LINKS[:2], "99", *LINKS[3:]])), 'refers to "l" 99'),
     "compass": (changed("v ", "v 0 UP"), "compass point"),
     "owner": (changed("0m gv ", "0m gv 77"), 'refers to "v" 77'),
