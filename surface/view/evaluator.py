@@ -50,8 +50,8 @@ class Evaluator(Protocol):
     def rotation(self) -> np.ndarray:
         """(3, 3) how the head is turned."""
 
-    def box(self, part: ViewPart) -> np.ndarray | None:
-        """Points whose box holds the part as posed now, (k, 3), or None if that would take too long to say."""
+    def vertices(self, part: ViewPart) -> np.ndarray | None:
+        """All vertices of the part as posed now, (m, 3), or None if that would take too long to say."""
 
     def release(self) -> None:
         """Give the graphics memory back."""
@@ -77,7 +77,7 @@ class CpuEvaluator:
     def rotation(self) -> np.ndarray:
         return np.asarray(getattr(self._head.parts[0], "turn", _AHEAD))
 
-    def box(self, part: ViewPart) -> np.ndarray | None:
+    def vertices(self, part: ViewPart) -> np.ndarray | None:
         return part.vertices
 
     def release(self) -> None:
@@ -183,7 +183,7 @@ class GpuEvaluator:
     def rotation(self) -> np.ndarray:
         return _AHEAD if self._turn is None else self._turn.matrix
 
-    def box(self, part: ViewPart) -> np.ndarray | None:
+    def vertices(self, part: ViewPart) -> np.ndarray | None:
         return None
 
     def release(self) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from surface.errors import ViewError
 from surface.view import materials
-from surface.view.bounds import box_corners
+from surface.view.bounds import Bands, Silhouette, corners
 from surface.view.camera import Camera
 from surface.view.evaluator import choose
 from surface.view.openings import Openings
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     import moderngl
 
 QUALITIES = ("full", "fast")
-Region = tuple[int, int, int, int]
-"""A rectangle of pixels: x, y (from the lower left corner), width, height."""
-_MARGIN = 3
 
 
 class Renderer:
@@ -68,7 +65,7 @@ class Renderer:
         self.openings = Openings(head.parts, self.evaluator.positions)
         self._programs = materials.programs(ctx, quality, self.theme)
         self._detail = materials.detail_texture(ctx)
-        self._background = ctx.vertex_array(self._programs["background"], [])
+        self._background = Rectangles(ctx, self._programs["background"])
         parts = sorted(head.parts, key=lambda part: materials.order(part.material))
         self._parts = [self._buffers(part) for part in parts]
         self._camera: tuple[Camera, float] | None = None
@@ -94,16 +91,19 @@ class Renderer:
         self.revision += sent > 0
         return sent
 
-    def draw(self, camera: Camera, target: moderngl.Framebuffer, region: Region | None = None) -> None:
-        """Draw the head and the background into `target`: all of it, or only the pixels of `region`."""
+    def draw(self, camera: Camera, target: moderngl.Framebuffer, bands: Bands | None = None) -> None:
+        """Draw the head into `target`, and round it the background: everywhere, or only within `bands`, which hold
+        the head."""
         width, height = target.size
-        target.scissor = region or (0, 0, width, height)
-        target.use()
+        target.scissor = 0, 0, width, height
+        # Colours stay: what was drawn before and is not covered now is background.
+        target.depth_mask, target.color_mask = True, (False, False, False, False)
+        target.clear(depth=1.0)
+        target.color_mask = True, True, True, True
+        target.use()  # which also brings the masks to OpenGL
         self.ctx.viewport = (0, 0, width, height)
         self.ctx.depth_func = "<="
         self.ctx.blend_func = self.ctx.SRC_ALPHA, self.ctx.ONE_MINUS_SRC_ALPHA
-        target.depth_mask = True
-        target.clear(depth=1.0)
         self._aim(camera, width / max(height, 1))
         self._turn_lights(camera)
         self._detail.use(0)
@@ -112,21 +112,16 @@ class Renderer:
         self.ctx.enable_only(self.ctx.DEPTH_TEST)
         theme = self.theme
         put(self._programs["background"], {"top": theme.background_top, "bottom": theme.background_bottom})
-        self._background.render(vertices=3)
+        self._background.render(corners((bands or Bands.whole(target.size)).boxes(), target.size))
 
-    def region(self, camera: Camera, size: tuple[int, int]) -> Region:
-        """The rectangle of a picture of `size` that the head can touch, as posed now."""
-        boxes = [self.evaluator.box(buffers.part) for buffers in self._parts]
-        if any(box is None for box in boxes):
-            return 0, 0, *size
-        corners = np.concatenate([box_corners(box) for box in boxes if box is not None])
-        clip = np.column_stack([corners, np.ones(len(corners))]) @ camera.matrix(size[0] / size[1]).T
-        if clip[:, 3].min() < camera.near:
-            return 0, 0, *size
-        pixels = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * size
-        low = np.clip(np.floor(pixels.min(axis=0)) - _MARGIN, 0, size).astype(int)
-        high = np.clip(np.ceil(pixels.max(axis=0)) + _MARGIN, 0, size).astype(int)
-        return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])
+    def region(self, camera: Camera, size: tuple[int, int]) -> Bands:
+        """Where a picture of `size` can be touched by the head, as posed now."""
+        found = Silhouette(size, camera.matrix(size[0] / size[1]), camera.near)
+        for buffers in self._parts:
+            vertices = self.evaluator.vertices(buffers.part)
+            if vertices is None or not found.add(vertices, buffers.part.triangles):
+                return Bands.whole(size)
+        return found.bands()
 
     def set_background(self, top: Colour, bottom: Colour) -> None:
         """Change the gradient; sRGB colours 0..1."""
@@ -191,6 +186,38 @@ class Renderer:
         self._detail.release()
         for program in self._programs.values():
             program.release()
+
+
+class Rectangles:
+    """Rectangles of a picture, to run a fragment shader over.
+
+    Parameters
+    ----------
+    program : with an input `corner`, as in background.vert.
+    """
+
+    def __init__(self, ctx: moderngl.Context, program: moderngl.Program) -> None:
+        self._ctx, self._program = ctx, program
+        self._make(1024)
+
+    def _make(self, room: int) -> None:
+        self._corners = self._ctx.buffer(reserve=room, dynamic=True)
+        self._array = self._ctx.vertex_array(self._program, [(self._corners, "2f", "corner")])
+        self._ctx.clear_errors()  # moderngl sets a divisor, which OpenGL 3.1 does not have
+
+    def render(self, at: np.ndarray) -> None:
+        """Draw the triangles whose corners `at` (k, 2) float32 lists."""
+        if at.nbytes > self._corners.size:
+            self.release()
+            self._make(at.nbytes)
+        self._corners.orphan()
+        self._corners.write(at.tobytes())
+        self._array.render(vertices=len(at))
+
+    def release(self) -> None:
+        """Give the buffer back."""
+        self._array.release()
+        self._corners.release()
 
 
 def theme_named(theme: str | Theme) -> Theme:

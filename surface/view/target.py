@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from surface.view.bounds import Bands, corners
 from surface.view.camera import Camera
 from surface.view.programs import build, put
-from surface.view.renderer import Region, Renderer
+from surface.view.renderer import Rectangles, Renderer
 from surface.view.theme import Theme
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ class Target:
 
     With `samples` > 1 the head is drawn multisampled and brought together; with 1 it is drawn once per
     pixel and its edges are smoothed. The background stands still, so after the first frame only the
-    rectangle around the head, where it is and where it was, is drawn again: on a software renderer
-    pixels are what costs.
+    bands of rows where the head is and where it was are drawn again: on a software renderer pixels are what
+    costs.
 
     :meth:`paint` begins a picture, :meth:`complete` ends it. Between the two a software renderer fills its
     pixels on other threads, so whoever has something else to do does it there.
@@ -48,8 +49,8 @@ class Target:
         self._enlarge = Pass(ctx, "enlarge.frag", size) if inner != size else None
         self._small = _texture(ctx, inner, ctx.LINEAR) if self._enlarge else None
         self._small_frame = ctx.framebuffer([self._small]) if self._small else None
-        self._last: Region | None = None
-        self._pending: Region | None = None
+        self._last: Bands | None = None
+        self._pending: Bands | None = None
         self._backdrop: tuple[object, object] | None = None
         self._shown: tuple[Renderer, int, Theme, Camera] | None = None
 
@@ -67,9 +68,9 @@ class Target:
         region = renderer.region(camera, inner)
         backdrop = (renderer.theme.background_top, renderer.theme.background_bottom)
         whole = self._last is None or backdrop != self._backdrop
-        dirty = (0, 0, *inner) if whole else union(region, self._last or region)
+        dirty = Bands.whole(inner) if whole else region.joined(self._last or region)
         self._last, self._backdrop = region, backdrop
-        if dirty[2] <= 0 or dirty[3] <= 0:
+        if not len(dirty.boxes()):
             return
         renderer.draw(camera, self._drawn, dirty)
         self._pending = dirty
@@ -77,17 +78,18 @@ class Target:
 
     def complete(self) -> None:
         """Bring the samples or raw pixels last painted to `picture`, waiting for them."""
-        region, self._pending = self._pending, None
-        if region is None:
+        bands, self._pending = self._pending, None
+        if bands is None:
             return
+        boxes, inner = bands.boxes(), self._drawn.size
         if self._smooth is None or self._raw is None:
-            self.picture.scissor = region
+            self.picture.scissor = bands.box()
             self._ctx.copy_framebuffer(self.picture, self._drawn)
         elif self._enlarge is None or self._small_frame is None or self._small is None:
-            self._smooth.render(self._raw, self.picture, region)
+            self._smooth.render(self._raw, self.picture, boxes)
         else:
-            self._smooth.render(self._raw, self._small_frame, region)
-            self._enlarge.render(self._small, self.picture, enlarged(region, self._drawn.size, self.size))
+            self._smooth.render(self._raw, self._small_frame, boxes)
+            self._enlarge.render(self._small, self.picture, enlarged(boxes, inner, self.size))
 
     def read(self) -> np.ndarray:
         """The picture, (height, width, 3) uint8, top row first."""
@@ -110,27 +112,27 @@ class Target:
 
 
 class Pass:
-    """One fragment shader over a rectangle of a picture.
+    """One fragment shader over rectangles of a picture.
 
     Parameters
     ----------
-    shader : its file; reads the sampler `picture` and the uniform `pixel`.
-    size : (width, height) of what is read, in the units `pixel` is one of.
+    shader : its file; reads the sampler `picture` and, where it has it, the uniform `pixel`.
+    size : (width, height) of what it writes, in the units `pixel` is one of.
     """
 
     def __init__(self, ctx: moderngl.Context, shader: str, size: tuple[int, int]) -> None:
-        self._ctx = ctx
+        self._ctx, self._size = ctx, size
         self._program = build(ctx, ("background.vert",), (shader,))
-        self._array = ctx.vertex_array(self._program, [])
+        self._array = Rectangles(ctx, self._program)
         put(self._program, {"picture": 1, "pixel": (1.0 / size[0], 1.0 / size[1])})
 
-    def render(self, source: moderngl.Texture, target: moderngl.Framebuffer, region: Region) -> None:
-        """Fill `region` of `target`."""
-        target.scissor = region
+    def render(self, source: moderngl.Texture, target: moderngl.Framebuffer, boxes: np.ndarray) -> None:
+        """Fill `boxes` (k, 4), pixels from left and bottom to right and top, of `target`."""
+        target.scissor = 0, 0, *self._size
         target.use()
         self._ctx.enable_only(self._ctx.NOTHING)
         source.use(1)
-        self._array.render(vertices=3)
+        self._array.render(corners(boxes, self._size))
 
     def release(self) -> None:
         """Give the program back."""
@@ -155,22 +157,8 @@ def _texture(ctx: moderngl.Context, size: tuple[int, int], kind: int) -> moderng
     return texture
 
 
-def enlarged(region: Region, inner: tuple[int, int], size: tuple[int, int]) -> Region:
-    """`region` of a picture of size `inner` in a picture of `size`, with the pixels its edge reaches."""
-    x, y, width, height = region
-    scale = size[0] / inner[0], size[1] / inner[1]
-    left, bottom = max(0, int((x - 1) * scale[0])), max(0, int((y - 1) * scale[1]))
-    right = min(size[0], int((x + width + 1) * scale[0]) + 1)
-    top = min(size[1], int((y + height + 1) * scale[1]) + 1)
-    return left, bottom, right - left, top - bottom
-
-
-def union(a: Region, b: Region) -> Region:
-    """Smallest rectangle (x, y, width, height) round both; an empty one adds nothing."""
-    if a[2] <= 0 or a[3] <= 0:
-        return b
-    if b[2] <= 0 or b[3] <= 0:
-        return a
-    x, y = min(a[0], b[0]), min(a[1], b[1])
-    right, top = max(a[0] + a[2], b[0] + b[2]), max(a[1] + a[3], b[1] + b[3])
-    return x, y, right - x, top - y
+def enlarged(boxes: np.ndarray, inner: tuple[int, int], size: tuple[int, int]) -> np.ndarray:
+    """`boxes` (k, 4) of a picture of size `inner` in a picture of `size`, with the pixels their edges reach."""
+    scale = np.divide(size, inner)
+    low, high = (boxes[:, :2] - 1) * scale, (boxes[:, 2:] + 1) * scale
+    return np.hstack([np.maximum(np.floor(low), 0), np.minimum(np.floor(high) + 1, size)]).astype(np.int64)

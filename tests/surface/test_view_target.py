@@ -9,7 +9,7 @@ from ball_head import BallHead, values
 from surface.view import Camera, Offscreen
 from surface.view.offscreen import open_context
 from surface.view.renderer import Renderer
-from surface.view.target import Target, enlarged, union
+from surface.view.target import Target, enlarged
 
 
 @pytest.mark.parametrize("samples", [1, 4])
@@ -50,12 +50,6 @@ def test_rows_are_top_first(gl: None) -> None:
     assert picture.shape == (100, 120, 3)
     assert picture.dtype == np.uint8
     assert picture[80, 60, 0] > 150 > picture[5, 60, 0]
-
-
-def test_union() -> None:
-    assert union((10, 10, 5, 5), (0, 12, 4, 10)) == (0, 10, 15, 12)
-    assert union((0, 0, 0, 0), (3, 4, 5, 6)) == (3, 4, 5, 6)
-    assert union((3, 4, 5, 6), (9, 9, 0, 3)) == (3, 4, 5, 6)
 
 
 def test_a_face_at_rest_is_not_drawn_again(gl: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,8 +117,9 @@ def test_a_picture_is_complete_when_it_is_read(gl: None) -> None:
 
 
 def test_enlarged_rectangles_hold_what_their_edge_reaches() -> None:
-    assert enlarged((0, 0, 60, 60), (60, 60), (100, 100)) == (0, 0, 100, 100)
-    x, y, width, height = enlarged((10, 20, 5, 6), (60, 60), (100, 100))
-    assert (x <= 9 / 0.6, y <= 19 / 0.6) == (True, True)
-    assert (x + width >= 16 / 0.6, y + height >= 27 / 0.6) == (True, True)
-    assert max(width, height) < 18
+    whole, part = enlarged(np.array([[0, 0, 60, 60], [10, 20, 15, 26]]), (60, 60), (100, 100))
+    assert whole.tolist() == [0, 0, 100, 100]
+    left, bottom, right, top = part
+    assert (left <= 9 / 0.6, bottom <= 19 / 0.6) == (True, True)
+    assert (right >= 16 / 0.6, top >= 27 / 0.6) == (True, True)
+    assert max(right - left, top - bottom) < 18

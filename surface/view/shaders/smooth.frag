@@ -1,17 +1,18 @@
-// Edges smoothed after the fact, for the fast picture with its one sample per pixel: a pixel that stands out
+// Edges smoothed after the fact, for the picture with one sample per pixel: a pixel that stands out
 // from its neighbours is drawn towards their mean (the sub-pixel term of FXAA, without the search along edges).
-uniform sampler2D picture;     // nearest, clamped to its edge
-uniform vec2 pixel;             // 1 / size
+uniform sampler2D picture;
 
 out vec4 colour;
 
 void main() {
-    vec2 at = gl_FragCoord.xy * pixel;
-    vec3 middle = texture(picture, at).rgb;
-    vec3 north = textureOffset(picture, at, ivec2(0, 1)).rgb;
-    vec3 south = textureOffset(picture, at, ivec2(0, -1)).rgb;
-    vec3 east = textureOffset(picture, at, ivec2(1, 0)).rgb;
-    vec3 west = textureOffset(picture, at, ivec2(-1, 0)).rgb;
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    ivec2 low = max(at - 1, 0);
+    ivec2 high = min(at + 1, textureSize(picture, 0) - 1);
+    vec3 middle = texelFetch(picture, at, 0).rgb;
+    vec3 north = texelFetch(picture, ivec2(at.x, high.y), 0).rgb;
+    vec3 south = texelFetch(picture, ivec2(at.x, low.y), 0).rgb;
+    vec3 east = texelFetch(picture, ivec2(high.x, at.y), 0).rgb;
+    vec3 west = texelFetch(picture, ivec2(low.x, at.y), 0).rgb;
     // Green stands for brightness: skin, eyes and background differ in it most.
     float range = max(max(max(north.g, south.g), max(east.g, west.g)), middle.g)
         - min(min(min(north.g, south.g), min(east.g, west.g)), middle.g);
