@@ -22,7 +22,6 @@ from controller.jerk import JerkFilter
 from controller.parameters import Floats, Parameters
 
 _LONGEST_STEP_S = 0.1
-_TINY = 1e-12
 
 
 def minimum_jerk(t: float) -> float:
@@ -94,19 +93,21 @@ class MotionLimiter:
         max_jerk: Floats | float = np.inf,
         period_s: float = 0.01,
     ) -> None:
+        from controller.braking import move  # numba, which only what moves needs
+
         n = len(low)
         self._low, self._high = _vector(low, n), _vector(high, n)
         self._speed, self._accel = _vector(max_speed, n), _vector(max_acceleration, n)
         self._response, jerk = _vector(response_s, n), _vector(max_jerk, n)
         _check_limits(self._speed, self._accel, self._response, jerk, self._high - self._low)
         self._filter, self._period_s = JerkFilter(self._accel, jerk), period_s
-        self._half_knee = 0.5 * self._accel * self._response**2
         self._position = np.clip(np.zeros(n), self._low, self._high)
         self._velocity = np.zeros(n)
         self._output, self._target = self._position.copy(), self._position.copy()
         self.limited: NDArray[np.bool_] = np.zeros(n, dtype=bool)
-        self._work = [np.zeros(n) for _ in range(6)]
-        self._flags = [np.zeros(n, dtype=bool) for _ in range(2)]
+        self._move = move
+        self._state = (self._target, self._position, self._velocity, self.limited, self._speed, self._accel,
+                       self._response, self._low, self._high)  # fmt: skip
         self._filter.reset(self._position)
 
     @classmethod
@@ -156,69 +157,14 @@ class MotionLimiter:
 
     def _steps(self, dt: float) -> None:
         if not self._filter.active:
-            self._move(dt)
+            self._move(dt, *self._state)
             np.copyto(self._output, self._position)
             return
         count = max(1, round(dt / self._period_s))
         for _ in range(count):
-            self._move(dt / count)
+            self._move(dt / count, *self._state)
             self._filter.step(dt / count, self._position, self._output)
         _keep(self._output, self._low, self._high)  # rounding of the mean
-
-    def _move(self, dt: float) -> None:
-        error, sign, speed, wanted, free, reach = self._work
-        np.subtract(self._target, self._position, out=error)
-        np.copysign(1.0, error, out=sign)
-        np.multiply(self._velocity, sign, out=speed)  # + = towards the target
-        np.abs(error, out=error)
-        self._braking_speed(dt, error, speed, wanted, free)
-        np.copyto(free, wanted)
-        np.minimum(wanted, self._speed, out=wanted)
-        np.multiply(self._accel, dt, out=reach)
-        np.subtract(wanted, speed, out=wanted)
-        np.minimum(wanted, reach, out=wanted)
-        np.negative(reach, out=reach)
-        np.maximum(wanted, reach, out=wanted)
-        np.add(wanted, speed, out=wanted)
-        np.subtract(free, wanted, out=free)
-        np.greater(free, 1e-9, out=self.limited)
-        self._advance(dt, error, sign, speed, wanted, free)
-
-    def _braking_speed(self, dt: float, error: Floats, speed: Floats, out: Floats, work: Floats) -> None:
-        """Speed at the end of the step from which the rest of the way is just enough to brake."""
-        left = np.multiply(speed, 0.5 * dt, out=work)
-        np.subtract(error, left, out=left)  # way left when the step ended at rest
-        np.divide(left, self._response + 0.5 * dt, out=out)  # the linear end
-        np.subtract(left, self._half_knee, out=left)
-        np.divide(left, self._accel, out=left)
-        left *= 2.0
-        left += 0.25 * dt * dt
-        np.maximum(left, 0.0, out=left)
-        np.sqrt(left, out=left)
-        left -= 0.5 * dt
-        left *= self._accel
-        np.maximum(left, 0.0, out=left)
-        far = np.greater(left, np.multiply(self._accel, self._response, out=self._work[5]), out=self._flags[0])
-        np.copyto(out, left, where=far)
-
-    def _advance(self, dt: float, error: Floats, sign: Floats, speed: Floats, wanted: Floats, work: Floats) -> None:
-        """Accelerate evenly from ``speed`` to ``wanted``; stop where the target lies on the way."""
-        arrived, braking = self._flags
-        np.multiply(speed, 0.5 * dt, out=work)  # way it takes to stop evenly within the step
-        np.greater_equal(work, error, out=arrived)
-        np.multiply(speed, speed, out=work)
-        work /= self._accel
-        work *= 0.5
-        np.less_equal(work, error + _TINY, out=braking)
-        arrived &= braking
-        np.add(speed, wanted, out=work)
-        work *= 0.5 * dt
-        np.copyto(work, error, where=arrived)
-        np.copyto(wanted, 0.0, where=arrived)
-        work *= sign
-        self._position += work
-        np.multiply(wanted, sign, out=self._velocity)
-        _keep(self._position, self._low, self._high)
 
 
 def _keep(values: Floats, low: Floats, high: Floats) -> None:
