@@ -25,8 +25,8 @@ class TargetLimits:
 
     def __init__(self, servos: Sequence[ServoSpec], report: BusReport) -> None:
         self.target: Floats = np.zeros(len(servos))
-        self._low = np.array([servo.min_rad for servo in servos])
-        self._high = np.array([servo.max_rad for servo in servos])
+        self._low = np.array([servo.min_rad for servo in servos], dtype=np.float64)
+        self._high = np.array([servo.max_rad for servo in servos], dtype=np.float64)
         self._guard = SpeedGuard(np.array([servo.max_speed_rad_s for servo in servos]))
         self._report = report
         from drivers.kernels import clip_targets  # compiled: only who drives servos pays for it

@@ -41,10 +41,10 @@ class Scale:
 
         self._to_steps, self._to_si = to_steps, to_si
         self.sign = np.array([-1.0 if servo.reverse else 1.0 for servo in servos])
-        self.zero_rad = np.array([servo.zero_rad for servo in servos])
+        self.zero_rad = np.array([servo.zero_rad for servo in servos], dtype=np.float64)
         self.center = np.array([float(table.center) for table in tables])
         self.rad_per_tick = np.array([table.rad_per_tick for table in tables])
-        ends = [self._steps(np.array([getattr(s, key) for s in servos])) for key in ("min_rad", "max_rad")]
+        ends = [self._steps(np.array([getattr(s, key) for s in servos], dtype=np.float64)) for key in ("min_rad", "max_rad")]
         top = np.array([table.ticks_per_turn - 1 for table in tables])
         self.low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), 0, top).astype(np.int32)
         self.high = np.clip(np.floor(np.maximum(*ends) + _EDGE), self.low, top).astype(np.int32)

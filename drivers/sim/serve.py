@@ -25,6 +25,10 @@ PAUSE_S = 0.1
 EARLY_S = 80e-6
 """How long before bytes are due the server wakes: the system wakes it late by about that much."""
 
+LINGER_S = 800e-6
+"""How long the server of a wire that takes time stays awake after a reply, for a client that writes again at once: a
+real wire is not slow to wake up. For one that paces itself it sleeps."""
+
 Control = int | socket.socket
 """Where commands to the server come from: a descriptor, or (the only thing that Windows can wait for) a socket."""
 
@@ -72,7 +76,8 @@ class PortServer:
         self._timing = WireTiming(latency_s) if wire else None
         self._on_line, self._lines = on_line, Lines()
         self._queue: deque[Timed] = deque()
-        self._read_s = 0.0
+        self._read_s = self._said_s = 0.0
+        self._prompt = False
         chain.on_unplug = self._unplug
 
     def run(self, control: Control) -> None:
@@ -116,7 +121,10 @@ class PortServer:
             due = min(due, self._queue[0][0] - EARLY_S)
         if self.chain.reader.pending:
             due = min(due, self._read_s + PAUSE_S)
-        return None if due == float("inf") else max(due - time.monotonic(), 0.0)
+        now_s = time.monotonic()
+        if self._prompt and now_s - self._said_s < LINGER_S:
+            return 0.0
+        return None if due == float("inf") else max(due - now_s, 0.0)
 
     def _receive(self) -> None:
         data = self.port.read()
@@ -125,6 +133,9 @@ class PortServer:
         if self.tap is not None:
             self.tap(True, data)
         now_s = self._read_s = time.monotonic()
+        if self._said_s:  # the first since the last reply
+            self._prompt = self._timing is not None and now_s - self._said_s < LINGER_S
+            self._said_s = 0.0
         chain = self.chain
         chain.set_line_baud(self.port.baud())
         if chain.echo:
@@ -158,6 +169,7 @@ class PortServer:
             while now_s < self._queue[0][0]:  # so little that the system would oversleep it
                 now_s = time.monotonic()
             self._write(self._queue.popleft()[1])
+            self._said_s = now_s
         if self.chain.reader.pending and now_s >= self._read_s + PAUSE_S:
             for packet in self.chain.reader.flush():
                 self._send(without_timing(self.chain.handle(packet, now_s), now_s))
