@@ -26,7 +26,8 @@ Tables = list[tuple[str, list[Measure]]]
 _MOVING = ("jawOpen", "eyeBlinkLeft", "browInnerUp")
 _POSES = 8
 _AREA = 0.99
-_UNIFORM_LEVEL = 7
+UNIFORM_LEVEL = 7  # quarterings of the uniform mesh that adaptive ones are compared with
+VERTICES = 100_000  # of the sheet that the bounds are for
 
 
 def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
@@ -46,24 +47,35 @@ def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
     return [(title, pose_rows(head, seconds, tell)), (about, [replace(row, reach="") for row in engine])]
 
 
-def bench_surface(seconds: float, tell: Tell) -> Tables:
-    """The engine at its memory limit, on a plain sheet."""
-    return [("about 100,000 vertices, 16 influences, one thread", speed_table(seconds=seconds, tell=tell))]
+def bench_surface(seconds: float, tell: Tell, vertices: int = VERTICES) -> Tables:
+    """The engine at its memory limit, on a plain sheet of about so many vertices."""
+    return [(f"about {vertices:,} vertices, 16 influences, one thread", speed_table(vertices, seconds, tell))]
 
 
-def bench_large(seconds: float, tell: Tell, progress: Progress) -> Tables:
-    """Building trees and lists for 100,000 control points, and two threads against one, for a million vertices."""
-    built = build_table(progress=progress)
-    return [("a million vertices", built + large_table(seconds=seconds, tell=tell))]
+def bench_large(seconds: float, tell: Tell, progress: Progress, vertices: int = VERTICES) -> Tables:
+    """Building trees and lists for that many control points; two threads against one; ten times ``vertices``."""
+    large = 10 * vertices
+    level = max(0, round(np.log2(np.sqrt(large) / 8)))  # under 8 x 8 roots
+    built = build_table(vertices, level, progress)
+    return [(f"about {large:,} vertices", built + large_table(large, seconds, tell))]
 
 
-def bench_growth(seconds: float, tell: Tell, out: Path) -> Tables:
-    """Slopes of time and memory against size on logarithmic scales; draws them as SVG, too."""
-    from surface.growth import growth, plot, slopes
+def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES) -> Tables:
+    """Slopes of time and memory against size on logarithmic scales; draws them as SVG, too.
 
-    series = growth(seconds=seconds, tell=tell)
-    plot(series, out)
-    return [("growth, from 10,000 to a million vertices and from 100 to 100,000 control points", slopes(series))]
+    Sizes run from a tenth to ten times ``vertices``, and from a thousandth of it to as many control points.
+    """
+    from surface import growth
+
+    share = vertices / VERTICES
+    sizes = tuple(max(256, round(share * count)) for count in growth.VERTICES)
+    points = tuple(max(25, round(share * count)) for count in growth.POINTS)
+    series = growth.growth(sizes, points, seconds, tell)
+    growth.plot(series, out)
+    title = (
+        f"growth, from {sizes[0]:,} to {sizes[-1]:,} vertices and from {points[0]:,} to {points[-1]:,} control points"
+    )
+    return [(title, growth.slopes(series))]
 
 
 def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
@@ -86,11 +98,12 @@ def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
     return [(title, rows)]
 
 
-def bench_quadtree(name: str, tell: Tell) -> tuple[Tables, list[Variant]]:
+def bench_quadtree(name: str, tell: Tell, level: int = UNIFORM_LEVEL) -> tuple[Tables, list[Variant]]:
     """The paper's figures 2 and 3 on a head's face: a uniform mesh, and adaptive ones that deviate no more.
 
     Once by the greatest deviation anywhere, as in the paper, once by the deviation that 99 % of the area keeps;
-    the pictures are of the second. A way that finds no mesh within the bound is left out.
+    the pictures are of the second. A way that finds no mesh within the bound is left out. The uniform mesh is
+    quartered ``level`` times.
     """
     from surface.comparison import compare
     from surface.head import Head
@@ -103,7 +116,7 @@ def bench_quadtree(name: str, tell: Tell) -> tuple[Tables, list[Variant]]:
     for quantile, title in ((1.0, "greatest deviation"), (_AREA, f"deviation of {_AREA:.0%} of the area")):
         tell(title)
         face = head.part("face").surface
-        variants = compare(face, domain, level=_UNIFORM_LEVEL, quantile=quantile, tell=tell)
+        variants = compare(face, domain, level=level, quantile=quantile, tell=tell)
         tables.append((f"quad tree on the face of {name}, at equal {title}", [_saving(v) for v in variants]))
     return tables, variants
 

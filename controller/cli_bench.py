@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from surface.bench import Measure
 
 console = Console(highlight=False)
+PICTURES = (".png", ".svg", ".jpg", ".webp")
 
 
 class Subject(StrEnum):
@@ -60,6 +63,10 @@ def bench(
     growth: Annotated[
         Path | None, typer.Option(help="Also growth with size, drawn as this SVG (surface only).")
     ] = None,
+    vertices: Annotated[
+        int, typer.Option(help="About how many; --large takes ten times that (surface only).", min=1_000)
+    ] = 100_000,
+    level: Annotated[int, typer.Option(help="Quarterings of the uniform mesh (quadtree only).", min=0, max=9)] = 7,
     updates: Annotated[int, typer.Option(help="How many (drift only).", min=1)] = 1_000_000,
     face: Annotated[bool, typer.Option("--face", help="Also beside the face (bus only).")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON (bus only).")] = False,
@@ -72,14 +79,30 @@ def bench(
         _bus(seconds, face, as_json)
         return
     columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=console, transient=True) as progress:
+    picture = out if what is Subject.quadtree else growth if what is Subject.surface else None
+    with _opened(picture) as file, Progress(*columns, console=console, transient=True) as progress:
         bar = Bar(progress)
         if what is Subject.surface:
-            tables = _surface(seconds, bar, large, growth)
+            tables = _surface(seconds, bar, large, file, vertices)
         else:
-            tables = _head(what, head, seconds, bar, out, updates)
+            tables = _head(what, head, seconds, bar, file, updates, level)
     for title, rows in tables:
         console.print(measure_table(title, rows))
+
+
+@contextmanager
+def _opened(picture: Path | None) -> Iterator[Path | None]:
+    """Where to draw; a place that cannot be written is refused before anything is measured."""
+    from controller.errors import ControllerError
+    from controller.files import replacing
+
+    if picture is None:
+        yield None
+        return
+    if picture.suffix.lower() not in PICTURES:
+        raise ControllerError(f"{picture}: no picture is named so", hint=f"let it end in {' or '.join(PICTURES)}")
+    with replacing(picture) as file:
+        yield file
 
 
 def _bus(seconds: float, face: bool, as_json: bool) -> None:
@@ -98,25 +121,25 @@ def _bus(seconds: float, face: bool, as_json: bool) -> None:
         console.print(table)
 
 
-def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None) -> Tables:
+def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None, vertices: int) -> Tables:
     from controller.benching import bench_growth, bench_large, bench_surface
 
-    tables = bench_surface(seconds, bar.tell)
+    tables = bench_surface(seconds, bar.tell, vertices)
     if large:
-        tables += bench_large(seconds, bar.tell, bar.advance)
+        tables += bench_large(seconds, bar.tell, bar.advance, vertices)
     if growth is not None:
-        tables += bench_growth(seconds, bar.tell, growth)
+        tables += bench_growth(seconds, bar.tell, growth, vertices)
     return tables
 
 
-def _head(what: Subject, head: str, seconds: float, bar: Bar, out: Path | None, updates: int) -> Tables:
+def _head(what: Subject, head: str, seconds: float, bar: Bar, out: Path | None, updates: int, level: int) -> Tables:
     from controller.benching import bench_drift, bench_head, bench_quadtree
 
     if what is Subject.head:
         return bench_head(head, seconds, bar.tell)
     if what is Subject.drift:
         return bench_drift(head, updates, bar.tell)
-    tables, variants = bench_quadtree(head, bar.tell)
+    tables, variants = bench_quadtree(head, bar.tell, level)
     if out is not None:
         from surface.comparison import draw
 

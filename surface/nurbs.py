@@ -41,7 +41,7 @@ def nurbs_arrays(
         raise ValueError(f"control_points: shape {net.shape}, expected (nu, nv, 3)")
     if not net.size:
         raise ValueError(f"control_points: empty, shape {net.shape}")
-    _check_grid(np.isfinite(net).all(axis=2), net, "control_points", "finite")
+    _check_grid(np.asarray(np.isfinite(net).all(axis=2)), net, "control_points", "finite")
     nu, nv = net.shape[:2]
     w = np.ones((nu, nv)) if weights is None else numbers(weights, "weights")
     if w.shape != (nu, nv):

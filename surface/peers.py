@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,9 +20,17 @@ if TYPE_CHECKING:
     from .mesh import Mesh
 
 BLENDSHAPES = 52
-SAMPLES = 1_000  # vertices that geomdl computes; all would take minutes
+SAMPLES = 200  # vertices that geomdl computes; all would take minutes
 
 Evaluator = Callable[[], object]
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Keep numpy's matrix products to one thread where threadpoolctl is installed; else they use what they find."""
+    if importlib.util.find_spec("threadpoolctl") is None:
+        return nullcontext()
+    limits = importlib.import_module("threadpoolctl").threadpool_limits
+    return limits(1)
 
 
 def sparse_matrix(surface: DCPSurface, mesh: Mesh) -> Evaluator:
@@ -56,7 +65,7 @@ def splinepy(surface: DCPSurface, mesh: Mesh) -> Evaluator:
 
 
 def geomdl(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """geomdl's NURBS in plain Python, for the first thousand vertices."""
+    """geomdl's NURBS in plain Python, for the first :data:`SAMPLES` vertices."""
     side, points, knots = net_of(surface)
     spline = importlib.import_module("geomdl.NURBS").Surface()
     spline.degree_u = spline.degree_v = 3

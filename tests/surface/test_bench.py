@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from surface.bench import Measure, measure, sheet
+import pytest
+
+from surface.bench import Measure, group, measure, sheet
 
 
 def test_rows_of_a_small_sheet() -> None:
     told: list[str] = []
-    surface, mesh = sheet(2_000)
+    surface, mesh = sheet(12_000)
     rows = measure(surface, mesh, seconds=0.002, tell=told.append)
-    assert [row.name for row in rows[:3]] == [
+    begins = (
         "one read of the weights",
         "all positions",
         "all positions and normals",
-    ]
-    assert len(rows) == 9
-    assert len(told) == 9
+        "every point moved",
+        "one point moved",
+        "group of ",
+        "group of ",
+        "scipy CSR @ dense",
+        "numpy 52 blendshapes, ",
+        "stencil table",
+    )
+    assert len(rows) == len(begins)
+    assert all(row.name.startswith(begin) for row, begin in zip(rows, begins, strict=True))
+    assert len({row.name for row in rows}) == len(rows)
+    assert len(told) == len(rows)
     assert all(row.milliseconds > 0 for row in rows)
     assert all(row.kept is None or isinstance(row.kept, bool) for row in rows)
 
@@ -25,6 +36,16 @@ def test_every_vertex_of_the_sheet_has_at_most_sixteen_influences() -> None:
     lists = surface.deformation(mesh, normals=False)._lists
     assert (lists.rows == 16).all()
     assert abs(len(mesh.vertices) / 2_000 - 1) < 0.3
+
+
+def test_a_group_reaches_the_vertices_it_says() -> None:
+    surface, mesh = sheet(3_000)
+    for share in (0.0, 0.1, 0.3):
+        ids, part = group(surface, mesh, share)
+        weights = surface.basis_matrix(mesh.uv, side=mesh.side)[:, ids]
+        assert part == pytest.approx((weights.sum(axis=1) > 0).mean(), abs=1e-12)
+        assert part >= share
+        assert len(ids) == 1 or group(surface, mesh, part)[0].tolist() == ids.tolist()
 
 
 def test_bounds_are_read_both_ways() -> None:
