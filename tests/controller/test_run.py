@@ -58,15 +58,18 @@ def newest(body: BodyProcess, name: str) -> float:
     return float(values[PARAMETERS.index(name)])
 
 
-def test_the_panel_moves_servos_and_they_are_limp_afterwards(stage: Stage, servos: SimulatedBus) -> None:
-    jaw = PARAMETERS.index("jawOpen")
+def test_servos_stand_until_commands_may_come_obey_the_panel_and_end_limp(stage: Stage, servos: SimulatedBus) -> None:
+    jaw, rest = PARAMETERS.index("jawOpen"), 2048
+    places = [rest + 10 * i for i in range(1, 25)]
+    for i, place in enumerate(places, 1):
+        servos.servo(i).place(place)
     with BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
-        body.begin()
         assert powered(servos) == list(range(1, 25))
-        rest = servos.servo(JAW_ID).position_ticks
         body.tell(Hold(jaw, 1.0))
         assert until(lambda: newest(body, "jawOpen") > 0.999)
+        assert [servos.servo(i).position_ticks for i in range(1, 25)] == pytest.approx(places, abs=2)
+        body.begin()
         assert until(lambda: servos.servo(JAW_ID).position_ticks - rest > 300)
         body.tell(Hold(jaw, None))
         assert until(lambda: newest(body, "jawOpen") < 0.001)
@@ -79,24 +82,11 @@ def test_the_panel_moves_servos_and_they_are_limp_afterwards(stage: Stage, servo
         body.stop()
         report = body.report
     assert powered(servos) == []
-    assert abs(servos.servo(JAW_ID).position_ticks - 2048) < 20  # led to rest before it went limp
+    assert abs(servos.servo(JAW_ID).position_ticks - rest) < 20  # led to rest before it went limp
     bus = report["buses"][0]  # type: ignore[index]
     assert bus["servos"] == 24
     assert bus["bus"]["errors"] == {}
     assert bus["ticks"] > 10
-
-
-def test_servos_stand_still_until_commands_may_come(stage: Stage, servos: SimulatedBus) -> None:
-    places = [2048 + 10 * i for i in range(1, 25)]
-    for i, place in enumerate(places, 1):
-        servos.servo(i).place(place)
-    with BodyProcess(stage, PARAMETERS) as body:
-        body.wait_ready()
-        body.tell(Hold(PARAMETERS.index("jawOpen"), 1.0))
-        assert until(lambda: newest(body, "jawOpen") > 0.999)
-        assert [servos.servo(i).position_ticks for i in range(1, 25)] == pytest.approx(places, abs=2)
-        body.begin()
-        assert until(lambda: servos.servo(JAW_ID).position_ticks > places[JAW_ID - 1] + 200)
 
 
 def test_an_error_on_the_way_out_of_main_still_stops_the_servos(stage: Stage, servos: SimulatedBus) -> None:
