@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -22,19 +24,22 @@ def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:
 
 
 def numbers(values: ArrayLike, name: str) -> Floats:
-    """A float64 copy; ``ValueError`` naming the first element that is not numbers like the one before."""
+    """A float64 copy; ``ValueError`` naming the first element that is no number, or not of the usual shape."""
     try:
         return np.array(values, dtype=np.float64, order="C")
     except (ValueError, TypeError):
-        rows = list(values)  # type: ignore[arg-type]
+        if not isinstance(values, Sequence) or isinstance(values, str):
+            raise ValueError(f"{name}: must be numbers, got {values!r:.60}") from None
+        rows = list(values)
+    shapes = []
     for i, row in enumerate(rows):
         try:
-            shape = np.shape(np.asarray(row, dtype=np.float64))
+            shapes.append(np.shape(np.asarray(row, dtype=np.float64)))
         except (ValueError, TypeError):
-            raise ValueError(f"{name}[{i}]: must be numbers, got {row!r}") from None
-        if shape != np.shape(rows[0]):
-            raise ValueError(f"{name}[{i}]: shape {shape}, expected {np.shape(rows[0])}")
-    raise ValueError(f"{name}: must be numbers")
+            raise ValueError(f"{name}[{i}]: must be numbers, got {row!r:.60}") from None
+    usual = max(shapes, key=shapes.count)
+    i = next(k for k, shape in enumerate(shapes) if shape != usual)
+    raise ValueError(f"{name}[{i}]: shape {shapes[i]}, expected {usual}")
 
 
 def check_points(points: ArrayLike, name: str = "points") -> Floats:

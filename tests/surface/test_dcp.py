@@ -205,3 +205,28 @@ def test_padded_round_trip() -> None:
 def test_importing_the_room_loads_neither_scipy_nor_numba(root: Path) -> None:
     code = "import sys, surface; sys.exit(any(m in sys.modules for m in ('scipy', 'numba', 'moderngl')))"
     assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.sampled_from(["points", "weights", "knots_u", "knots_v"]),
+    st.integers(0, 5),
+    st.sampled_from([np.nan, np.inf, -np.inf, None, "x", [1, 2], {}]),
+    st.booleans(),
+)
+def test_whatever_stands_for_a_number_is_named(name: str, index: int, bad: object, whole: bool) -> None:
+    surface = scattered(5, 2)
+    given_ = {
+        "points": surface.points.tolist(),
+        "weights": surface.weights.tolist(),
+        "knots_u": [k.tolist() for k in surface.knots_u],
+        "knots_v": [k.tolist() for k in surface.knots_v],
+    }
+    if whole or name == "weights":
+        given_[name][index] = bad
+    else:
+        given_[name][index][1] = bad
+    if name != "weights" and whole and bad == [1, 2] and name.startswith("knots"):
+        return  # two knots that rise are a knot vector
+    with pytest.raises(ValueError, match=rf"^{name}\[{index}\]: "):
+        DCPSurface(**given_)

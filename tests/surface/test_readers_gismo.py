@@ -49,6 +49,8 @@ class Direct:
 
     def __init__(self, knots: list[list[np.ndarray]], degree: int, boxes: list[tuple[int, ...]]) -> None:
         self.knots, self.degree, self.boxes = knots, degree, boxes
+        self.known: dict[tuple[int, int], np.ndarray] = {}
+        self.grid: dict[tuple[int, int], np.ndarray] = {}
 
     def functions(self, level: int, x: np.ndarray, axis: int) -> np.ndarray:
         t = self.knots[level][axis]
@@ -58,10 +60,13 @@ class Direct:
 
     def step(self, level: int, axis: int) -> np.ndarray:
         """(nf, nc): coarse coefficients to fine ones."""
+        if (level, axis) in self.known:
+            return self.known[level, axis]
         x = np.linspace(0, 1, 400)
         fine, coarse = self.functions(level + 1, x, axis), self.functions(level, x, axis)
         a = np.linalg.lstsq(fine, coarse, rcond=None)[0]
-        return np.where(np.abs(a) < 1e-11, 0, a)
+        self.known[level, axis] = np.where(np.abs(a) < 1e-11, 0, a)
+        return self.known[level, axis]
 
     def depth(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         out = np.zeros(u.shape, dtype=int)
@@ -95,8 +100,11 @@ class Direct:
             for a, b in zip(*c.nonzero(), strict=True):
                 if self.least(level, int(a), int(b)) >= level:
                     c[a, b] = 0
-        bu, bv = self.functions(level, GRID[:, 0], 0), self.functions(level, GRID[:, 1], 1)
-        return np.einsum("mi,ij,mj->m", bu, c, bv)
+        for axis in range(2):
+            if (level, axis) not in self.grid:
+                self.grid[level, axis] = self.functions(level, GRID[:, axis], axis)
+        bu, bv = self.grid[level, 0], self.grid[level, 1]
+        return np.einsum("mj,mj->m", bu @ c, bv)
 
 
 def dyadic(levels: int, text: str = OPEN) -> list[list[np.ndarray]]:

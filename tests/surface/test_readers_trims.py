@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +16,7 @@ from surface.readers.trims import invert, polyline
 from tests.surface import shapes
 
 
+@cache
 def cylinder() -> DCPSurface:
     """Radius 2, height 3, clamped at its seam at u = 0 and 4."""
     angle = np.arange(9) * np.pi / 4
