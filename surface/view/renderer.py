@@ -96,11 +96,12 @@ class Renderer:
         the head."""
         width, height = target.size
         target.scissor = 0, 0, width, height
+        target.use()
         # Colours stay: what was drawn before and is not covered now is background.
         target.depth_mask, target.color_mask = True, (False, False, False, False)
         target.clear(depth=1.0)
         target.color_mask = True, True, True, True
-        target.use()  # which also brings the masks to OpenGL
+        target.use()  # again: it brings the masks to OpenGL
         self.ctx.viewport = (0, 0, width, height)
         self.ctx.depth_func = "<="
         self.ctx.blend_func = self.ctx.SRC_ALPHA, self.ctx.ONE_MINUS_SRC_ALPHA
