@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from controller.errors import ConfigError
+from controller.salvage import Rest
 
 Model = TypeVar("Model", bound="Settings")
 
@@ -20,8 +22,13 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def load(path: Path, model: type[Model]) -> Model:
+def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
     """Read ``path`` as ``model``.
+
+    Parameters
+    ----------
+    cross_check : gives the faults that only the whole file can have, such as names that nothing has; of a file that
+        does not fit the model it is asked about the rest.
 
     Raises
     ------
@@ -34,16 +41,23 @@ def load(path: Path, model: type[Model]) -> Model:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not valid TOML: {error}", hint="mend the line named above") from error
-    return check(table, model, path)
+    return check(table, model, path, cross_check)
 
 
-def check(table: dict[str, Any], model: type[Model], path: Path) -> Model:
-    """Turn a table into ``model``; ``path`` only names the source in messages."""
+def check(table: dict[str, Any], model: type[Model], path: Path,
+          cross_check: Callable[[Model], list[str]] | None = None) -> Model:  # fmt: skip
+    """Turn a table into ``model``; ``path`` only names the source in messages. See :func:`load`."""
     try:
-        return model.model_validate(table)
+        read = model.model_validate(table)
     except ValidationError as error:
         faults = [describe(fault, model) for fault in error.errors()]
+        rest = Rest(table, model, error)
+        if cross_check is not None and rest.read is not None:
+            faults += rest.tell(cross_check(rest.read))
         raise config_error(path, faults) from error
+    if cross_check is not None and (faults := cross_check(read)):
+        raise config_error(path, faults)
+    return read
 
 
 def config_error(path: Path, faults: list[str]) -> ConfigError:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from controller.buses import PULSES, BusSettings
-from controller.config import Settings, config_error, load
+from controller.config import Settings, load
 from controller.parameters import Parameters, did_you_mean
 from controller.rules import RuleSettings
 from controller.terms import Curve, Finite, Term, check_points
@@ -140,7 +140,7 @@ class RobotSettings(Settings):
         channels, profiles = table.get("channels"), table.get("profiles", {})
         if not isinstance(channels, list) or not isinstance(profiles, dict):
             return table
-        filled = [_with_profile(i, channel, profiles) for i, channel in enumerate(channels)]
+        filled = [_with_profile(channel, profiles) for channel in channels]
         return {**table, "channels": filled}
 
     def on_bus(self, name: str) -> list[ChannelSettings]:
@@ -148,13 +148,13 @@ class RobotSettings(Settings):
         return [channel for channel in self.channels if channel.bus == name]
 
 
-def _with_profile(i: int, channel: Any, profiles: dict[str, Any]) -> Any:
+def _with_profile(channel: Any, profiles: dict[str, Any]) -> Any:
+    """A channel with what its profile says; with that of all profiles where there is none of that name (a fault)."""
     if not isinstance(channel, dict) or "profile" not in channel:
         return channel
-    name = channel["profile"]
-    if not isinstance(profiles.get(name), dict):
-        raise ValueError(f"channels[{i}].profile: no profile called {name!r}{did_you_mean(str(name), profiles)}")
-    return {**profiles[name], **channel}
+    own = profiles.get(str(channel["profile"]))
+    tables = [own] if isinstance(own, dict) else [each for each in profiles.values() if isinstance(each, dict)]
+    return {key: value for table in (*tables, channel) for key, value in table.items()}
 
 
 def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
@@ -165,10 +165,7 @@ def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
     ConfigError
         listing every fault: unknown keys and parameters, doubled names and ids, buses that do not exist.
     """
-    robot = load(path, RobotSettings)
-    faults = _doubled(robot) + _references(robot, parameters) + _rules(robot)
-    if faults:
-        raise config_error(path, faults)
+    robot = load(path, RobotSettings, lambda read: _doubled(read) + _references(read, parameters) + _rules(read))
     if robot.calibration is None:
         return robot
     from controller.calibration import calibrated, calibration_path
@@ -217,6 +214,9 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
     faults = [f"buses[{i}]: no channel is on {b.name!r}" for i, b in enumerate(robot.buses) if b.name not in used]
     faults += _models(robot)
     for i, channel in enumerate(robot.channels):
+        if channel.profile is not None and channel.profile not in robot.profiles:
+            known = did_you_mean(channel.profile, robot.profiles)
+            faults.append(f"channels[{i}].profile: no profile called {channel.profile!r}{known}")
         if channel.bus not in buses:
             faults.append(f"channels[{i}].bus: no bus called {channel.bus!r} (buses: {', '.join(sorted(buses))})")
         named = [(f"mix.{name}", name) for name in channel.mix]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from controller.commands import CommandState
-from controller.config import Settings, config_error, load
-from controller.errors import ConfigError
+from controller.config import Settings, load
+from controller.errors import ConfigError, TakeError
 from controller.expression import Vocabulary
 from controller.host import load_script
 from controller.identity import check_identity
@@ -154,8 +154,19 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
         listing every fault of the stage and of the files it names.
     """
     path = find_config("stages", name)
-    settings = load(path, StageSettings)
-    faults: list[str] = []
+    found: list[Stage] = []
+
+    def check(settings: StageSettings) -> list[str]:
+        faults: list[str] = []
+        found[:] = [_gather(path, settings, parameters, faults)]
+        return faults
+
+    load(path, StageSettings, check)
+    return found[0]
+
+
+def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
+    """All that a stage refers to; what is wrong with it goes to ``faults``, and leaves the stage unfit for use."""
     head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
     if head is not None and settings.identity:
         _collect(faults, "identity", lambda: check_identity(head, settings.identity))
@@ -170,17 +181,14 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
     layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
     life = _collect(faults, "life", lambda: LifeSettings.named(settings.life, parameters))
-    if settings.show is not None:
-        _collect(faults, "show", lambda: load_script(str(settings.show), parameters, vocabulary))
-    for i, link in enumerate(settings.links):
-        if link.script is not None:
-            _collect(faults, f"links[{i}].script", lambda name=link.script: load_script(name, parameters, vocabulary))
-    if faults:
-        raise config_error(path, faults)
-    worn = tuple(zip(groups, settings.groups.values(), strict=True))
+    scripts = [("show", settings.show)] + [(f"links[{i}].script", link.script) for i, link in enumerate(settings.links)]
+    for key, script in scripts:
+        if script is not None:
+            _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary))
+    worn = tuple(zip(groups, settings.groups.values(), strict=False))
     stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, worn)
     if settings.take is not None:
-        load_take(stage.file(settings.take), parameters)
+        _collect(faults, "take", lambda: load_take(stage.file(str(settings.take)), parameters))
     return stage
 
 
@@ -197,7 +205,7 @@ def _collect(faults: list[str], key: str, read):  # type: ignore[no-untyped-def]
     """Run ``read``; a configuration error becomes a fault of ``key``, so that all are seen at once."""
     try:
         return read()
-    except ConfigError as error:
+    except (ConfigError, TakeError) as error:
         hint = f" ({error.hint})" if error.hint and "\n" not in str(error) else ""
         faults.append(f"{key}: {error}{hint}".replace("\n", "\n  "))
         return None
