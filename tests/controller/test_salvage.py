@@ -23,7 +23,13 @@ limit_deg = {limits}
 {rest}
 """
 USUAL = {"bus": "b", "mix": "jawOpen", "limits": [-5, 25], "rest": "max_speed_deg_s = 300\nmax_accel_deg_s2 = 3000"}
-TOP = 'name = "r"\nprofiles.slow = { max_speed_deg_s = 9, max_accel_deg_s2 = 9 }\n[[buses]]\nname = "b"\nkind = "simulated"\n'
+TOP = """
+name = "r"
+profiles.slow = { max_speed_deg_s = 9, max_accel_deg_s2 = 9 }
+[[buses]]
+name = "b"
+kind = "simulated"
+"""
 
 
 def faults_of(path: Path, *channels: dict[str, object], top: str = TOP) -> list[str]:
