@@ -8,6 +8,7 @@ error is 6e-8 of the cell's size, not of the head's.
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 LIMIT = 256  # differences a cell takes before it is computed anew
 BIAS = 6.0  # cost of one row's difference, in rows computed anew (measured)
 GAP = 256  # unchanged vertices between two changed ranges that are uploaded rather than left out
+PARTS = 4  # a thread's share of the cells is cut into
 SMALL = 500_000  # weights below which one thread is as fast as two
 MOST_MOVED = 0.75  # from this part of the points on, everything is computed anew
 
@@ -110,6 +112,7 @@ class Deformation:
     def _reserve_local(self) -> None:
         """Room for the longest list; called whenever the lists' arrays may have been replaced."""
         self._table: np.ndarray | None = None
+        self._parts: tuple[list[int], list[tuple[np.ndarray, np.ndarray]]] | None = None
         self._local = np.zeros((int(self._lists.rows.max(initial=0)), 3), dtype=np.float32)
 
     @property
@@ -215,21 +218,32 @@ class Deformation:
         self._count = 1
 
     def _refresh_in_parts(self) -> None:
-        """Every thread takes cells with an equal share of the weights, and scratch of its own."""
+        """Threads take one part after the other: where one is held up, the others do more."""
         from . import apply
 
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="surface")
-        work = np.cumsum(self._lists.rows * np.diff(self._lists.tile_start))
-        cuts = np.searchsorted(work, work[-1] * np.arange(self._threads + 1) / self._threads)
-        cuts[-1] = len(work)
-        inputs = self._inputs()[:-2]
-        scratch = [(np.zeros_like(self._local), np.zeros_like(self._spare)) for _ in cuts[1:]]
-        parts = [(self._cells, a, b, *inputs, *own) for a, b, own in zip(cuts[:-1], cuts[1:], scratch, strict=True)]
-        waiting = [self._pool.submit(apply.apply_cells, *part) for part in parts[1:]]
-        apply.apply_cells(*parts[0])
+        if self._parts is None:
+            self._parts = self._cut()
+        cuts, scratch = self._parts
+        inputs, turns = self._inputs()[:-2], count()  # next(turns) is one step: no two threads take the same part
+
+        def work(own: tuple[np.ndarray, np.ndarray]) -> None:
+            while (part := next(turns)) < len(cuts) - 1:
+                apply.apply_cells(self._cells, cuts[part], cuts[part + 1], *inputs, *own)
+
+        waiting = [self._pool.submit(work, own) for own in scratch[1:]]
+        work(scratch[0])
         for done in waiting:
             done.result()
+
+    def _cut(self) -> tuple[list[int], list[tuple[np.ndarray, np.ndarray]]]:
+        """First cells of parts with equal shares of the weights, and scratch for every thread."""
+        total = np.cumsum(self._lists.rows * np.diff(self._lists.tile_start))
+        parts = PARTS * self._threads
+        cuts = [int(cell) for cell in np.searchsorted(total, total[-1] * np.arange(parts) / parts)]
+        scratch = [(np.zeros_like(self._local), np.zeros_like(self._spare)) for _ in range(self._threads)]
+        return [*cuts, len(total)], scratch
 
     def _place(self, ids: ArrayLike, rows: ArrayLike, name: str, relative: bool) -> None:
         which, target = integers(ids), _rows(rows, name)
