@@ -17,6 +17,7 @@ import numpy as np
 from drivers.bus import BusState, Floats, ServoInfo, ServoSpec, frozen
 from drivers.errors import BusError, NoReply, PortLost
 from drivers.serialport import SerialPort, link_to, reply_margin_s
+from drivers.telling import Teller
 from drivers.wirebus import WireBus
 
 log = logging.getLogger(__name__)
@@ -24,8 +25,6 @@ log = logging.getLogger(__name__)
 STAGGER_S = 0.02
 """Pause between switching servos on: each jumps with all its power to its first pulse."""
 OFF_TRIES = 6
-SAY_AGAIN_S = 10.0
-"""A fault that stays is told again after this time."""
 
 
 class BoardBus(WireBus):
@@ -67,7 +66,7 @@ class BoardBus(WireBus):
         self._on = np.zeros(n, dtype=bool)
         self._silent = False
         self._mute: list[int] = []  # servos that a board answers nothing about, longest not asked first
-        self._told: dict[str, float] = {}
+        self._say = Teller(log, clock)
 
     # ------------------------------------------------------------------ hooks
 
@@ -218,16 +217,9 @@ class BoardBus(WireBus):
             return
         self._silent = not answered
         if answered:
-            log.warning("the board on %s answers again", self.path)
+            self._say("the board on %s answers again", self.path)
         else:
             self._say(f"the board on {self.path} does not answer")
-
-    def _say(self, message: str) -> None:
-        """Log a fault, and the same one not again for a while."""
-        now = self._clock()
-        if now - self._told.get(message, -math.inf) >= SAY_AGAIN_S:
-            self._told[message] = now
-            log.warning("%s", message)
 
     def _state(self) -> BusState:
         n, now = len(self.servos), self._clock()

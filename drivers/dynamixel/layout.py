@@ -44,7 +44,8 @@ class Scale:
         self.zero_rad = np.array([servo.zero_rad for servo in servos], dtype=np.float64)
         self.center = np.array([float(table.center) for table in tables])
         self.rad_per_tick = np.array([table.rad_per_tick for table in tables])
-        ends = [self._steps(np.array([getattr(s, key) for s in servos], dtype=np.float64)) for key in ("min_rad", "max_rad")]
+        reach = np.array([(servo.min_rad, servo.max_rad) for servo in servos], dtype=np.float64)
+        ends = [self._steps(reach[:, 0]), self._steps(reach[:, 1])]
         top = np.array([table.ticks_per_turn - 1 for table in tables])
         self.low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), 0, top).astype(np.int32)
         self.high = np.clip(np.floor(np.maximum(*ends) + _EDGE), self.low, top).astype(np.int32)

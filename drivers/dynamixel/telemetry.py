@@ -17,6 +17,7 @@ from drivers.dynamixel.layout import Block, Scale, Ticks, layout_of
 from drivers.dynamixel.packet import ALERT
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Exchange, group_read
+from drivers.telling import Teller
 
 log = logging.getLogger(__name__)
 
@@ -67,6 +68,7 @@ class Telemetry:
         self._slow_state: tuple[NDArray[Any], ...] | None = None
         self._place = {servo: index for index, servo in enumerate(self.ids)}
         self._missed: set[int] = set()
+        self._say = Teller(log, self._port.link.clock)
         self._silent: deque[int] = deque()
         self._probe_s = -np.inf
         self._tripped: set[int] = set()
@@ -185,7 +187,7 @@ class Telemetry:
                 self._missed.discard(servo)
                 continue
             self._silent.append(servo)
-            log.warning("servo %s stopped answering", self._registers.label(servo))
+            self._say("servo %s stopped answering", self._registers.label(servo))
             failed += 1
             if failed == FAILED_PINGS:
                 return
@@ -204,7 +206,7 @@ class Telemetry:
             self._silent.popleft()
             self._missed.discard(servo)
             self._look_at(servo)  # it may have lost its supply, and its torque with it
-            log.warning("servo %s answers again", self._registers.label(servo))
+            self._say("servo %s answers again", self._registers.label(servo))
 
     def _note_missing(self, missing: Sequence[int], corrupt: bool) -> None:
         for servo in missing:
@@ -305,7 +307,7 @@ class Telemetry:
                 if servo not in self._forgetful:
                     self._forgetful.add(servo)
                     self.report.count("reset", servo)
-                    log.warning("servo %s was rebooted or without power", self._registers.label(servo))
+                    self._say("servo %s was rebooted or without power", self._registers.label(servo))
         return known
 
     def _take_motion(
@@ -344,7 +346,7 @@ class Telemetry:
         if rising.any():
             for servo in [servo for servo, new in zip(ids, rising, strict=True) if new]:
                 self.report.count("alert", servo)
-                log.warning("servo %s reports a hardware error", self._registers.label(servo))
+                self._say("servo %s reports a hardware error", self._registers.label(servo))
                 self._look_at(servo)
 
     def _note_torque(self, ids: Sequence[int], where: NDArray[np.intp], now_on: Flags, running: bool) -> None:
@@ -354,7 +356,7 @@ class Telemetry:
             return
         for servo in [servo for servo, gone in zip(ids, let_go, strict=True) if gone]:
             self.report.count("torque_lost", servo)
-            log.warning("servo %s let go: its torque is off", self._registers.label(servo))
+            self._say("servo %s let go: its torque is off", self._registers.label(servo))
 
     def _note_watchdogs(self, ids: Sequence[int], tripped: Flags) -> None:
         if not tripped.any():
@@ -363,7 +365,7 @@ class Telemetry:
         for servo in found:
             if servo not in self._tripped:
                 self.report.count("watchdog", servo)
-                log.warning("watchdog of servo %s tripped", self._registers.label(servo))
+                self._say("watchdog of servo %s tripped", self._registers.label(servo))
         self._tripped.update(found)
 
 

@@ -16,6 +16,7 @@ from drivers.dynamixel.packet1 import Packet1
 from drivers.protocol1.exchange import Exchange
 from drivers.protocol1.layout import Block, Group, layout_of
 from drivers.protocol1.registers import Registers
+from drivers.telling import Teller
 
 log = logging.getLogger(__name__)
 
@@ -63,6 +64,7 @@ class Telemetry:
         self._error, self._hardware = np.zeros(n, np.uint8), np.zeros(n, np.uint8)
         self._place = {servo: index for index, servo in enumerate(self.ids)}
         self._missed: set[int] = set()
+        self._say = Teller(log, self._port.link.clock)
         self._silent: deque[int] = deque()
         self._probe_s = -np.inf
 
@@ -160,7 +162,7 @@ class Telemetry:
                 self._missed.discard(servo)
                 continue
             self._silent.append(servo)
-            log.warning("servo %s stopped answering", self._registers.label(servo))
+            self._say("servo %s stopped answering", self._registers.label(servo))
             failed += 1
             if failed == FAILED_HELLOS:
                 return
@@ -179,7 +181,7 @@ class Telemetry:
             self._silent.popleft()
             self._missed.discard(servo)
             self._look_at([servo])  # it may have lost its supply, and its torque with it
-            log.warning("servo %s answers again", self._registers.label(servo))
+            self._say("servo %s answers again", self._registers.label(servo))
 
     def _note_missing(self, got: Exchange) -> None:
         for servo in got.missing:
@@ -210,7 +212,7 @@ class Telemetry:
         for index in np.flatnonzero(before & ~self.torque):
             servo = self.ids[index]
             self.report.count("torque_lost", servo)
-            log.warning("servo %s let go: its torque is off", self._registers.label(servo))
+            self._say("servo %s let go: its torque is off", self._registers.label(servo))
 
     def _ask(self, group: Group, block: Block, ids: Sequence[int]) -> list[int]:
         """Read a block and take its values over; returns who answered."""
@@ -263,7 +265,7 @@ class Telemetry:
             risen = [servo for servo, rises in zip(replies, new, strict=True) if rises]
             for servo in risen:
                 self.report.count("alert", servo)
-                log.warning("servo %s reports a hardware error", self._registers.label(servo))
+                self._say("servo %s reports a hardware error", self._registers.label(servo))
             self._look_at(risen)
 
     def _turns(self) -> Iterator[Turn]:
