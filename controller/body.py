@@ -38,6 +38,7 @@ from controller.sources import Sources, Voice
 from controller.speech import layer_of, load_take
 from controller.stage import Stage, load_stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
+from drivers.priority import take_priority, take_turns_quickly
 from drivers.shutdown import Closers, with_those_before
 
 Floats = NDArray[np.float64]
@@ -85,7 +86,9 @@ class Body:
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
         self.reflection = self._reflection(parameters)
         self.state.watch = self.reflection
-        self.state.shows = Shows(lambda name: load_script(name, parameters, stage.vocabulary), self.state)
+        self.state.shows = Shows(
+            lambda name: load_script(name, parameters, stage.vocabulary, beside=stage.path), self.state
+        )
         if stage.settings.show is not None:
             self.state.shows.start(stage.settings.show)
         self.puppet = Puppet(self.reflection, parameters) if mirror and self.reflection is not None else None
@@ -156,7 +159,7 @@ class Body:
         """
         if self.live:
             links = [link for link in self.stage.settings.links if self.puppet is None or link.port != "simulated"]
-            self.links = open_links(links, self.state, self._closers, self.stage.vocabularies)
+            self.links = open_links(links, self.state, self._closers, self.stage.vocabularies, beside=self.stage.path)
             self._closers.callback(self.sources.stop)
             self.sources.begin()
         for bus in self.buses:
@@ -177,6 +180,7 @@ class Body:
         self._closers.close()
 
     def _control(self) -> None:
+        take_priority()  # else a servo's thread waits for this one while that waits for a processor
         try:
             self._control_loop()
         except Exception as error:  # noqa: BLE001  the body has to hear of it and stop the servos
@@ -295,6 +299,7 @@ def _obey(body: Body, pipe: Connection) -> bool:
     state, now = body.state, time.monotonic_ns()
     match wish:
         case Begin():
+            take_turns_quickly()
             body.begin()
         case Hold(index, None):
             state.release([index], now)
