@@ -53,9 +53,6 @@ class Material:
 
 def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, moderngl.Program]:
     """Every program of a quality and a theme, by name."""
-    plates: dict[str, int | str] = {}
-    if theme.seams:
-        plates = {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
     flat = ("flat.frag",)
     made = {
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
@@ -63,13 +60,21 @@ def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, mod
         "hair": build(ctx, ("light.glsl", "hair.vert"), ("hair.frag",)),
         "background": build(ctx, ("background.vert",), ("background.frag",)),
     }
-    if quality == "full":
-        made["skin"] = build(
-            ctx, ("light.glsl", "skin.glsl", "skin.vert"), ("light.glsl", "skin.glsl", "skin.frag"), defines=plates
-        )
-    else:
-        made["skin"] = build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), flat)
+    made["skin"] = skin_program(ctx, quality, theme)
     return made
+
+
+def skin_program(ctx: moderngl.Context, quality: str, theme: Theme, *, hurried: bool = False) -> moderngl.Program:
+    """The program of skin; a `hurried` one takes its grain unfiltered, for moving pictures drawn in software."""
+    if quality != "full":
+        return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), ("flat.frag",))
+    defines: dict[str, int | str] = {}
+    if theme.seams:
+        defines |= {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
+    if hurried:
+        defines["GRAIN_TEXELS"] = f"{_DETAIL_SIZE // 2}.0"
+    shared = ("light.glsl", "skin.glsl")
+    return build(ctx, (*shared, "skin.vert"), (*shared, "skin.frag"), defines=defines)
 
 
 def of(name: str) -> Material:

@@ -105,6 +105,8 @@ class Offscreen:
         self.target.complete()
         self.ctx.finish()
         self._fit_target()
+        if self._pace.hurried:
+            self.renderer.hurry()
         self.renderer.update()
         self.target.paint(self.renderer, camera or Camera.front())
         if self._pace.live:

@@ -43,6 +43,11 @@ class Pace:
         """Samples per pixel, and the share of the picture's size to draw at."""
         return self.samples, self.scale
 
+    @property
+    def hurried(self) -> bool:
+        """Whether pictures move and the processor draws them."""
+        return self.live and self._free and self._software
+
     def begin_live(self) -> None:
         """From now on frames are in a hurry."""
         if not self.live and self._free and self._software:

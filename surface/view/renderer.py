@@ -69,6 +69,7 @@ class Renderer:
         parts = sorted(head.parts, key=lambda part: materials.order(part.material))
         self._parts = [self._buffers(part) for part in parts]
         self._camera: tuple[Camera, float] | None = None
+        self._hurried = False
         #: Grows with every upload: equal revisions, cameras and themes draw equal pictures.
         self.revision = 0
         self._apply_theme()
@@ -79,6 +80,20 @@ class Renderer:
         static = material.static(part, self.theme, self.openings)
         elsewhere = self.evaluator.name == "gpu"
         return PartBuffers(self.ctx, part, self._programs[material.program], static, interleaved=elsewhere)
+
+    def hurry(self) -> None:
+        """From now on pictures move and are drawn in software: leave out what costs much and shows little."""
+        if self._hurried or self.quality != "full" or self.evaluator.name != "cpu":
+            return
+        self._hurried, old = True, self._programs["skin"]
+        self._programs["skin"] = materials.skin_program(self.ctx, self.quality, self.theme, hurried=True)
+        for i, buffers in enumerate(self._parts):
+            if materials.of(buffers.part.material).program == "skin":
+                self._parts[i] = self._buffers(buffers.part)
+                buffers.release()
+        old.release()
+        self._camera = None
+        self._apply_theme()
 
     def pose(self, values: np.ndarray) -> None:
         """Move the head to parameter values (P,)."""

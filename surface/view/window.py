@@ -193,6 +193,8 @@ class _Window:
         self._renderer = Renderer(
             self._ctx, self.head, quality=self.quality, theme=self.theme, evaluator=self.evaluator
         )
+        if self._pace.hurried:
+            self._renderer.hurry()
 
     def background(self) -> None:
         """One frame of the head, under the panels."""

@@ -171,3 +171,12 @@ def pixel(camera: Camera, point: np.ndarray, size: tuple[int, int]) -> tuple[int
     """Column and row of a point in head space."""
     clip = camera.matrix(size[0] / size[1]).astype(float) @ [*point, 1.0]
     return int((clip[0] / clip[3] * 0.5 + 0.5) * size[0]), int((0.5 - clip[1] / clip[3] * 0.5) * size[1])
+
+
+def test_a_hurried_picture_is_hardly_another(screen: Offscreen) -> None:
+    calm = screen.render(values(jawOpen=0.4)).astype(int)
+    screen.renderer.hurry()
+    screen.renderer.revision += 1
+    hurried = screen.render(values(jawOpen=0.4)).astype(int)
+    assert np.abs(calm - hurried).mean() < 0.5
+    assert (calm != hurried).any() == (screen.renderer.quality == "full")

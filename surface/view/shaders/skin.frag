@@ -26,7 +26,12 @@ float seams(vec2 at) {
 #endif
 
 void main() {
+#ifdef GRAIN_TEXELS
+    // One texel of the level that is about a pixel wide: filtering costs a software renderer more than shading does.
+    vec4 grain = (texelFetch(detail, ivec2(v_uv * GRAIN_TEXELS) & (int(GRAIN_TEXELS) - 1), 1) - 0.5) * detail_strength;
+#else
     vec4 grain = (texture(detail, v_uv) - 0.5) * detail_strength;
+#endif
     vec3 n = normalize(v_normal_wide.xyz + grain.xyz);
     float wide = lobe(dot(n, v_half_narrow.xyz), WIDE_SHARPNESS);
     float narrow = wide * wide;
