@@ -167,14 +167,22 @@ class RobotHost:
             self.counts["unanswered"] += self._greeted
 
 
-def load_script(name: str, parameters: Parameters, vocabulary: Vocabulary | None = None) -> Script:
+def load_script(
+    name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
+) -> Script:
     """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
+
+    Parameters
+    ----------
+    beside : the file that names it; its folder is looked through first.
 
     Raises
     ------
     ConfigError : it is not there, or wrong; every fault with its key.
     """
-    return Script.load(find_config("scripts", name), parameters, vocabulary or Vocabulary.load(parameters))
+    return Script.load(
+        find_config("scripts", name, beside=beside), parameters, vocabulary or Vocabulary.load(parameters)
+    )
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -14,6 +14,7 @@ from typing import Protocol
 from controller.commands import CommandSink
 from controller.errors import LinkError
 from controller.linelink import LineLink
+from controller.paths import find_config
 
 _START_LIMIT_S = 20.0
 _END_LIMIT_S = 3.0
@@ -36,13 +37,19 @@ class LinkChoice(Protocol):
 
 
 def open_links(
-    choices: Sequence[LinkChoice], sink: CommandSink, closers: ExitStack, vocabularies: Sequence[Path] = ()
+    choices: Sequence[LinkChoice],
+    sink: CommandSink,
+    closers: ExitStack,
+    vocabularies: Sequence[Path] = (),
+    *,
+    beside: Path | None = None,
 ) -> list[LineLink]:
     """Open every link of a stage; ``closers`` gets what closes them, simulated hosts last.
 
     Parameters
     ----------
     vocabularies : files of further expressions that scripts of simulated hosts name.
+    beside : the stage's file; scripts may lie beside it.
 
     Raises
     ------
@@ -52,7 +59,7 @@ def open_links(
     for choice in choices:
         port = choice.port
         if port == "simulated":
-            host = HostProcess(choice.script or "tour", vocabularies)
+            host = HostProcess(str(find_config("scripts", choice.script or "tour", beside=beside)), vocabularies)
             closers.callback(host.stop)
             port = host.path
         link = LineLink(port, choice.baud, sink).start()

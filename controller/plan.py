@@ -58,7 +58,10 @@ def _feed(stage: Stage, take: Path | None, state: CommandState) -> tuple[Feed, f
     if take is not None:
         return _of_take(stage, take, state)
     names = [link.script or "tour" for link in stage.settings.links if link.port == "simulated"]
-    scripts = [load_script(name, state.parameters, stage.vocabulary) for name in names] or [_every(state)]
+    names += [stage.settings.show] if stage.settings.show is not None else []
+    scripts = [load_script(name, state.parameters, stage.vocabulary, beside=stage.path) for name in names] or [
+        _every(state)
+    ]
     shows = [Show(script, state) for script in scripts]
     for show in shows:
         show.play()

@@ -184,7 +184,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     scripts = [("show", settings.show)] + [(f"links[{i}].script", link.script) for i, link in enumerate(settings.links)]
     for key, script in scripts:
         if script is not None:
-            _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary))
+            _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
     worn = tuple(zip(groups, settings.groups.values(), strict=False))
     stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, worn)
     if settings.take is not None:

@@ -70,3 +70,13 @@ def test_the_command_opens_no_port_and_writes_every_angle(tmp_path: Path) -> Non
 
 def test_a_stage_without_a_robot_sends_nothing() -> None:
     assert Session.load("serial").plan() == ([], [])
+
+
+def test_the_show_of_a_stage_lies_beside_it_and_is_played(tmp_path: Path) -> None:
+    (tmp_path / "act.toml").write_text('name = "act"\nloop_s = 2.0\nsteps = ["0.0 SET headYaw 0.5"]\n')
+    _, report = rehearse(
+        load_stage(str(stage_file(tmp_path, 'show = "act.toml"\n')), PARAMETERS), None, 2.0, PARAMETERS
+    )
+    sent = dict(zip(report[0]["channels"], zip(*report[0]["sent_deg"], strict=True), strict=True))
+    assert sent["neckYaw"][-1] == pytest.approx(30.0, abs=0.1)
+    assert max(sent["lipCornerUpLeft"]) < 0.1
