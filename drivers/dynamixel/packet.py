@@ -16,6 +16,8 @@ from enum import IntEnum, IntFlag
 from functools import lru_cache
 from typing import NamedTuple
 
+from drivers.framing import FrameReader
+
 HEADER = b"\xff\xff\xfd"
 STUFFED = b"\xff\xff\xfd\xfd"
 BROADCAST_ID = 0xFE
@@ -254,52 +256,19 @@ def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusP
     return replies
 
 
-class PacketReader:
-    """Cuts a byte stream into frames whose length and CRC are right, whatever lies between them.
+class PacketReader(FrameReader):
+    """Frames of Protocol 2.0, header to CRC, still stuffed.
 
-    Attributes
+    Parameters
     ----------
-    noise_bytes : bytes thrown away because they belong to no valid frame.
-    broken_frames : frames begun whose length or CRC was wrong.
+    max_length : largest LEN that is believed.
     """
 
+    MARK = _PREFIX
+
     def __init__(self, max_length: int = MAX_LENGTH) -> None:
+        super().__init__()
         self._max_length = max_length
-        self._buffer = bytearray()
-        self.noise_bytes = 0
-        self.broken_frames = 0
-
-    @property
-    def pending(self) -> int:
-        """Bytes held back because the frame they begin is not complete."""
-        return len(self._buffer)
-
-    def feed_frames(self, data: bytes) -> list[bytes]:
-        """Add received bytes; return the frames completed by them, header to CRC, still stuffed."""
-        self._buffer += data
-        frames = []
-        while (frame := self._next()) is not None:
-            frames.append(frame)
-        return frames
-
-    def flush_frames(self) -> list[bytes]:
-        """Give up on the incomplete frame (the sender paused); return valid frames found behind it."""
-        frames = []
-        while self._buffer:
-            self.broken_frames += self._buffer.startswith(_PREFIX)
-            self._drop(1)
-            frames += self.feed_frames(b"")
-        return frames
-
-    def take_pending(self) -> bytes:
-        """Remove and return the incomplete bytes, for instance of a joint reply cut short."""
-        data = bytes(self._buffer)
-        self._buffer.clear()
-        return data
-
-    def _drop(self, count: int) -> None:
-        self.noise_bytes += count
-        del self._buffer[:count]
 
     def _seek_header(self) -> bool:
         """Drop what cannot begin a frame; True when a whole frame head lies at the start of the buffer."""

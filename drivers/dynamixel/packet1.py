@@ -12,6 +12,8 @@ from __future__ import annotations
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
+from drivers.framing import FrameReader
+
 HEADER = b"\xff\xff"
 BROADCAST_ID = 0xFE
 MAX_ID = 253
@@ -82,53 +84,20 @@ def encode(device_id: int, code: int, params: bytes = b"") -> bytes:
     return HEADER + body + bytes((checksum(body),))
 
 
-class Reader1:
-    """Cuts a byte stream into packets whose length and checksum are right, whatever lies between them.
+class Reader1(FrameReader):
+    """Yields the packets in a byte stream."""
 
-    Attributes
-    ----------
-    noise_bytes : bytes thrown away because they belong to no valid packet.
-    broken_frames : packets begun whose length or checksum was wrong.
-    """
-
-    def __init__(self) -> None:
-        self._buffer = bytearray()
-        self.noise_bytes = 0
-        self.broken_frames = 0
-
-    @property
-    def pending(self) -> int:
-        """Bytes held back because the packet they begin is not complete."""
-        return len(self._buffer)
+    MARK = HEADER
 
     def feed(self, data: bytes) -> list[Packet1]:
         """Add received bytes; return the packets completed by them."""
-        self._buffer += data
-        packets = []
-        while (packet := self._next()) is not None:
-            packets.append(packet)
-        return packets
+        return _packets(self.feed_frames(data))
 
     def flush(self) -> list[Packet1]:
         """Give up on the incomplete packet (the sender paused); return valid ones found behind its header."""
-        packets: list[Packet1] = []
-        while self._buffer:
-            self.broken_frames += self._buffer.startswith(HEADER)
-            self._drop(1)
-            packets += self.feed(b"")
-        return packets
+        return _packets(self.flush_frames())
 
-    def take_pending(self) -> bytes:
-        """Remove and return the incomplete bytes."""
-        data = bytes(self._buffer)
-        self._buffer.clear()
-        return data
-
-    def _drop(self, count: int) -> None:
-        self.noise_bytes += count
-        del self._buffer[:count]
-
-    def _next(self) -> Packet1 | None:
+    def _next(self) -> bytes | None:
         buffer = self._buffer
         while True:
             at = buffer.find(HEADER)
@@ -148,6 +117,10 @@ class Reader1:
             frame = bytes(buffer[:size])
             if frame[-1] == checksum(frame[2:-1]):
                 del buffer[:size]
-                return Packet1(frame[2], frame[4], frame[5:-1])
+                return frame
             self.broken_frames += 1
             self._drop(1)
+
+
+def _packets(frames: list[bytes]) -> list[Packet1]:
+    return [Packet1(frame[2], frame[4], frame[5:-1]) for frame in frames]
