@@ -14,13 +14,16 @@ def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:
     """(m,) int64 copy of the wanted limits; ``ValueError`` for another shape or others than 0 to 3."""
     if side is None:
         return np.zeros(len(samples), dtype=np.int64)
-    wanted = numbers(side, "side")
+    fast = isinstance(side, np.ndarray) and side.dtype == np.int64
+    wanted = np.asarray(side) if fast else numbers(side, "side")
     if wanted.shape not in ((), (len(samples),)):
         raise ValueError(f"side: shape {wanted.shape}, expected {(len(samples),)}")
-    bad = ~np.isin(wanted, (0, 1, 2, 3))
+    sides = np.broadcast_to(wanted, len(samples)).astype(np.int64)
+    bad = (sides < 0) | (sides > 3) | (sides != wanted)
     if bad.any():
-        raise ValueError(f"side[{int(np.argmax(bad))}]: must be 0, 1, 2 or 3, not {wanted.flat[np.argmax(bad)]:g}")
-    return np.broadcast_to(wanted, len(samples)).astype(np.int64)
+        i = int(np.argmax(bad))
+        raise ValueError(f"side[{i}]: must be 0, 1, 2 or 3, not {np.broadcast_to(wanted, len(samples))[i]:g}")
+    return sides
 
 
 def numbers(values: ArrayLike, name: str) -> Floats:
