@@ -109,8 +109,9 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     )  # fmt: skip
     head = finish_head(head, mesh, charts, recipe)
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
-    left_out = loaded.named.left_out
-    report = FitReport(name, reports, sorted(sources), loaded.named.missing, left_out, [*loaded.notes, *plan.notes])
+    missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
+    moving = sorted({*sources, *loaded.named.missing} - {*missing})
+    report = FitReport(name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes])
     return FitResult(head, report, fitted_parts)
 
 

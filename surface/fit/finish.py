@@ -16,6 +16,8 @@ from surface.head.data import HeadData
 from surface.head.parameters import read_pose
 from surface.head.rig import SkinRig
 
+SETTLINGS = 4  # each moves what is left by half
+
 
 def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe: Recipe) -> HeadData:
     """The head with wrinkles, contacts and mends; neutral becomes what contacts make of it."""
@@ -27,7 +29,9 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names)
     parts = [wrinkled if p is face else p for p in head.parts]
     head = add_mends(replace(head, parts=parts, rules=rules, contacts=contacts), recipe.mends)
-    return _settled(head)
+    for _ in range(SETTLINGS):
+        head = _settled(head)
+    return head
 
 
 def _settled(head: HeadData) -> HeadData:

@@ -1,7 +1,8 @@
 """Wrinkles: control points with small spans put in along lines of a fitted face, and groups that sink them.
 
 At rest they lie on the surface and move with every other group as the skin around them does, so that they change
-nothing. What sinks them is worked out by least squares, so that a furrow of the wanted depth and width comes out.
+little: a sum with one more point on it is not quite the same sum. What sinks them is worked out by least squares, so
+that a furrow of the wanted depth and width comes out.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ STEPS = np.arange(-2.0, 3.0)
 ALONG = 1.8  # distance of the points along a line, in widths of its furrow
 SPAN = 0.62  # of a knot, in widths across a line; along it spans are as long as the points are apart
 TAPER = 0.3  # share of a line's length over which its ends run out
-STIFF = 2e-3  # weight of moving no point, beside a sample's
+STIFF = 0.03  # weight of moving no point, beside what the samples say of an average one
 RIDGE = 0.35  # of its depth: how far the skin beside a furrow rises
 
 
@@ -49,13 +50,16 @@ def add_wrinkles(
     Parameters
     ----------
     wanted : tables with ``group``, ``terms``, ``depth`` and ``width`` in mm, ``lines`` of (x, y) seen from the front;
-        with ``mirror`` the same on the right side, "Left" in names becoming "Right".
+        with ``mirror`` the same on the right side, "Left" in names becoming "Right"; ``raised``, more lines, along
+        which the skin comes out by ``rise`` mm, as a cheek does beside its fold.
     """
     furrows, rules = [], []
     for table in wanted:
         for sided in (table, _mirrored(table)) if table.get("mirror") else (table,):
             rules.append(Rule(sided["group"], tuple(sided["terms"]), float(sided.get("power", 2.0))))
             furrows += [_furrow(sided, np.array(line, float), chart, mesh) for line in sided["lines"]]
+            up = sided | {"depth": -sided.get("rise", 0.0)}
+            furrows += [_furrow(up, np.array(line, float), chart, mesh) for line in sided.get("raised", [])]
     if not furrows:
         return face, []
     surface = make_surface(face)
@@ -84,10 +88,9 @@ def deepened(part: PartData, points: Floats) -> Floats:
 
 
 def _mirrored(table: dict[str, Any]) -> dict[str, Any]:
-    lines = [[[-x, y] for x, y in line] for line in table["lines"]]
-    return table | {"group": _other(table["group"]), "lines": lines, "terms": [
-        {_other(name): share for name, share in term.items()} for term in table["terms"]
-    ]}  # fmt: skip
+    lines = {k: [[[-x, y] for x, y in line] for line in table.get(k, [])] for k in ("lines", "raised")}
+    terms = [{_other(name): share for name, share in term.items()} for term in table["terms"]]
+    return table | lines | {"group": _other(table["group"]), "terms": terms}
 
 
 def _other(name: str) -> str:
@@ -121,7 +124,7 @@ def _knots(f: Furrow, surface: DCPSurface) -> tuple[Floats, Floats]:
 
 
 def _with_points(face: PartData, surface: DCPSurface, knots_u: Floats, knots_v: Floats) -> PartData:
-    """More points that change nothing: each where the surface is, with the weight 1, in every group."""
+    """More points that change next to nothing: each where the surface is, with the weight 1, in every group."""
     centre = np.column_stack([knots_u[:, 2], knots_v[:, 2]])
     share = surface.basis_matrix(centre).tocsr()
     n, k = surface.n, len(centre)
@@ -162,8 +165,9 @@ def _sunk(f: Furrow, surface: DCPSurface, ids: NDArray[np.int64]) -> tuple[NDArr
         profile = np.exp(-0.5 * (x / 0.5) ** 2) - RIDGE * np.exp(-0.5 * ((abs(x) - 1.3) / 0.5) ** 2)
         wanted.append(-f.depth * profile * ends)
     matrix = surface.basis_matrix(np.concatenate(samples)).tocsc()[:, ids].toarray()
-    normalised = matrix.T @ matrix + STIFF * np.eye(len(ids))
-    amount = np.linalg.solve(normalised, matrix.T @ np.concatenate(wanted))
+    normal_matrix = matrix.T @ matrix
+    normal_matrix += STIFF * np.trace(normal_matrix) / len(ids) * np.eye(len(ids))
+    amount = np.linalg.solve(normal_matrix, matrix.T @ np.concatenate(wanted))
     return ids, amount[:, None] * normal
 
 

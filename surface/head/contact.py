@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 MEET = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
 SOFT_MM = 0.1
 PRESS_MM = (0.05, 0.15)  # so deep they may overlap: triangles cut about that off the round of both sides
-FAR_MM = 30.0  # sides further apart than this are not brought together
-PASSES, AGAIN_MM = 2, 0.4  # the second pass takes what bending left over of more than that
+PASSES, AGAIN_MM = 3, 0.1  # further passes take what bending left over of more than that
+RAISE = 1.7  # of what a lid sinks in: least squares hold it back, because its neighbours need not move
 LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
 TOUCH_MM = 0.05  # what rests on the eyeball keeps this far away
 STIFF = 0.02  # weight of moving no control point, beside a sample's
@@ -73,26 +73,18 @@ class Feeler:
         return self.push
 
     def _mend(self, axis: Floats, points: Floats) -> None:
-        """Move control points (n, 3) in place, and leave the overlap that was found in ``push``."""
+        """Move control points (n, 3) in place, and leave the overlap that was found in ``push``.
+
+        Lids are raised before they are parted: raising opens them.
+        """
         self.push[:] = 0.0
         for _ in range(PASSES):
             self._place(points)
-            moved = self._part(points)
-            if self.radius > 0:
-                if moved > 0.0:
-                    self._place(points)
-                moved = max(moved, self._raise(axis, points))
-            if moved < AGAIN_MM:
+            sunk = self._raise(axis, points) if self.radius > 0 else 0.0
+            if sunk > 0.0:
+                self._place(points)
+            if max(sunk, self._part(points)) < AGAIN_MM:
                 break
-
-    def closing(self, points: Floats, overlap_mm: float) -> Floats:
-        """Displacements (n, 3) of control points (n, 3) that bring parted sides together to overlap a little."""
-        self._place(points)
-        find_overlap(self._samples[:, :, : self._meeting], PRESS_MM[self.radius > 0], FAR_MM, self._overlap)
-        apart = np.minimum(2.0 * np.sqrt(FAR_MM * self._overlap) - FAR_MM - overlap_mm, 0.0)
-        moved = np.array(points)
-        move_points(self.ids, apart.ravel(), self._away, self.eye, self.radius, False, moved)
-        return moved - points
 
     def _part(self, points: Floats) -> float:
         """Move the sides, whose samples are placed, apart where they overlap; returns the deepest overlap, mm."""
@@ -104,8 +96,10 @@ class Feeler:
     def _raise(self, axis: Floats, points: Floats) -> float:
         """Move lids, whose samples are placed, out of the eyeball; returns how deep the deepest was, mm."""
         find_sinking(self._samples.reshape(-1, 3), self.radius, self._thick, axis, self._sinking)
+        deepest = float(self._sinking.max())
+        self._sinking *= RAISE
         move_points(self.ids, self._sinking, self._lift, self.eye, self.radius, True, points)
-        return float(self._sinking.max())
+        return deepest
 
 
 class Follower:

@@ -14,6 +14,7 @@ from surface.head.part import border_edges
 from surface.jit import kernel
 
 LEAST_MM = 0.15  # shallower crossings are not looked for
+REACH_MM = 4.0  # about a point that lies inside: where surfaces must cross
 FAR_MM = 6.0  # beyond that a point behind a sheet belongs to something else
 
 
@@ -96,6 +97,55 @@ def way_out(points, directions, corners, normals, far, out):
         out[k] = best if behind else 0.0
 
 
+@kernel
+def near_triangle(points, corners, normals, lists, first, signed):
+    """Distance ``signed (m,)`` of points (m, 3) from the nearest of triangles ``corners (t, 3, 3)``, below 0 behind it.
+
+    Those of ``lists`` from ``first[k]`` to ``first[k + 1]`` are looked at for point k; ``normals (t, 3, 3)`` stand at
+    the corners. The nearest place by its region, as in Ericson, Real-Time Collision Detection (2005), 5.1.5.
+    """
+    for k in range(len(points)):
+        best, p = np.inf, points[k]
+        for t in lists[first[k] : first[k + 1]]:
+            a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
+            ab, ac = b - a, c - a
+            d1, d2 = (ab * (p - a)).sum(), (ac * (p - a)).sum()
+            d3, d4 = (ab * (p - b)).sum(), (ac * (p - b)).sum()
+            d5, d6 = (ab * (p - c)).sum(), (ac * (p - c)).sum()
+            va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+            if d1 <= 0 and d2 <= 0:
+                v, w = 0.0, 0.0
+            elif d3 >= 0 and d4 <= d3:
+                v, w = 1.0, 0.0
+            elif d6 >= 0 and d5 <= d6:
+                v, w = 0.0, 1.0
+            elif vc <= 0 and d1 >= 0 and d3 <= 0:
+                v, w = d1 / (d1 - d3), 0.0
+            elif vb <= 0 and d2 >= 0 and d6 <= 0:
+                v, w = 0.0, d2 / (d2 - d6)
+            elif va <= 0 and d4 >= d3 and d5 >= d6:
+                w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+                v = 1.0 - w
+            else:
+                v, w = vb / (va + vb + vc), vc / (va + vb + vc)
+            away = p - a - v * ab - w * ac
+            if (away * away).sum() < best:
+                best = (away * away).sum()
+                facing = (away * ((1.0 - v - w) * normals[t, 0] + v * normals[t, 1] + w * normals[t, 2])).sum()
+                signed[k] = np.sqrt(best) if facing >= 0 else -np.sqrt(best)
+
+
+def any_pierce(starts: np.ndarray, ends: np.ndarray, corners: np.ndarray) -> bool:
+    """Does any edge from ``starts (e, 3)`` to ``ends`` go through any of triangles ``corners (t, 3, 3)``?"""
+    way, s = (ends - starts)[:, None], starts[:, None] - corners[None, :, 0]
+    e, f = ((corners[:, k] - corners[:, 0])[None] for k in (1, 2))
+    h, q = np.cross(way, f), np.cross(s, e)
+    det = (e * h).sum(axis=2)
+    det[np.abs(det) < 1e-12] = np.inf
+    u, v, along = (s * h).sum(axis=2) / det, (way * q).sum(axis=2) / det, (f * q).sum(axis=2) / det
+    return bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (along > 0) & (along <= 1)).any())
+
+
 @dataclass(frozen=True)
 class Sheet:
     """One side of an opening: (part, ids of vertices, rows of triangles) for each part it reaches over."""
@@ -107,6 +157,14 @@ class Sheet:
 
     def normals(self) -> np.ndarray:
         return np.concatenate([p.normals[i] for p, i, _ in self.pieces]).astype(float)
+
+    def corner_normals(self) -> np.ndarray:
+        return np.concatenate([p.normals[p.triangles[t]] for p, _, t in self.pieces]).astype(float)
+
+    def edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """(e, 3) where each edge starts and ends."""
+        at, _ = self.corners()
+        return at.reshape(-1, 3), at[:, [1, 2, 0]].reshape(-1, 3)
 
     def corners(self) -> tuple[np.ndarray, np.ndarray]:
         """(t, 3, 3) corners of the triangles, (t, 3) outward normals."""
@@ -146,24 +204,46 @@ def sides(head: Head, loop: np.ndarray, lining: str, reach: float) -> tuple[Shee
 def crossing(one: Sheet, other: Sheet) -> tuple[float, np.ndarray]:
     """How deep points of either side lie in the flesh of the other, and where the deepest lies (3,).
 
-    A point lies inside if its own way out, along its normal, first meets the other side from behind. Its depth is
-    its distance from the other side's surface.
+    A point lies inside if the nearest place of the other side shows it its back, and its own way out, along its
+    normal, first meets the other side from behind. That counts only within REACH_MM of a place where an edge of one
+    side pierces a triangle of the other: at folds and at the sheets' cut edges, backs are seen without any crossing.
     """
     worst, where = 0.0, np.zeros(3)
     for a, b in ((one, other), (other, one)):
-        points, (at, normals) = a.points(), (b.points(), b.normals())
-        distance, near = cKDTree(at).query(points, distance_upper_bound=FAR_MM)
-        found = np.flatnonzero(np.isfinite(distance))
-        behind = -((points[found] - at[near[found]]) * normals[near[found]]).sum(axis=1)
-        found = found[behind > LEAST_MM]
-        if not len(found):
-            continue
-        out = np.zeros(len(found))
-        way_out(points[found], a.normals()[found], *b.corners(), FAR_MM, out)
-        depth = np.minimum(np.minimum(behind[behind > LEAST_MM], distance[found]), out)
-        if depth.max() > worst:
-            worst, where = float(depth.max()), points[found][depth.argmax()]
+        points, depths = _inside(a, b)
+        for k in np.argsort(-depths):
+            if depths[k] <= worst:
+                break
+            if _pierced(one, other, points[k]) or _pierced(other, one, points[k]):
+                worst, where = float(depths[k]), points[k]
     return worst, where
+
+
+def _inside(a: Sheet, b: Sheet) -> tuple[np.ndarray, np.ndarray]:
+    """Points (k, 3) of a sheet that seem to lie in another's flesh, and how deep (k,)."""
+    points, others, (at, flat) = a.points(), b.points(), b.corners()
+    distance, near = cKDTree(others).query(points, distance_upper_bound=FAR_MM)
+    found = np.flatnonzero(np.isfinite(distance))
+    found = found[((points[found] - others[near[found]]) * b.normals()[near[found]]).sum(axis=1) < 0]
+    middle = at.mean(axis=1)
+    radius = float(np.linalg.norm(at - middle[:, None], axis=2).max())
+    lists = cKDTree(middle).query_ball_point(points[found], distance[found] + radius)
+    first = np.cumsum([0, *map(len, lists)])
+    signed, near_ones = np.zeros(len(found)), np.array([t for row in lists for t in row], np.int64)
+    near_triangle(points[found], at, b.corner_normals(), near_ones, first, signed)
+    found, signed = found[signed < -LEAST_MM], signed[signed < -LEAST_MM]
+    out = np.zeros(len(found))
+    way_out(points[found], a.normals()[found], at, flat, FAR_MM, out)
+    return points[found], np.minimum(-signed, out)
+
+
+def _pierced(one: Sheet, other: Sheet, place: np.ndarray) -> bool:
+    """Does an edge of one sheet within REACH_MM of a place (3,) go through a triangle of the other?"""
+    start, end = one.edges()
+    near = np.linalg.norm(0.5 * (start + end) - place, axis=1) < REACH_MM
+    at, _ = other.corners()
+    close = np.linalg.norm(at.mean(axis=1) - place, axis=1) < REACH_MM + 2.0
+    return any_pierce(start[near], end[near], at[close])
 
 
 def eye_height(directions: np.ndarray, gaze: np.ndarray) -> np.ndarray:
@@ -208,6 +288,17 @@ def lips_gap(head: Head, step: float = 0.1) -> float:
     skin = window.depth(head.part("face"))
     back = window.depth(*(head.part(n) for n in ("cavity", "teeth_upper", "teeth_lower", "tongue")))
     return float(((back > skin) & np.isfinite(skin)).sum(axis=0).max() * step)
+
+
+def seams_gape(head: Head) -> float:
+    """How far the borders of two parts that are one line lie apart at most."""
+    widest = 0.0
+    for z in head.zippers:
+        if z.first is not z.second:
+            a, b = z.first.vertices, z.second.vertices
+            edge = a[z.low] + z.share[:, None] * (a[z.high] - a[z.low])
+            widest = max(widest, float(np.abs(b[z.ids] - edge).max(initial=0.0)))
+    return widest
 
 
 def inside(points: np.ndarray, ring: np.ndarray) -> np.ndarray:

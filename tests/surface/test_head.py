@@ -163,7 +163,7 @@ def test_lids_stay_at_the_eyeball_at_every_gaze(head, holes):
             v = posed(head, leftEyeYaw=yaw, leftEyePitch=pitch, rightEyeYaw=yaw, rightEyePitch=pitch)
             for side, eye in zip(("left", "right"), head.data.eyes, strict=True):
                 rim = np.linalg.norm(v[holes[side]] - eye, axis=1) - head.data.eye_radius
-                assert rim.max() < 1.6  # the rim's edge lies behind the eyeball's front
+                assert rim.max() < 1.9  # the cornea, which may pass under the rim, stands out by 1.15
                 assert rim.min() > -2.5
 
 

@@ -1,20 +1,22 @@
 """The shipped head, measured: lips and lids meet and do not cross, nothing stands out where it should not."""
 
-import itertools
-
 import numpy as np
 import pytest
-from face_measures import Window, crossing, eye_cut, eye_opening, lips_gap, poke, rim, sides
+from face_measures import Window, crossing, eye_cut, eye_opening, lips_gap, poke, rim, seams_gape, sides
 
 from surface.head import NAMES, Head
 
 EYES = ("eye_left", "eye_right")
 MOUTH = ("teeth_upper", "teeth_lower", "gums_upper", "gums_lower")
+# The pairs that come nearest to it, of all 1378; benchmarks/head_pairs.py measures every one
 HARD = [
-    ("mouthPucker", "mouthShrugLower"), ("mouthLeft", "mouthShrugLower"), ("mouthRollLower", "mouthRollUpper"),
-    ("mouthLeft", "mouthRollLower"), ("jawOpen", "mouthClose"), ("mouthSmileLeft", "mouthDimpleLeft"),
-    ("eyeBlinkLeft", "eyeSquintLeft"), ("eyeBlinkLeft", "cheekSquintLeft"), ("eyeBlinkLeft", "eyeLookOutLeft"),
-    ("eyeBlinkLeft", "mouthSmileLeft"), ("jawOpen", "mouthPucker"), ("mouthRollLower", "mouthShrugLower"),
+    ("mouthDimpleRight", "noseSneerRight"), ("mouthLeft", "mouthDimpleRight"), ("mouthRight", "mouthShrugLower"),
+    ("jawOpen", "mouthClose"), ("mouthDimpleRight", "mouthPressRight"), ("mouthSmileLeft", "mouthDimpleLeft"),
+    ("jawRight", "mouthLeft"), ("mouthSmileRight", "mouthShrugLower"), ("mouthLeft", "mouthShrugLower"),
+    ("mouthSmileRight", "mouthRollLower"), ("mouthPucker", "mouthStretchRight"), ("mouthPucker", "mouthShrugLower"),
+    ("mouthShrugLower", "mouthPressLeft"), ("jawOpen", "mouthPucker"), ("mouthRollLower", "mouthRollUpper"),
+    ("eyeBlinkLeft", "eyeSquintLeft"), ("eyeBlinkLeft", "cheekSquintLeft"), ("eyeBlinkLeft", "mouthSmileLeft"),
+    ("eyeBlinkRight", "noseSneerRight"), ("eyeBlinkLeft", "eyeLookOutLeft"),
 ]  # fmt: skip
 
 
@@ -46,14 +48,14 @@ def looking(yaw: float, pitch: float) -> dict[str, float]:
 @pytest.mark.parametrize("yaw", [-0.86, 0.0, 0.86])
 def test_a_blink_closes_both_eyes_at_every_gaze(head, yaw, pitch):
     head.pose(head.values(looking(yaw, pitch) | {"eyeBlinkLeft": 1, "eyeBlinkRight": 1}))
-    widest = 0.6 if pitch == 1.0 else 0.3  # straight down the cornea stands right in the lids' gap
-    assert max(eye_opening(head, side)[0] for side in (0, 1)) < widest
+    assert max(eye_opening(head, side)[0] for side in (0, 1)) < 0.35
 
 
 @pytest.mark.parametrize("pitch", [-1.0, 0.0, 1.0])
-def test_lids_do_not_cut_the_eyeball_at_any_gaze(head, pitch):
+@pytest.mark.parametrize("closed", [0.0, 1.0])
+def test_lids_do_not_cut_the_eyeball_at_any_gaze(head, pitch, closed):
     for yaw in (-0.86, 0.0, 0.86):
-        head.pose(head.values(looking(yaw, pitch)))
+        head.pose(head.values(looking(yaw, pitch) | {"eyeBlinkLeft": closed, "eyeBlinkRight": closed}))
         assert max(eye_cut(head, side, "face") for side in (0, 1)) < 0.5
 
 
@@ -81,14 +83,20 @@ def test_lips_meet_at_rest_and_over_an_open_jaw(head, jaw):
     assert lips_gap(head) < 0.3
 
 
-def test_no_two_parameters_push_lips_or_lids_into_each_other(head, lips, lids):
-    mouth = [n for n in NAMES[:52] if n.startswith(("mouth", "jaw")) and not n.endswith("Right")]
-    pairs = list(itertools.combinations_with_replacement(mouth, 2))
-    chosen = np.random.default_rng(4).choice(len(pairs), 60, replace=False)
-    for one, other in [*HARD, *(pairs[i] for i in chosen)]:
-        head.pose(head.values({one: 1.0, other: 1.0}))
-        assert crossing(*lips)[0] < 0.85, (one, other)
-        assert crossing(*lids)[0] < 0.85, (one, other)
+@pytest.mark.parametrize("pair", HARD, ids=" ".join)
+def test_no_two_parameters_push_lips_or_lids_into_each_other(head, lips, lids, pair):
+    head.pose(head.values(dict.fromkeys(pair, 1.0)))
+    assert crossing(*(lips if pair[1].startswith(("mouth", "jaw")) and "Blink" not in pair[0] else lids))[0] < 0.5
+
+
+def test_the_measure_of_crossings_finds_one(head, lips):
+    head.pose(head.values({}))
+    lower, part = lips[1], head.part("face")
+    own = lower.pieces[0][1]
+    part.vertices[own, 1] += 1.5
+    found = crossing(*lips)[0]
+    part.vertices[own, 1] -= 1.5
+    assert 0.6 < found < 1.6
 
 
 def mixture(rng: np.random.Generator) -> np.ndarray:
@@ -100,13 +108,9 @@ def mixture(rng: np.random.Generator) -> np.ndarray:
 
 def test_no_seam_opens_in_random_mixtures(head):
     rng = np.random.default_rng(11)
-    for _ in range(500):
+    for _ in range(120):  # benchmarks/head_pairs.py takes 500
         head.pose(mixture(rng))
-        for z in head._zippers:
-            if z.first is not z.second:
-                a, b = z.first.vertices, z.second.vertices
-                edge = a[z.low] + z.share[:, None] * (a[z.high] - a[z.low])
-                assert np.abs(b[z.ids] - edge).max(initial=0.0) < 0.1
+        assert seams_gape(head) < 0.1
 
 
 def test_eyes_and_teeth_do_not_poke_through_the_skin(head, loops):
@@ -142,7 +146,7 @@ def test_wrinkles_are_not_there_at_rest_and_set_in_softly(head):
         flat[fold.ids] -= fold.moves * drivers.amounts(_shapes(head, full, 1.0))[drivers.names.index(name)]
         uv = np.column_stack([k[:, 2] for k in (head.data.parts[0].knots_u, head.data.parts[0].knots_v)])[fold.ids]
         sunk = part.surface.with_points(deep).evaluate(uv) - part.surface.with_points(flat).evaluate(uv)
-        assert 0.25 < np.quantile(np.linalg.norm(sunk, axis=1), 0.9) < 1.2, name
+        assert 0.25 < np.quantile(np.linalg.norm(sunk, axis=1), 0.9) < 1.8, name
 
 
 def _shapes(head: Head, given: dict[str, float], share: float) -> np.ndarray:
