@@ -27,6 +27,8 @@ _DETAIL_SIZE = 128
 #: A baked sky that hides nothing.
 _OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
 _LOWER_LASHES = 0.42
+#: Materials of what the skin surrounds, in whatever pose.
+INSIDE = ("eye", "teeth", "gums", "mouth")
 
 
 @dataclass(frozen=True)

@@ -133,7 +133,7 @@ class Renderer:
     def region(self, camera: Camera, size: tuple[int, int]) -> Bands:
         """Where a picture of `size` can be touched by the head, as posed now."""
         found = Silhouette(size, camera.matrix(size[0] / size[1]), camera.near)
-        for buffers in self._parts:
+        for buffers in [p for p in self._parts if p.part.material not in materials.INSIDE] or self._parts:
             vertices = self.evaluator.vertices(buffers.part)
             if vertices is None or not found.add(vertices, buffers.part.triangles):
                 return Bands.whole(size)

@@ -1,0 +1,124 @@
+"""What a frame of the picture costs, material by material, beside a bare fill of the same pixels.
+
+Run ``python benchmarks/picture_cost.py [--quality fast] [--size 1280x720]``. Each row draws the same pose again and
+again and says milliseconds a frame: on the clock, of the processor in all its threads, and of the thread that calls
+OpenGL. Rows that leave something out say, by their difference from the first, what that costs. Times are from one run
+on one machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from controller.paths import find_config
+from surface.head import Head
+from surface.view.bounds import Bands
+from surface.view.camera import Camera
+from surface.view.offscreen import Offscreen
+
+FRAMES = 40
+Times = tuple[float, float, float]
+
+
+def timed(work: Callable[[], object], frames: int = FRAMES) -> Times:
+    """Milliseconds a call: clock, processor, this thread; the least of three rounds by the processor's."""
+    rounds = []
+    for _ in range(3):
+        began = time.process_time(), time.perf_counter(), time.thread_time()
+        for _ in range(frames):
+            work()
+        ended = time.process_time(), time.perf_counter(), time.thread_time()
+        rounds.append(tuple(1e3 * (b - a) / frames for a, b in zip(began, ended, strict=True)))
+    cpu, clock, own = min(rounds)
+    return clock, cpu, own
+
+
+class Bench:
+    """A head at one pose, drawn again and again."""
+
+    def __init__(self, quality: str, size: tuple[int, int]) -> None:
+        self.head = Head.load(find_config("heads", "ict"))
+        self.screen = Offscreen(self.head, size, quality=quality)
+        self.values = np.full(len(self.head.parameters), 0.2)
+        self.screen.draw(self.values)
+        self.screen.draw(self.values)  # the first makes the live target
+        self.screen.finish()
+        self.renderer, self.target, self.camera = self.screen.renderer, self.screen.target, Camera.front()
+        self.parts = list(self.renderer._parts)
+        self.bands = self.renderer.region(self.camera, self.target._drawn.size)
+
+    def draw(self, leave_out: str = "", bands: Bands | None = None) -> None:
+        """One frame without the parts of a material, and wait for it."""
+        self.renderer._parts = [p for p in self.parts if p.part.material != leave_out and leave_out != "everything"]
+        self.renderer.draw(self.camera, self.target._drawn, bands or self.bands)
+        self.target._kick.clear()
+        self.screen.ctx.finish()
+        self.renderer._parts = self.parts
+
+    def smooth(self) -> None:
+        """What comes after a frame: smoothing, and enlarging where it was drawn smaller."""
+        self.target._pending = self.bands
+        self.target.complete()
+        self.screen.ctx.finish()
+
+    def pixels(self) -> dict[str, int]:
+        """Pixels that pass the depth test, by part."""
+        query, draw, found = self.screen.ctx.query(samples=True), self.renderer._draw_part, {}
+        self.draw("everything")
+        for buffers in self.parts:
+            with query:
+                draw(buffers)
+            found[buffers.part.name] = query.samples
+        return found
+
+    def rows(self) -> list[tuple[str, Times]]:
+        """Every measurement."""
+        materials = sorted({p.part.material for p in self.parts})
+        whole = Bands.whole(self.target._drawn.size)
+        return [
+            ("drawing, all", timed(self.draw)),
+            *((f"drawing without {name}", timed(lambda name=name: self.draw(name))) for name in materials),
+            ("bare fill: the background where the head is", timed(lambda: self.draw("everything"))),
+            ("bare fill: the background everywhere", timed(lambda: self.draw("everything", whole))),
+            ("smoothing the edges", timed(self.smooth)),
+            ("finding the bands", timed(lambda: self.renderer.region(self.camera, self.target._drawn.size))),
+            ("posing, every parameter", timed(self.poser())),
+        ]
+
+    def poser(self) -> Callable[[], None]:
+        """A call that poses the head differently each time."""
+        random = np.random.default_rng(1)
+
+        def pose() -> None:
+            self.head.pose(random.uniform(0.0, 0.5, len(self.values)))
+
+        return pose
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quality", default="full", choices=("full", "fast"))
+    parser.add_argument("--size", default="1280x720")
+    given = parser.parse_args()
+    width, height = (int(number) for number in given.size.split("x"))
+    bench, console = Bench(given.quality, (width, height)), Console(highlight=False)
+    table = Table(f"{given.quality}, {given.size}", "clock ms", "processor ms", "OpenGL's thread ms")
+    for name, times in bench.rows():
+        table.add_row(name, *(f"{t:.2f}" for t in times))
+    console.print(table)
+    found = bench.pixels()
+    triangles = sum(len(p.part.triangles) for p in bench.parts)
+    console.print(f"{sum(found.values())} pixels of {triangles} triangles; {bench.screen.ctx.info['GL_RENDERER']}")
+    console.print("  ".join(f"{name} {count}" for name, count in found.items()))
+    bench.screen.close()
+
+
+if __name__ == "__main__":
+    main()
