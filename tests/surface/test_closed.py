@@ -110,5 +110,5 @@ def test_wrapping() -> None:
 
 @pytest.mark.parametrize("closed", [(0, 1e-3), (1000, 1001), (0,), "ab"])
 def test_periods_that_fit_no_surface_are_refused(closed: object) -> None:
-    with pytest.raises(ValueError, match="closed_u: (knots reach|needs)"):
+    with pytest.raises(ValueError, match=r"closed_u: (knots reach|needs)"):
         DCPSurface([[0, 0, 0]], [1], [[0, 1]], [[0, 1]], closed_u=closed)  # type: ignore[arg-type]
