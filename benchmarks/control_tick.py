@@ -12,6 +12,7 @@ import gc
 import resource
 import time
 import tracemalloc
+from collections import Counter
 
 import numpy as np
 from rich.console import Console
@@ -157,15 +158,17 @@ def resident_kb() -> int:
 
 def soak(ticks: int, console: Console) -> None:
     """Hostile ticks, and how much memory they took."""
-    chain = Chain(3)
-    faults(chain, range(ticks // 10))
-    before, began = resident_kb(), time.perf_counter()
-    rest = ticks - ticks // 10
-    counts = faults(chain, track(range(rest), "hostile ticks", console=console, transient=True))  # type: ignore[arg-type]
+    chain, tenth = Chain(3), ticks // 10
+    faults(chain, range(tenth))
+    held, counts, began = [resident_kb()], Counter[str](), time.perf_counter()
+    for part in track(range(1, 10), "hostile ticks", console=console, transient=True):
+        counts.update(faults(chain, range(part * tenth, (part + 1) * tenth)))
+        held.append(resident_kb())
+    took = (time.perf_counter() - began) / (9 * tenth)
     broken = ", ".join(f"{kind} {count}" for kind, count in counts.items())
     console.print(f"{ticks} hostile ticks; limits broken at the bus: {broken}")
-    console.print(f"resident memory: {resident_kb() - before} kB more after {ticks} ticks than after {ticks // 10}")
-    console.print(f"{(time.perf_counter() - began) / rest * 1e3:.3f} ms a tick with its checks")
+    console.print(f"resident memory after each tenth of them: {', '.join(str(kb) for kb in held)} kB")
+    console.print(f"{took * 1e3:.3f} ms a tick with its checks")
     acted = [f"{rule['rule']} {rule['times']}" for rule in chain.line.guard.report()]
     console.print(f"rules that acted: {', '.join(acted)}")
 
