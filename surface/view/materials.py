@@ -200,7 +200,7 @@ MATERIALS: dict[str, Material] = {
     "eye": Material("eye", _eye_static, _eye_uniforms, order=1),
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
     "brow": _hair("brow", (0.72, 0.50, 0.30, 2.4), 1.0),
-    "teeth": _inner((0.72, 0.66, 0.54), 0.3, 0.30, order=3),
+    "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, order=3),
     "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.22, order=4),
     "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),
     "mouth": _inner((0.32, 0.09, 0.08), 0.3, 0.08, two_sided=True, order=6),

@@ -1,4 +1,6 @@
 // Teeth, gums, tongue and the mouth's lining: lit by what comes in between the lips, per vertex.
+#define WALLS vec3(0.50, 0.18, 0.16)
+
 uniform mat4 view_projection;
 uniform vec3 camera;
 uniform vec3 opening_centre;
@@ -35,9 +37,10 @@ void main() {
     // A tongue past the lips is in the open.
     float past = dot(position - opening_centre, opening_area / (length(opening_area) + 1e-3));
     float reach = mix(clamp(daylight(n) * occlusion, 0.0, 1.0), 1.0, smoothstep(-8.0, 3.0, past));
-    // What light has bounced about the mouth is red.
-    vec3 tint = mix(vec3(1.0, 0.55, 0.45), vec3(1.0), reach);
+    // Light bounces between here and the red walls of the mouth: the less comes straight in, the more that counts.
+    vec3 bounce = 0.5 * (albedo + WALLS);
+    vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach;
-    v_colour = encode(albedo * light * tint * reach + shine * key_colour);
+    v_colour = encode(albedo * light * arrives + shine * key_colour);
 }
