@@ -22,13 +22,14 @@ class SpeedGuard:
 
     Attributes
     ----------
-    shortened : how many steps of the last call were.
+    speed, saved, last : (n,) top speeds, travel saved up, and what was last allowed.
+    shortened : how many steps of the last call of `step` were.
     """
 
     def __init__(self, max_speed_rad_s: Floats) -> None:
-        self._speed = np.array(max_speed_rad_s, dtype=np.float64)
-        self._saved = np.zeros_like(self._speed)
-        self._last = np.zeros_like(self._speed)
+        self.speed = np.array(max_speed_rad_s, dtype=np.float64)
+        self.saved = np.zeros_like(self.speed)
+        self.last = np.zeros_like(self.speed)
         self._time_s = 0.0
         self.shortened = 0
         from drivers.kernels import spend_travel  # compiled: only who drives servos pays for it
@@ -37,14 +38,14 @@ class SpeedGuard:
 
     def reset(self, position_rad: Floats, now_s: float) -> None:
         """Begin again from where the servos are, with nothing saved up."""
-        self._last = np.array(position_rad, dtype=np.float64)
-        self._saved = np.zeros_like(self._speed)
+        self.last = np.array(position_rad, dtype=np.float64)
+        self.saved = np.zeros_like(self.speed)
         self._time_s = now_s
 
     def reset_one(self, index: int, position_rad: float) -> None:
         """Begin again for one servo."""
-        self._last[index] = position_rad
-        self._saved[index] = 0.0
+        self.last[index] = position_rad
+        self.saved[index] = 0.0
 
     def step(self, target_rad: Floats, now_s: float) -> Floats:
         """The target, or the nearest to it that may be asked for now.
@@ -58,7 +59,11 @@ class SpeedGuard:
         -------
         (n,) float64.
         """
+        self.shortened = self._spend(target_rad, self.speed, self.elapsed_s(now_s), BURST_S, self.saved, self.last)
+        return self.last.copy()
+
+    def elapsed_s(self, now_s: float) -> float:
+        """Time since the call before that counts, at most ``BURST_S``; from now on the next one counts from `now_s`."""
         elapsed = min(max(now_s - self._time_s, 0.0), BURST_S)
         self._time_s = now_s
-        self.shortened = self._spend(target_rad, self._speed, elapsed, BURST_S, self._saved, self._last)
-        return self._last.copy()
+        return elapsed

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivers.bus import BusReport, Floats, ServoSpec
-from drivers.guard import SpeedGuard
+from drivers.guard import BURST_S, SpeedGuard
 
 
 class TargetLimits:
@@ -29,9 +29,9 @@ class TargetLimits:
         self._high = np.array([servo.max_rad for servo in servos], dtype=np.float64)
         self._guard = SpeedGuard(np.array([servo.max_speed_rad_s for servo in servos]))
         self._report = report
-        from drivers.kernels import clip_targets  # compiled: only who drives servos pays for it
+        from drivers.kernels import limit_targets  # compiled: only who drives servos pays for it
 
-        self._clip = clip_targets
+        self._limit = limit_targets
 
     def begin(self, position_rad: Floats, now_s: float) -> None:
         """Begin from where the servos (n,) are."""
@@ -55,9 +55,13 @@ class TargetLimits:
         -------
         (n,) float64 : inside the angle limits, and no further from the last call's than top speed allows.
         """
-        refused, clipped = self._clip(wanted_rad, self._low, self._high, self.target)
-        allowed = self._guard.step(self.target, now_s)
-        self._report.refused_targets += refused
-        self._report.limits_hit += clipped
-        self._report.speed_limited += self._guard.shortened
-        return allowed
+        guard, report = self._guard, self._report
+        refused, clipped, shortened = self._limit(
+            wanted_rad, self._low, self._high, self.target,
+            guard.speed, guard.elapsed_s(now_s), BURST_S, guard.saved, guard.last,
+        )  # fmt: skip
+        if refused or clipped or shortened:
+            report.refused_targets += refused
+            report.limits_hit += clipped
+            report.speed_limited += shortened
+        return guard.last.copy()

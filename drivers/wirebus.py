@@ -116,6 +116,14 @@ class WireBus(Bus):
     @contextmanager
     def _losing(self) -> Iterator[None]:
         """Close the port and count once when it goes away."""
+        self._raise_if_lost()
+        try:
+            yield
+        except PortLost:
+            self._note_loss()
+            raise
+
+    def _raise_if_lost(self) -> None:
         if self._lost or not self.is_open:
             raise PortLost(
                 f"port {self.path} is {'lost' if self._lost else 'not open'}",
@@ -123,14 +131,12 @@ class WireBus(Bus):
                 port=self.path,
                 servo_ids=self.ids,
             )
-        try:
-            yield
-        except PortLost:
-            self._lost = True
-            self._close_link()
-            self._report.count("port_lost")
-            log.error("port %s went away", self.path)
-            raise
+
+    def _note_loss(self) -> None:
+        self._lost = True
+        self._close_link()
+        self._report.count("port_lost")
+        log.error("port %s went away", self.path)
 
     # ------------------------------------------------------------------ starting and stopping
 
@@ -181,20 +187,28 @@ class WireBus(Bus):
             raise ValueError(f"angle_rad: shape {wanted.shape}, expected {(len(self.servos),)}")
         if not self._running:
             raise BusError(f"the bus on {self.path} is not started", hint="call start()", port=self.path)
-        with self._losing():
+        self._raise_if_lost()  # not _losing(): between a reply and the next goals the wire waits for every line here
+        try:
             now = self._clock()
             self._settle(now)
             sent = self._send(self._limits.apply(wanted, now))
-            self._report.writes += 1
-            return frozen(sent)
+        except PortLost:
+            self._note_loss()
+            raise
+        self._report.writes += 1
+        return frozen(sent)
 
     def read(self) -> BusState:
         """Ask for this cycle's measurements; see :meth:`drivers.bus.Bus.read`."""
-        with self._losing():
+        self._raise_if_lost()
+        try:
             self._settle(self._clock())
             state = self._ask()
-            self._report.cycles += 1
-            return state
+        except PortLost:
+            self._note_loss()
+            raise
+        self._report.cycles += 1
+        return state
 
     def report(self) -> BusReport:
         """A copy of the counters."""

@@ -209,10 +209,10 @@ class DynamixelBus(WireBus):
         """One sync read of all servos and one slow value of some."""
         for servo in self._telemetry.take_forgetful():
             self._map_again(servo)
-        self._telemetry.cycle(self._clock, self._running)
+        state = self._telemetry.cycle(self._clock, self._running, self.scale)
         if self._running:
             self._clear_watchdogs()
-        return self._telemetry.state(self.scale, self._clock())
+        return state
 
     def _use_map(self, mapped: dict[int, Block]) -> None:
         """Group the servos anew where other registers are mapped now."""

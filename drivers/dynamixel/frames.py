@@ -6,8 +6,8 @@ caller to the careful readers in ``packet`` and ``sdk``.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from drivers.dynamixel.packet import (
     crc16,
     encode_fast_head,
     encode_instruction,
-    fast_reply_size,
 )
 
 Octets = NDArray[np.uint8]
@@ -28,6 +27,8 @@ HEAD_SIZE = 8
 """Bytes of a status packet before its error byte."""
 STATUS_SIZE = 11
 """Bytes of a status packet without data."""
+PART_SIZE = 4
+"""Bytes of a servo's part of a joint reply without data: error, id and CRC."""
 _ROWS_AT = 12
 """Where the rows of a sync write begin: behind the header, INST, address and length."""
 
@@ -39,32 +40,25 @@ class GoalFrame:
     ----------
     ids : k servo ids.
     address, size : the register; 2 or 4 bytes.
+    places : (k,) int64, which of the values given to `encode` are theirs.
     """
 
-    def __init__(self, ids: Sequence[int], address: int, size: int) -> None:
-        from drivers.kernels import crc_span  # compiled: only who drives servos pays for it
+    def __init__(self, ids: Sequence[int], address: int, size: int, places: NDArray[np.int64]) -> None:
+        from drivers.kernels import put_goals  # compiled: only who drives servos pays for it
 
-        self._crc_span = crc_span
-        self._rows = np.zeros(len(ids), dtype=[("id", "u1"), ("goal", f"<i{size}")])
-        self._rows["id"] = ids
-        self._head = bytes((address & 0xFF, address >> 8, size & 0xFF, size >> 8))
-        frame = encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, self._head + self._rows.tobytes())
+        self._put_goals = put_goals
+        self._size, self._places = size, places
+        rows = b"".join(bytes((servo,)) + bytes(size) for servo in ids)
+        frame = encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, _words(address, size) + rows)
         self._frame = bytearray(frame)
         self._state = crc16(frame[:_ROWS_AT])
-        self._bytes = np.frombuffer(self._frame, np.uint8)
-        self.encode(np.zeros(len(ids), np.int32))  # compiles, so that no cycle has to wait for that
+        self._octets = np.frombuffer(self._frame, np.uint8)
 
-    def encode(self, values: NDArray[np.integer]) -> bytes:
-        """The packet for these values, ``(k,)``, stuffed where they need it."""
-        self._rows["goal"] = values
-        rows = self._rows.tobytes()
-        if HEADER in rows:
-            return encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, self._head + rows)
-        frame = self._frame
-        frame[_ROWS_AT:-2] = rows
-        crc = self._crc_span(self._bytes, _ROWS_AT, len(frame) - 2, self._state)
-        frame[-2], frame[-1] = crc & 0xFF, crc >> 8
-        return bytes(frame)
+    def encode(self, values: NDArray[np.int32]) -> bytes:
+        """The packet for the values of the whole bus, ``(n,)``, stuffed where they need it."""
+        if self._put_goals(self._octets, _ROWS_AT, values, self._places, self._size, self._state):
+            return bytes(self._frame)
+        return encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, bytes(self._frame[8:-2]))
 
 
 class Run(NamedTuple):
@@ -86,6 +80,16 @@ class Rows(NamedTuple):
     data: Octets
 
 
+class Quick(Protocol):
+    """Something that understands replies only where they are as expected."""
+
+    def prepare(self) -> None:
+        """Get ready; called while the wire is busy."""
+
+    def take(self, data: bytes, now_s: float) -> bool:
+        """Whether it has taken them; else nothing has changed."""
+
+
 class GroupRead:
     """A read of many servos that is asked again and again: one sync read, or a bulk read where addresses differ.
 
@@ -99,27 +103,24 @@ class GroupRead:
     frame : the instruction.
     wanted : data bytes expected by id, in the order of the replies.
     size : bytes of all replies, not stuffed.
+    spans, heads, states : where each reply lies and how it begins, see ``drivers.kernels``.
     """
 
     def __init__(self, runs: Sequence[Run], fast: bool = False) -> None:
         from drivers.kernels import check_joint, check_replies  # compiled: only who drives servos pays for it
 
-        self._check_replies, self._check_joint = check_replies, check_joint
+        self._check = check_joint if fast else check_replies
         self.runs, self.fast = tuple(runs), fast
         self.ids = tuple(servo for run in runs for servo in run.ids)
         self.wanted = {servo: run.length for run in runs for servo in run.ids}
         self.frame = self._sync() if len(runs) == 1 else self._bulk()
-        sizes = [len(run.ids) * ((4 if fast else STATUS_SIZE) + run.length) for run in runs]
-        self.size = fast_reply_size(self.wanted.values()) if fast else sum(sizes)
-        self._spans = []  # where each run begins, and the bytes of each of its replies
-        begin = HEAD_SIZE if fast else 0
-        for run, size in zip(runs, sizes, strict=True):
-            self._spans.append((begin, size // len(run.ids)))
-            begin += size
-        self._joint = encode_fast_head(list(self.wanted.values()))
-        self._joint_state = crc16(self._joint)
-        self._ids = [np.array(run.ids, np.uint8) for run in runs]
-        self._heads = [] if fast else [_status_heads(run) for run in runs]
+        self.spans = _spans(self.wanted, fast)
+        self.size = int(self.spans[-1, 2])
+        heads = (
+            [encode_fast_head(list(self.wanted.values()))] if fast else [_status_head(*w) for w in self.wanted.items()]
+        )
+        self.heads = np.frombuffer(b"".join(heads), np.uint8).reshape(-1, HEAD_SIZE)
+        self.states = np.array([crc16(head) for head in heads], np.int64)
 
     def _sync(self) -> bytes:
         (run,) = self.runs
@@ -136,40 +137,33 @@ class GroupRead:
         if len(data) != self.size:
             return None
         octets = np.frombuffer(data, np.uint8)
-        if not (self._joint_is_right(data, octets) if self.fast else self._all_are_right(data, octets)):
+        if not self._check(octets, self.spans, self.heads, self.states):
             return None
-        at = 2 if self.fast else HEAD_SIZE + 1
-        replies = []
-        for run, (begin, size) in zip(self.runs, self._spans, strict=True):
-            rows = octets[begin : begin + size * len(run.ids)].reshape(-1, size)
-            replies.append(Rows(rows[:, at - (2 if self.fast else 1)], rows[:, at:-2]))
+        at, begin, replies = (0, HEAD_SIZE, []) if self.fast else (HEAD_SIZE, 0, [])
+        for run in self.runs:
+            size = (PART_SIZE if self.fast else STATUS_SIZE) + run.length
+            end = begin + size * len(run.ids)
+            rows = octets[begin:end].reshape(-1, size)
+            replies.append(Rows(rows[:, at], rows[:, -2 - run.length : -2]))
+            begin = end
         return replies
 
-    def _all_are_right(self, data: bytes, octets: Octets) -> bool:
-        if data.count(HEADER) != len(self.ids):  # some data is stuffed
-            return False
-        for (begin, size), (heads, states) in zip(self._spans, self._heads, strict=True):
-            if not self._check_replies(octets, begin, heads, states, size):
-                return False
-        return True
 
-    def _joint_is_right(self, data: bytes, octets: Octets) -> bool:
-        """Each CRC covers all before it, those of the servos before included."""
-        state = self._joint_state if data.startswith(self._joint) else -1
-        for (begin, size), ids in zip(self._spans, self._ids, strict=True):
-            if state < 0:
-                return False
-            state = self._check_joint(octets, begin, ids, size, state)
-        return state >= 0
+def _spans(wanted: Mapping[int, int], fast: bool) -> NDArray[np.int64]:
+    """Each servo's id, where its error byte stands and where its reply ends; see ``drivers.kernels.check_replies``."""
+    error, extra, begin = (0, PART_SIZE, HEAD_SIZE) if fast else (HEAD_SIZE, STATUS_SIZE, 0)
+    spans = np.empty((len(wanted), 3), np.int64)
+    for k, (servo, length) in enumerate(wanted.items()):
+        spans[k] = servo, begin + error, begin + extra + length
+        begin += extra + length
+    return spans
 
 
 def _words(address: int, length: int) -> bytes:
     return bytes((address & 0xFF, address >> 8, length & 0xFF, length >> 8))
 
 
-def _status_heads(run: Run) -> tuple[Octets, NDArray[np.int64]]:
-    """Bytes before the error byte of each servo's reply, (k, 8), and their CRCs, (k,)."""
-    size = run.length + 4
-    heads = [HEADER + bytes((0, servo, size & 0xFF, size >> 8, Instruction.STATUS)) for servo in run.ids]
-    matrix = np.frombuffer(b"".join(heads), np.uint8).reshape(len(heads), HEAD_SIZE)
-    return matrix, np.array([crc16(head) for head in heads], np.int64)
+def _status_head(servo: int, length: int) -> bytes:
+    """Bytes before the error byte of a servo's reply."""
+    size = length + 4
+    return HEADER + bytes((0, servo, size & 0xFF, size >> 8, Instruction.STATUS))

@@ -23,11 +23,11 @@ class Group:
 
     def __init__(self, index: Sequence[int], ids: Sequence[int], layouts: Sequence[Layout]) -> None:
         self.ids = tuple(ids)
-        self.index = np.array(index)
+        self.index = np.array(index, np.int64)
         self.layout = layouts[0]
         names = self.layout.scales
         self.scales = {name: np.array([layout.scales[name] for layout in layouts]) for name in names}
-        self.goals = GoalFrame(self.ids, self.layout.goal.address, self.layout.goal.size)
+        self.goals = GoalFrame(self.ids, self.layout.goal.address, self.layout.goal.size, self.index)
         self._slot = {servo: slot for slot, servo in enumerate(self.ids)}
 
     def slots(self, ids: Sequence[int]) -> slice | list[int]:
@@ -50,3 +50,13 @@ class Question(NamedTuple):
     def without(self, left_out: set[int]) -> Question:
         """The same for fewer servos."""
         return self._replace(ids=tuple(servo for servo in self.ids if servo not in left_out))
+
+
+def turns_of(groups: Sequence[Group], size: int) -> list[Question]:
+    """Slow values, `size` servos at a time; none where it is 0."""
+    return [
+        Question(group, block, group.ids[at : at + size])
+        for group in groups
+        for block in group.layout.slow
+        for at in range(0, len(group.ids) if size else 0, max(size, 1))
+    ]

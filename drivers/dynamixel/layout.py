@@ -17,6 +17,9 @@ Ticks = NDArray[np.int32]
 MAGNITUDE_BIT = 1024
 """XL-320: bit 10 of speed and load is the direction, the rest the magnitude."""
 
+TRIPPED = 0xFF
+"""What the watchdog's register says when it has stopped the servo."""
+
 _EDGE = 1e-6  # steps: a limit given as a whole step must not lose it to rounding
 
 
@@ -32,6 +35,7 @@ class Scale:
 
     Attributes
     ----------
+    axes : (4, n): sign, zero_rad, center and rad_per_tick, which are its rows.
     low, high : where goals may lie, steps.
     lowest, highest : what the servos take as a goal at all, steps.
     """
@@ -40,16 +44,19 @@ class Scale:
         from drivers.kernels import to_si, to_steps  # compiled: only who drives servos pays for it
 
         self._to_steps, self._to_si = to_steps, to_si
-        self.sign = np.array([-1.0 if servo.reverse else 1.0 for servo in servos])
-        self.zero_rad = np.array([servo.zero_rad for servo in servos], dtype=np.float64)
-        self.center = np.array([float(table.center) for table in tables])
-        self.rad_per_tick = np.array([table.rad_per_tick for table in tables])
+        sign = [-1.0 if servo.reverse else 1.0 for servo in servos]
+        zero_rad = [servo.zero_rad for servo in servos]
+        self.axes = np.array(
+            [sign, zero_rad, [table.center for table in tables], [table.rad_per_tick for table in tables]], np.float64
+        )
+        self.sign, self.zero_rad, self.center, self.rad_per_tick = self.axes
         reach = np.array([(servo.min_rad, servo.max_rad) for servo in servos], dtype=np.float64)
         ends = [self._steps(reach[:, 0]), self._steps(reach[:, 1])]
         top = np.array([table.ticks_per_turn - 1 for table in tables])
-        self.low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), 0, top).astype(np.int32)
-        self.high = np.clip(np.floor(np.maximum(*ends) + _EDGE), self.low, top).astype(np.int32)
-        self.lowest, self.highest = np.zeros_like(self.low), top.astype(np.int32)
+        low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), 0, top)
+        high = np.clip(np.floor(np.maximum(*ends) + _EDGE), low, top)
+        self._bounds = np.array([low, high, np.zeros_like(top), top], np.int32)
+        self.low, self.high, self.lowest, self.highest = self._bounds
 
     def _steps(self, angle_rad: Floats) -> Floats:
         steps: Floats = self.center + (self.zero_rad + self.sign * angle_rad) / self.rad_per_tick
@@ -77,16 +84,18 @@ class Scale:
         (n,) float64 : the angles of the new goals.
         """
         sent: Floats = np.empty(len(steps))
-        self._to_steps(
-            angle_rad, self.sign, self.zero_rad, self.center, self.rad_per_tick,
-            self.low, self.high, self.lowest, self.highest, steps, sent,
-        )  # fmt: skip
+        self._to_steps(angle_rad, self.axes, self._bounds, steps, sent)
         return sent
 
-    def measured(self, ticks: Floats, speed: Floats, current: Floats, seen_s: Floats, now_s: float) -> Floats:
-        """Angles (rad), speeds and currents with the angle's sign, and ages (s) of what was measured; (4, n)."""
-        out: Floats = np.empty((4, len(ticks)))
-        self._to_si(ticks, speed, current, seen_s, now_s, self.sign, self.zero_rad, self.center, self.rad_per_tick, out)
+    def measured(self, known: Floats, now_s: float) -> Floats:
+        """Angles (rad), speeds and currents with the angle's sign, and ages (s), (4, n).
+
+        Parameters
+        ----------
+        known : (at least 4, n): position in steps, speed, current, and when they were measured.
+        """
+        out: Floats = np.empty((4, known.shape[1]))
+        self._to_si(known, self.axes, now_s, out)
         return out
 
     def narrow(self, index: int, low: int, high: int) -> None:

@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 from dynamixel_sdk import protocol2_packet_handler, robotis_def
 
 from drivers.dynamixel import packet
-from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Rows, Run
+from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Quick, Rows, Run
 from drivers.dynamixel.packet import Instruction, StatusPacket, StatusReader, encode_instruction
 from drivers.dynamixel.port import Port
 
@@ -192,20 +192,27 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
             return got._replace(missing=got.missing + left_out)
         return Exchange(_replies(group.runs, got), left_out, False)
 
-    def read_rows(self, port: Port, group: GroupRead) -> list[Rows] | Exchange:
+    def read_rows(self, port: Port, group: GroupRead, sweep: Quick | None = None) -> list[Rows] | Exchange:
         """Ask a group that was made before. None of it may be in ``port.suspects``.
+
+        Parameters
+        ----------
+        sweep : takes what it can by itself.
 
         Returns
         -------
-        list of Rows : what every servo said, run by run, when all is as it should be; otherwise an Exchange with
-            whatever arrived.
+        list of Rows : what every servo said, run by run, when all is as it should be (nothing more where `sweep`
+            has taken it); otherwise an Exchange with whatever arrived.
         """
         port.suspects.update(group.wanted)  # until they have answered, so also when this is interrupted
         self.send(port, group.frame)
         try:
             port.expect(group.size)
+            if sweep is not None:
+                sweep.prepare()
             data = self._fill(port, group.size)
-            rows = group.decode(data)
+            taken = sweep is not None and sweep.take(data, port.clock())
+            rows = [] if taken else group.decode(data)
             if rows is not None:
                 port.suspects.difference_update(group.wanted)
                 return rows
@@ -255,12 +262,9 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):
         Once the first have come, the others are known to take their time on the wire: sleeping through it costs
         one awakening instead of one for every few bytes.
         """
-        data = port.link.read(port.deadline_s)
-        while data and len(data) < size:
-            port.nap(size - len(data))
-            more = port.link.read(port.deadline_s)
-            if not more:
-                break
+        data = more = port.link.read(port.deadline_s)
+        while more and len(data) < size:
+            more = port.more(size - len(data))
             data += more
         return data
 

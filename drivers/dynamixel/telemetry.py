@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from drivers.bus import BusReport, BusState, Flags
 from drivers.dynamixel.frames import Octets, Rows
-from drivers.dynamixel.groups import Group, Question
-from drivers.dynamixel.layout import Block, Scale, Ticks, layout_of
+from drivers.dynamixel.groups import Group, Question, turns_of
+from drivers.dynamixel.layout import TRIPPED, Block, Scale, Ticks, layout_of
 from drivers.dynamixel.packet import ALERT
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Exchange, group_read
+from drivers.dynamixel.sweep import Sweep, sealed
 from drivers.telling import Teller
 
 log = logging.getLogger(__name__)
@@ -29,7 +30,6 @@ FAILED_PINGS = 3
 """Pings without an answer that one cycle may wait for."""
 JOINT_FAILURES = 2
 """Fast reads in a row that nobody answers before plain ones are used."""
-TRIPPED = 0xFF
 _VITAL = ("temperature", "hardware", "torque", "watchdog")
 _SLOW = frozenset({"hardware", "voltage", "temperature"})
 
@@ -59,11 +59,11 @@ class Telemetry:
         self.report = report
         self._feedback, self._may_be_fast, self._slow_group = feedback, fast, max(slow_group, 0)
         n = len(self.ids)
-        self._ticks, self._speed, self._current = (np.full(n, np.nan) for _ in range(3))
-        self._volts, self._celsius = np.full(n, np.nan), np.full(n, np.nan)
-        self._seen_s = np.full(n, -np.inf)
-        self._fresh, self._torque = np.zeros(n, bool), np.zeros(n, bool)
-        self._error, self._hardware = np.zeros(n, np.uint8), np.zeros(n, np.uint8)
+        self._known = np.full((6, n), np.nan)
+        self._ticks, self._speed, self._current, self._seen_s, self._volts, self._celsius = self._known
+        self._octets = np.zeros((4, n), np.uint8)
+        self._error, self._hardware = self._octets[:2]
+        self._torque, self._fresh = self._octets[2:].view(bool)
         self._alarmed = False
         self._slow_state: tuple[NDArray[Any], ...] | None = None
         self._place = {servo: index for index, servo in enumerate(self.ids)}
@@ -93,23 +93,14 @@ class Telemetry:
         self._feedbacks = [Question(group, group.layout.feedback, group.ids) for group in self._groups]
         self._fast = self._may_be_fast and all(table.fast_read for table in tables.values())
         self._joint_failures = 0
+        self._sweep: Sweep | None = None
         self._ticks[:] = np.nan  # the servos may have been moved since
         self._seen_s[:] = -np.inf
         for known in (self._missed, self._silent, self._tripped, self._forgetful):
             known.clear()
         self._urgent: deque[Question] = deque()
-        self._turns = self._rota()
+        self._turns = turns_of(self._groups, self._slow_group)
         self._turn, self._turn_s = 0, -np.inf
-
-    def _rota(self) -> list[Question]:
-        """Slow values, some servos at a time; none where the size is 0."""
-        size = self._slow_group
-        return [
-            Question(group, block, group.ids[at : at + size])
-            for group in self._groups
-            for block in group.layout.slow
-            for at in range(0, len(group.ids) if size else 0, max(size, 1))
-        ]
 
     def started(self, ids: Sequence[int]) -> None:
         """Torque of these servos was read back as on."""
@@ -122,6 +113,8 @@ class Telemetry:
 
     def take_tripped(self) -> list[int]:
         """Servos whose watchdog was found tripped since the last call."""
+        if not self._tripped:
+            return []
         found, self._tripped = sorted(self._tripped), set()
         return found
 
@@ -131,22 +124,36 @@ class Telemetry:
 
     def take_forgetful(self) -> list[int]:
         """Servos that have lost their pointers since the last call: they have been rebooted, or were without power."""
+        if not self._forgetful:
+            return []
         found, self._forgetful = sorted(self._forgetful), set()
         return found
 
     def send_goals(self, ticks: Ticks) -> None:
         """One sync write per group, all handed over at once. ``(n,)`` steps."""
-        self._packets.tell(self._port, b"".join([group.goals.encode(ticks[group.index]) for group in self._groups]))
+        self._packets.tell(self._port, b"".join([group.goals.encode(ticks) for group in self._groups]))
 
-    def cycle(self, clock: Callable[[], float], running: bool) -> None:
+    def cycle(self, clock: Callable[[], float], running: bool, scale: Scale) -> BusState:
         """Bring back who can be brought back, read everybody, and ask some for one slow value."""
         self._fresh[:] = False
-        if self._port.suspects:
+        if self._port.suspects or self._silent:
             self._revive(clock())
-        self._ask(self._feedbacks, clock, running, self._fast)
+        sweep = None if self._port.suspects else self._sweep_of(scale)
+        self._ask(self._feedbacks, clock, running, self._fast, sweep)
         turn = self._urgent.popleft() if self._urgent else self._next_turn(clock())
         if turn is not None:
             self._ask([turn], clock, running)
+        elif sweep is not None and sweep.state is not None:
+            return sweep.state
+        return self.state(scale, clock())
+
+    def _sweep_of(self, scale: Scale) -> Sweep:
+        """The usual read of everybody in one go."""
+        sweep = self._sweep
+        if sweep is None or sweep.axes is not scale.axes or sweep.read.fast != self._fast:
+            read = group_read(tuple([question.run for question in self._feedbacks]), self._fast)
+            sweep = self._sweep = Sweep(self._feedbacks, read, self._octets, self._known, scale.axes, self._told)
+        return sweep
 
     def ask_watchdogs(self, clock: Callable[[], float]) -> None:
         """Look at every servo's watchdog now."""
@@ -156,12 +163,8 @@ class Telemetry:
     def state(self, scale: Scale, now: float) -> BusState:
         """Everything known, in SI units."""
         silent = np.isin(self.ids, self._silent) if self._silent else np.zeros(len(self.ids), bool)
-        if self._slow_state is None:
-            slow = (self._error, self._volts, self._celsius, self._hardware, self._torque)
-            self._slow_state = tuple(sealed(array.copy()) for array in slow)
-        error, volts, celsius, hardware, torque = self._slow_state
-        measured = scale.measured(self._ticks, self._speed, self._current, self._seen_s, now)
-        position, velocity, current, age = sealed(measured)
+        error, volts, celsius, hardware, torque = self._told()
+        position, velocity, current, age = sealed(scale.measured(self._known, now))
         return BusState(
             time_s=now,
             position_rad=position,
@@ -177,11 +180,21 @@ class Telemetry:
             torque=torque,
         )
 
+    def _told(self) -> tuple[NDArray[Any], ...]:
+        """Error, supply, temperature, hardware error and torque, read-only; new arrays only where something changed."""
+        if self._slow_state is None:
+            slow = (self._error, self._volts, self._celsius, self._hardware, self._torque)
+            self._slow_state = tuple(sealed(array.copy()) for array in slow)
+        return self._slow_state
+
     # ------------------------------------------------------------------ who answers
 
     def _revive(self, now: float) -> None:
         """Ping who missed its time: at once the first time, then one silent servo a second."""
         suspects, failed = self._port.suspects, 0
+        for servo in [i for i in self._silent if i not in suspects]:  # it answered another question, as in recover()
+            self._silent.remove(servo)
+            self._returned(servo)
         for servo in [i for i in self.ids if i in suspects and i not in self._silent]:
             if self._packets.revive(self._port, servo):
                 self._missed.discard(servo)
@@ -204,9 +217,12 @@ class Telemetry:
                 self._silent.rotate(-1)
                 return
             self._silent.popleft()
-            self._missed.discard(servo)
-            self._look_at(servo)  # it may have lost its supply, and its torque with it
-            self._say("servo %s answers again", self._registers.label(servo))
+            self._returned(servo)
+
+    def _returned(self, servo: int) -> None:
+        self._missed.discard(servo)
+        self._look_at(servo)  # it may have lost its supply, and its torque with it
+        self._say("servo %s answers again", self._registers.label(servo))
 
     def _note_missing(self, missing: Sequence[int], corrupt: bool) -> None:
         for servo in missing:
@@ -233,14 +249,28 @@ class Telemetry:
 
     # ------------------------------------------------------------------ what they say
 
-    def _ask(self, questions: list[Question], clock: Callable[[], float], running: bool, fast: bool = False) -> None:
-        """One transaction for all questions: a sync read, or a bulk read where there are several."""
+    def _ask(
+        self,
+        questions: list[Question],
+        clock: Callable[[], float],
+        running: bool,
+        fast: bool = False,
+        sweep: Sweep | None = None,
+    ) -> None:
+        """One transaction for all questions: a sync read, or a bulk read where there are several.
+
+        `sweep` asks them too, and may take the replies.
+        """
         suspects = self._port.suspects
         asked = [question.without(suspects) for question in questions] if suspects else questions
         asked = [question for question in asked if question.ids]
         got: list[Rows] | Exchange = Exchange({}, (), False)
         if asked:
-            got = self._packets.read_rows(self._port, group_read(tuple([q.run for q in asked]), fast))
+            read = group_read(tuple([q.run for q in asked]), fast) if sweep is None else sweep.read
+            got = self._packets.read_rows(self._port, read, sweep)
+        if sweep is not None and sweep.state is not None:
+            self._joint_failures = 0
+            return
         now = clock()
         if isinstance(got, Exchange):
             self._note_missing([i for question in questions for i in question.ids if i in suspects], got.corrupt)
@@ -367,9 +397,3 @@ class Telemetry:
                 self.report.count("watchdog", servo)
                 self._say("watchdog of servo %s tripped", self._registers.label(servo))
         self._tripped.update(found)
-
-
-def sealed(array: NDArray[Any]) -> NDArray[Any]:
-    """The array itself, read-only from now on."""
-    array.flags.writeable = False
-    return array

@@ -26,8 +26,11 @@ EARLY_S = 80e-6
 """How long before bytes are due the server wakes: the system wakes it late by about that much."""
 
 LINGER_S = 800e-6
-"""How long the server of a wire that takes time stays awake after a reply, for a client that writes again at once: a
-real wire is not slow to wake up. For one that paces itself it sleeps."""
+"""How long the server of a wire that takes time sleeps lightly after a reply, for a client that writes again at once: a
+real wire is not slow to wake up. For one that paces itself it sleeps as long as it can."""
+DOZE_S = 100e-6
+"""A light sleep: too short for the processor to be switched off. Without any the server, where it has real-time
+priority, would keep the system itself from carrying the bytes of its pseudo-terminal."""
 
 Control = int | socket.socket
 """Where commands to the server come from: a descriptor, or (the only thing that Windows can wait for) a socket."""
@@ -123,7 +126,7 @@ class PortServer:
             due = min(due, self._read_s + PAUSE_S)
         now_s = time.monotonic()
         if self._prompt and now_s - self._said_s < LINGER_S:
-            return 0.0
+            return min(DOZE_S, max(due - now_s, 0.0))
         return None if due == float("inf") else max(due - now_s, 0.0)
 
     def _receive(self) -> None:

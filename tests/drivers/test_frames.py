@@ -88,7 +88,7 @@ def test_the_request_is_a_sync_read_or_a_bulk_read_by_who_is_asked() -> None:
 @examples(deadline=None)
 @given(st.lists(st.integers(-(2**31), 2**31 - 1), min_size=2, max_size=2))
 def test_goals_make_the_packet_that_the_codec_makes(goals: list[int]) -> None:
-    frame = GoalFrame((5, 250), 116, 4)
+    frame = GoalFrame((5, 250), 116, 4, np.array([0, 1]))
     for values in (goals, [0, 0x00FDFFFF], goals[::-1]):
         rows = b"".join(
             bytes((i,)) + v.to_bytes(4, "little", signed=True) for i, v in zip((5, 250), values, strict=True)
@@ -96,7 +96,7 @@ def test_goals_make_the_packet_that_the_codec_makes(goals: list[int]) -> None:
         expected = encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, b"\x74\0\4\0" + rows)
         assert frame.encode(np.array(values, np.int32)) == expected
     small = encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, b"\x1e\0\2\0\5\x10\x02")
-    assert GoalFrame((5,), 30, 2).encode(np.array([0x210])) == small
+    assert GoalFrame((5,), 30, 2, np.array([1])).encode(np.array([7, 0x210], np.int32)) == small
 
 
 def test_fewer_servos_of_a_run() -> None:

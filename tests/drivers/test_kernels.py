@@ -31,3 +31,26 @@ def test_travel_that_was_not_used_is_saved_up_to_a_burst() -> None:
     np.testing.assert_allclose(last, [0.05, -1.0])
     assert kernels.spend_travel(last.copy(), speed, 100.0, 0.2, saved, last) == 0
     np.testing.assert_allclose(saved, [0.1, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("data", "sign", "value"),
+    [
+        (b"\xfe\xff", kernels.UNSIGNED, 0xFFFE),
+        (b"\xfe\xff", kernels.TWOS_COMPLEMENT, -2),
+        (b"\xff\xff\xff\x7f", kernels.TWOS_COMPLEMENT, 2**31 - 1),
+        (b"\x03\x04", kernels.SIGN_MAGNITUDE, -3),
+        (b"\x03\x00", kernels.SIGN_MAGNITUDE, 3),
+        (b"", kernels.TWOS_COMPLEMENT, 0),
+    ],
+)
+def test_registers_of_every_kind_of_sign(data: bytes, sign: int, value: int) -> None:
+    octets = np.frombuffer(b"\x55\x55" + data, np.uint8)
+    assert kernels.register(octets, 1, np.array([1, len(data), sign])) == value
+
+
+def test_a_header_is_found_only_as_a_whole() -> None:
+    data = np.frombuffer(b"\xff\xff\xfd\xff\xff", np.uint8)
+    assert kernels.has_header(data, 0, 3)
+    assert not kernels.has_header(data, 0, 2)
+    assert not kernels.has_header(data, 1, 5)

@@ -5,6 +5,7 @@ Numbers S5 to S12 as in drivers/dynamixel/sdk.py. Everything runs over real pseu
 
 from __future__ import annotations
 
+import math
 import struct
 import threading
 import time
@@ -15,7 +16,7 @@ import pytest
 import serial
 
 from drivers.dynamixel.packet import Instruction, InstructionPacket, encode_status
-from drivers.dynamixel.port import Port
+from drivers.dynamixel.port import DOZE_LATE_S, DOZE_S, NAP_EARLY_S, Port
 from drivers.dynamixel.sdk import Packets
 from drivers.errors import DriverError, PortLost
 from tests.drivers.wire import Wire
@@ -163,6 +164,35 @@ def test_s12_waiting_does_not_spin(wire: Wire, ours: tuple, theirs: Client, monk
     assert spins > 20, "the bare SDK waits without spinning by now"
     theirs[0].ser.close()
     assert reads_while_waiting(ours[0].link, "read", ours, monkeypatch) <= 3
+
+
+def test_a_reply_is_slept_through_and_its_end_awaited_lightly(monkeypatch: pytest.MonkeyPatch) -> None:
+    port = Port("unused", margin_s=0.05)
+    now, naps, asked = 0.0, [], []
+
+    def sleep(seconds: float) -> None:
+        nonlocal now
+        naps.append(seconds)
+        now += seconds
+
+    def read(deadline_s: float) -> bytes:
+        nonlocal now
+        asked.append(deadline_s)
+        now = max(now, min(deadline_s, last_s))
+        return b"x" if now >= last_s else b""
+
+    port.clock, port.sleep = lambda: now, sleep
+    monkeypatch.setattr(port.link, "read", read)
+    port.deadline_s, last_s = 0.055, 0.005
+    assert port.more(500) == b"x"
+    assert naps == [pytest.approx(0.005 - NAP_EARLY_S)]
+    assert max(asked) <= last_s + DOZE_S, "so the processor is awake when it comes"
+    now, last_s, port.deadline_s = 0.0, math.inf, 0.055
+    asked.clear()
+    assert port.more(20) == b""
+    assert len(naps) == 1, "a sleep as short as this is none"
+    assert now == port.deadline_s
+    assert len(asked) <= (0.0002 + DOZE_LATE_S) / DOZE_S + 3, "then it is awaited in one go"
 
 
 @pytest.mark.parametrize("baud", [123_456, 250_000, 4_500_000])

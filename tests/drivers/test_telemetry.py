@@ -63,6 +63,19 @@ def test_a_silent_servo_costs_the_others_nothing_but_a_bounded_wait(wire: Virtua
     bus.stop()
 
 
+def test_a_silent_servo_that_is_found_by_another_question_is_no_longer_silent(wire: VirtualBus, bus: Bus) -> None:
+    wire.fault("mute:2")
+    for _ in range(3):
+        state = bus.read()
+    assert state.silent.tolist() == [False, True, False]
+    wire.clear()
+    bus.recover()
+    state = bus.read()
+    assert state.fresh.all()
+    assert not state.silent.any()
+    assert bus.report().silent == ()
+
+
 def test_the_last_known_position_of_a_silent_servo_stays_and_is_marked(wire: VirtualBus, bus: Bus) -> None:
     settle(bus, [0.3, 0.3, 0.3])
     wire.fault("mute:2")
