@@ -24,7 +24,7 @@ from controller.clock import Clock, Samples
 from controller.paths import find_config
 from drivers.bus import Bus, ServoSpec
 from drivers.dynamixel.frames import GoalFrame, GroupRead, Run
-from drivers.priority import ORDINARY, take_priority
+from drivers.priority import ORDINARY, give_priority_back, take_priority
 from drivers.serialport import SerialPort
 from drivers.sim import SimulatedBus
 
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Tell = Callable[[str], None]
-Cycle = Callable[["NDArray[np.float64]"], object]
+Cycle = Callable[["NDArray[np.float64]"], "bool | NDArray[np.bool_]"]
+"""One write of goals (n,) rad and one read; who answered."""
 
 SERVOS = 24
 BAUD = 1_000_000
@@ -84,7 +85,7 @@ class Loop:
 
     Attributes
     ----------
-    rate_hz : cycles per second.
+    rate_hz : cycles per second, of those in which every servo answered.
     processor : share of one core that the calling thread used.
     cycle_ms : wall time of one write and one read.
     late_ms : how late each tick began; empty where nothing was paced.
@@ -174,12 +175,13 @@ def _bytes(path: str, seconds: float, fast: bool) -> Loop:
     goals = GoalFrame(ids, GOAL, WIDTH, np.arange(SERVOS)).encode(np.full(SERVOS, 2048, np.int32))
     read, port = GroupRead((Run(ids, POSITION, WIDTH),), fast), SerialPort(path, BAUD)
 
-    def cycle(_: object) -> None:
+    def cycle(_: object) -> bool:
         port.write(goals)
         port.write(read.frame)
         missing, deadline_s = read.size, time.monotonic() + 1.0
         while missing > 0 and (data := port.read(deadline_s)):
             missing -= len(data)
+        return missing == 0
 
     port.open()
     try:
@@ -189,15 +191,18 @@ def _bytes(path: str, seconds: float, fast: bool) -> Loop:
 
 
 def _cycle_of(bus: Bus) -> Cycle:
-    def cycle(angle_rad: NDArray[np.float64]) -> object:
+    def cycle(angle_rad: NDArray[np.float64]) -> NDArray[np.bool_]:
         bus.write(angle_rad)
-        return bus.read()
+        return bus.read().fresh
 
     return cycle
 
 
 def _theirs(path: str, seconds: float, rate_hz: float) -> Loop:
-    """The same goals and positions through the SDK's own group classes."""
+    """The same goals and positions through the SDK's own group classes, at ordinary priority: as it waits by asking
+    again and again, with a better one it keeps the system from carrying the bytes it waits for, gives up, and takes
+    late replies for those to its next question.
+    """
     import dynamixel_sdk as sdk
 
     port, packets = sdk.PortHandler(path), sdk.PacketHandler(2.0)
@@ -209,18 +214,21 @@ def _theirs(path: str, seconds: float, rate_hz: float) -> Loop:
         read.addParam(servo)
         write.addParam(servo, [0, 8, 0, 0])
 
-    def cycle(angle_rad: NDArray[np.float64]) -> object:
+    def cycle(angle_rad: NDArray[np.float64]) -> bool:
         for servo, angle in enumerate(angle_rad, 1):
             goal = 2048 + int(angle * 2048 / np.pi)
             write.changeParam(servo, [goal & 0xFF, goal >> 8, 0, 0])
         write.txPacket()
-        read.txRxPacket()
-        return [read.getData(servo, POSITION, WIDTH) for servo in range(1, SERVOS + 1)]
+        result = read.txRxPacket()
+        ticks = [read.getData(servo, POSITION, WIDTH) for servo in range(1, SERVOS + 1)]
+        return bool(result == sdk.COMM_SUCCESS and ticks)
 
+    give_priority_back()
     try:
         return measure_loop(cycle, seconds, rate_hz)
     finally:
         port.closePort()
+        take_priority()
 
 
 def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
@@ -231,12 +239,13 @@ def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
     clock = Clock(rate_hz or 1.0)
     began, used, end = time.monotonic(), time.thread_time(), time.monotonic() + seconds
     ticks = clock.run(lambda: time.monotonic() < end) if rate_hz else _without_pause(end)
-    took = [_timed(cycle, targets[k % len(targets)]) for k, _ in enumerate(ticks)]
+    done = [_timed(cycle, targets[k % len(targets)]) for k, _ in enumerate(ticks)]
     wall, used = time.monotonic() - began, time.thread_time() - used
     times = Samples()
-    for one in took:
-        times.add(one)
-    return Loop(len(took) / wall, used / wall, times.summary(), clock.jitter_ms.summary() if rate_hz else {})
+    for took, _ in done:
+        times.add(took)
+    whole = sum(bool(np.all(answered)) for _, answered in done)
+    return Loop(whole / wall, used / wall, times.summary(), clock.jitter_ms.summary() if rate_hz else {})
 
 
 def _without_pause(end_s: float) -> Iterator[float]:
@@ -244,11 +253,11 @@ def _without_pause(end_s: float) -> Iterator[float]:
         yield now
 
 
-def _timed(cycle: Cycle, angle_rad: NDArray[np.float64]) -> float:
-    """Milliseconds of one cycle."""
+def _timed(cycle: Cycle, angle_rad: NDArray[np.float64]) -> tuple[float, bool | NDArray[np.bool_]]:
+    """Milliseconds of one cycle, and who answered."""
     began = time.perf_counter()
-    cycle(angle_rad)
-    return 1e3 * (time.perf_counter() - began)
+    answered = cycle(angle_rad)
+    return 1e3 * (time.perf_counter() - began), answered
 
 
 def _targets() -> NDArray[np.float64]:

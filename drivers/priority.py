@@ -47,3 +47,9 @@ def take_priority() -> bool:
     except OSError:
         return False
     return True
+
+
+def give_priority_back() -> None:
+    """Ordinary scheduling of the calling thread again."""
+    if hasattr(os, "sched_setscheduler"):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

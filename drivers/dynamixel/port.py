@@ -16,7 +16,7 @@ NAP_LEAST_S = 0.0005
 """A shorter sleep costs more than it saves."""
 NAP_EARLY_S = 0.0006
 """How much before the last byte a sleep through a reply ends."""
-DOZE_S = 0.00005
+DOZE_S = 0.00002
 """From then on sleeps are so short: a processor that is not switched off finds its caches as it left them, and what is
 done with the reply then takes a third of the time."""
 DOZE_LATE_S = 0.0005

@@ -21,12 +21,13 @@ def test_the_limit_is_that_of_the_bytes(servos: int, baud: int, fast: bool, hz: 
 
 def test_a_paced_loop_keeps_its_rate_and_a_free_one_its_own() -> None:
     seen: list[float] = []
-    paced = measure_loop(lambda angle: seen.append(float(angle[0])), 0.2, 100.0)
+    paced = measure_loop(lambda angle: seen.append(float(angle[0])) is None, 0.2, 100.0)
     assert 0.0 < paced.rate_hz < 120.0
     assert paced.late_ms["p50"] >= 0.0
     assert np.abs(seen).max() <= 0.3
-    free = measure_loop(lambda angle: None, 0.05, 0.0)
+    free = measure_loop(lambda angle: True, 0.05, 0.0)
     assert free.rate_hz > 120.0
+    assert measure_loop(lambda angle: False, 0.02, 0.0).rate_hz == 0.0, "a cycle without an answer is none"
     assert free.late_ms == {}
 
 
