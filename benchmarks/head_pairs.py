@@ -1,7 +1,8 @@
 """How deep lips and lids pass through each other in every pair of the 52 parameters at 1.0, and in random mixtures;
 and how far seams gape.
 
-Run ``python benchmarks/head_pairs.py [HEAD] [--worst 12] [--mixtures 500]``: a minute. The bound is 0.5 mm for pairs.
+Run ``python benchmarks/head_pairs.py [--head HEAD] [--worst 12] [--mixtures 500]``: a minute. The
+bound is 0.5 mm for pairs.
 """
 
 from __future__ import annotations

@@ -25,6 +25,7 @@ from surface.fit.report import FitReport, PartReport, measure
 from surface.fit.rigging import find_jaw
 from surface.fit.seat import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.strokes import make_paint
+from surface.fit.wrap import wrap_chart
 from surface.fit.wrinkles import deepened
 from surface.head.data import HeadData, Neck, PartData
 from surface.head.file import save_data
@@ -122,7 +123,7 @@ def _fit_parts(
     parts, reports, fitted_parts = [], [], []
     steps = _Steps([p for p, _ in plan.parts], progress)
     for part, islands in plan.parts:
-        chart = make_chart(mesh, islands, normalise=part.tiled)
+        chart = part_chart(mesh, part, islands)
         fitted = fit_chart(mesh if part.follows == "skin" else _still(mesh), chart, part.wish, steps.of(part))
         parts.append(skin_part(part, chart, fitted, body))
         reports.append(measure(part.name, chart, fitted, mesh.names))
@@ -136,6 +137,11 @@ def _fit_parts(
     if body.radius > 0:
         parts += [eyeball_part(side, e, body.radius) for side, e in zip(("left", "right"), body.eyes, strict=True)]
     return parts, reports, fitted_parts
+
+
+def part_chart(mesh: FitMesh, part: PartRecipe, islands: list[Island]) -> Chart:
+    """The chart of one part of a plan: its islands in tiles, or one skin around them."""
+    return wrap_chart(mesh, islands) if part.wrapped else make_chart(mesh, islands, normalise=part.tiled)
 
 
 def _still(mesh: FitMesh) -> FitMesh:

@@ -11,6 +11,7 @@ from surface.fit.contacts import find_contacts
 from surface.fit.mends import add_mends
 from surface.fit.mesh import FitMesh
 from surface.fit.recipe import Recipe
+from surface.fit.rigging import DROOP, DROOP_RULE
 from surface.fit.wrinkles import add_wrinkles
 from surface.head.data import HeadData
 from surface.head.parameters import read_pose
@@ -24,11 +25,12 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     face = next((p for p in head.parts if p.follows == "skin" and len(p.slits) and p.name in charts), None)
     if face is None:
         return head
-    wrinkled, rules = add_wrinkles(face, charts[face.name], mesh, recipe.wrinkles)
+    rules = [DROOP_RULE] if any(g.name == DROOP for p in head.parts for g in p.groups) else []
+    wrinkled, folds = add_wrinkles(face, charts[face.name], mesh, recipe.wrinkles)
     names = tuple(p.name for p in head.parts)
     contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names)
     parts = [wrinkled if p is face else p for p in head.parts]
-    head = add_mends(replace(head, parts=parts, rules=rules, contacts=contacts), recipe.mends)
+    head = add_mends(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.mends)
     for _ in range(SETTLINGS):
         head = _settled(head)
     return head

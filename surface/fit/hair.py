@@ -16,6 +16,7 @@ from surface.fit.solve import basis
 
 Floats = NDArray[np.float64]
 DEGREES = (3, 2)
+END_LASH = 0.045  # how far from the strip's ends the first and the last lash stand
 LASH_LEAN, LASH_LIFT = 0.85, 0.5  # of a lash's length: away from the eyeball, up along it
 
 
@@ -93,7 +94,7 @@ def _comb(hairs: int, *, lean: float, thick: float) -> Floats:
     rng, root = np.random.default_rng(5), 0.22 * thick
     tops = []
     for k in range(hairs):
-        s = (k + 0.5) / hairs
+        s = END_LASH + (1.0 - 2.0 * END_LASH) * (k + 0.5) / hairs  # the outermost lean out, and stay whole
         half = thick / hairs
         tip = 1.0 - 0.35 * rng.random()
         shift = lean * (2 * s - 1) * 4 + 0.6 * (rng.random() - 0.5) / hairs

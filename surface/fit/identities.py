@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.errors import FitError
-from surface.fit.api import eyes_of, prepare, recipe_plan
-from surface.fit.chart import Chart, make_chart
+from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
+from surface.fit.chart import Chart
 from surface.fit.load import load_mesh
 from surface.fit.mesh import FitMesh
 from surface.fit.net import Net
@@ -37,7 +37,7 @@ TABLE = Path(__file__).with_name("identities.toml")
 LEAST_MM = 0.01
 LID_V, ROWS = 0.03, 9  # how far a lid reaches outside the hole in the skin, in v; where it is looked at
 SHORT_MM = 1.0  # lids that have less far to go than this, at the corners, are changed less
-TRIES, STEP, LEEWAY = 9, 0.5, (-0.4, 0.6)  # of scaling a blink; by what share of the gap; how much at most
+TRIES, STEP, LEEWAY = 14, 0.5, (-0.4, 0.8)  # of scaling a blink; by what share of the gap; how much at most
 NEAR = 8  # mesh vertices whose displacement a hair or a tooth follows
 SAME_FIT_MM = 0.5  # control points of a head that was fitted to another mesh lie further off than this, RMS
 
@@ -143,7 +143,7 @@ def fit_identities(
     shifts = np.stack([o.vertices - base.vertices for o in others])
     eyes = eyes_of(base, recipe)[0]
     eye_shifts = np.stack([eyes_of(o, recipe)[0] - eyes for o in others])
-    charts = {p.name: make_chart(base, islands, normalise=p.tiled) for p, islands in recipe_plan(base, recipe).parts}
+    charts = {p.name: part_chart(base, p, islands) for p, islands in recipe_plan(base, recipe).parts}
     moves = _part_moves(head, charts, base.vertices, shifts, eye_shifts, where)
     jaw = _jaw_shift(head, moves)
     lids = [_rims(base, charts[head.parts[0].name], eye) for eye in eyes]

@@ -15,7 +15,7 @@ from surface.fit.mesh import FitMesh
 from surface.fit.recipe import PartRecipe
 from surface.fit.refine import Fitted, fit_chart
 from surface.fit.report import PartReport, measure
-from surface.fit.rigging import lid_share, make_groups, tongue_group
+from surface.fit.rigging import lid_share, make_groups, tongue_groups
 from surface.fit.strokes import mirrored, smooth_line, uv_of
 from surface.head.data import Jaw, PartData
 
@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 STILL = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
 LASH_ROOT = 0.0145  # how far outside the hole in the skin the lashes stand, in v
 LASH_MM, LOWER_LASH_MM = 8.0, 3.2
+STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.2, 7)}  # fine enough for single hairs
+LASHES, LOWER_LASHES = 24, 14
 BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
 
 
@@ -34,7 +36,7 @@ class Body:
     jaw: Jaw
     eyes: Floats
     radius: float
-    tongue: Floats = field(default_factory=lambda: np.zeros((0, 5)))
+    tongue: Floats = field(default_factory=lambda: np.zeros((0, 7)))
 
 
 def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, body: Body) -> PartData:
@@ -42,7 +44,7 @@ def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, body: Body) -> Par
     n, skin = len(fitted.net), part.follows == "skin"
     groups, share = make_groups(fitted.points, fitted.moves, body.sources, body.jaw) if skin else ([], np.zeros(n))
     if part.material == "tongue" and skin and len(body.tongue):
-        groups.append(tongue_group(fitted.points, body.tongue, body.jaw))
+        groups += tongue_groups(fitted.points, body.tongue, body.jaw)
     slits = np.array([[c.v, c.start, c.end] for c in chart.cuts]).reshape(-1, 3)
     return PartData(
         part.name, part.material, part.follows, fitted.points, np.ones(n),
@@ -85,8 +87,8 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], bod
         for upper in (True, False):
             root, along = _lid_line(rim, upper=upper, inner_first=is_left)
             length = (LASH_MM if upper else LOWER_LASH_MM) * _length_profile(along)
-            lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=28 if upper else 16))
-    return [_strips_part("brows", "brow", brows, body), _strips_part("lashes", "lash", lashes, body)]
+            lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=LASHES if upper else LOWER_LASHES))
+    return [_strips_part(n, m, s, body) for n, m, s in (("brows", "brow", brows), ("lashes", "lash", lashes))]
 
 
 def _brow_patch(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64]) -> Floats:
@@ -134,5 +136,5 @@ def _strips_part(name: str, material: str, strips: list[Strip], body: Body) -> P
     loops = [loop + np.array([TILE * k, 0.0]) for k, s in enumerate(strips) for loop in s.loops]
     return PartData(
         name, material, "skin", points, np.ones(len(points)), knots_u, knots_v, degrees, loops, np.zeros((0, 3)),
-        (0, 0.6, 5), groups, share, lid_share(points, body.eyes, body.radius),
+        STRIP_BUDGET[material], groups, share, lid_share(points, body.eyes, body.radius),
     )  # fmt: skip

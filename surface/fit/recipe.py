@@ -21,7 +21,7 @@ RECIPES = Path(__file__).parent / "recipes"
 class PartRecipe:
     """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted.
 
-    ``tiled`` : its islands are still to be laid into tiles of their own.
+    ``tiled`` : its islands are still to be laid into tiles of their own; ``wrapped`` : one skin goes round all of them.
     """
 
     name: str
@@ -31,6 +31,7 @@ class PartRecipe:
     wish: Wish
     budget: tuple[int, float, int]
     tiled: bool = False
+    wrapped: bool = False
 
     def holds(self, vertex: float) -> bool:
         """Is the vertex in one of the ranges?"""
@@ -113,5 +114,5 @@ def _part(t: dict[str, Any]) -> PartRecipe:
     wish = {k: t[k] for k in ("points", "coarse", "neutral_mm", "shape_mm", "fair", "deepest") if k in t}
     return PartRecipe(
         t["name"], t["material"], t.get("follows", "skin"), [tuple(r) for r in t["vertices"]],
-        Wish(**wish), tuple(t["budget"]),
+        Wish(**wish), tuple(t["budget"]), wrapped=t.get("wrapped", False),
     )  # fmt: skip

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from surface.fit.mesh import FitMesh
-from surface.head.data import Group, Jaw
+from surface.head.data import Group, Jaw, Rule
 from surface.head.parameters import TONGUE_NEEDS
 from surface.head.rig import jaw_path
 
 Floats = NDArray[np.float64]
 LEAST_MM = 0.004  # displacements smaller than this are dropped
 LEAST_GROUP_MM = 0.25  # a part in which a shape moves nothing further than this does not take part in it
+DROOP = "tongueDroop"
+DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
 TILTS = ("jawForward", "jawLeft", "jawRight")
 
 
@@ -75,26 +79,43 @@ def make_groups(points: Floats, moves: Floats, sources: dict[str, list[int]], ja
     return groups, share
 
 
-def tongue_group(points: Floats, path: Floats, jaw: Jaw) -> Group:
-    """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_NEEDS`.
+def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
+    """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_NEEDS`: ``tongueOut``, straight
+    ahead, and :data:`DROOP`, which lets it hang once it is out.
 
     Parameters
     ----------
     points : (n, 3) control points of the tongue at rest.
-    path : (k, 5) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, and
-        how much of its thickness is left.
+    path : (k, 7) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, how much
+        of its thickness and of its width is left, and how much further down it hangs.
     """
     from scipy.interpolate import PchipInterpolator
 
-    z = np.clip(points[:, 2], path[0, 0], path[-1, 0])
-    middle, to_y, to_z, thickness = PchipInterpolator(path[:, 0], path[:, 1:])(z).T
-    target = points.copy()
-    target[:, 1] = to_y + thickness * (points[:, 1] - middle)
-    target[:, 2] = to_z + (points[:, 2] - z)
+    hanging = path[:, 1:6].copy()
+    hanging[:, 1] -= path[:, 6]
+    straight, hung = (
+        _along_path(points, path[0, 0], path[-1, 0], PchipInterpolator(path[:, 0], rows))
+        for rows in (path[:, 1:6], hanging)
+    )
     turn, shift = jaw_path(jaw, TONGUE_NEEDS)
-    move = target - (points @ turn.T + shift)
-    move *= np.clip((points[:, 2] - path[0, 0]) / 20.0, 0.0, 1.0)[:, None]
-    return Group("tongueOut", np.arange(len(points), dtype=np.int32), np.round(move, 4).astype(np.float32))
+    held = np.clip((points[:, 2] - path[0, 0]) / 20.0, 0.0, 1.0)[:, None]
+    ids = np.arange(len(points), dtype=np.int32)
+    moves = straight - (points @ turn.T + shift), hung - straight
+    named = zip(("tongueOut", DROOP), moves, strict=True)
+    return [Group(name, ids, np.round(held * move, 4).astype(np.float32)) for name, move in named]
+
+
+def _along_path(points: Floats, first: float, last: float, path: Callable[..., Floats]) -> Floats:
+    """Points (n, 3) moved along a path of z, its cross-sections square to the line of their middles."""
+    z = np.clip(points[:, 2], first, last)
+    middle, to_y, to_z, thickness, width = path(z).T
+    _, slope_y, slope_z, _, _ = path(z, 1).T
+    over, length = thickness * (points[:, 1] - middle), np.hypot(slope_y, slope_z)
+    return np.column_stack([
+        width * points[:, 0],
+        to_y + over * slope_z / length,
+        to_z - over * slope_y / length + (points[:, 2] - z),
+    ])  # fmt: skip
 
 
 def lid_share(points: Floats, eyes: Floats, radius: float) -> Floats:

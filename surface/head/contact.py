@@ -19,9 +19,9 @@ from surface.lists import LANES
 Floats = NDArray[np.float64]
 MEET = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
 SOFT_MM = 0.1
-PRESS_MM = (0.05, 0.15)  # so deep they may overlap: triangles cut about that off the round of both sides
+PRESS_MM = (0.25, 0.15)  # so deep lips and lids may overlap: triangles cut about that off the round of both sides
 PASSES, AGAIN_MM = 3, 0.1  # further passes take what bending left over of more than that
-RAISE = 1.7  # of what a lid sinks in: least squares hold it back, because its neighbours need not move
+RAISE = 1.85  # of what a lid sinks in: least squares hold it back, because its neighbours need not move
 LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
 TOUCH_MM = 0.05  # what rests on the eyeball keeps this far away
 STIFF = 0.02  # weight of moving no control point, beside a sample's

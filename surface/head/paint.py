@@ -20,7 +20,12 @@ from surface.errors import HeadFileError
 from surface.head.kernels import nearest_on_line
 
 Floats = NDArray[np.float64]
-BASE: dict[str, tuple[float, ...]] = {"albedo": (0.60, 0.37, 0.28), "occlusion": (1.0,), "gloss": (0.3,)}
+BASE: dict[str, tuple[float, ...]] = {
+    "albedo": (0.60, 0.37, 0.28),
+    "occlusion": (1.0,),
+    "occlusion_floor": (0.0,),  # baked shade leaves at least this much light
+    "gloss": (0.3,),
+}
 
 
 def paint_part(layers: list[dict[str, Any]], part: str, uv: Floats, where: str) -> dict[str, NDArray[np.float32]]:

@@ -34,7 +34,7 @@ _LOOK = np.array([[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] f
 _BLINK = np.array([_AT[f"eyeBlink{s}"] for s in SIDES])
 _OPENERS = np.array([[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES])
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
-TONGUE_NEEDS = 0.31  # how far the jaw opens at least to let the whole tongue out
+TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # how far the jaw opens at least to let the whole tongue out
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
 
 
@@ -63,7 +63,7 @@ def read_pose(values: NDArray[np.float64]) -> Pose:
     """Parameter values (59,) in the order of NAMES, clipped, as a pose.
 
     mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
-    opens the jaw as far as it needs.
+    opens the jaw as far as it needs, ahead of the tongue, and keeps the lips off it.
 
     Raises
     ------
@@ -75,7 +75,8 @@ def read_pose(values: NDArray[np.float64]) -> Pose:
     if np.isnan(v).any():
         raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
     v = np.minimum(np.maximum(v, _LOW), 1.0)
-    jaw = v[_JAW] = max(float(v[_JAW]), TONGUE_NEEDS * float(v[_TONGUE]))
+    needed = TONGUE_NEEDS * min(1.0, TONGUE_FIRST * float(v[_TONGUE]))
+    jaw = v[_JAW] = max(float(v[_JAW]), needed)
     shapes, angle = v[: len(SHAPES)], v[_ANGLE]
     gaze = np.array([_gaze(v[_LOOK[side]].tolist(), side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)])
     for side in (0, 1):
@@ -83,7 +84,7 @@ def read_pose(values: NDArray[np.float64]) -> Pose:
         outward = yaw * (1 - 2 * side)
         shapes[_LOOK[side]] = max(pitch, 0.0), max(-outward, 0.0), max(outward, 0.0), max(-pitch, 0.0)
         shapes[_OPENERS[side]] *= 1.0 - shapes[_BLINK[side]]  # a closing lid ends closed, wherever it started
-    shapes[_CLOSE] = min(shapes[_CLOSE], jaw)
+    shapes[_CLOSE] = min(shapes[_CLOSE], jaw - needed)
     closed = float(shapes[_CLOSE] / jaw) if jaw > 0 else 0.0
     return Pose(shapes, jaw, closed, angle[:3] * HEAD_RAD, gaze * EYE_RAD)
 

@@ -57,12 +57,16 @@ def write_shade(head: str | Path, shares: Shares) -> Path:
 
 
 def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:
-    """Multiply the parts' ``occlusion`` attribute by their shares; shares of another tessellation are passed over."""
+    """Multiply the parts' ``occlusion`` attribute by their shares; shares of another tessellation are passed over.
+
+    What is painted as ``occlusion_floor`` stays at least that light.
+    """
     for part in parts:
         share = shares.get(part.name)
         if share is not None and share.shape == (len(part.vertices), 1):
             painted = part.attributes.get("occlusion", np.float32(1.0))
-            part.attributes["occlusion"] = (painted * share).astype(np.float32)
+            floor = part.attributes.get("occlusion_floor", np.float32(0.0))
+            part.attributes["occlusion"] = np.maximum(painted * share, floor).astype(np.float32)
         for name in ("visible", "thin"):
             more = shares.get(f"{part.name}/{name}")
             if more is not None and len(more) == len(part.vertices):

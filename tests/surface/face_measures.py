@@ -15,6 +15,7 @@ from surface.jit import kernel
 
 LEAST_MM = 0.15  # shallower crossings are not looked for
 REACH_MM = 4.0  # about a point that lies inside: where surfaces must cross
+EDGE = 1e-6  # of a triangle: so near to an edge lies on it
 FAR_MM = 6.0  # beyond that a point behind a sheet belongs to something else
 
 
@@ -98,11 +99,12 @@ def way_out(points, directions, corners, normals, far, out):
 
 
 @kernel
-def near_triangle(points, corners, normals, lists, first, signed):
+def near_triangle(points, corners, normals, cut, lists, first, signed):
     """Distance ``signed (m,)`` of points (m, 3) from the nearest of triangles ``corners (t, 3, 3)``, below 0 behind it.
 
     Those of ``lists`` from ``first[k]`` to ``first[k + 1]`` are looked at for point k; ``normals (t, 3, 3)`` stand at
-    the corners. The nearest place by its region, as in Ericson, Real-Time Collision Detection (2005), 5.1.5.
+    the corners. Beyond an edge where the sheet is cut off, ``cut (t, 3)``, nothing is behind it. The
+    nearest place by its region, as in Ericson, Real-Time Collision Detection (2005), 5.1.5.
     """
     for k in range(len(points)):
         best, p = np.inf, points[k]
@@ -132,7 +134,8 @@ def near_triangle(points, corners, normals, lists, first, signed):
             if (away * away).sum() < best:
                 best = (away * away).sum()
                 facing = (away * ((1.0 - v - w) * normals[t, 0] + v * normals[t, 1] + w * normals[t, 2])).sum()
-                signed[k] = np.sqrt(best) if facing >= 0 else -np.sqrt(best)
+                beyond = (cut[t, 0] and w < EDGE) or (cut[t, 1] and v + w > 1 - EDGE) or (cut[t, 2] and v < EDGE)
+                signed[k] = np.sqrt(best) if facing >= 0 or beyond else -np.sqrt(best)
 
 
 def any_pierce(starts: np.ndarray, ends: np.ndarray, corners: np.ndarray) -> bool:
@@ -148,18 +151,35 @@ def any_pierce(starts: np.ndarray, ends: np.ndarray, corners: np.ndarray) -> boo
 
 @dataclass(frozen=True)
 class Sheet:
-    """One side of an opening: (part, ids of vertices, rows of triangles) for each part it reaches over."""
+    """One side of an opening: (part, ids of vertices, rows of triangles, which way they run) for each part it reaches
+    over. Normals are those of the triangles: a surface's own turn over in the folds of a pressed lip."""
 
     pieces: list
 
     def points(self) -> np.ndarray:
-        return np.concatenate([p.vertices[i] for p, i, _ in self.pieces]).astype(float)
+        return np.concatenate([p.vertices[i] for p, i, _, _ in self.pieces]).astype(float)
 
     def normals(self) -> np.ndarray:
-        return np.concatenate([p.normals[i] for p, i, _ in self.pieces]).astype(float)
+        """(n, 3) outward, at the points."""
+        tree = cKDTree(self.corners()[0].reshape(-1, 3))
+        return self.corner_normals().reshape(-1, 3)[tree.query(self.points())[1]]
 
     def corner_normals(self) -> np.ndarray:
-        return np.concatenate([p.normals[p.triangles[t]] for p, _, t in self.pieces]).astype(float)
+        """(t, 3, 3) the sum of what meets at each corner, whichever part it belongs to."""
+        at, flat = self.corners()
+        _, place = np.unique(np.round(at.reshape(-1, 3), 3), axis=0, return_inverse=True)
+        total = np.zeros((place.max() + 1, 3))
+        np.add.at(total, place.ravel(), np.repeat(flat, 3, axis=0))
+        return total[place.ravel()].reshape(at.shape)
+
+    def cut(self) -> np.ndarray:
+        """(t, 3) which edges, from corner k to the next, no other triangle of the sheet has."""
+        at, _ = self.corners()
+        _, place = np.unique(np.round(at.reshape(-1, 3), 3), axis=0, return_inverse=True)
+        ends = place.reshape(-1, 3)
+        pairs = np.sort(np.stack([ends, np.roll(ends, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+        _, edge, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+        return (count[edge.ravel()] == 1).reshape(-1, 3)
 
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
         """(e, 3) where each edge starts and ends."""
@@ -168,10 +188,16 @@ class Sheet:
 
     def corners(self) -> tuple[np.ndarray, np.ndarray]:
         """(t, 3, 3) corners of the triangles, (t, 3) outward normals."""
-        at = np.concatenate([p.vertices[p.triangles[t]] for p, _, t in self.pieces]).astype(float)
-        out = np.concatenate([p.normals[p.triangles[t]].mean(axis=1) for p, _, t in self.pieces]).astype(float)
-        flat = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
-        return at, flat * np.sign((flat * out).sum(axis=1))[:, None]
+        at = np.concatenate([p.vertices[p.triangles[t]] for p, _, t, _ in self.pieces]).astype(float)
+        run = np.concatenate([np.full(len(t), way) for _, _, t, way in self.pieces])
+        return at, np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) * run[:, None]
+
+
+def winding(part) -> float:
+    """1 where a part's triangles run counter-clockwise seen from outside, else -1."""
+    at = part.vertices[part.triangles].astype(float)
+    flat = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
+    return float(np.sign((flat * part.normals[part.triangles].mean(axis=1)).sum()))
 
 
 def sides(head: Head, loop: np.ndarray, lining: str, reach: float) -> tuple[Sheet, Sheet]:
@@ -196,7 +222,8 @@ def sides(head: Head, loop: np.ndarray, lining: str, reach: float) -> tuple[Shee
             own = np.concatenate([own, np.zeros(len(part.vertices) - len(own), bool)])
             side = own if wanted else ~own & (np.arange(len(own)) < len(part.mesh.uv))
             chosen = (distance < reach) & inside & side
-            pieces.append((part, np.flatnonzero(chosen), np.flatnonzero(chosen[part.triangles].all(axis=1))))
+            triangles = np.flatnonzero(chosen[part.triangles].all(axis=1))
+            pieces.append((part, np.unique(part.triangles[triangles]), triangles, winding(part)))
         out.append(Sheet(pieces))
     return out[0], out[1]
 
@@ -230,7 +257,7 @@ def _inside(a: Sheet, b: Sheet) -> tuple[np.ndarray, np.ndarray]:
     lists = cKDTree(middle).query_ball_point(points[found], distance[found] + radius)
     first = np.cumsum([0, *map(len, lists)])
     signed, near_ones = np.zeros(len(found)), np.array([t for row in lists for t in row], np.int64)
-    near_triangle(points[found], at, b.corner_normals(), near_ones, first, signed)
+    near_triangle(points[found], at, b.corner_normals(), b.cut(), near_ones, first, signed)
     found, signed = found[signed < -LEAST_MM], signed[signed < -LEAST_MM]
     out = np.zeros(len(found))
     way_out(points[found], a.normals()[found], at, flat, FAR_MM, out)
@@ -287,7 +314,7 @@ def lips_gap(head: Head, step: float = 0.1) -> float:
     window = Window((-14.0, 14.0), (-75.0, -10.0), step)
     skin = window.depth(head.part("face"))
     back = window.depth(*(head.part(n) for n in ("cavity", "teeth_upper", "teeth_lower", "tongue")))
-    return float(((back > skin) & np.isfinite(skin)).sum(axis=0).max() * step)
+    return float((back > skin).sum(axis=0).max() * step)
 
 
 def seams_gape(head: Head) -> float:
@@ -322,3 +349,46 @@ def poke(head: Head, ring: np.ndarray, window: Window, *names: str) -> float:
     beside = ~inside(at, face.vertices[ring, :2].astype(float))
     rows = out[beside]
     return float((own[rows[:, 0], rows[:, 1]] - skin[rows[:, 0], rows[:, 1]]).max(initial=0.0))
+
+
+@kernel
+def draw_backs(points, triangles, way, u0, v0, step, depth, back):
+    """As :func:`draw_depth`; ``back (h, w)`` is True where what is nearest shows its inside. ``way`` is 1 where
+    triangles run counter-clockwise seen from outside, -1 where clockwise, 0 where it does not matter."""
+    h, w = depth.shape
+    for t in range(triangles.shape[0]):
+        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
+        x0, x1 = (min(a[0], b[0], c[0]) - u0) / step, (max(a[0], b[0], c[0]) - u0) / step
+        y0, y1 = (min(a[1], b[1], c[1]) - v0) / step, (max(a[1], b[1], c[1]) - v0) / step
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if x1 < 0 or y1 < 0 or x0 > w - 1 or y0 > h - 1 or abs(area) < 1e-12:
+            continue
+        for j in range(max(0, int(np.ceil(y0))), min(h - 1, int(np.floor(y1))) + 1):
+            for i in range(max(0, int(np.ceil(x0))), min(w - 1, int(np.floor(x1))) + 1):
+                x, y = u0 + i * step, v0 + j * step
+                p = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
+                q = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
+                z = p * a[2] + q * b[2] + (1.0 - p - q) * c[2]
+                if p >= 0 and q >= 0 and p + q <= 1 and z > depth[j, i]:
+                    depth[j, i], back[j, i] = z, area * way < 0
+
+
+def seen_through(head: Head, window: Window) -> tuple[float, float]:
+    """mm^2 of a picture in which one looks right through the head, and in which one sees the back of what lies inside
+    it, as the linings of mouth and eyes, through a gap between parts."""
+    shape = tuple(int((b - a) / window.step) + 1 for a, b in (window.y, window.x))
+    depth, back = np.full(shape, -np.inf), np.zeros(shape, bool)
+    for part in head.parts:
+        if part.material not in ("brow", "lash"):
+            points = part.vertices.astype(float)
+            points = points if window.turn is None else points @ window.turn.T
+            way = 0.0 if part.name == "face" else winding(part)  # skin may fold over itself
+            draw_backs(points, part.triangles, way, window.x[0], window.y[0], window.step, depth, back)
+    there = np.isfinite(depth)
+    enclosed = ~there
+    for axis in (0, 1):
+        for way in (slice(None), slice(None, None, -1)):
+            ordered = there[way] if axis == 0 else there[:, way]
+            before = np.maximum.accumulate(ordered, axis=axis)
+            enclosed &= before[way] if axis == 0 else before[:, way]
+    return float(enclosed.sum() * window.step**2), float(back.sum() * window.step**2)

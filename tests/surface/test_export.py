@@ -1,7 +1,9 @@
 """Heads for other programs: structure of the GLB, names, shapes, the way back, OBJ, and what is refused."""
 
 import json
+import shutil
 import struct
+import subprocess
 
 import numpy as np
 import pytest
@@ -164,3 +166,18 @@ def test_trimesh_opens_it(tmp_path, head):
     assert set(scene.geometry) == {"a", "b", "tooth"}
     rest = np.concatenate([p.vertices for p in head.parts])
     np.testing.assert_allclose(1000 * scene.bounds, [rest.min(axis=0), rest.max(axis=0)], atol=1e-2)
+
+
+VALIDATE = """
+const bytes = new Uint8Array(require('fs').readFileSync(process.argv[1]));
+require('gltf-validator').validateBytes(bytes).then(r => console.log(r.issues.numErrors, r.issues.numWarnings));
+"""
+
+
+def test_the_validator_of_khronos_finds_no_fault(tmp_path, head):
+    node = shutil.which("node")
+    if node is None or subprocess.run([node, "-e", "require('gltf-validator')"], capture_output=True).returncode:
+        pytest.skip("needs node and its package gltf-validator (npm install gltf-validator, NODE_PATH)")
+    (path,) = export_head(head, tmp_path / "h.glb")
+    said = subprocess.run([node, "-e", VALIDATE, str(path)], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == ["0", "0"]

@@ -5,13 +5,14 @@ import pytest
 
 from surface.fit.mesh import FitMesh
 from surface.fit.rigging import (
+    DROOP_RULE,
     affine_fit,
     find_jaw,
     jaw_share,
     lid_share,
     make_groups,
     rigid_fit,
-    tongue_group,
+    tongue_groups,
 )  # fmt: skip
 from surface.head.data import Jaw
 from surface.head.parameters import TONGUE_NEEDS, rotation
@@ -74,11 +75,35 @@ def test_lids_hold_to_their_own_eye():
     np.testing.assert_allclose(share, [1, -1, 0, 0])
 
 
-def test_the_tongue_ends_where_its_path_says():
-    path = np.array([[30.0, -41, -41, 30, 1], [60, -41, -40, 75, 0.5], [98, -41, -45, 126, 0.5]])
-    tip = np.array([[0.0, -41.0, 98.0], [0.0, -41.0, 25.0]])
-    group = tongue_group(tip, path, JAW)
+PATH = np.array([[30.0, -41, -41, 30, 1, 1, 0], [60, -41, -40, 75, 0.5, 0.9, 0], [98, -41, -40, 126, 0.5, 0.8, 9]])
+
+
+def put_out(points: np.ndarray, amount: float) -> np.ndarray:
+    """Where points stand at tongueOut ``amount``."""
     turn, shift = jaw_path(JAW, TONGUE_NEEDS)
-    out = tip @ turn.T + shift + group.moves
-    np.testing.assert_allclose(out[0], [0, -45, 126], atol=1e-3)
-    assert np.abs(group.moves[1]).max() < 1e-6
+    out, droop = tongue_groups(points, PATH, JAW)
+    assert (out.name, droop.name) == ("tongueOut", DROOP_RULE.group)
+    return points @ turn.T + shift + amount * out.moves + amount**DROOP_RULE.power * droop.moves
+
+
+def test_the_tongue_ends_where_its_path_says():
+    tip = np.array([[0.0, -41.0, 98.0], [0.0, -41.0, 25.0]])
+    np.testing.assert_allclose(put_out(tip, 1.0)[0], [0, -49, 126], atol=1e-3)
+    assert all(np.abs(g.moves[1]).max() < 1e-6 for g in tongue_groups(tip, PATH, JAW))
+
+
+def test_the_tongue_comes_out_straight_and_hangs_at_the_end():
+    tip = np.array([[0.0, -41.0, 98.0]])
+    start, half, whole = (put_out(tip, x)[0] for x in (0.0, 0.5, 1.0))
+    assert half[1] > 0.5 * (start[1] + whole[1]) + 3.0
+    np.testing.assert_allclose(half[2], 0.5 * (start[2] + whole[2]), atol=0.5)
+
+
+def test_sections_of_the_tongue_stand_square_to_its_path():
+    section = np.array([[0.0, -47.0, 80.0], [0.0, -41.0, 80.0], [0.0, -35.0, 80.0], [8.0, -41.0, 80.0]])
+    ahead = np.array([[0.0, -41.0, 79.9], [0.0, -41.0, 80.1]])
+    low, middle, high, side = put_out(section, 1.0)
+    forward = np.subtract(*put_out(ahead, 1.0)[::-1])
+    assert abs((high - low) @ forward) < 1e-3 * np.linalg.norm(high - low) * np.linalg.norm(forward) + 2e-4
+    assert 5.9 < np.linalg.norm(high - low) < 6.1
+    assert 6.4 < side[0] - middle[0] < 7.2

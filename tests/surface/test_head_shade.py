@@ -43,3 +43,11 @@ def test_shade_darkens_what_is_painted_and_passes_over_another_mesh() -> None:
     assert part.attributes["occlusion"] == pytest.approx(np.full((count, 1), 0.25))
     apply_shade([part], {"face": np.zeros((count - 1, 1), np.float32)})
     assert part.attributes["occlusion"].min() == pytest.approx(0.25)
+
+
+def test_shade_stops_at_a_painted_floor() -> None:
+    part = skin()
+    part.attributes["occlusion_floor"] = np.full((len(part.rest), 1), 0.4, np.float32)
+    apply_shade([part], {"face": np.linspace(0.0, 1.0, len(part.rest), dtype=np.float32)[:, None]})
+    assert part.attributes["occlusion"].min() == pytest.approx(0.4)
+    assert part.attributes["occlusion"].max() == pytest.approx(1.0)
