@@ -64,10 +64,13 @@ def add_with_progress(mesh: Path, head: Path, modes: Path, console: Console) -> 
 
 
 def _shade(out: Path, console: Console) -> bool:
-    """Bake how much light reaches each vertex of the head; False without OpenGL."""
+    """Bake how much light reaches each vertex of the head; False without OpenGL. Find its lean triangles."""
     from surface.errors import ViewError
+    from surface.view.lean import lean_head
     from surface.view.occlusion import shade_head
 
+    with console.status("finding fewer triangles for live pictures"):
+        lean_head(out)
     try:
         with console.status("baking shade"):
             shade_head(out)

@@ -12,6 +12,7 @@ from surface.errors import HeadFileError
 from surface.head.data import Group, HeadData, PartData
 from surface.head.file import load_data
 from surface.head.identity import load_identities, with_identities
+from surface.head.lean import apply_lean, read_lean
 from surface.head.meshes import make_surface, tessellate, unpack
 from surface.head.paint import paint_part
 from surface.head.parameters import NAMES, read_pose, rotation
@@ -63,6 +64,7 @@ class Head:
             data = with_identities(data, load_identities(path), identity, str(path))
         head = cls(data, str(path))
         apply_shade(head.parts, read_shade(path))
+        apply_lean(head.parts, read_lean(path))
         return head
 
     @property

@@ -103,10 +103,11 @@ class Offscreen:
         started = time.perf_counter()
         self.ctx.__enter__()  # another context may have been current since
         self.target.complete()
-        self.ctx.finish()
-        self._fit_target()
-        if self._pace.hurried:
+        if self._pace.hurried:  # smoothing has just waited for all that was painted: there is no more than one frame
             self.renderer.hurry()
+        else:
+            self.ctx.finish()
+        self._fit_target()
         self.renderer.update()
         self.target.paint(self.renderer, camera or Camera.front())
         if self._pace.live:

@@ -59,6 +59,11 @@ class PartBuffers:
     program : its material's program, with inputs `position`, `normal` and any of `static`.
     static : per-vertex data that never changes, by shader input name: (m, k) float32, or uint8 read as 0..1.
     interleaved : positions and normals lie in one buffer, `moving`, which somebody else fills.
+    lean : (k, 3) triangles to draw instead of the part's own; vertices that none of them has are left out.
+
+    Attributes
+    ----------
+    triangles : (k, 3) that are drawn, of the rows that :meth:`picked` keeps.
     """
 
     def __init__(
@@ -69,15 +74,17 @@ class PartBuffers:
         static: Mapping[str, np.ndarray],
         *,
         interleaved: bool = False,
+        lean: np.ndarray | None = None,
     ) -> None:
         self.part = part
-        count = len(part.vertices)
-        self._index = ctx.buffer(np.ascontiguousarray(part.triangles, np.int32).tobytes())
+        self._pick(lean)
+        count = len(self.picked(part.vertices))
+        self._index = ctx.buffer(np.ascontiguousarray(self.triangles, np.int32).tobytes())
         self._static: list[moderngl.Buffer] = []
         content: list[tuple[Any, ...]] = []
         for name, data in static.items():
             kind = "f1" if data.dtype == np.uint8 else "f"
-            self._static.append(ctx.buffer(np.ascontiguousarray(data).tobytes()))
+            self._static.append(ctx.buffer(np.ascontiguousarray(self.picked(data)).tobytes()))
             content.append((self._static[-1], f"{data.shape[1]}{kind}", name))
         if interleaved:
             self.moving = ctx.buffer(reserve=2 * count * _VERTEX_BYTES, dynamic=True)
@@ -92,11 +99,27 @@ class PartBuffers:
         kept = [entry for entry in content if entry[2] in program]
         self._array = ctx.vertex_array(program, kept, index_buffer=self._index, index_element_size=4)
         if not interleaved:
-            self.upload([(0, count)])
+            self.upload([(0, len(part.vertices))])
+
+    def _pick(self, lean: np.ndarray | None) -> None:
+        """Choose the triangles to draw and, of the part's vertices, those that they have."""
+        self.triangles = self.part.triangles
+        self._kept: np.ndarray | None = None
+        if lean is not None:
+            self._kept, at = np.unique(lean, return_inverse=True)
+            self.triangles = at.reshape(-1, 3).astype(np.int32)
+
+    def picked(self, rows: np.ndarray) -> np.ndarray:
+        """Of ``rows`` (m, ...), one a vertex of the part, those that are drawn."""
+        return rows if self._kept is None else rows.take(self._kept, axis=0)
 
     def upload(self, ranges: Sequence[tuple[int, int]]) -> int:
         """Send the vertex ranges [start, stop) that changed; returns how many vertices were sent."""
-        vertices, normals = self.part.vertices, self.part.normals
+        if not ranges:
+            return 0
+        vertices, normals = self.picked(self.part.vertices), self.picked(self.part.normals)
+        if self._kept is not None:
+            ranges = np.searchsorted(self._kept, np.reshape(ranges, (-1, 2))).tolist()
         touched = sum(stop - start for start, stop in ranges)
         if touched > _WHOLE * len(vertices):
             self._position.orphan()

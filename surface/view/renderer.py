@@ -67,9 +67,10 @@ class Renderer:
         self._detail = materials.detail_texture(ctx)
         self._background = Rectangles(ctx, self._programs["background"])
         parts = sorted(head.parts, key=lambda part: materials.order(part.material))
+        self._hurried = False
+        self._static: dict[str, materials.Arrays] = {}
         self._parts = [self._buffers(part) for part in parts]
         self._camera: tuple[Camera, float] | None = None
-        self._hurried = False
         #: Grows with every upload: equal revisions, cameras and themes draw equal pictures.
         self.revision = 0
         self._apply_theme()
@@ -77,20 +78,23 @@ class Renderer:
     def _buffers(self, part: Any) -> PartBuffers:
         """Buffers of `part` with what its material reads."""
         material = materials.of(part.material)
-        static = material.static(part, self.theme, self.openings)
+        if part.name not in self._static:  # as the part is at rest: later the face may have moved
+            self._static[part.name] = material.static(part, self.theme, self.openings)
         elsewhere = self.evaluator.name == "gpu"
-        return PartBuffers(self.ctx, part, self._programs[material.program], static, interleaved=elsewhere)
+        lean = getattr(part, "lean", {}).get(self.quality) if self._hurried else None
+        program = self._programs[material.program]
+        static = self._static[part.name]
+        return PartBuffers(self.ctx, part, program, static, interleaved=elsewhere, lean=lean)
 
     def hurry(self) -> None:
         """From now on pictures move and are drawn in software: leave out what costs much and shows little."""
-        if self._hurried or self.quality != "full" or self.evaluator.name != "cpu":
+        if self._hurried or self.evaluator.name != "cpu":
             return
         self._hurried, old = True, self._programs["skin"]
         self._programs["skin"] = materials.skin_program(self.ctx, self.quality, self.theme, hurried=True)
         for i, buffers in enumerate(self._parts):
-            if materials.of(buffers.part.material).program == "skin":
-                self._parts[i] = self._buffers(buffers.part)
-                buffers.release()
+            self._parts[i] = self._buffers(buffers.part)
+            buffers.release()
         old.release()
         self._camera = None
         self._apply_theme()
@@ -135,7 +139,7 @@ class Renderer:
         found = Silhouette(size, camera.matrix(size[0] / size[1]), camera.near)
         for buffers in [p for p in self._parts if p.part.material not in materials.INSIDE] or self._parts:
             vertices = self.evaluator.vertices(buffers.part)
-            if vertices is None or not found.add(vertices, buffers.part.triangles):
+            if vertices is None or not found.add(buffers.picked(vertices), buffers.triangles):
                 return Bands.whole(size)
         return found.bands()
 

@@ -42,13 +42,11 @@ class Target:
         inner = max(1, round(size[0] * self.scale)), max(1, round(size[1] * self.scale))
         self._texture = ctx.texture(size, 4)
         self.picture = ctx.framebuffer([self._texture])
-        self._raw = _texture(ctx, inner, ctx.NEAREST) if self.samples == 1 else None
+        self._raw = _texture(ctx, inner) if self.samples == 1 else None
         self._drawn = _drawn(ctx, inner, self.samples, self._raw)
         self._kick = ctx.framebuffer([ctx.renderbuffer((1, 1), 4)])
-        self._smooth = None if self.samples > 1 else Pass(ctx, "smooth.frag", inner)
-        self._enlarge = Pass(ctx, "enlarge.frag", size) if inner != size else None
-        self._small = _texture(ctx, inner, ctx.LINEAR) if self._enlarge else None
-        self._small_frame = ctx.framebuffer([self._small]) if self._small else None
+        shader = "smooth.frag" if inner == size else "enlarge.frag"
+        self._smooth = None if self._raw is None else Pass(ctx, shader, size, inner)
         self._last: Bands | None = None
         self._pending: Bands | None = None
         self._backdrop: tuple[object, object] | None = None
@@ -85,11 +83,8 @@ class Target:
         if self._smooth is None or self._raw is None:
             self.picture.scissor = bands.box()
             self._ctx.copy_framebuffer(self.picture, self._drawn)
-        elif self._enlarge is None or self._small_frame is None or self._small is None:
-            self._smooth.render(self._raw, self.picture, boxes)
-        else:
-            self._smooth.render(self._raw, self._small_frame, boxes)
-            self._enlarge.render(self._small, self.picture, enlarged(boxes, inner, self.size))
+            return
+        self._smooth.render(self._raw, self.picture, boxes if inner == self.size else enlarged(boxes, inner, self.size))
 
     def read(self) -> np.ndarray:
         """The picture, (height, width, 3) uint8, top row first."""
@@ -100,15 +95,13 @@ class Target:
 
     def release(self) -> None:
         """Give the buffers back."""
-        for step in (self._smooth, self._enlarge):
-            if step is not None:
-                step.release()
-        for frame in (self._drawn, self.picture, self._kick, self._small_frame):
-            if frame is not None:
-                for attachment in (*frame.color_attachments, frame.depth_attachment):
-                    if attachment is not None:
-                        attachment.release()
-                frame.release()
+        if self._smooth is not None:
+            self._smooth.release()
+        for frame in (self._drawn, self.picture, self._kick):
+            for attachment in (*frame.color_attachments, frame.depth_attachment):
+                if attachment is not None:
+                    attachment.release()
+            frame.release()
 
 
 class Pass:
@@ -116,15 +109,15 @@ class Pass:
 
     Parameters
     ----------
-    shader : its file; reads the sampler `picture` and, where it has it, the uniform `pixel`.
-    size : (width, height) of what it writes, in the units `pixel` is one of.
+    shader : its file; reads the sampler `picture` and, where it has it, the uniform `share`.
+    size, inner : (width, height) of what it writes and of what it reads; `share` is the second beside the first.
     """
 
-    def __init__(self, ctx: moderngl.Context, shader: str, size: tuple[int, int]) -> None:
+    def __init__(self, ctx: moderngl.Context, shader: str, size: tuple[int, int], inner: tuple[int, int]) -> None:
         self._ctx, self._size = ctx, size
         self._program = build(ctx, ("background.vert",), (shader,))
         self._array = Rectangles(ctx, self._program)
-        put(self._program, {"picture": 1, "pixel": (1.0 / size[0], 1.0 / size[1])})
+        put(self._program, {"picture": 1, "share": np.divide(inner, size)})
 
     def render(self, source: moderngl.Texture, target: moderngl.Framebuffer, boxes: np.ndarray) -> None:
         """Fill `boxes` (k, 4), pixels from left and bottom to right and top, of `target`."""
@@ -149,11 +142,10 @@ def _drawn(
     return ctx.framebuffer([colour], ctx.depth_renderbuffer(size, samples=many))
 
 
-def _texture(ctx: moderngl.Context, size: tuple[int, int], kind: int) -> moderngl.Texture:
-    """A texture read with filter `kind`, its edge pixels standing for what lies outside."""
+def _texture(ctx: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
+    """A texture whose texels are read one by one."""
     texture = ctx.texture(size, 4)
-    texture.filter = (kind, kind)
-    texture.repeat_x = texture.repeat_y = False
+    texture.filter = (ctx.NEAREST, ctx.NEAREST)
     return texture
 
 

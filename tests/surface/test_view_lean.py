@@ -1,0 +1,52 @@
+"""surface.view.lean"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_head import small_head
+
+from surface.head import Head
+from surface.head.part import border_edges
+from surface.view import Camera, Offscreen
+from surface.view.lean import lean_triangles
+
+SHAPES: tuple[dict[str, float], ...] = (
+    {},
+    {"jawOpen": 1.0, "mouthUpperUpLeft": 1.0},
+    {"leftEyeYaw": 1.0, "rightEyeYaw": -1.0, "leftEyePitch": -1.0, "eyeWideRight": 1.0, "jawOpen": 0.3},
+)
+CAMERAS = (Camera.front(), Camera.profile(), Camera.around(40.0, -15.0))
+
+
+def pictures(head: Head, quality: str) -> np.ndarray:
+    with Offscreen(head, (320, 240), quality=quality) as screen:
+        made = []
+        for shapes, camera in zip(SHAPES, CAMERAS, strict=True):
+            screen.draw(head.values(shapes), camera)
+            made.append(screen.read().astype(int))
+    return np.array(made)
+
+
+@pytest.mark.parametrize(("quality", "mean"), [("full", 0.2), ("fast", 0.6)])
+def test_fewer_triangles_draw_hardly_another_picture(gl: None, root: Path, quality: str, mean: float) -> None:
+    head = Head.load(root / "configs" / "heads" / "ict")
+    assert sum(len(p.lean[quality]) for p in head.parts) < 0.7 * sum(len(p.triangles) for p in head.parts)
+    lean = pictures(head, quality)
+    for p in head.parts:
+        p.lean = {}
+    off = np.abs(pictures(head, quality) - lean).max(axis=3)
+    assert 0.0 < off.mean() < mean
+    assert (off > 48).mean() < 2e-3
+
+
+def test_where_parts_meet_all_vertices_stay() -> None:
+    head = Head(small_head())
+    lean = lean_triangles(head)
+    for part in head.parts:
+        full, fast = lean[f"{part.name}/full"], lean[f"{part.name}/fast"]
+        assert len(fast) <= len(full) < len(part.triangles)
+        own = set(map(tuple, border_edges(part.triangles).tolist()))
+        assert set(map(tuple, border_edges(fast).tolist())) == own
