@@ -251,6 +251,7 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     stage = load_stage(orders.stage, parameters)
     mailbox = Mailbox(orders.mailbox, len(parameters.names))
     body = _body(orders, stage, mailbox, parameters)
+    take_turns_quickly()  # before torque: what collects garbage later finds little to look at
     body.start()
     try:
         _tell(pipe, Ready())
@@ -300,6 +301,7 @@ def _obey(body: Body, pipe: Connection) -> bool:
     match wish:
         case Begin():
             take_turns_quickly()
+            take_priority()  # the links' threads too: one put off while it holds the interpreter puts off the servos
             body.begin()
         case Hold(index, None):
             state.release([index], now)
