@@ -24,7 +24,7 @@ from controller.clock import Clock, Samples
 from controller.paths import find_config
 from drivers.bus import Bus, ServoSpec
 from drivers.dynamixel.frames import GoalFrame, GroupRead, Run
-from drivers.priority import ORDINARY, give_priority_back, take_priority
+from drivers.priority import ORDINARY, give_priority_back, take_priority, take_turns_quickly
 from drivers.serialport import SerialPort
 from drivers.sim import SimulatedBus
 
@@ -118,10 +118,11 @@ def bench_bus(seconds: float, tell: Tell, *, face: bool = False) -> list[tuple[s
     face : also run the whole program, face and body, and measure the jitter of its bus.
     """
     specs = [ServoSpec(i + 1, f"servo{i + 1}", "xl330-m288", -1.0, 1.0, 6.0, 60.0) for i in range(SERVOS)]
+    take_turns_quickly()
     realtime = take_priority()
     title = f"{SERVOS} servos at {BAUD} baud, wire-timed" + (", real-time priority" if realtime else "")
     with SimulatedBus(specs, process=True, wire=True, baud=BAUD) as wire:
-        free = [_round(wire, specs, seconds / ROUNDS, k, tell) for k in range(ROUNDS)]
+        free = [_round(wire, specs, seconds, k, tell) for k in range(ROUNDS)]
         tell(f"sync read, {PACED_HZ} Hz")
         paced = _ours(wire, specs, seconds, False, PACED_HZ)
         tell(f"sync read, {JITTER_HZ} Hz")
@@ -239,25 +240,19 @@ def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
     clock = Clock(rate_hz or 1.0)
     began, used, end = time.monotonic(), time.thread_time(), time.monotonic() + seconds
     ticks = clock.run(lambda: time.monotonic() < end) if rate_hz else _without_pause(end)
-    done = [_timed(cycle, targets[k % len(targets)]) for k, _ in enumerate(ticks)]
+    times, answers = Samples(), []
+    for k, _ in enumerate(ticks):
+        start = time.perf_counter()
+        answers.append(cycle(targets[k % len(targets)]))
+        times.add(1e3 * (time.perf_counter() - start))
     wall, used = time.monotonic() - began, time.thread_time() - used
-    times = Samples()
-    for took, _ in done:
-        times.add(took)
-    whole = sum(bool(np.all(answered)) for _, answered in done)
+    whole = sum(bool(np.all(answered)) for answered in answers)
     return Loop(whole / wall, used / wall, times.summary(), clock.jitter_ms.summary() if rate_hz else {})
 
 
 def _without_pause(end_s: float) -> Iterator[float]:
     while (now := time.monotonic()) < end_s:
         yield now
-
-
-def _timed(cycle: Cycle, angle_rad: NDArray[np.float64]) -> tuple[float, bool | NDArray[np.bool_]]:
-    """Milliseconds of one cycle, and who answered."""
-    began = time.perf_counter()
-    answered = cycle(angle_rad)
-    return 1e3 * (time.perf_counter() - began), answered
 
 
 def _targets() -> NDArray[np.float64]:
