@@ -34,3 +34,8 @@ def test_what_is_wrong_is_told(program: ModuleType) -> None:
     bad = program.Soak(wrong=1, jumps=2, left_on=3, growth_mb=6.0)
     bad.logs["x"] = 1
     assert len(bad.failures) == 5
+    once = program.Soak(apart=True, errors={"reset": 1, "torque_lost": 1})
+    once.faults["forget"] = 1
+    assert once.failures == []
+    once.errors["torque_lost"] = 2
+    assert len(once.failures) == 1
