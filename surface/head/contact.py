@@ -26,6 +26,7 @@ LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that 
 TOUCH_MM = 0.05  # what rests on the eyeball keeps this far away
 STIFF = 0.02  # weight of moving no control point, beside a sample's
 FELT = 0.004  # of a sample: points with less are left out of it
+FAR_MM = 20.0  # from every sample: points of large spans that stand there would move brow and chin
 LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
 
 
@@ -48,7 +49,7 @@ class Feeler:
         self._sinking = np.empty(len(start) - 1)
         self._place(surface.points)
         self._thick = np.clip(self._samples[..., 2].ravel() - self.radius, TOUCH_MM, LID_MM)
-        self.ids, self._lift = _inverse(start, ids, share)
+        self.ids, self._lift = _inverse(start, ids, share, surface.points)
         self._away = _spread(contact).T @ self._lift
         self._overlap = np.zeros((2, contact.places.shape[1]))
         self.push = np.zeros_like(self._overlap)
@@ -176,12 +177,15 @@ def _nearest(points: Floats, others: Floats) -> Floats:
     return np.sqrt(np.maximum(square.min(axis=1), 0.0))
 
 
-def _inverse(start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats) -> tuple[NDArray[np.int64], Floats]:
-    """Control points (k,) that reach the samples, and (s, k) how far each moves, in least squares, for every sample
-    that shall move by 1. A point that mostly acts elsewhere is left alone."""
+def _inverse(
+    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats, points: Floats
+) -> tuple[NDArray[np.int64], Floats]:
+    """Control points (k,) of ``points (n, 3)`` that reach the samples, and (s, k) how far each moves, in least squares,
+    for every sample that shall move by 1. A point that mostly acts elsewhere, or stands far off, is left alone."""
     dense = np.zeros((len(start) - 1, int(ids.max()) + 1))
     np.add.at(dense, (np.repeat(np.arange(len(dense)), np.diff(start)), ids), share)
     used = np.flatnonzero(dense.max(axis=0) > LEAST_SHARE).astype(np.int64)
+    used = used[_nearest(points[used], dense @ points[: dense.shape[1]]) < FAR_MM]
     dense = dense[:, used]
     normal = dense.T @ dense
     normal[np.diag_indices(len(used))] += STIFF

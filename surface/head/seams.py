@@ -28,7 +28,7 @@ class Zipper:
 
     def __init__(self, seam: Seam, first: HeadPart, second: HeadPart) -> None:
         self.first, self.second = first, second
-        a_ids, a_at = _along(first, seam.uv_a)
+        a_ids, a_at = _around(*_along(first, seam.uv_a), seam.uv_a)
         b_ids, b_at = _along(second, seam.uv_b)
         inside = (b_at >= a_at.min(initial=np.inf) - SAME) & (b_at <= a_at.max(initial=-np.inf) + SAME)
         self.ids, at = b_ids[inside], b_at[inside]
@@ -39,15 +39,17 @@ class Zipper:
         self.low, self.high = a_ids[after - 1], a_ids[after]
         gap = np.maximum(a_at[after] - a_at[after - 1], 1e-12)
         self.share = np.clip((at - a_at[after - 1]) / gap, 0.0, 1.0).astype(np.float32)
-        self._fill(a_ids, a_at, at)
+        self._fill(a_ids, a_at, *_around(self.ids, at, seam.uv_a))
 
-    def _fill(self, a_ids: NDArray[np.int64], a_at: NDArray[np.float64], at: NDArray[np.float64]) -> None:
-        """Slivers over the first part's vertices that stand between two neighbours of the second part's."""
+    def _fill(
+        self, a_ids: NDArray[np.int64], a_at: NDArray[np.float64], ids: NDArray[np.int64], at: NDArray[np.float64]
+    ) -> None:
+        """Slivers over the first part's vertices ``a_ids`` that stand between neighbours ``ids`` of the second's."""
         directed = {(int(p), int(q)) for p, q in self.second.borders}
         triangles: list[NDArray[np.int64]] = []
         copies: list[int] = []
         like: list[int] = []
-        for p, q, start, end in zip(self.ids, self.ids[1:], at, at[1:], strict=False):
+        for p, q, start, end in zip(ids, ids[1:], at, at[1:], strict=False):
             between = a_ids[(a_at > start + SAME) & (a_at < end - SAME)]
             forward = (int(p), int(q)) in directed
             if not len(between) or not (forward or (int(q), int(p)) in directed):
@@ -84,3 +86,13 @@ def _along(part: HeadPart, line: NDArray[np.float64]) -> tuple[NDArray[np.int64]
     ids, at = ids[on], at[on]
     order = np.argsort(at, kind="stable")
     return ids[order], at[order]
+
+
+def _around(
+    ids: NDArray[np.int64], at: NDArray[np.float64], line: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Vertices along a polyline; on a closed one the last also stands before the first, the first after the last."""
+    if not len(ids) or not np.array_equal(line[0], line[-1]):
+        return ids, at
+    length = len(line) - 1.0
+    return np.concatenate([ids[-1:], ids, ids[:1]]), np.concatenate([at[-1:] - length, at, at[:1] + length])

@@ -14,8 +14,9 @@ from surface.head.part import border_edges
 from surface.jit import kernel
 
 LEAST_MM = 0.15  # shallower crossings are not looked for
-REACH_MM = 4.0  # about a point that lies inside: where surfaces must cross
+ROUND_MM = 4.0  # radius of lips and lids: two that cross by d do so over sqrt(2 r d) on either side
 EDGE = 1e-6  # of a triangle: so near to an edge lies on it
+LEAN = 0.5  # of a point's ways out, beside its normal: at a fold one of them may slip through
 FAR_MM = 6.0  # beyond that a point behind a sheet belongs to something else
 
 
@@ -231,9 +232,9 @@ def sides(head: Head, loop: np.ndarray, lining: str, reach: float) -> tuple[Shee
 def crossing(one: Sheet, other: Sheet) -> tuple[float, np.ndarray]:
     """How deep points of either side lie in the flesh of the other, and where the deepest lies (3,).
 
-    A point lies inside if the nearest place of the other side shows it its back, and its own way out, along its
-    normal, first meets the other side from behind. That counts only within REACH_MM of a place where an edge of one
-    side pierces a triangle of the other: at folds and at the sheets' cut edges, backs are seen without any crossing.
+    A point lies inside if the nearest place of the other side shows it its back, and most of its own ways out, along
+    its normal and leaning from it, first meet the other side from behind. That counts only near a place where an
+    edge of one side pierces a triangle of the other: at folds, backs are seen without any crossing.
     """
     worst, where = 0.0, np.zeros(3)
     for a, b in ((one, other), (other, one)):
@@ -241,7 +242,8 @@ def crossing(one: Sheet, other: Sheet) -> tuple[float, np.ndarray]:
         for k in np.argsort(-depths):
             if depths[k] <= worst:
                 break
-            if _pierced(one, other, points[k]) or _pierced(other, one, points[k]):
+            reach = float(np.sqrt(2.0 * ROUND_MM * depths[k]))
+            if _pierced(one, other, points[k], reach) or _pierced(other, one, points[k], reach):
                 worst, where = float(depths[k]), points[k]
     return worst, where
 
@@ -259,17 +261,27 @@ def _inside(a: Sheet, b: Sheet) -> tuple[np.ndarray, np.ndarray]:
     signed, near_ones = np.zeros(len(found)), np.array([t for row in lists for t in row], np.int64)
     near_triangle(points[found], at, b.corner_normals(), b.cut(), near_ones, first, signed)
     found, signed = found[signed < -LEAST_MM], signed[signed < -LEAST_MM]
-    out = np.zeros(len(found))
-    way_out(points[found], a.normals()[found], at, flat, FAR_MM, out)
-    return points[found], np.minimum(-signed, out)
+    ways = np.zeros((5, len(found)))
+    for way, out in zip(_fan(a.normals()[found]), ways, strict=True):
+        way_out(points[found], np.ascontiguousarray(way), at, flat, FAR_MM, out)
+    return points[found], np.minimum(-signed, np.median(ways, axis=0))
 
 
-def _pierced(one: Sheet, other: Sheet, place: np.ndarray) -> bool:
-    """Does an edge of one sheet within REACH_MM of a place (3,) go through a triangle of the other?"""
+def _fan(normals: np.ndarray) -> np.ndarray:
+    """(5, m, 3) unit vectors: normals, and four that lean away from each."""
+    n = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    side = np.cross(n, np.where(np.abs(n[:, :1]) < 0.7, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
+    leaning = [n + LEAN * d for d in (side, -side, np.cross(n, side), -np.cross(n, side))]
+    return np.stack([n, *leaning]) / np.sqrt([[[1.0]], *[[[1.0 + LEAN**2]]] * 4])
+
+
+def _pierced(one: Sheet, other: Sheet, place: np.ndarray, reach: float) -> bool:
+    """Does an edge of one sheet within ``reach`` mm of a place (3,) go through a triangle of the other?"""
     start, end = one.edges()
-    near = np.linalg.norm(0.5 * (start + end) - place, axis=1) < REACH_MM
+    near = np.linalg.norm(0.5 * (start + end) - place, axis=1) < reach
     at, _ = other.corners()
-    close = np.linalg.norm(at.mean(axis=1) - place, axis=1) < REACH_MM + 2.0
+    close = np.linalg.norm(at.mean(axis=1) - place, axis=1) < reach + 2.0
     return any_pierce(start[near], end[near], at[close])
 
 
