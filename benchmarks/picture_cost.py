@@ -114,7 +114,7 @@ def main() -> None:
         table.add_row(name, *(f"{t:.2f}" for t in times))
     console.print(table)
     found = bench.pixels()
-    triangles = sum(len(p.part.triangles) for p in bench.parts)
+    triangles = sum(len(p.triangles) for p in bench.parts)
     console.print(f"{sum(found.values())} pixels of {triangles} triangles; {bench.screen.ctx.info['GL_RENDERER']}")
     console.print("  ".join(f"{name} {count}" for name, count in found.items()))
     bench.screen.close()
