@@ -24,9 +24,9 @@ PASSES, AGAIN_MM = 3, 0.1  # further passes take what bending left over of more 
 RAISE = 1.85  # of what a lid sinks in: least squares hold it back, because its neighbours need not move
 LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
 TOUCH_MM = 0.05  # what rests on the eyeball keeps this far away
-STIFF = 0.02  # weight of moving no control point, beside a sample's
+STIFF = (0.02, 0.06)  # for lips and lids: weight of moving no control point, beside a sample's
 FELT = 0.004  # of a sample: points with less are left out of it
-FAR_MM = 20.0  # from every sample: points of large spans that stand there would move brow and chin
+FAR_MM = 18.0  # from every sample: points of large spans that stand there would move brow and chin
 LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
 
 
@@ -49,7 +49,7 @@ class Feeler:
         self._sinking = np.empty(len(start) - 1)
         self._place(surface.points)
         self._thick = np.clip(self._samples[..., 2].ravel() - self.radius, TOUCH_MM, LID_MM)
-        self.ids, self._lift = _inverse(start, ids, share, surface.points)
+        self.ids, self._lift = _inverse(start, ids, share, surface.points, STIFF[self.radius > 0])
         self._away = _spread(contact).T @ self._lift
         self._overlap = np.zeros((2, contact.places.shape[1]))
         self.push = np.zeros_like(self._overlap)
@@ -178,7 +178,7 @@ def _nearest(points: Floats, others: Floats) -> Floats:
 
 
 def _inverse(
-    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats, points: Floats
+    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats, points: Floats, stiff: float
 ) -> tuple[NDArray[np.int64], Floats]:
     """Control points (k,) of ``points (n, 3)`` that reach the samples, and (s, k) how far each moves, in least squares,
     for every sample that shall move by 1. A point that mostly acts elsewhere, or stands far off, is left alone."""
@@ -188,7 +188,7 @@ def _inverse(
     used = used[_nearest(points[used], dense @ points[: dense.shape[1]]) < FAR_MM]
     dense = dense[:, used]
     normal = dense.T @ dense
-    normal[np.diag_indices(len(used))] += STIFF
+    normal[np.diag_indices(len(used))] += stiff
     return used, np.ascontiguousarray(np.linalg.solve(normal, dense.T).T)
 
 

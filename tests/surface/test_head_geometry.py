@@ -61,6 +61,19 @@ def test_lids_do_not_cut_the_eyeball_at_any_gaze(head, pitch, closed):
         assert max(eye_cut(head, side, "face") for side in (0, 1)) < 0.5
 
 
+@pytest.mark.parametrize("side", ["Left", "Right"])
+def test_a_wink_closes_the_eye_and_leaves_the_brow_where_it_is(head, side):
+    head.pose(head.values({}))
+    face = head.part("face")
+    brow = np.array([35.0 if side == "Left" else -35.0, 62.0, 105.0])
+    near = np.argsort(np.linalg.norm(face.vertices - brow, axis=1))[:20]
+    rest = face.vertices[near].copy()
+    cheek = {f"cheekSquint{side}": 0.6, f"mouthSmile{side}": 0.5, f"eyeSquint{side}": 0.4}
+    head.pose(head.values(cheek | {f"eyeBlink{side}": 1.0}))
+    assert eye_opening(head, int(side == "Right"))[0] < 0.25
+    assert np.abs((face.vertices[near] - rest)[:, 2]).max() < 0.5
+
+
 def test_eyes_at_rest_are_calm(head):
     head.pose(head.values({}))
     iris = 0.49 * head.data.eye_radius
