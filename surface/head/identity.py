@@ -7,7 +7,6 @@ go on from there.
 from __future__ import annotations
 
 import math
-import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.errors import HeadFileError
+from surface.head.beside import beside, read_beside, write_beside
 from surface.head.data import Group, HeadData, PartData
 
 FILE = "identities.npz"
@@ -63,21 +63,16 @@ def load_identities(head: str | Path) -> dict[str, Identity]:
     ------
     HeadFileError : the file is damaged.
     """
-    path = identities_path(head)
-    if not path.is_file():
-        return {}
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as z:
-            names = [str(n) for n in z["names"]]
-            eyes, jaw = _finite(z["eyes"], (len(names), 2, 3)), _finite(z["jaw"], (len(names), 3))
-            fit = int(z["fit"])
-            groups = [_groups(z, k, name) for k, name in enumerate(names)]
-            changes = [_changes(z, k) for k in range(len(names))]
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as e:
-        raise HeadFileError(
-            f"{path}: {e}", hint="make it again: omote fit MESH -o FOLDER --keep --identities FILE"
-        ) from e
-    return {n: Identity(n, groups[k], changes[k], eyes[k], jaw[k], fit) for k, n in enumerate(names)}
+    hint = "make it again: omote fit MESH -o FOLDER --keep --identities FILE"
+    return read_beside(identities_path(head), _identities, hint) or {}
+
+
+def _identities(z: np.lib.npyio.NpzFile) -> dict[str, Identity]:
+    """By name, as a file has them."""
+    names = [str(n) for n in z["names"]]
+    eyes, jaw = _finite(z["eyes"], (len(names), 2, 3)), _finite(z["jaw"], (len(names), 3))
+    fit = int(z["fit"])
+    return {n: Identity(n, _groups(z, k, n), _changes(z, k), eyes[k], jaw[k], fit) for k, n in enumerate(names)}
 
 
 def _indices(a: NDArray) -> NDArray[np.int32]:
@@ -115,7 +110,6 @@ def _changes(z: np.lib.npyio.NpzFile, k: int) -> dict[str, list[Group]]:
 
 def save_identities(head: str | Path, identities: list[Identity]) -> Path:
     """Keep identities beside a head; returns the file's path."""
-    path = identities_path(head)
     arrays: dict[str, NDArray] = {
         "fit": np.array(identities[0].fit if identities else 0, np.int64),
         "names": np.array([i.name for i in identities]),
@@ -128,17 +122,12 @@ def save_identities(head: str | Path, identities: list[Identity]) -> Path:
         for part, changes in identity.changes.items():
             for g in changes:
                 arrays |= {f"{k}/change_ids/{part}/{g.name}": g.ids, f"{k}/change_moves/{part}/{g.name}": g.moves}
-    new = path.with_suffix(".npz.new")
-    with new.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
-    new.replace(path)
-    return path
+    return write_beside(identities_path(head), arrays)
 
 
 def identities_path(head: str | Path) -> Path:
     """Where a head's identities are kept."""
-    folder = Path(head)
-    return (folder.parent if folder.suffix == ".toml" else folder) / FILE
+    return beside(head, FILE)
 
 
 def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mapping[str, float], where: str) -> HeadData:

@@ -6,7 +6,6 @@ parts that it does not fit, or a head without it, are drawn with all their trian
 
 from __future__ import annotations
 
-import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import HeadFileError
+from surface.head.beside import beside, read_beside, write_beside
 from surface.head.part import HeadPart
 
 FILE = "lean.npz"
@@ -25,8 +24,7 @@ Triangles = NDArray[np.int32]
 
 def lean_path(head: str | Path) -> Path:
     """Where a head's lean triangles are kept; ``head`` is its folder or its head.toml."""
-    folder = Path(head)
-    return (folder.parent if folder.suffix == ".toml" else folder) / FILE
+    return beside(head, FILE)
 
 
 def read_lean(head: str | Path) -> dict[str, Triangles]:
@@ -37,25 +35,14 @@ def read_lean(head: str | Path) -> dict[str, Triangles]:
     HeadFileError : the file is damaged.
     """
     path = lean_path(head)
-    if not path.is_file():
-        return {}
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            return {name: stored[name].astype(np.int32) for name in stored.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise HeadFileError(f"{path}: {error}", hint=f"delete {path}, or make the head again: omote fit") from error
+    hint = f"delete {path}, or make the head again: omote fit"
+    return read_beside(path, lambda z: {name: z[name].astype(np.int32) for name in z.files}, hint) or {}
 
 
 def write_lean(head: str | Path, parts: Iterable[HeadPart], lean: Mapping[str, Triangles]) -> Path:
     """Keep triangles by "PART/LEVEL" beside the head; returns the file's path."""
-    path = lean_path(head)
-    packed: dict[str, Any] = {name: _packed(triangles) for name, triangles in lean.items()}
-    packed |= {part.name: made_from(part) for part in parts}
-    temporary = path.with_suffix(".part")
-    with temporary.open("wb") as stream:
-        np.savez_compressed(stream, **packed)
-    temporary.replace(path)
-    return path
+    packed: dict[str, NDArray[Any]] = {name: _packed(triangles) for name, triangles in lean.items()}
+    return write_beside(lean_path(head), packed | {part.name: made_from(part) for part in parts})
 
 
 def _packed(triangles: Triangles) -> NDArray[np.unsignedinteger]:

@@ -8,14 +8,13 @@ The file belongs to one tessellation. Parts that it does not fit, or a head with
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import HeadFileError
+from surface.head.beside import beside, read_beside, write_beside
 from surface.head.part import HeadPart
 
 FILE = "occlusion.npz"
@@ -34,26 +33,16 @@ def read_shade(head: str | Path) -> dict[str, NDArray[np.float32]]:
     HeadFileError : the file is damaged.
     """
     path = shade_path(head)
-    if not path.is_file():
-        return {}
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            return {name: _rows(stored[name]) for name in stored.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise HeadFileError(f"{path}: {error}", hint=f"delete {path}, or make the head again: omote fit") from error
+    hint = f"delete {path}, or make the head again: omote fit"
+    return read_beside(path, lambda z: {name: _rows(z[name]) for name in z.files}, hint) or {}
 
 
 def write_shade(head: str | Path, shares: Shares) -> Path:
     """Keep shares (m, k), 0..1, beside the head; returns the file's path."""
-    path = shade_path(head)
     packed = {
         name: np.rint(np.clip(np.squeeze(share), 0.0, 1.0) * 255.0).astype(np.uint8) for name, share in shares.items()
     }
-    temporary = path.with_suffix(".part")
-    with temporary.open("wb") as stream:
-        np.savez_compressed(stream, **packed)
-    temporary.replace(path)
-    return path
+    return write_beside(shade_path(head), packed)
 
 
 def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:
@@ -80,5 +69,4 @@ def _rows(stored: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 def shade_path(head: str | Path) -> Path:
     """Where a head's shade is kept."""
-    folder = Path(head)
-    return (folder.parent if folder.suffix == ".toml" else folder) / FILE
+    return beside(head, FILE)

@@ -21,8 +21,10 @@ FAR_MM = 6.0  # beyond that a point behind a sheet belongs to something else
 
 
 @kernel
-def draw_depth(points, triangles, u0, v0, step, depth):
-    """Z-buffer of triangles (t, 3) of points (m, 3): ``depth (h, w)`` keeps the largest z; row 0 is the lowest y."""
+def draw_depth(points, triangles, way, u0, v0, step, depth, back):
+    """Z-buffer of triangles (t, 3) of points (m, 3): ``depth (h, w)`` keeps the largest z, row 0 is the lowest y, and
+    ``back (h, w)`` is True where what is nearest shows its inside. ``way`` is 1 where triangles run counter-clockwise
+    seen from outside, -1 where clockwise, 0 where it does not matter."""
     h, w = depth.shape
     for t in range(triangles.shape[0]):
         a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
@@ -36,11 +38,9 @@ def draw_depth(points, triangles, u0, v0, step, depth):
                 x, y = u0 + i * step, v0 + j * step
                 p = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
                 q = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
-                r = 1.0 - p - q
-                if p >= 0 and q >= 0 and r >= 0:
-                    z = p * a[2] + q * b[2] + r * c[2]
-                    if z > depth[j, i]:
-                        depth[j, i] = z
+                z = p * a[2] + q * b[2] + (1.0 - p - q) * c[2]
+                if p >= 0 and q >= 0 and p + q <= 1 and z > depth[j, i]:
+                    depth[j, i], back[j, i] = z, area * way < 0
 
 
 @dataclass(frozen=True)
@@ -55,11 +55,11 @@ class Window:
     def depth(self, *parts) -> np.ndarray:
         """(h, w) the nearest z of parts, -inf where there is none."""
         shape = tuple(int((b - a) / self.step) + 1 for a, b in (self.y, self.x))
-        out = np.full(shape, -np.inf)
+        out, back = np.full(shape, -np.inf), np.zeros(shape, bool)
         for p in parts:
             points = p.vertices.astype(float)
             points = points if self.turn is None else points @ self.turn.T
-            draw_depth(points, p.triangles, self.x[0], self.y[0], self.step, out)
+            draw_depth(points, p.triangles, 0.0, self.x[0], self.y[0], self.step, out, back)
         return out
 
 
@@ -363,28 +363,6 @@ def poke(head: Head, ring: np.ndarray, window: Window, *names: str) -> float:
     return float((own[rows[:, 0], rows[:, 1]] - skin[rows[:, 0], rows[:, 1]]).max(initial=0.0))
 
 
-@kernel
-def draw_backs(points, triangles, way, u0, v0, step, depth, back):
-    """As :func:`draw_depth`; ``back (h, w)`` is True where what is nearest shows its inside. ``way`` is 1 where
-    triangles run counter-clockwise seen from outside, -1 where clockwise, 0 where it does not matter."""
-    h, w = depth.shape
-    for t in range(triangles.shape[0]):
-        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
-        x0, x1 = (min(a[0], b[0], c[0]) - u0) / step, (max(a[0], b[0], c[0]) - u0) / step
-        y0, y1 = (min(a[1], b[1], c[1]) - v0) / step, (max(a[1], b[1], c[1]) - v0) / step
-        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if x1 < 0 or y1 < 0 or x0 > w - 1 or y0 > h - 1 or abs(area) < 1e-12:
-            continue
-        for j in range(max(0, int(np.ceil(y0))), min(h - 1, int(np.floor(y1))) + 1):
-            for i in range(max(0, int(np.ceil(x0))), min(w - 1, int(np.floor(x1))) + 1):
-                x, y = u0 + i * step, v0 + j * step
-                p = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
-                q = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
-                z = p * a[2] + q * b[2] + (1.0 - p - q) * c[2]
-                if p >= 0 and q >= 0 and p + q <= 1 and z > depth[j, i]:
-                    depth[j, i], back[j, i] = z, area * way < 0
-
-
 def seen_through(head: Head, window: Window) -> tuple[float, float]:
     """mm^2 of a picture in which one looks right through the head, and in which one sees the back of what lies inside
     it, as the linings of mouth and eyes, through a gap between parts."""
@@ -395,7 +373,7 @@ def seen_through(head: Head, window: Window) -> tuple[float, float]:
             points = part.vertices.astype(float)
             points = points if window.turn is None else points @ window.turn.T
             way = 0.0 if part.name == "face" else winding(part)  # skin may fold over itself
-            draw_backs(points, part.triangles, way, window.x[0], window.y[0], window.step, depth, back)
+            draw_depth(points, part.triangles, way, window.x[0], window.y[0], window.step, depth, back)
     there = np.isfinite(depth)
     enclosed = ~there
     for axis in (0, 1):
