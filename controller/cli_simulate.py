@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 from rich.console import Console
@@ -72,13 +74,13 @@ BoardBaud = Annotated[int, typer.Option("--baud", min=300, help="Baud rate of th
 
 
 def _serving(
-    link: Path | None,
-    tcp: str | None,
-    wire: bool,
-    latency: float,
-    fault: list[str] | None,
-    control: Path | None,
-    watch: bool,
+    link: Link = None,
+    tcp: Tcp = None,
+    wire: Wire = False,
+    latency: Latency = 0.0,
+    fault: Faults = None,
+    control: Control = None,
+    watch: Look = False,
 ) -> Serving:
     """Where and how to serve: a link to a pseudo-terminal, or a TCP address."""
     from controller.simulating import Serving
@@ -91,17 +93,32 @@ def _serving(
     return Serving(where, wire, latency / 1000.0, tuple(fault or ()), control, watch)
 
 
+def _served(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with the options of :func:`_serving` for its first parameter, ``how``."""
+    own, shared = _options(command)[1:], _options(_serving)
+
+    def run(**given: Any) -> None:
+        how = _serving(**{option.name: given.pop(option.name) for option in shared})
+        command(how, **given)
+
+    run.__name__, run.__doc__ = command.__name__, command.__doc__
+    run.__annotations__ = {}
+    run.__signature__ = inspect.Signature([*own, *shared])  # type: ignore[attr-defined]
+    return run
+
+
+def _options(command: Callable[..., Any]) -> list[inspect.Parameter]:
+    """A function's parameters, their annotations as objects; that of ``how`` is no option."""
+    hints = get_type_hints(command, localns={"Serving": object}, include_extras=True)
+    return [p.replace(annotation=hints[p.name]) for p in inspect.signature(command).parameters.values()]
+
+
+@_served
 def simulate_dynamixel(
+    how: Serving,
     ids: Ids = "1-24",
     model: Annotated[str, typer.Option(help="Model of the servos.")] = "xl330-m288",
     baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    latency: Latency = 0.0,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
 ) -> None:
     """Serve simulated Dynamixel servos until interrupted; prints `ready PATH`. AX and MX models speak Protocol 1.0.
 
@@ -110,20 +127,15 @@ def simulate_dynamixel(
     from controller.simulating import SimulatedId, serve_servos
 
     servos = [SimulatedId(i, model) for i in parse_ids(ids)]
-    serve_servos(servos, baud, _serving(link, tcp, wire, latency, fault, control, watch), console)
+    serve_servos(servos, baud, how, console)
 
 
+@_served
 def simulate_feetech(
+    how: Serving,
     ids: Ids = "1-6",
     model: Annotated[str, typer.Option(help="Model of the servos.")] = "sts3215",
     baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    latency: Latency = 0.0,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
 ) -> None:
     """Serve simulated Feetech STS or SCS servos until interrupted; prints `ready PATH`.
 
@@ -132,21 +144,16 @@ def simulate_feetech(
     from controller.simulating import SimulatedId, serve_servos
 
     servos = [SimulatedId(i, model) for i in parse_ids(ids)]
-    serve_servos(servos, baud, _serving(link, tcp, wire, latency, fault, control, watch), console)
+    serve_servos(servos, baud, how, console)
 
 
+@_served
 def simulate_maestro(
+    how: Serving,
     channels: Annotated[int, typer.Option(help="6 (Micro Maestro), 12, 18 or 24.")] = 24,
     device: Annotated[int, typer.Option(min=0, max=127, help="Device number, for the Pololu protocol.")] = 12,
     crc: Annotated[bool, typer.Option("--crc", help="Commands end with a CRC-7.")] = False,
     baud: BoardBaud = 115_200,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    latency: Latency = 0.0,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
 ) -> None:
     """Serve a simulated Pololu Maestro until interrupted; prints `ready PATH`.
 
@@ -159,18 +166,13 @@ def simulate_maestro(
     if channels not in MAESTRO_SIZES:
         raise ConfigError(f"--channels {channels}: no Maestro has so many", hint="6, 12, 18 or 24")
     board = Maestro(channels, time.monotonic(), device=device, crc=crc)
-    serve_board(board, baud, _serving(link, tcp, wire, latency, fault, control, watch), console)
+    serve_board(board, baud, how, console)
 
 
+@_served
 def simulate_ssc32(
+    how: Serving,
     baud: BoardBaud = 115_200,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    latency: Latency = 0.0,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
 ) -> None:
     """Serve a simulated Lynxmotion SSC-32 until interrupted; prints `ready PATH`.
 
@@ -179,11 +181,12 @@ def simulate_ssc32(
     from controller.simulating import serve_board
     from drivers.sim import Ssc32
 
-    how = _serving(link, tcp, wire, latency, fault, control, watch)
     serve_board(Ssc32(now_s=time.monotonic()), baud, how, console)
 
 
+@_served
 def simulate_text(
+    how: Serving,
     template: Annotated[
         str, typer.Option("--template", help=r"One servo's move, as in a robot file; \n and \r end a line.")
     ] = r"#{ch}P{us}\r",
@@ -195,13 +198,6 @@ def simulate_text(
     end: Annotated[str, typer.Option(help="What stands behind them.")] = "",
     ids: Ids = "1-16",
     baud: BoardBaud = 115_200,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    latency: Latency = 0.0,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
 ) -> None:
     """Serve a simulated board that reads lines of a template, until interrupted; prints `ready PATH`.
 
@@ -215,19 +211,14 @@ def simulate_text(
     texts = {name: text.replace(r"\r", "\r").replace(r"\n", "\n") for name, text in texts.items()}
     numbers = parse_ids(ids)
     board = TextBoard(texts=texts, names=[f"servo{i}" for i in numbers], ids=numbers, now_s=time.monotonic())
-    serve_board(board, baud, _serving(link, tcp, wire, latency, fault, control, watch), console)
+    serve_board(board, baud, how, console)
 
 
+@_served
 def simulate_omote(
+    how: Serving,
     names: Annotated[str, typer.Option(help="What the head takes, with commas; all parameters without it.")] = "",
     baud: BoardBaud = 115_200,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    latency: Latency = 0.0,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
 ) -> None:
     """Serve a simulated head that takes the omote line protocol, until interrupted; prints `ready PATH`.
 
@@ -238,20 +229,14 @@ def simulate_omote(
     from drivers.sim.linehead import LineHead
 
     known = [name.strip() for name in names.split(",") if name.strip()] or [*PARAMETERS.names]
-    how = _serving(link, tcp, wire, latency, fault, control, watch)
     serve_board(LineHead(known, time.monotonic()), baud, how, console)
 
 
+@_served
 def simulate_robot(
+    how: Serving,
     robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],
     bus: Annotated[str | None, typer.Option("--bus", help="Name of the bus; the first without it.")] = None,
-    link: Link = None,
-    tcp: Tcp = None,
-    wire: Wire = False,
-    latency: Latency = 0.0,
-    fault: Faults = None,
-    control: Control = None,
-    watch: Look = False,
 ) -> None:
     """Serve the simulated servos or board of a robot file, until interrupted; prints `ready PATH`.
 
@@ -259,7 +244,7 @@ def simulate_robot(
     """
     from controller.simulating import serve_robot
 
-    serve_robot(robot, bus, _serving(link, tcp, wire, latency, fault, control, watch), console)
+    serve_robot(robot, bus, how, console)
 
 
 def simulate_host(
