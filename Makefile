@@ -67,7 +67,7 @@ $(VENV)/.opengl: $(VENV)/.installed
 $(VENV)/.compiled: $(VENV)/.installed
 	@echo "Compiling the surface engine (half a minute, once) ..."
 	@$(BIN)/omote check ict
-	@$(PY) -c 'import drivers.kernels'
+	@$(PY) -c 'import drivers.kernels, controller.braking'
 	@touch $@
 
 lock: ## renew requirements.lock (needs uv)

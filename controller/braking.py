@@ -1,18 +1,23 @@
-"""One step along the braking curve of :mod:`controller.motion`, compiled: it runs for every value in every tick."""
+"""One step along the braking curve of :mod:`controller.motion`, compiled: it runs for every value in every tick.
+
+The types stand with each function so that it is compiled on import, which is before servos are under torque: compiled
+at the first tick, on a new machine, it would hold up the bus for longer than the servos' watchdog waits.
+"""
 
 from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import boolean, float64, njit, void
 from numpy.typing import NDArray
 
 from controller.parameters import Floats
 
 _TINY = 1e-12
+_ROW = float64[::1]
 
 
-@njit(cache=True, nogil=True)
+@njit([float64(float64, float64, float64, float64)], cache=True, nogil=True)
 def _braking_speed(dt: float, left: float, accel: float, response: float) -> float:
     """Speed at the end of a step of ``dt`` from which ``left`` is just enough to brake."""
     near = left / (response + 0.5 * dt)  # the linear end
@@ -21,7 +26,7 @@ def _braking_speed(dt: float, left: float, accel: float, response: float) -> flo
     return far if far > accel * response else near
 
 
-@njit(cache=True, nogil=True)
+@njit([void(float64, _ROW, _ROW, _ROW, boolean[::1], _ROW, _ROW, _ROW, _ROW, _ROW)], cache=True, nogil=True)
 def move(dt: float, target: Floats, position: Floats, velocity: Floats, limited: NDArray, speed: Floats, accel: Floats,
          response: Floats, low: Floats, high: Floats) -> None:  # fmt: skip
     """Move ``position`` and ``velocity`` towards ``target`` for ``dt`` s, in place; all are (n,).

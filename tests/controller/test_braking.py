@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from controller import braking
 from controller.braking import move
 
 DT, SPEED, ACCEL, RESPONSE = 0.01, 3.0, 40.0, 0.02
@@ -41,3 +42,9 @@ def test_it_stops_where_the_target_lies_on_the_way() -> None:
     assert step(0.001, 0.0, 0.25) == (0.001, 0.0, False)
     place, speed, _ = step(0.001, 0.0, 2.0)  # too fast to stop there
     assert (place > 0.001, speed) == (True, pytest.approx(2.0 - ACCEL * DT))
+
+
+def test_nothing_is_compiled_at_its_first_call() -> None:
+    kernels = [value for value in vars(braking).values() if hasattr(value, "signatures")]
+    assert len(kernels) == 2
+    assert all(len(kernel.signatures) == 1 and not kernel._can_compile for kernel in kernels)
