@@ -45,3 +45,13 @@ def test_locked_vertices_stay_and_so_does_their_border() -> None:
     left = Collapse(points, triangles, locked).run(1.0)
     assert set(np.unique(border_edges(left))) == set(border)
     assert len(left) < len(triangles)
+
+
+def test_no_triangle_turns_over_where_every_collapse_is_free() -> None:
+    points, triangles = sheet(12)
+    inner = ((points[:, :2] > 0) & (points[:, :2] < 12)).all(axis=1)
+    points[inner, :2] += np.random.default_rng(3).uniform(-0.3, 0.3, (inner.sum(), 2))
+    left = Collapse(points, triangles, np.random.default_rng(4).random(len(points)) < 0.2).run(1e-6)
+    area = 0.5 * np.cross(points[left[:, 1]] - points[left[:, 0]], points[left[:, 2]] - points[left[:, 0]])[:, 2]
+    assert len(left) < 0.6 * len(triangles)
+    assert (area > 0).all()
