@@ -54,6 +54,8 @@ class Clock:
     ----------
     rate_hz : ticks per second.
     now_ns, sleep_s : the time source and the way to wait; replaced in tests.
+    prompt : after a tick that took too long the next comes at once, and the deadlines move with it; else it comes at
+        the next one that is still to come. Servos want even steps; pictures want to be many.
 
     Attributes
     ----------
@@ -67,6 +69,7 @@ class Clock:
         *,
         now_ns: Callable[[], int] = time.monotonic_ns,
         sleep_s: Callable[[float], object] = time.sleep,
+        prompt: bool = False,
     ) -> None:
         if not rate_hz > 0:
             raise ValueError(f"rate_hz must be positive, not {rate_hz}")
@@ -76,6 +79,7 @@ class Clock:
         self.ticks = 0
         self._now_ns = now_ns
         self._sleep_s = sleep_s
+        self._prompt = prompt
         self._started_ns = 0
         self._last_ns = 0
 
@@ -99,6 +103,8 @@ class Clock:
         return now
 
     def _next_deadline(self, deadline: int) -> int:
+        if self._prompt:
+            return max(deadline + self.period_ns, self._last_ns)
         missed = max(0, (self._last_ns - deadline) // self.period_ns)
         self.skipped += missed
         return deadline + (missed + 1) * self.period_ns

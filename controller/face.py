@@ -201,7 +201,7 @@ class HeadlessFace:
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Draw until ``keep_going()`` is false, at most ``fps`` times a second."""
         started = time.monotonic_ns()
-        for now in Clock(self._settings.fps).run(keep_going):
+        for now in Clock(self._settings.fps, prompt=True).run(keep_going):
             values = self._values()
             self._draw(values, (now - started) / 1e9)
             self._log.add(values, now, time.monotonic_ns())

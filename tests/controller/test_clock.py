@@ -45,6 +45,14 @@ def test_a_late_tick_skips_deadlines_and_does_not_hurry() -> None:
     assert clock.skipped == 3
 
 
+def test_a_prompt_clock_ticks_at_once_after_a_late_tick_and_never_faster_than_its_rate() -> None:
+    time = Time()
+    clock = Clock(100.0, now_ns=time.now, sleep_s=time.sleep, prompt=True)
+    began = run(clock, time, [0, 35_000_000, 12_000_000, 4_000_000, 0, 0])
+    assert [b - 1_000 for b in began] == [0, 10_000_000, 45_000_000, 57_000_000, 67_000_000, 77_000_000]
+    assert clock.skipped == 0
+
+
 def test_report_counts_rate_and_jitter() -> None:
     time = Time()
     clock = Clock(50.0, now_ns=time.now, sleep_s=lambda s: time.sleep(s + 0.002))
