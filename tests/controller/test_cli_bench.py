@@ -10,13 +10,20 @@ import pytest
 from typer.testing import CliRunner
 
 from controller.cli import app
+from controller.cli_bench import console
 from controller.errors import ControllerError
 from surface.head.file import save_data
 from tests.surface.small_head import part, small_head
 
 
+@pytest.fixture(autouse=True)
+def wide_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wide enough that no title or row is broken; the console reads the terminal's width only once."""
+    monkeypatch.setattr(console, "width", 200)
+
+
 def said(*words: str) -> str:
-    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["bench", *words])
+    result = CliRunner().invoke(app, ["bench", *words])
     assert result.exit_code == 0, result.output
     return result.output
 
