@@ -54,8 +54,8 @@ def fit(
 
 
 def export(
-    head: Annotated[str, typer.Argument(help="Head: a name from configs/heads or a folder.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="File to write: .glb or .obj.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write: .glb or .obj.")],
+    head: Annotated[str, typer.Option("--head", help="Head: a name from configs/heads or a folder.")] = "ict",
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Pose it: set a parameter; may be repeated.")
     ] = None,
@@ -69,7 +69,7 @@ def export(
 ) -> None:
     """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.
 
-    Example: omote export ict -o head.glb
+    Example: omote export head.glb
     """
     from controller.exporting import export_with_progress
 

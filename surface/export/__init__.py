@@ -45,4 +45,4 @@ def export_head(head: Head, path: str | Path, pose: Mapping[str, float] | None =
             return write_obj(head, path, pose or {})
     except OSError as e:
         raise ExportError(f"{path}: cannot be written ({e})", hint="choose a folder that can be written to") from e
-    raise ExportError(f"{path}: is neither .glb nor .obj", hint="for example: -o head.glb")
+    raise ExportError(f"{path}: is neither .glb nor .obj", hint="for example: omote export head.glb")

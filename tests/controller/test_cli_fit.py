@@ -41,17 +41,17 @@ def test_fit_says_what_it_did_and_guessed(sheet):
 
 def test_export_writes_what_fit_wrote(sheet, tmp_path):
     out = tmp_path / "out.glb"
-    said = CliRunner().invoke(app, ["export", str(sheet[1]), "-o", str(out), "--set", "jawOpen=0.5"])
+    said = CliRunner().invoke(app, ["export", str(out), "--head", str(sheet[1]), "--set", "jawOpen=0.5"])
     assert said.exit_code == 0 and out.read_bytes()[:4] == b"glTF", said.output
-    back = CliRunner().invoke(app, ["export", str(sheet[1]), "-o", str(tmp_path / "out.obj")])
+    back = CliRunner().invoke(app, ["export", str(tmp_path / "out.obj"), "--head", str(sheet[1])])
     assert back.exit_code == 0 and "out_shapes" in back.output.replace("\n", "")
 
 
 @pytest.mark.parametrize(
     ("words", "kind", "message"),
     [
-        (["export", "ict", "-o", "x.fbx"], ExportError, "is neither .glb nor .obj"),
-        (["export", "ict", "-o", "x.glb", "--set", "jawOpn=1"], ParameterError, "jawOpn"),
+        (["export", "x.fbx"], ExportError, "is neither .glb nor .obj"),
+        (["export", "x.glb", "--set", "jawOpn=1"], ParameterError, "jawOpn"),
         (["fit", "none.glb", "-o", "h"], FitError, "no such mesh file"),
         (["fit", "none.glb", "-o", "h", "--unit", "ell"], FitError, "no such mesh file"),
     ],
