@@ -55,7 +55,7 @@ def bake(
 
 
 def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str, np.ndarray]:
-    """The greater of what vertices see at rest and in `open_pose` (P,), so that what opens does not stay black.
+    """The greater of what vertices see at rest and in `open_pose` (P,), so that what opens does not stay black, calmed.
 
     `open_pose` has the mouth open and the eyes shut; the head is left at rest. Options as for :func:`bake`.
     Skin also gets which way the sky lies, by "NAME/visible" (see :func:`fit_sky`), and how thin it is, by
@@ -68,11 +68,29 @@ def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str
     result: dict[str, np.ndarray] = {}
     for part in head.parts:
         shut, wide = rest[part.name], opened[part.name]
-        best = np.where(wide[:, :1] > shut[:, :1], wide, shut)
+        best = calm(np.where(wide[:, :1] > shut[:, :1], wide, shut), part.triangles)
         result[part.name] = best[:, :1]
         if part.material == "skin":
             result[f"{part.name}/visible"] = best[:, 1:] / (2.0 * SKY_RANGE) + 0.5
             result[f"{part.name}/thin"] = thinness(part)
+    return result
+
+
+def calm(values: np.ndarray, triangles: np.ndarray, passes: int = 2) -> np.ndarray:
+    """Values (m, k) of vertices half way to the mean of their neighbours, `passes` times over.
+
+    Views are few, and what neighbours differ by for that reason shows as streaks where skin stretches.
+    """
+    from scipy.sparse import coo_array
+
+    start, end = np.asarray(triangles).T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
+    ones = np.ones(2 * len(start), np.float32)
+    joined = coo_array((ones, (np.append(start, end), np.append(end, start))), shape=(len(values),) * 2).tocsr()
+    count = np.maximum(joined.sum(axis=1), 1e-9)[:, None]
+    alone = (count < 1.0)[:, 0]
+    result = np.asarray(values, np.float32)
+    for _ in range(passes):
+        result = np.where(alone[:, None], result, 0.5 * result + 0.5 * (joined @ result) / count)
     return result
 
 
