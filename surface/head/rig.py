@@ -34,6 +34,7 @@ class SkinRig:
     rest : (n, 3) float64, control points at rest; whoever changes them calls :meth:`wake`.
     points : (n, 3) float64, control points of the last pose.
     version : grows whenever ``points`` is worked out anew.
+    woken : grows with every :meth:`wake`.
     """
 
     def __init__(self, part: PartData, head: HeadData, drivers: Drivers | None = None) -> None:
@@ -50,7 +51,7 @@ class SkinRig:
         self._asked: tuple[object, ...] = ()
         self._pushes: dict[str, Floats] = {}
         self.points = np.zeros((n, 3))
-        self.version = 0
+        self.version = self.woken = 0
 
     def apply(self, pose: Pose) -> Floats:
         """Positions (n, 3) of all control points before the head turns.
@@ -70,6 +71,18 @@ class SkinRig:
     def wake(self) -> None:
         """Work everything out anew at the next pose: the points at rest have been changed."""
         self._asked = ()
+        self.woken += 1
+
+    def meet(self, pose: Pose, points: Floats) -> None:
+        """Let the part's own openings close, and what goes with others' openings follow, in control points (n, 3) that
+        everything else has moved; what the openings ask for is left in ``pose.pushes``."""
+        for feeler in self._feelers:
+            axis = optical_axis(pose.gaze[max(feeler.contact.eye, 0)])
+            self._pushes[feeler.contact.name] = feeler.apply(axis, points)
+        pose.pushes.update(self._pushes)
+        for name, follower in self._followers:
+            if name in pose.pushes:
+                follower.apply(pose.pushes[name], points)
 
     def _asks(self, pose: Pose) -> tuple[object, ...]:
         """All that the part's points depend on, to compare with the pose before."""
@@ -89,12 +102,7 @@ class SkinRig:
             swing_jaw(self.rest, self._open, turn, shift, full_turn * pose.jaw, full_shift * pose.jaw,
                       pose.jaw, undo, self.points)  # fmt: skip
         self._lids.apply(self._amounts, self.points)
-        for feeler in self._feelers:
-            axis = optical_axis(pose.gaze[max(feeler.contact.eye, 0)])
-            self._pushes[feeler.contact.name] = feeler.apply(axis, self.points)
-        for name, follower in self._followers:
-            if name in pose.pushes:
-                follower.apply(pose.pushes[name], self.points)
+        self.meet(pose, self.points)
 
 
 class Lids:

@@ -7,7 +7,7 @@ buffer textures would, without their limit of 65,536 texels in OpenGL 3.1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -41,17 +41,14 @@ class Evaluator(Protocol):
     def pose(self, values: np.ndarray) -> None:
         """Move the head to parameter values (P,)."""
 
-    def update(self, parts: list[PartBuffers]) -> int:
-        """Bring the parts' buffers up to date; returns how many vertices changed."""
+    def update(self, parts: Sequence[Any]) -> int:
+        """Bring what is drawn up to date; returns how many vertices changed."""
 
     def positions(self, part: ViewPart, ids: np.ndarray) -> np.ndarray:
         """Where vertices `ids` (k,) of a part are now, (k, 3)."""
 
     def rotation(self) -> np.ndarray:
         """(3, 3) how the head is turned."""
-
-    def vertices(self, part: ViewPart) -> np.ndarray | None:
-        """All vertices of the part as posed now, (m, 3), or None if that would take too long to say."""
 
     def release(self) -> None:
         """Give the graphics memory back."""
@@ -68,17 +65,14 @@ class CpuEvaluator:
     def pose(self, values: np.ndarray) -> None:
         self._head.pose(values)
 
-    def update(self, parts: list[PartBuffers]) -> int:
-        return sum(buffers.upload(buffers.part.changed) for buffers in parts)
+    def update(self, parts: Sequence[PartBuffers]) -> int:
+        return sum(buffers.upload() for buffers in parts)
 
     def positions(self, part: ViewPart, ids: np.ndarray) -> np.ndarray:
         return part.vertices[ids]
 
     def rotation(self) -> np.ndarray:
         return np.asarray(getattr(self._head.parts[0], "turn", _AHEAD))
-
-    def vertices(self, part: ViewPart) -> np.ndarray | None:
-        return part.vertices
 
     def release(self) -> None:
         pass
@@ -126,7 +120,7 @@ class GpuEvaluator:
         own[:], self._turn = points, turn
         self._fresh |= not same
 
-    def update(self, parts: list[PartBuffers]) -> int:
+    def update(self, parts: Sequence[PartBuffers]) -> int:
         if not self._fresh or self._turn is None:
             return 0
         self._fresh = False
@@ -182,9 +176,6 @@ class GpuEvaluator:
 
     def rotation(self) -> np.ndarray:
         return _AHEAD if self._turn is None else self._turn.matrix
-
-    def vertices(self, part: ViewPart) -> np.ndarray | None:
-        return None
 
     def release(self) -> None:
         for content, array in self._passes.values():

@@ -84,6 +84,11 @@ def of(name: str) -> Material:
     return MATERIALS.get(name, MATERIALS["skin"])
 
 
+def told(part: ViewPart) -> tuple[str, str]:
+    """Equal for parts that are told the same in every frame: those of a material, but each eye looks for itself."""
+    return part.material, part.name if part.material == "eye" else ""
+
+
 def order(name: str) -> int:
     """Drawing order of a material."""
     return of(name).order

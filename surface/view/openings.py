@@ -79,6 +79,19 @@ class Openings:
         self._shut_area, self._outward = _SHUT * float(np.linalg.norm(area)), 1.0 if area[2] > 0 else -1.0
         self.refresh()
 
+    def read_vertices(self) -> dict[str, np.ndarray]:
+        """Which vertices (k,) are read, by part."""
+        found = {name: frame.ids for name, frame in self._eyes.items()}
+        edges = [frame.lids for frame in self._eyes.values() if frame.lids is not None]
+        edges += [self._lips] if self._lips is not None else []
+        if self._skin is not None and edges:
+            found[self._skin.name] = np.unique(np.concatenate([i for e in edges for i in (e.loop, e.upper, e.lower)]))
+        return found
+
+    def read_by(self, read: Read) -> None:
+        """From now on somebody else knows where vertices are."""
+        self._read = read
+
     def refresh(self) -> None:
         """Read the mouth anew, once after each pose: five materials ask for it."""
         self._mouth = self._read_mouth()

@@ -50,6 +50,36 @@ class ViewHead(Protocol):
     def pose(self, values: np.ndarray) -> None: ...
 
 
+class Moving:
+    """Positions and normals on the graphics processor.
+
+    Attributes
+    ----------
+    content : what a vertex array needs of them, by shader input.
+    """
+
+    def __init__(self, ctx: moderngl.Context, count: int) -> None:
+        self.positions, self.normals = (ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True) for _ in range(2))
+        self.content = [(self.positions, "3f", "position"), (self.normals, "3f", "normal")]
+
+    def upload(self, vertices: np.ndarray, normals: np.ndarray, ranges: Sequence[tuple[int, int]]) -> int:
+        """Send the ranges [start, stop) of `vertices` and `normals` (m, 3); returns how many vertices were sent."""
+        touched = sum(stop - start for start, stop in ranges)
+        if touched > _WHOLE * len(vertices):
+            self.positions.orphan()
+            self.normals.orphan()
+            ranges = [(0, len(vertices))]
+        for start, stop in ranges:
+            self.positions.write(_contiguous(vertices[start:stop]), offset=start * _VERTEX_BYTES)
+            self.normals.write(_contiguous(normals[start:stop]), offset=start * _VERTEX_BYTES)
+        return touched
+
+    def release(self) -> None:
+        """Give the buffers back."""
+        self.positions.release()
+        self.normals.release()
+
+
 class PartBuffers:
     """Vertex and index buffers of one part, bound to one program.
 
@@ -59,11 +89,10 @@ class PartBuffers:
     program : its material's program, with inputs `position`, `normal` and any of `static`.
     static : per-vertex data that never changes, by shader input name: (m, k) float32, or uint8 read as 0..1.
     interleaved : positions and normals lie in one buffer, `moving`, which somebody else fills.
-    lean : (k, 3) triangles to draw instead of the part's own; vertices that none of them has are left out.
 
     Attributes
     ----------
-    triangles : (k, 3) that are drawn, of the rows that :meth:`picked` keeps.
+    triangles : (t, 3) that are drawn.
     """
 
     def __init__(
@@ -74,61 +103,33 @@ class PartBuffers:
         static: Mapping[str, np.ndarray],
         *,
         interleaved: bool = False,
-        lean: np.ndarray | None = None,
     ) -> None:
-        self.part = part
-        self._pick(lean)
-        count = len(self.picked(part.vertices))
+        self.part, self.triangles, count = part, part.triangles, len(part.vertices)
         self._index = ctx.buffer(np.ascontiguousarray(self.triangles, np.int32).tobytes())
-        self._static: list[moderngl.Buffer] = []
-        content: list[tuple[Any, ...]] = []
-        for name, data in static.items():
-            kind = "f1" if data.dtype == np.uint8 else "f"
-            self._static.append(ctx.buffer(np.ascontiguousarray(self.picked(data)).tobytes()))
-            content.append((self._static[-1], f"{data.shape[1]}{kind}", name))
-        if interleaved:
+        self._static, content = static_buffers(ctx, static)
+        self._own = None if interleaved else Moving(ctx, count)
+        if self._own is None:
             self.moving = ctx.buffer(reserve=2 * count * _VERTEX_BYTES, dynamic=True)
             normal = ("3f 3f", "position", "normal") if "normal" in program else ("3f 12x", "position")
             content.append((self.moving, *normal))
             self._static.append(self.moving)
         else:
-            self._position = ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True)
-            self._normal = ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True)
-            self._static += [self._position, self._normal]
-            content += [(self._position, "3f", "position"), (self._normal, "3f", "normal")]
+            content += self._own.content
         kept = [entry for entry in content if entry[2] in program]
         self._array = ctx.vertex_array(program, kept, index_buffer=self._index, index_element_size=4)
         if not interleaved:
-            self.upload([(0, len(part.vertices))])
+            self.upload([(0, count)])
 
-    def _pick(self, lean: np.ndarray | None) -> None:
-        """Choose the triangles to draw and, of the part's vertices, those that they have."""
-        self.triangles = self.part.triangles
-        self._kept: np.ndarray | None = None
-        if lean is not None:
-            self._kept, at = np.unique(lean, return_inverse=True)
-            self.triangles = at.reshape(-1, 3).astype(np.int32)
-
-    def picked(self, rows: np.ndarray) -> np.ndarray:
-        """Of ``rows`` (m, ...), one a vertex of the part, those that are drawn."""
-        return rows if self._kept is None else rows.take(self._kept, axis=0)
-
-    def upload(self, ranges: Sequence[tuple[int, int]]) -> int:
-        """Send the vertex ranges [start, stop) that changed; returns how many vertices were sent."""
-        if not ranges:
+    def upload(self, ranges: Sequence[tuple[int, int]] | None = None) -> int:
+        """Send the vertex ranges [start, stop) that the last pose changed, or those given; returns how many vertices
+        were sent."""
+        if self._own is None:
             return 0
-        vertices, normals = self.picked(self.part.vertices), self.picked(self.part.normals)
-        if self._kept is not None:
-            ranges = np.searchsorted(self._kept, np.reshape(ranges, (-1, 2))).tolist()
-        touched = sum(stop - start for start, stop in ranges)
-        if touched > _WHOLE * len(vertices):
-            self._position.orphan()
-            self._normal.orphan()
-            ranges = [(0, len(vertices))]
-        for start, stop in ranges:
-            self._position.write(_contiguous(vertices[start:stop]), offset=start * _VERTEX_BYTES)
-            self._normal.write(_contiguous(normals[start:stop]), offset=start * _VERTEX_BYTES)
-        return touched
+        return self._own.upload(self.part.vertices, self.part.normals, self.part.changed if ranges is None else ranges)
+
+    def outline(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Positions now (m, 3) and the triangles drawn of them (t, 3), or None where only OpenGL knows."""
+        return None if self._own is None else (self.part.vertices, self.triangles)
 
     def draw(self) -> None:
         """Draw the triangles with the part's program."""
@@ -137,8 +138,22 @@ class PartBuffers:
     def release(self) -> None:
         """Give the buffers back."""
         self._array.release()
+        if self._own is not None:
+            self._own.release()
         for buffer in (self._index, *self._static):
             buffer.release()
+
+
+def static_buffers(
+    ctx: moderngl.Context, static: Mapping[str, np.ndarray]
+) -> tuple[list[moderngl.Buffer], list[tuple[Any, ...]]]:
+    """Buffers of per-vertex data that never changes, (m, k) float32 or uint8 by shader input, and what a vertex array
+    needs of them."""
+    buffers, content = [], []
+    for name, data in static.items():
+        buffers.append(ctx.buffer(np.ascontiguousarray(data).tobytes()))
+        content.append((buffers[-1], f"{data.shape[1]}{'f1' if data.dtype == np.uint8 else 'f'}", name))
+    return buffers, content
 
 
 def _contiguous(block: np.ndarray) -> np.ndarray:

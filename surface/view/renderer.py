@@ -17,12 +17,14 @@ from surface.view.bounds import Bands, Silhouette, corners
 from surface.view.camera import Camera
 from surface.view.evaluator import choose
 from surface.view.openings import Openings
-from surface.view.parts import PartBuffers, ViewHead
+from surface.view.parts import PartBuffers, ViewHead, ViewPart
 from surface.view.programs import put
 from surface.view.theme import THEMES, Colour, Light, Theme
 
 if TYPE_CHECKING:
     import moderngl
+
+    from surface.view.leandraw import LeanDrawn
 
 QUALITIES = ("full", "fast")
 
@@ -68,40 +70,56 @@ class Renderer:
         self._background = Rectangles(ctx, self._programs["background"])
         parts = sorted(head.parts, key=lambda part: materials.order(part.material))
         self._hurried = False
-        self._static: dict[str, materials.Arrays] = {}
-        self._parts = [self._buffers(part) for part in parts]
+        self._posed = np.zeros(len(head.parameters))
+        self._static: dict[str, materials.Arrays] = {part.name: self._shown(part) for part in parts}
+        self._parts: list[PartBuffers] | list[LeanDrawn] = [self._buffers(part) for part in parts]
         self._camera: tuple[Camera, float] | None = None
         #: Grows with every upload: equal revisions, cameras and themes draw equal pictures.
         self.revision = 0
         self._apply_theme()
 
-    def _buffers(self, part: Any) -> PartBuffers:
+    def _shown(self, part: ViewPart) -> materials.Arrays:
+        """What the part's material reads, as the part is at rest: later the face may have moved."""
+        return materials.of(part.material).static(part, self.theme, self.openings)
+
+    def _buffers(self, part: ViewPart) -> PartBuffers:
         """Buffers of `part` with what its material reads."""
-        material = materials.of(part.material)
-        if part.name not in self._static:  # as the part is at rest: later the face may have moved
-            self._static[part.name] = material.static(part, self.theme, self.openings)
+        program = self._programs[materials.of(part.material).program]
         elsewhere = self.evaluator.name == "gpu"
-        lean = getattr(part, "lean", {}).get(self.quality) if self._hurried else None
-        program = self._programs[material.program]
-        static = self._static[part.name]
-        return PartBuffers(self.ctx, part, program, static, interleaved=elsewhere, lean=lean)
+        return PartBuffers(self.ctx, part, program, self._static[part.name], interleaved=elsewhere)
 
     def hurry(self) -> None:
-        """From now on pictures move and are drawn in software: leave out what costs much and shows little."""
+        """From now on pictures move and are drawn in software: leave out what costs much and shows little.
+
+        From then on the head's own vertices stay where they are, as they do where the graphics processor evaluates.
+        """
         if self._hurried or self.evaluator.name != "cpu":
             return
         self._hurried, old = True, self._programs["skin"]
         self._programs["skin"] = materials.skin_program(self.ctx, self.quality, self.theme, hurried=True)
-        for i, buffers in enumerate(self._parts):
-            self._parts[i] = self._buffers(buffers.part)
+        for buffers in self._parts:
             buffers.release()
         old.release()
+        self._parts = self._lean_parts() or [self._buffers(buffers.part) for buffers in self._parts]
         self._camera = None
         self._apply_theme()
+
+    def _lean_parts(self) -> list[LeanDrawn]:
+        """The head's lean triangles, evaluated for themselves; none where it has none."""
+        if not any(getattr(part, "lean", None) for part in self.head.parts):
+            return []
+        from surface.view.leandraw import LeanEvaluator, lean_drawn
+
+        lean: Any = LeanEvaluator(self.head, self.quality, self.openings, self.evaluator.reason)  # type: ignore[arg-type]
+        lean.pose(self._posed)
+        self.evaluator = lean
+        self.openings.read_by(lean.positions)
+        return lean_drawn(self.ctx, lean.lean, self._programs, lambda part: self._static[part.name])
 
     def pose(self, values: np.ndarray) -> None:
         """Move the head to parameter values (P,)."""
         self.evaluator.pose(values)
+        self._posed = np.array(values, float)
 
     def update(self) -> int:
         """Bring the buffers up to date with the last :meth:`pose`, once after each. Returns vertices changed."""
@@ -137,9 +155,9 @@ class Renderer:
     def region(self, camera: Camera, size: tuple[int, int]) -> Bands:
         """Where a picture of `size` can be touched by the head, as posed now."""
         found = Silhouette(size, camera.matrix(size[0] / size[1]), camera.near)
-        for buffers in [p for p in self._parts if p.part.material not in materials.INSIDE] or self._parts:
-            vertices = self.evaluator.vertices(buffers.part)
-            if vertices is None or not found.add(buffers.picked(vertices), buffers.triangles):
+        outer = [p for p in self._parts if p.part.material not in materials.INSIDE] or self._parts
+        for outline in (drawn.outline() for drawn in outer):
+            if outline is None or not found.add(*outline):
                 return Bands.whole(size)
         return found.bands()
 
@@ -147,7 +165,7 @@ class Renderer:
         """Change the gradient; sRGB colours 0..1."""
         self.theme = replace(self.theme, background_top=top, background_bottom=bottom)
 
-    def _draw_part(self, buffers: PartBuffers) -> None:
+    def _draw_part(self, buffers: PartBuffers | LeanDrawn) -> None:
         """One part with its material's uniforms and culling."""
         part = buffers.part
         material = materials.of(part.material)

@@ -26,7 +26,8 @@ def buffers_of(ctx: moderngl.Context, part: BallPart) -> PartBuffers:
 
 
 def held(buffers: PartBuffers) -> tuple[np.ndarray, np.ndarray]:
-    position, normal = buffers._position.read(), buffers._normal.read()
+    assert buffers._own is not None
+    position, normal = buffers._own.positions.read(), buffers._own.normals.read()
     return np.frombuffer(position, np.float32).reshape(-1, 3), np.frombuffer(normal, np.float32).reshape(-1, 3)
 
 
@@ -54,21 +55,4 @@ def test_arrays_that_are_not_contiguous_are_sent_rightly(ctx: moderngl.Context) 
     part.vertices = np.asfortranarray(part.vertices)
     buffers = buffers_of(ctx, part)
     assert (held(buffers)[0] == part.vertices).all()
-    buffers.release()
-
-
-def test_of_a_lean_part_only_what_is_drawn_is_sent(ctx: moderngl.Context) -> None:
-    part = eye("left_eye")
-    lean = part.triangles[[5, 90, 200]]
-    used = np.unique(lean)
-    program = build(ctx, ("light.glsl", "hair.vert"), ("flat.frag",))
-    buffers = PartBuffers(ctx, part, program, {}, lean=lean)
-    assert (buffers.picked(part.vertices)[buffers.triangles] == part.vertices[lean]).all()
-    before = part.vertices.copy()
-    part.vertices += 5
-    middle = int(used[3])
-    assert buffers.upload([(0, used[0]), (middle, middle + 1)]) == 1
-    assert (held(buffers)[0] == np.where((used == middle)[:, None], part.vertices[used], before[used])).all()
-    assert buffers.upload([(0, len(before))]) == len(used)
-    assert (held(buffers)[0] == part.vertices[used]).all()
     buffers.release()
