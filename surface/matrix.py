@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .basis import Floats, Ints
+from .checks import check_sides, check_uv
+from .closed import wrap
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -19,22 +22,42 @@ CHUNK = 8192  # samples per pass: bounds the scratch memory
 
 def basis_matrix(surface: DCPSurface, uv: ArrayLike, derivative: tuple[int, int], side: ArrayLike | None) -> csr_matrix:
     """See :meth:`surface.DCPSurface.basis_matrix`."""
+    return basis_matrices(surface, uv, [derivative], side)[0]
+
+
+def basis_matrices(
+    surface: DCPSurface, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None = None
+) -> list[csr_matrix]:
+    """Several of :func:`basis_matrix` at the same samples, for hardly more than the time of one."""
     from scipy.sparse import csr_matrix
 
-    if tuple(derivative) not in ((0, 0), (1, 0), (0, 1)):
-        raise ValueError(f"derivative: must be (0, 0), (1, 0) or (0, 1), not {derivative!r}")
-    samples, sides, _ = surface.sample(uv, side)
-    data, columns, start = _rows(surface, samples, sides)
+    from .kernels import TINY
+
+    for wanted in derivatives:
+        if tuple(wanted) not in ((0, 0), (1, 0), (0, 1)):
+            raise ValueError(f"derivative: must be (0, 0), (1, 0) or (0, 1), not {wanted!r}")
+    samples = wrap(check_uv(uv), surface.closed)
+    data, columns, start = _rows(surface, samples, check_sides(samples, side))
+    rows, total = _sums(data, start)
+    if not (total[:, 0] > TINY).all():  # nothing covers there, or only the limit from another side
+        data, columns, start = _rows(surface, samples, surface.sample(uv, side)[1])
+        rows, total = _sums(data, start)
     columns %= surface.n  # shifted copies are the same point
-    rows = np.repeat(np.arange(len(samples)), np.diff(start))
-    total = np.stack([np.bincount(rows, data[:, k], len(samples)) for k in range(3)], axis=1)
-    ratio = data[:, 0] / total[rows, 0]
-    if tuple(derivative) != (0, 0):
-        k = 1 if derivative[0] else 2
-        ratio = (data[:, k] - ratio * total[rows, k]) / total[rows, 0]
-    matrix = csr_matrix((ratio, columns, start), shape=(len(samples), surface.n))
-    matrix.sum_duplicates()
-    return matrix
+    value = data[:, 0] / total[rows, 0]
+    out = []
+    for u, v in derivatives:
+        k = 2 * v + u
+        ratio = value if k == 0 else (data[:, k] - value * total[rows, k]) / total[rows, 0]
+        matrix = csr_matrix((ratio, columns.copy(), start.copy()), shape=(len(samples), surface.n))
+        matrix.sum_duplicates()
+        out.append(matrix)
+    return out
+
+
+def _sums(data: Floats, start: Ints) -> tuple[Ints, Floats]:
+    """The row of every entry of ``data (k, 3)``, and the sums (m, 3) over each row."""
+    rows = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    return rows, np.stack([np.bincount(rows, data[:, k], len(start) - 1) for k in range(3)], axis=1)
 
 
 def _rows(surface: DCPSurface, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:

@@ -116,9 +116,10 @@ def wanted_places(
             share = np.abs(1 - di - fraction[:, 0]) * np.abs(1 - dj - fraction[:, 1])
             places.append(np.column_stack([level, cell + np.array([di, dj])]))
             wants.append(share * error[bad] ** 2)
-    unique, inverse = np.unique(np.concatenate(places), axis=0, return_inverse=True)
-    want = np.bincount(inverse.ravel(), np.concatenate(wants), len(unique))
-    return unique[np.argsort(-want, kind="stable")]
+    every = np.concatenate(places)
+    _, first, inverse = np.unique(_keys(every), return_index=True, return_inverse=True)
+    want = np.bincount(inverse.ravel(), np.concatenate(wants), len(first))
+    return every[first][np.argsort(-want, kind="stable")]
 
 
 def level_caps(spacing: NDArray[np.float64], coarse: float, deepest: int) -> NDArray[np.int64]:
@@ -131,14 +132,21 @@ def _next_level(
     net: Net, uv: NDArray[np.float64], caps: NDArray[np.int64], coarse: float
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """The first level (m, 2) that does not have all four points around a sample, and whether there is one."""
-    have = {tuple(p) for p in net.place.tolist()}
+    have = np.unique(_keys(net.place))
     out, found = np.zeros((len(uv), 2), np.int64), np.zeros(len(uv), bool)
-    for k, (sample, cap) in enumerate(zip(uv, caps, strict=True)):
-        for level in range(1, int(cap.max()) + 1):
-            pair = np.minimum(level, cap)
-            a, b = (int(x) for x in pair)
-            i, j = (int(x) for x in np.floor(sample * 2.0**pair / coarse))
-            if any((a, b, i + di, j + dj) not in have for di in (0, 1) for dj in (0, 1)):
-                out[k], found[k] = pair, True
-                break
+    for level in range(1, int(caps.max(initial=0)) + 1):
+        left = np.flatnonzero(~found & (caps.max(axis=1) >= level))
+        pair = np.minimum(level, caps[left])
+        cell = np.floor(uv[left] * 2.0**pair / coarse).astype(np.int64)
+        lacks = np.zeros(len(left), bool)
+        for corner in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            keys = _keys(np.column_stack([pair, cell + np.array(corner)]))
+            lacks |= have[np.searchsorted(have, keys) % len(have)] != keys
+        out[left[lacks]], found[left[lacks]] = pair[lacks], True
     return out, found
+
+
+def _keys(places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) one number for each place: levels below 16, i and j within four million of the middle."""
+    level, at = places[:, :2], places[:, 2:] + (1 << 22)
+    return ((level[:, 0] * 16 + level[:, 1]) << 46) + (at[:, 0] << 23) + at[:, 1]

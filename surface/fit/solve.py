@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +10,20 @@ from numpy.typing import NDArray
 from surface import DCPSurface
 from surface.fit.net import Net
 from surface.fit.slopes import Slopes
+from surface.matrix import basis_matrices
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 
-def basis(net: Net, uv: NDArray[np.float64], derivative: tuple[int, int] = (0, 0)) -> csr_matrix:
-    """Rational weights (m, n) of all control points (weights 1) at the samples, or their derivative."""
+def basis(net: Net, uv: NDArray[np.float64]) -> csr_matrix:
+    """Rational weights (m, n) of all control points (weights 1) at the samples."""
+    return _surface(net).basis_matrix(uv)
+
+
+def _surface(net: Net) -> DCPSurface:
     n = len(net)
-    return DCPSurface(np.zeros((n, 3)), np.ones(n), net.knots_u, net.knots_v).basis_matrix(uv, derivative)
+    return DCPSurface(np.zeros((n, 3)), np.ones(n), net.knots_u, net.knots_v)
 
 
 def fairness(net: Net) -> csr_matrix:
@@ -32,18 +36,22 @@ def fairness(net: Net) -> csr_matrix:
     return (identity(len(net)) - basis(net, net.centres)).tocsr()
 
 
-@dataclass
 class System:
-    """Normal equations of a weighted least squares problem: matrix (n, n) sparse, right-hand sides (n, c)."""
+    """Normal equations of a weighted least squares problem: upper half of a matrix (n, n), right-hand sides (n, c)."""
 
-    matrix: csr_matrix
-    right: NDArray[np.float64]
+    def __init__(self, n: int, columns: int) -> None:
+        self.matrix = np.zeros((n, n))
+        self.right = np.zeros((n, columns))
 
     def add(self, rows: csr_matrix, weight: NDArray[np.float64], targets: NDArray[np.float64]) -> None:
-        """Ask for rows @ x = targets, each row with its weight."""
-        weighted = rows.T.multiply(weight).tocsr()
-        self.matrix = self.matrix + weighted @ rows
-        self.right = self.right + weighted @ targets
+        """Ask for rows (m, n) @ x = targets (m, c), each row with its weight (m,)."""
+        from surface.fit.gram import add_normal
+
+        matrix, right = np.zeros_like(self.matrix), np.zeros_like(self.right)
+        rows.sort_indices()
+        add_normal(rows.indptr, rows.indices, rows.data, weight, targets, matrix, right)
+        self.matrix += matrix
+        self.right += right
 
 
 def solve(
@@ -60,18 +68,17 @@ def solve(
     factorisation serves every right-hand side. ``slopes`` come with their targets (f, c) in u and in v.
     """
     from scipy.linalg import cho_factor, cho_solve
-    from scipy.sparse import csr_matrix, diags
 
     n = len(net)
-    system = System(csr_matrix((n, n)), np.zeros((n, targets.shape[1])))
+    system = System(n, targets.shape[1])
     system.add(samples, weight, targets)
     if slopes is not None:
         where, *wanted = slopes
-        for axis, derivative in enumerate(((1, 0), (0, 1))):
-            rows = diags(where.span[:, axis]) @ basis(net, where.uv, derivative)
-            system.add(rows.tocsr(), where.weight, wanted[axis])
+        for axis, slope in enumerate(basis_matrices(_surface(net), where.uv, [(1, 0), (0, 1)])):
+            slope.data *= np.repeat(where.span[:, axis], np.diff(slope.indptr))
+            system.add(slope, where.weight, wanted[axis])
     strength = weight.sum() / n
     f = fairness(net)
-    normal = (system.matrix + fair * strength * (f.T @ f)).toarray()
+    normal = system.matrix + (fair * strength * (f.T @ f)).toarray()
     normal[np.diag_indices(n)] += 1e-7 * strength
     return cho_solve(cho_factor(normal, check_finite=False), system.right, check_finite=False)

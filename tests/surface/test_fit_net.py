@@ -48,3 +48,16 @@ def test_no_net_is_finer_than_the_samples():
     np.testing.assert_array_equal(caps, [[1, 3], [0, 6]])
     net = net_at(coarse_places(GRID, 0.2), 0.2, [], GRID)
     assert len(wanted_places(net, GRID, np.zeros((len(GRID), 2), int), np.full(len(GRID), 9.0), 0.2)) == 0
+
+
+def test_a_sample_asks_for_the_first_level_that_lacks_one_of_its_four_points():
+    net = net_at(coarse_places(GRID, 0.2), 0.2, [], GRID)
+    at, caps = np.array([[0.33, 0.72]]), np.array([[3, 1]])
+    for level, i in (((1, 1), 3), ((2, 1), 6), ((3, 1), 13)):
+        places = wanted_places(net, at, caps, np.array([2.0]), 0.2)
+        around = np.array([[*level, i + di, 7 + dj] for di in (0, 1) for dj in (0, 1)])
+        assert sorted(places.tolist()) == around.tolist()
+        net = net.joined(net_at(places[:3], 0.2, [], GRID))
+        assert wanted_places(net, at, caps, np.array([2.0]), 0.2)[:, :2].tolist() == [list(level)] * 4
+        net = net.joined(net_at(places[3:], 0.2, [], GRID))
+    assert not len(wanted_places(net, at, caps, np.array([2.0]), 0.2))
