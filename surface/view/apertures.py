@@ -140,5 +140,8 @@ def nearest_loop(loops: list[np.ndarray], vertices: np.ndarray, point: np.ndarra
 
 def vector_area(ring: np.ndarray) -> np.ndarray:
     """Vector area (3,) of a closed polygon (k, 3): half the sum of p_i x p_{i+1}, in mm^2."""
-    centred = ring - ring.mean(axis=0)
-    return 0.5 * np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
+    before = np.asarray(ring - ring[0], np.float64)
+    after = before[1:]
+    # The sum of p x q is the antisymmetric part of the sum of p q^T.
+    both = before[:-1].T @ after
+    return 0.5 * np.array([both[1, 2] - both[2, 1], both[2, 0] - both[0, 2], both[0, 1] - both[1, 0]])

@@ -16,35 +16,46 @@ _MARGIN = 3
 
 
 @kernel
-def project(points: Any, matrix: Any, width: int, height: int, near: float, pixels: Any) -> bool:
-    """Pixel coordinates ``pixels (m, 2)`` float32 of ``points (m, 3)``; False where one is nearer than ``near``."""
+def project(points: Any, matrix: Any, near: Any, pixels: Any) -> bool:
+    """Write ``pixels (m, 2)`` of ``points (m, 3)``, all float32; False where one is nearer than ``near``.
+
+    ``matrix`` (4, 4) gives a pixel's coordinates times the depth in its first two rows, and the depth in its last.
+    """
+    a, b, c, d = matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3]
+    e, f, g, h = matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3]
+    p, q, r, s = matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[3, 3]
+    least = near
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        depth = matrix[3, 0] * x + matrix[3, 1] * y + matrix[3, 2] * z + matrix[3, 3]
-        if depth < near:
-            return False
-        u = matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]
-        v = matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]
-        pixels[i, 0] = (0.5 * u / depth + 0.5) * width
-        pixels[i, 1] = (0.5 * v / depth + 0.5) * height
-    return True
+        depth = p * x + q * y + r * z + s
+        least = min(least, depth)
+        over = np.float32(1.0) / depth
+        pixels[i, 0] = (a * x + b * y + c * z + d) * over
+        pixels[i, 1] = (e * x + f * y + g * z + h) * over
+    return least >= near
 
 
 @kernel
 def sweep(triangles: Any, pixels: Any, rows: int, margin: float, low: Any, high: Any) -> None:
     """Widen the bands ``low``, ``high`` (k,) float64, ``rows`` pixels high each, by the boxes round ``triangles``
     (t, 3) of ``pixels (m, 2)``, with a margin all round."""
-    last = low.shape[0] - 1
+    last, share = low.shape[0] - 1.0, 1.0 / rows
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        bottom = min(pixels[a, 1], pixels[b, 1], pixels[c, 1]) - margin
-        top = max(pixels[a, 1], pixels[b, 1], pixels[c, 1]) + margin
-        left = min(pixels[a, 0], pixels[b, 0], pixels[c, 0]) - margin
-        right = max(pixels[a, 0], pixels[b, 0], pixels[c, 0]) + margin
-        first = int(max(np.floor(bottom / rows), 0.0))
-        for band in range(first, int(min(np.floor(top / rows), last)) + 1):
-            low[band] = min(low[band], left)
-            high[band] = max(high[band], right)
+        x, y = pixels[a, 0], pixels[a, 1]
+        left, right, bottom, top = x, x, y, y
+        for k in (b, c):
+            x, y = pixels[k, 0], pixels[k, 1]
+            left, right = (x if x < left else left), (x if x > right else right)
+            bottom, top = (y if y < bottom else bottom), (y if y > top else top)
+        first, end = (bottom - margin) * share, (top + margin) * share
+        if first > last or end < 0.0:
+            continue
+        for band in range(int(max(first, 0.0)), int(min(end, last)) + 1):
+            if left - margin < low[band]:
+                low[band] = left - margin
+            if right + margin > high[band]:
+                high[band] = right + margin
 
 
 @dataclass(frozen=True)
@@ -97,14 +108,18 @@ class Silhouette:
     """
 
     def __init__(self, size: tuple[int, int], matrix: np.ndarray, near: float) -> None:
-        self._size, self._matrix, self._near = size, np.ascontiguousarray(matrix, np.float64), near
+        self._size, self._near = size, np.float32(near)
+        self._matrix = np.array(matrix, np.float64)
+        for axis in (0, 1):
+            self._matrix[axis] = (0.5 * self._matrix[axis] + 0.5 * self._matrix[3]) * size[axis]
+        self._matrix = self._matrix.astype(np.float32)
         count = -(-size[1] // ROWS)
         self._low, self._high = np.full(count, np.inf), np.full(count, -np.inf)
 
     def add(self, vertices: np.ndarray, triangles: np.ndarray) -> bool:
         """Take in a part's ``vertices (m, 3)`` and ``triangles (t, 3)``; False where one is too near to tell."""
         pixels = np.empty((len(vertices), 2), np.float32)
-        if not project(vertices, self._matrix, *self._size, self._near, pixels):
+        if not project(np.asarray(vertices, np.float32), self._matrix, self._near, pixels):
             return False
         sweep(triangles, pixels, ROWS, float(_MARGIN), self._low, self._high)
         return True

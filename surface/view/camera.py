@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -121,8 +122,9 @@ class Camera:
         return matrix.astype(np.float32)
 
     def matrix(self, aspect: float) -> np.ndarray:
-        """World to clip space, (4, 4) float32, for column vectors."""
-        return self.projection(aspect) @ self.view()
+        """World to clip space, (4, 4) float32, for column vectors; read-only, a camera that stands still is asked in
+        every frame."""
+        return _matrix(self, aspect)
 
 
 #: Presets by name, for command lines and keys.
@@ -133,6 +135,14 @@ PRESETS: dict[str, Callable[[], Camera]] = {
     "profile": Camera.profile,
     "profile-right": lambda: Camera.profile("right"),
 }
+
+
+@lru_cache(maxsize=8)
+def _matrix(camera: Camera, aspect: float) -> np.ndarray:
+    """See :meth:`Camera.matrix`."""
+    matrix = camera.projection(aspect) @ camera.view()
+    matrix.flags.writeable = False
+    return matrix
 
 
 def _side_sign(side: str) -> float:

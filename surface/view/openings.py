@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -156,9 +157,10 @@ class Openings:
                 "opening_area": _FALLBACK_AREA,
                 "opening_side": (18.0, 0.0, 0.0),
             }
-        area = self._edge_area() * self._outward
-        size = max(float(np.linalg.norm(area)), 1e-6)
-        centre = self._read(self._skin, self._lips.loop).mean(axis=0) + area * (_LIP_DEPTH / size)
+        ring = self._read(self._skin, self._lips.loop)
+        area = vector_area(ring) * self._outward
+        size = max(math.hypot(*area), 1e-6)
+        centre = ring.mean(axis=0) + area * (_LIP_DEPTH / size)
         corners = self._read(self._skin, self._lips.upper)[[0, -1]]
         return {
             "opening_centre": centre,

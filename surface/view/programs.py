@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
@@ -80,11 +80,19 @@ def put(program: moderngl.Program, values: Mapping[str, Any]) -> None:
             continue
         if isinstance(value, int | float):
             uniform.value = value
+        elif isinstance(value, tuple):
+            uniform.write(_packed(value))
         else:
             uniform.write(_bytes(np.asarray(value, np.float32)))
+
+
+@lru_cache(maxsize=256)
+def _packed(numbers: tuple[float, ...]) -> bytes:
+    """Uniform bytes of a vector; the same few come in every frame."""
+    return np.array(numbers, np.float32).tobytes()
 
 
 def _bytes(array: np.ndarray) -> bytes:
     """Uniform bytes: square matrices transposed to column-major, everything else as it lies."""
     square = array.ndim == 2 and array.shape[0] == array.shape[1]
-    return (array.T if square else array).astype(np.float32).tobytes()
+    return (array.T if square else array).tobytes()
