@@ -1,8 +1,8 @@
 """Teeth: crowns are sampled by rays and fitted as one small patch each.
 
 A tooth's own texture is cut like a paper model; a patch wrapped around the crown needs a tenth of the points.
-(u, v) are angles about the tooth's left-right axis: v runs from the gum behind over the edge to the gum in front,
-u from one neighbour to the next.
+(u, v) go evenly over the crown, about the tooth's left-right axis: v from the gum behind over the edge to the gum in
+front, u from one neighbour to the next.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from surface.fit.chart import TILE, Chart
 from surface.fit.mesh import FitMesh, triangles
 
 Floats = NDArray[np.float64]
-GRID = (15, 21)  # rays along u and v
+GRID = (19, 31)  # samples along u and v
+RAYS = (41, 91)  # that they are found with
 U_RANGE = (np.radians(7.0), np.radians(173.0))
-V_RANGE = (np.radians(150.0), np.radians(-150.0))
+V_RANGE = (np.radians(165.0), np.radians(-165.0))
 TALL_MM = 10.0  # of a tooth, only this much below its tip is a crown
 
 
@@ -69,20 +70,34 @@ def _sample(mesh: FitMesh, faces: NDArray[np.int64], upper: bool, middle: Floats
     """(grid, 3) points of one crown, u fastest last."""
     tri = mesh.vertices[triangles(mesh.faces[faces])]
     down = np.array([0.0, -1.0 if upper else 1.0, 0.0])
-    height = (tri.reshape(-1, 3) * down).sum(axis=1)
-    tip = height.max()
-    crown = tri.reshape(-1, 3)[height > tip - TALL_MM]
+    gum = (tri @ down).max() - TALL_MM
+    crown = tri.reshape(-1, 3)[(tri @ down).ravel() > gum]
     centre = 0.5 * (crown.min(axis=0) + crown.max(axis=0))
-    outward = centre - middle
-    outward[1] = 0.0
+    outward = (centre - middle) * [1.0, 0.0, 1.0]
     length = float(np.linalg.norm(outward))
     outward = outward / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
     across = np.cross(down, outward)
-    u = np.linspace(*U_RANGE, GRID[0])
-    v = np.linspace(*V_RANGE, GRID[1])
-    a, b = (x.ravel()[:, None] for x in np.meshgrid(u, v, indexing="ij"))
+    a, b = np.meshgrid(np.linspace(*U_RANGE, RAYS[0]), np.linspace(*V_RANGE, RAYS[1]), indexing="ij")
+    a, b = a[..., None], b[..., None]
     rays = np.cos(a) * across + np.sin(a) * (np.cos(b) * down - np.sin(b) * outward)
-    return centre + rays * _reach(tri, centre, rays)[:, None]
+    hits = centre + rays * _reach(tri, centre, rays.reshape(-1, 3)).reshape(*RAYS, 1)
+    rows = np.stack([_even(_below(row, row @ down > gum), GRID[1]) for row in hits])
+    return np.stack([_even(column, GRID[0]) for column in rows.swapaxes(0, 1)], axis=1).reshape(-1, 3)
+
+
+def _below(row: Floats, crown: NDArray[np.bool_]) -> Floats:
+    """Of a row of points (k, 3) about a tooth, those in the middle that are its crown's."""
+    middle, outside = len(row) // 2, np.flatnonzero(~crown)
+    start = outside[outside < middle].max(initial=-1) + 1
+    end = outside[outside > middle].min(initial=len(row))
+    return row[start:end]
+
+
+def _even(line: Floats, count: int) -> Floats:
+    """(count, 3) points along a line of points (k, 3), as far apart along it: rays crowd, and miss a thin edge."""
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    at = np.linspace(0.0, length[-1], count)
+    return np.column_stack([np.interp(at, length, x) for x in line.T])
 
 
 def _reach(tri: Floats, origin: Floats, rays: Floats) -> Floats:

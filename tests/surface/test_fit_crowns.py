@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from surface.fit.crowns import crown_chart, split_teeth
+from surface.fit.crowns import GRID, crown_chart, split_teeth
 from surface.fit.mesh import FitMesh
 from surface.fit.refine import Wish, fit_chart
 from surface.fit.solve import basis
@@ -54,3 +54,29 @@ def test_crowns_face_outwards():
     steps = np.array([[d, 0]]), np.array([[0, d]])
     u, v = ((basis(net.net, at + s) - basis(net.net, at - s)) @ net.points for s in steps)
     assert np.cross(u, v)[0, 1] < 0  # the tip of an upper tooth points down
+
+
+def blade() -> tuple[np.ndarray, np.ndarray]:
+    """An incisor: 8 mm wide, 5 mm thick at the root, 0.8 mm at its edge, 16 mm below."""
+    outline = np.array([[-4.0, -1], [4, -1], [4, 1], [-4, 1]])
+    rings = [
+        np.column_stack([outline[:, 0], np.full(4, -y), outline[:, 1] * thick])
+        for y, thick in zip(np.linspace(0, 16, 9), np.linspace(2.5, 0.4, 9), strict=True)
+    ]
+    sides = np.array([[i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)])
+    ends = np.array([[3, 2, 1, 0], [32, 33, 34, 35]])
+    return np.vstack(rings), np.vstack([*(sides + 4 * k for k in range(8)), ends])
+
+
+def test_samples_are_even_and_miss_no_thin_edge():
+    vertices, faces = blade()
+    mesh = FitMesh(vertices, faces, np.zeros((1, 2)), np.zeros_like(faces), (), np.zeros((0, len(vertices), 3)))
+    chart, crowns = crown_chart(mesh, [np.arange(len(faces))], upper=True)
+    grid = crowns.vertices.reshape(*GRID, 3)
+    gaps = np.linalg.norm(np.diff(grid, axis=1), axis=2)
+    assert gaps.max() < 1.2
+    edge = np.column_stack([np.tile(np.linspace(-4, 4, 33), 2), np.full(66, -16.0), np.repeat([-0.4, 0.4], 33)])
+    assert np.linalg.norm(grid.reshape(-1, 1, 3) - edge, axis=2).min(axis=0).max() < 0.6
+    assert -8.0 < grid[..., 1].max() <= -6.0  # the crown ends 10 mm above its tip
+    fit = fit_chart(crowns, chart, Wish(96, coarse=0.4, deepest=2, neutral_mm=0.08))
+    assert np.quantile(fit.error, 0.99) < 0.5
