@@ -13,19 +13,19 @@ Floats32 = NDArray[np.float32]
 
 @kernel
 def add_moves(
-    amounts: Floats, start: NDArray[np.int64], ids: NDArray[np.int32], moves: Floats32, points: Floats
-) -> None:
-    """Add to ``points (n, 3)`` the rows of ``moves`` from ``start[g]`` to ``start[g + 1]``, by ``amounts[g]``, for
-    every group g that acts; ``ids`` says which points they move."""
-    for g in range(amounts.shape[0]):
-        amount = amounts[g]
+    amounts: Floats, group: NDArray[np.int64], first: NDArray[np.int64], start: NDArray[np.int64], moves: Floats32,
+    points: Floats,
+) -> None:  # fmt: skip
+    """Add to the numbers ``points (m,)`` runs of ``moves``: the r-th, from ``start[r]`` to ``start[r + 1]``, by
+    ``amounts[group[r]]`` to those that begin at ``first[r]``."""
+    for r in range(group.shape[0]):
+        amount = amounts[group[r]]
         if amount == 0.0:
             continue
-        for k in range(start[g], start[g + 1]):
-            i = ids[k]
-            points[i, 0] += amount * moves[k, 0]
-            points[i, 1] += amount * moves[k, 1]
-            points[i, 2] += amount * moves[k, 2]
+        run = moves[start[r] : start[r + 1]]
+        own = points[first[r] : first[r] + len(run)]
+        for k in range(len(run)):
+            own[k] += amount * run[k]
 
 
 @kernel

@@ -26,6 +26,17 @@ def test_sparse_is_dense():
     np.testing.assert_array_equal(moves.at(np.array([7]))[:, 0], [[0, 0, 6], [4, 5, 6]])
 
 
+def test_runs_of_points_are_cut_at_wide_gaps_only():
+    ids = np.array([24, 1, 3, 1], np.int32)
+    moves = Moves(part("a", 0, groups=[Group("cheekPuff", ids, np.arange(12, dtype=np.float32).reshape(4, 3))]), NAMED)
+    points = np.zeros((25, 3))
+    moves.add(np.array([2.0]), points)
+    want = np.zeros((25, 3))
+    want[[24, 3]], want[1] = [[0, 2, 4], [12, 14, 16]], [24, 28, 32]
+    np.testing.assert_array_equal(points, want)
+    np.testing.assert_array_equal(moves.at(np.arange(25))[0], want / 2)
+
+
 def test_a_rig_rests_while_nothing_changes_and_wakes_when_it_is_told_to():
     rig = SkinRig(part("a", 0, groups=[all_points("mouthPucker", (0, 0, 6))]), small_head())
 
