@@ -5,15 +5,14 @@ Done once when a head is made and kept in its file; see :mod:`surface.head.lean`
 
 from __future__ import annotations
 
+from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from surface.collapse import Collapse
-from surface.head.part import border_edges
-from surface.view import materials
-from surface.view.materials import attribute, strip_uv
+from surface.view.materials import attribute, of, strip_uv
 
 if TYPE_CHECKING:
     from surface.head import Head
@@ -33,6 +32,7 @@ _KEPT: tuple[dict[str, float], ...] = (
 )
 #: A change of colour from black to white counts as so many mm, a normal turned by a radian, and one strip of hair.
 _COLOUR_MM, _NORMAL_MM, _STRIP_MM = 4.0, 2.0, 1.5
+_PATCH = 341
 
 
 def lean_head(folder: str | Path) -> Path:
@@ -62,23 +62,65 @@ def lean_triangles(head: Head) -> dict[str, np.ndarray]:
     head.pose(np.zeros(len(head.parameters)))
     found = {}
     for part in head.parts:
-        collapse = Collapse(np.hstack([*places[part.name], _looks(part)]), part.triangles, _locked(part))
+        collapse = Collapse(np.hstack([*places[part.name], _looks(part)]), part.triangles, _locked(part, head))
         for level, share in SHARES.items():
-            found[f"{part.name}/{level}"] = collapse.run(share * ERROR_MM.get(part.material, _OTHER_MM))
+            found[f"{part.name}/{level}"] = gathered(collapse.run(share * ERROR_MM.get(part.material, _OTHER_MM)))
     return found
 
 
-def _locked(part: HeadPart) -> np.ndarray:
+def _locked(part: HeadPart, head: Head) -> np.ndarray:
     """Vertices that stay, (m,): where parts meet, all of them."""
     locked = np.zeros(len(part.vertices), bool)
-    if not materials.of(part.material).blended:
-        locked[np.unique(border_edges(part.triangles))] = True
+    for zipper in head.zippers:
+        if zipper.first is part:
+            locked[[*zipper.low, *zipper.high]] = True
+        if zipper.second is part:
+            locked[zipper.ids] = True
     return locked
+
+
+def gathered(triangles: np.ndarray) -> np.ndarray:
+    """The same triangles (k, 3), in patches of :data:`_PATCH` that hang together.
+
+    Mesa's software renderer draws so many at a time, and works out a vertex anew for each patch that has it.
+    """
+    corners, around = triangles.tolist(), _around(triangles)
+    left, order, rim = dict.fromkeys(range(len(corners))), [], deque[int]()
+    while left:
+        start = next((t for v in rim for t in around[v] if t in left), next(iter(left)))
+        rim = deque(v for v in rim if any(t in left for t in around[v]))
+        order += _patch(start, corners, around, left, rim)
+    return triangles[order]
+
+
+def _around(triangles: np.ndarray) -> dict[int, list[int]]:
+    """Triangles by vertex."""
+    around: dict[int, list[int]] = {}
+    for t, row in enumerate(triangles.tolist()):
+        for v in row:
+            around.setdefault(v, []).append(t)
+    return around
+
+
+def _patch(
+    start: int, corners: list[list[int]], around: dict[int, list[int]], left: dict[int, None], rim: deque[int]
+) -> list[int]:
+    """Triangles round one, nearest first, taken from those that are ``left``; vertices on their rim go to ``rim``."""
+    waiting, seen, order = deque(corners[start]), set(corners[start]), list[int]()
+    while waiting and len(order) < _PATCH:
+        for t in [t for t in around[waiting.popleft()] if t in left][: _PATCH - len(order)]:
+            del left[t]
+            order.append(t)
+            fresh = [v for v in corners[t] if v not in seen]
+            seen.update(fresh)
+            waiting.extend(fresh)
+    rim.extend(waiting)
+    return order
 
 
 def _looks(part: HeadPart) -> np.ndarray:
     """What else a vertex carries, (m, k), as mm."""
-    if materials.of(part.material).blended:
+    if of(part.material).blended:
         return _STRIP_MM * strip_uv(part)
     if part.material != "skin":
         return np.zeros((len(part.vertices), 0))
