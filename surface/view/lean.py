@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from surface.head.part import HeadPart
 
 #: How far triangles of quality "fast" may be off, mm (root mean square), by material; those of "full" by this share.
-ERROR_MM = {"skin": 0.5, "brow": 0.56, "lash": 0.42, "teeth": 0.5, "gums": 0.7, "mouth": 0.84, "eye": 0.35}
+ERROR_MM = {"skin": 0.5, "brow": 0.56, "lash": 0.42, "teeth": 0.2, "gums": 0.5, "mouth": 0.84, "eye": 0.35}
 _OTHER_MM = 0.56
 SHARES = {"full": 0.36, "fast": 1.0}
 #: Poses whose shapes are kept, beside the face at rest.
