@@ -80,8 +80,10 @@ def _shade(out: Path, console: Console) -> bool:
 
 
 def remarks(report: FitReport) -> list[str]:
-    """What was guessed and what is missing, a line each."""
-    out = list(report.notes)
+    """How the face keeps its bounds, what was guessed and what is missing, a line each."""
+    from surface.fit.report import face_bounds
+
+    out = [face_bounds(report), *report.notes]
     if report.missing:
         out.append(f"no shape for {', '.join(report.missing)}: these parameters will not move this head")
     if report.left_out:

@@ -52,6 +52,7 @@ class Domain:
         holes and several islands may stand in any order; the rectangle cuts off what reaches beyond it. No loops:
         the whole rectangle.
     slits : segments across which the surface is cut; one that reaches beyond the rectangle cuts through its border
+    marks : (k, 2) points on the loops at which the border gets a vertex, as at their sharp corners
 
     Raises
     ------
@@ -63,6 +64,7 @@ class Domain:
     rect: tuple[float, float, float, float]
     loops: Sequence[ArrayLike] = ()
     slits: Sequence[Slit] = ()
+    marks: ArrayLike = ()
     segments: Floats = field(init=False, repr=False, compare=False, default_factory=lambda: np.zeros((0, 4)))
 
     def __post_init__(self) -> None:
@@ -77,6 +79,7 @@ class Domain:
         loops = tuple(_check_loop(loop, i) for i, loop in enumerate(self.loops))
         object.__setattr__(self, "loops", loops)
         object.__setattr__(self, "slits", tuple(self.slits))
+        object.__setattr__(self, "marks", numbers(self.marks, "marks").reshape(-1, 2))
         parts = [np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops]
         segments = np.concatenate(parts) if parts else np.zeros((0, 4))
         segments.flags.writeable = False

@@ -112,7 +112,7 @@ def _near_or_inside(flat: Flat, domain: Domain) -> Flat:
 
 def _all_corners(domain: Domain, scale: tuple[float, float]) -> Floats:
     rings = [np.asarray(loop) for loop in domain.loops]
-    return np.concatenate([ring[loops.corners(ring, scale)] for ring in rings])
+    return np.concatenate([*(ring[loops.corners(ring, scale)] for ring in rings), np.asarray(domain.marks)])
 
 
 def _lines(uv: Floats, domain: Domain) -> Ints:
@@ -147,7 +147,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
 def _place_corners(
     flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, fixed: np.ndarray
 ) -> tuple[Flat, Ints, np.ndarray]:
-    """Put a vertex at every sharp corner of a loop, and one where each of its two sides leaves the corner's fan.
+    """Put a vertex at every sharp corner and mark of a loop, and one where each of its sides leaves the corner's fan.
 
     So the sides at a corner are edges of the mesh, and a wedge narrower than a triangle is not lost.
     """

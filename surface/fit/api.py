@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from surface.fit.chart import Chart, make_chart
 from surface.fit.finish import finish_head
+from surface.fit.frame import head_scale
 from surface.fit.generic import Plan, make_plan
 from surface.fit.islands import Island, find_islands
 from surface.fit.joins import find_seams
@@ -112,7 +113,8 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
-    report = FitReport(name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes])
+    scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
+    report = FitReport(name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes], scale)
     return FitResult(head, report, fitted_parts)
 
 
@@ -196,7 +198,7 @@ def _with_mesh(part: PartData, head: HeadData) -> PartData:
     if part.follows == "skin":
         lively = SkinRig(part, head).apply(read_pose(np.array([LIVELY.get(n, 0.0) for n in NAMES])))
         surface = surface.with_points(deepened(part, lively))
-    return replace(part, mesh=pack(tessellate(part, surface), part.budget))
+    return replace(part, mesh=pack(tessellate(part, surface, head.seams), part.budget))
 
 
 def eyes_of(mesh: FitMesh, recipe: Recipe) -> tuple[Floats, float]:

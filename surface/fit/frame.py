@@ -12,6 +12,7 @@ from surface.errors import FitError
 Floats = NDArray[np.float64]
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 GUESSED = ("mm", "cm", "m")
+GUESSED_BY_EYES = (*GUESSED, "in")  # heads differ less in their eyes than in how much neck comes with them
 AXES = {f"{sign}{'xyz'[i]}": (i, -1.0 if sign else 1.0) for i in range(3) for sign in ("", "-")}
 HEAD_HEIGHT_MM = 250.0  # a head with neck; only tells metres, centimetres and millimetres apart
 EYES_MM = 65.4  # between the middles of what blinks, on the head that the bounds were set for
@@ -60,11 +61,12 @@ def find_frame(
             raise FitError(f"--unit {unit}: is not one of {', '.join(UNITS)}", hint="--unit cm")
         return Frame(turn, UNITS[unit], tuple(notes))
     turned = vertices @ turn.T
-    measure, usual = eye_distance(turned, shapes), EYES_MM
+    measure, usual, units = eye_distance(turned, shapes), EYES_MM, GUESSED_BY_EYES
+    height = float(np.ptp(turned[:, 1]))
     if not measure:
-        measure, usual = float(np.ptp(turned[:, 1])), HEAD_HEIGHT_MM
-    guess = min(GUESSED, key=lambda u: abs(np.log(max(measure * UNITS[u], 1e-12) / usual)))
-    notes.append(f"unit taken for {guess} by the size of the head (say --unit otherwise)")
+        measure, usual, units = height, HEAD_HEIGHT_MM, GUESSED
+    guess = min(units, key=lambda u: abs(np.log(max(measure * UNITS[u], 1e-12) / usual)))
+    notes.append(f"unit taken for {guess}: all of it is {UNITS[guess] * height:.0f} mm high (say --unit otherwise)")
     return Frame(turn, UNITS[guess], tuple(notes))
 
 

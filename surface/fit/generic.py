@@ -29,6 +29,9 @@ WORDS = {  # in the name of an object or material -> material of the part; the f
 }  # fmt: skip
 KEPT = ("skin", "socket", "lid")  # what is called so is no part of an eyeball, however near it lies
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
+FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
+FINEST = 0.6  # in spacings of a mesh whose triangles may be of any size, since the largest around a place count
+GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
 TOOTH_MM, TEETH = 24.0, 12  # so many pieces no larger than this are teeth
 ROUND = 0.07  # how far a ball may stray from a sphere, in radii
@@ -166,9 +169,11 @@ def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[
     moved = np.array([_shapes_moving(mesh, i.vertex, scale) for i in islands])
     lively = moved >= LIVELY * moved.max(initial=0)
     face, rest = ([i for i, x in zip(islands, lively, strict=True) if x == wanted] for wanted in (True, False))
-    out = [_part("face", "skin", POINTS, 0.1, 0.25, scale, face, mesh)]
+    area = sum(_area(mesh, i) for i in face)
+    beyond = np.clip(area / (FACE_MM2 * scale**2) - 1.0, 0.0, 1.0)
+    out = [_part("face", "skin", int(POINTS * (1.0 + beyond)), 0.1, 0.25, scale, face, mesh)]
     if rest:
-        share = sum(_area(mesh, i) for i in rest) / max(sum(_area(mesh, i) for i in face), 1e-9)
+        share = sum(_area(mesh, i) for i in rest) / max(area, 1e-9)
         points = int(np.clip(POINTS * share, max(REST, LEAST * len(rest)), POINTS))
         out.append(_part("back", "skin", points, 0.1, 0.4, scale, rest, mesh))
     return out
@@ -190,8 +195,10 @@ def _part(
     name: str, material: str, points: int, coarse: float, error: float, scale: float, islands: list[Island],
     mesh: FitMesh,
 ) -> tuple[PartRecipe, list[Island]]:  # fmt: skip
-    wish = Wish(points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.3 * scale)
-    recipe = PartRecipe(name, material, "skin", [], wish, (0, 0.24 * scale if name == "face" else 0.5 * scale, 8))
+    face = name == "face"
+    wish = Wish(points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, finest=FINEST,
+                growth=GROWTH if face else 1.25)  # fmt: skip
+    recipe = PartRecipe(name, material, "skin", [], wish, (0, 0.24 * scale if face else 0.5 * scale, 8))
     return recipe, [open_flat_holes(i) for i in lay_out(mesh, islands)]
 
 

@@ -17,8 +17,6 @@ from surface.fit.solve import basis, solve
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-FINEST = 1.2  # a net may be this fine, in spacings of the mesh's vertices
-
 
 @dataclass(frozen=True)
 class Wish:
@@ -28,6 +26,8 @@ class Wish:
     ----------
     points : most control points; coarse : spacing of the first net, in tiles; deepest : its finest level.
     neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
+    growth : by how much the net grows between two solves, at most.
+    finest : how fine a net may be, in spacings of the mesh's vertices.
     """
 
     points: int
@@ -37,6 +37,7 @@ class Wish:
     shape_mm: float = 0.3
     fair: float = 1e-4
     growth: float = 1.25
+    finest: float = 1.2
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def need(chart: Chart, fitted: Fitted, wish: Wish) -> NDArray[np.float64]:
 
 def _grow(net: Net, chart: Chart, error: NDArray[np.float64], wish: Wish, room: int) -> tuple[Net, bool]:
     """Add the most wanted points, at most a share of what stands."""
-    caps = level_caps(FINEST * chart.spacing, wish.coarse, wish.deepest)
+    caps = level_caps(wish.finest * chart.spacing, wish.coarse, wish.deepest)
     places = wanted_places(net, chart.uv, caps, error, wish.coarse)
     quota = min(room, max(12, int(len(net) * (wish.growth - 1))))
     standing = {tuple(p) for p in net.place.tolist()}

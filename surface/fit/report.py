@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from surface.fit.chart import Chart
 from surface.fit.refine import Fitted
 
+# what a face on a head of usual size shall keep to, mm
+RMS_MM, P99_MM, SHAPES_MM = 0.25, 0.8, 0.08
+
 
 @dataclass(frozen=True)
 class Errors:
@@ -48,6 +51,7 @@ class FitReport:
     ----------
     parameters : ARKit's names that the head has shapes for; missing : those it has none for.
     left_out : shapes of the mesh that mean none of them; notes : what was guessed or left out, in words.
+    scale : how large the head is beside the one that the bounds were set for.
     """
 
     name: str
@@ -56,11 +60,22 @@ class FitReport:
     missing: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+    scale: float = 1.0
 
     @property
     def points(self) -> int:
         """Control points of all fitted parts."""
         return sum(p.points for p in self.parts)
+
+
+def face_bounds(report: FitReport) -> str:
+    """The face, which is the first part, beside its bounds; they grow with the head."""
+    face = report.parts[0]
+    pairs = [("RMS", face.neutral.rms, RMS_MM), ("99 %", face.neutral.p99, P99_MM)]
+    pairs += [("shapes", face.mean_shape_rms, SHAPES_MM)] if face.shapes else []
+    said = ", ".join(f"{name} {got:.3f} of {most * report.scale:.3f} mm" for name, got, most in pairs)
+    kept = all(got <= most * report.scale for _, got, most in pairs)
+    return f"{face.name}: {'within' if kept else 'beyond'} the bounds for its size ({report.scale:.2f}): {said}"
 
 
 def measure(name: str, chart: Chart, fitted: Fitted, names: tuple[str, ...]) -> PartReport:

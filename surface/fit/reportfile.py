@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from surface.errors import FitError, ViewError
 from surface.fit.chart import TILE
 from surface.fit.nurbsnet import UniformNet, uniform_nets
-from surface.fit.report import Errors, FitReport
+from surface.fit.report import Errors, FitReport, face_bounds
 
 if TYPE_CHECKING:
     from surface.fit.api import FitResult, FittedPart
@@ -67,6 +67,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
     """The report as plain values."""
     return {
         "head": report.name,
+        "scale": report.scale,
         "control_points": report.points,
         "parameters": report.parameters,
         "missing": list(report.missing),
@@ -89,7 +90,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
 def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) -> str:
     """The report to read: tables of errors, and what was guessed."""
     lines = [f"# {report.name}: {report.points} control points, {len(report.parameters)} shapes", ""]
-    lines += [f"- {note}" for note in report.notes]
+    lines += [f"- {note}" for note in [face_bounds(report), *report.notes]]
     lines += [f"- no shape for: {', '.join(report.missing)}"] if report.missing else []
     lines += [f"- left out, not ARKit's: {', '.join(report.left_out)}"] if report.left_out else []
     lines += ["", "Distances between mesh and surface at the same (u, v), mm.", ""]

@@ -142,7 +142,8 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
         )
     try:
         surface = make_surface(part)
-        mesh = unpack(part.mesh, surface, part.budget, rough=part.follows == "skin") or tessellate(part, surface)
+        kept = unpack(part.mesh, surface, part.budget, rough=part.follows == "skin")
+        mesh = kept or tessellate(part, surface, head.seams)
     except ValueError as e:
         raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e
     attributes = paint_part(head.paint, part.name, mesh.uv, where)

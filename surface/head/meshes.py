@@ -5,12 +5,15 @@ A head without it, or with another budget than it was made with, is tessellated 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from surface.dcp import DCPSurface
 from surface.domain import Domain
-from surface.head.data import PartData
+from surface.head.data import PartData, Seam
 from surface.mesh import Mesh
 from surface.tessellate import unit_normals
 
@@ -25,17 +28,24 @@ def make_surface(data: PartData) -> DCPSurface:
     )
 
 
-def tessellate(data: PartData, surface: DCPSurface) -> Mesh:
-    """Triangles for a part by its budget."""
+def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) -> Mesh:
+    """Triangles for a part by its budget, with vertices where the head's seams begin and end."""
     most, chord, depth = data.budget
     with np.errstate(divide="ignore", invalid="ignore"):  # triangles without area while borders are cut
         return surface.tessellate(
             max_points=most or None,
             chord_error=chord,
             max_depth=depth,
-            domain=domain_of(data),
+            domain=replace(domain_of(data), marks=_ends(seams, data.name)),
             loop_error=LOOP_SHARE * chord,
         )
+
+
+def _ends(seams: Sequence[Seam], part: str) -> NDArray[np.float64]:
+    """(k, 2) where seams of a part begin and end: three borders or more meet there. Closed seams have no ends."""
+    lines = [uv for s in seams for name, uv in ((s.part_a, s.uv_a), (s.part_b, s.uv_b)) if name == part]
+    ends = [line[k] for line in lines for k in (0, -1) if not np.array_equal(line[0], line[-1])]
+    return np.unique(np.array(ends, float).reshape(-1, 2), axis=0)
 
 
 def domain_of(data: PartData) -> Domain:

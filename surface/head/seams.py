@@ -33,7 +33,8 @@ class Zipper:
         inside = (b_at >= a_at.min(initial=np.inf) - SAME) & (b_at <= a_at.max(initial=-np.inf) + SAME)
         self.ids, at = b_ids[inside], b_at[inside]
         if len(a_ids) < 2 or not len(self.ids):
-            self.ids = self.ids[:0]
+            self.ids = self.low = self.high = self.ids[:0]
+            self.share = np.zeros(0, np.float32)
             return
         after = np.clip(np.searchsorted(a_at, at), 1, max(len(a_at) - 1, 1))
         self.low, self.high = a_ids[after - 1], a_ids[after]

@@ -34,7 +34,7 @@ def sheet(tmp_path_factory):
 def test_fit_says_what_it_did_and_guessed(sheet):
     mesh, head, output = sheet
     words = " ".join(output.split())
-    for expected in ("me: ", "2 shapes", "unit taken for m by the size", "no shape for", f"wrote {head}"):
+    for expected in ("me: ", "2 shapes", "unit taken for m: all of it is 200 mm high", "no shape for", f"wrote {head}"):
         assert expected in words
     assert (mesh.parent / "report" / "report.md").is_file()
 

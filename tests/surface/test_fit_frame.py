@@ -54,7 +54,7 @@ def test_sides_named_by_the_viewer_are_noticed():
     assert any("as the viewer sees them" in note for note in frame.notes)
 
 
-@pytest.mark.parametrize("unit", [0.001, 0.1, 1.0])
+@pytest.mark.parametrize("unit", [0.001, 1 / 25.4, 0.1, 1.0])
 def test_the_eyes_tell_the_unit_even_of_a_whole_body(unit):
     vertices, shapes = face()
     body = unit * np.vstack([vertices, [[0, -1600.0, 0]]])

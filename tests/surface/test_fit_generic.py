@@ -9,8 +9,10 @@ from meshfiles import remapped
 from slit_sheet import SIZE_MM, slit_sheet
 
 from surface.errors import FitError
-from surface.fit.generic import MOST_ISLANDS, make_plan
+from surface.fit.generic import MOST_ISLANDS, POINTS, make_plan
 from surface.fit.mesh import FitMesh
+
+EYES = {"eyeBlinkLeft": 32.7, "eyeBlinkRight": -32.7}  # where they are, mm
 
 
 def joined(meshes: list[tuple[str, FitMesh]]) -> FitMesh:
@@ -69,6 +71,14 @@ def test_a_row_of_small_pieces_is_teeth():
     row = [("head", ball((x, -20, 0), 3)) for x in np.linspace(-40, 40, 14)]
     plan = make_plan(joined([("head", slit_sheet()), *row]))
     assert [(p.name, p.material, len(i)) for p, i in plan.parts] == [("face", "skin", 1), ("teeth_1", "teeth", 14)]
+
+
+def test_one_skin_for_face_and_back_gets_points_by_its_area():
+    mesh = slit_sheet()
+    around = {n: np.array([0, 0, 1.0]) * (np.abs(mesh.vertices[:, :1] - x) < 12) for n, x in EYES.items()}
+    mesh = mesh.with_shapes(tuple(around), np.stack(list(around.values())))
+    (small, _), (large, _) = (make_plan(replace(mesh, vertices=mesh.vertices * [1, k, 1])).parts[0] for k in (1, 6))
+    assert (small.wish.points, large.wish.points) == (POINTS, pytest.approx(1.85 * POINTS, rel=0.05))
 
 
 def test_what_hardly_moves_is_the_back():

@@ -13,6 +13,7 @@ from surface.fit.islands import find_islands
 from surface.fit.load import Loaded
 from surface.fit.names import map_names
 from surface.fit.nurbsnet import uniform_nets
+from surface.fit.report import Errors, FitReport, PartReport, face_bounds
 from surface.fit.reportfile import EXCLUDED, _colours, write_report
 
 
@@ -47,6 +48,14 @@ def test_it_can_be_read(folder):
     text = (folder / "report.md").read_text()
     for words in ("left out, not ARKit's: odd", "| jawOpen |", "uniform cubic NURBS net", "unit taken for mm"):
         assert words in text
+
+
+@pytest.mark.parametrize(("scale", "said"), [(0.5, "within"), (0.04, "beyond")])
+def test_the_face_stands_beside_bounds_that_grow_with_the_head(scale, said):
+    face = PartReport("face", 9, 9, 0, Errors(0.02, 0.05, 0.1), {"jawOpen": Errors(0.003, 0.02, 0.1)})
+    line = face_bounds(FitReport("me", [face], [], scale=scale))
+    assert line.startswith(f"face: {said} the bounds for its size ({scale:.2f}): RMS 0.020 of {0.25 * scale:.3f} mm")
+    assert f"99 % 0.050 of {0.8 * scale:.3f} mm" in line and f"shapes 0.003 of {0.08 * scale:.3f} mm" in line
 
 
 def test_the_error_is_drawn_on_the_face(folder, gl):

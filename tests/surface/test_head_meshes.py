@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from small_head import part
 
+from surface.head.data import Seam
 from surface.head.meshes import pack, tessellate, unpack
 from surface.head.part import make_surface
 
@@ -20,6 +21,14 @@ def test_it_comes_back():
     np.testing.assert_allclose(got.normals, MESH.normals, atol=1e-5)
     for key in ("triangles", "cell", "cell_start", "list_start", "list_ids"):
         np.testing.assert_array_equal(getattr(got, key), getattr(MESH, key))
+
+
+def test_seams_end_at_vertices_of_the_border():
+    line = np.array([[1.0, 0.31], [1.0, 0.5], [1.0, 0.77]])
+    mesh = tessellate(DATA, SURFACE, [Seam("a", "b", line, line - [1, 0]), Seam("b", "c", line - 0.5, line)])
+    assert np.linalg.norm(mesh.uv[:, None] - line[[0, 2]], axis=2).min(axis=0).max() < 1e-12
+    ring = np.array([[0.0, 0.13], [1.0, 0.31], [1.0, 0.77], [0.0, 0.13]])
+    np.testing.assert_array_equal(tessellate(DATA, SURFACE, [Seam("a", "b", ring, ring)]).uv, MESH.uv)
 
 
 def test_rough_positions_are_near():

@@ -1,5 +1,7 @@
 """Seams show no crack, whatever the pose."""
 
+from dataclasses import replace
+
 import numpy as np
 from small_head import all_points, part, small_head
 
@@ -56,3 +58,11 @@ def test_a_seam_reports_what_it_wrote():
     assert h.part("b").changed == [(0, len(h.part("b").vertices))]
     h.pose(h.values({"mouthPucker": 1.0}))
     assert all(not p.changed for p in h.parts)
+
+
+def test_a_seam_off_the_border_is_none():
+    data = small_head()
+    far = data.seams[0].uv_a * 0.2 + 0.4
+    (zipper,) = Head(replace(data, seams=[replace(data.seams[0], uv_a=far, uv_b=far)])).zippers
+    assert [len(a) for a in (zipper.ids, zipper.low, zipper.high, zipper.share)] == [0] * 4
+    zipper.close()

@@ -53,6 +53,16 @@ def test_sharp_corners_become_vertices() -> None:
         assert (flat.uv == corner).all(axis=1).any()
 
 
+@pytest.mark.parametrize("scale", [(1.0, 1.0), (1.0, 7.0)])
+def test_the_border_has_a_vertex_at_every_mark(scale: tuple[float, float]) -> None:
+    ring, marks = shapes.circle(0.5, 0.5, 0.4), shapes.circle(0.5, 0.5, 0.4)[3::17]
+    flat = trim.trim(grid(9), Domain((0, 1, 0, 1), loops=[ring], marks=marks), scale)
+    directed = {(a, b) for t in flat.triangles.tolist() for a, b in zip(t, [*t[1:], t[0]], strict=True)}
+    border = flat.uv[sorted({a for a, b in directed if (b, a) not in directed})]
+    assert np.linalg.norm(marks[:, None] - border, axis=2).min(axis=1).max() < 1e-12
+    assert (areas(flat) > 0).all()
+
+
 def test_nothing_inside_leaves_nothing() -> None:
     away = Domain((0, 1, 0, 1), loops=[shapes.circle(4, 4, 0.5)])
     assert len(trim.trim(grid(4), away, (1.0, 1.0)).triangles) == 0
