@@ -43,9 +43,12 @@ def fit(
 
     Example: omote fit me.glb -o heads/me --report report
     """
+    from controller.errors import ConfigError
     from controller.fitting import add_with_progress, fit_with_progress
     from surface.fit.load import LoadOptions
 
+    if keep and identities is None:
+        raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
     if not keep:
         options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
         fit_with_progress(mesh, out, name or out.resolve().name, console, options, report)

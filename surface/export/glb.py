@@ -32,8 +32,12 @@ def write_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
         raise ExportError(f"{turned[0]}: angles are no morph targets", hint="export an .obj in this pose")
     content = Document(head, pieces_of(head), pose).bytes()
     new = path.with_name(path.name + ".new")
-    new.write_bytes(content)
-    new.replace(path)
+    try:
+        new.write_bytes(content)
+        new.replace(path)
+    finally:
+        if path.parent.is_dir():
+            new.unlink(missing_ok=True)
     return [path]
 
 

@@ -29,7 +29,7 @@ from surface.fit.strokes import make_paint
 from surface.fit.wrap import wrap_chart
 from surface.fit.wrinkles import deepened
 from surface.head.data import HeadData, Neck, PartData
-from surface.head.file import save_data
+from surface.head.file import check_writable, save_data
 from surface.head.meshes import pack, tessellate
 from surface.head.parameters import NAMES, read_pose
 from surface.head.part import make_surface
@@ -79,8 +79,11 @@ def fit_head(
     ------
     FitError : the mesh cannot be read, has no texture coordinates or faces, holds NaN, is no manifold, or does not
         fit together. Nothing is written then.
+    HeadFileError : a folder cannot be written to.
     """
     tell = progress or (lambda part, done: None)
+    for folder in (out_dir, report_dir):
+        check_writable(folder or out_dir)
     loaded = load_mesh(mesh_path, options)
     result = fit_mesh(loaded, name, tell, str(mesh_path))
     if report_dir is not None:

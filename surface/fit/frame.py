@@ -11,7 +11,7 @@ from surface.errors import FitError
 
 Floats = NDArray[np.float64]
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-GUESSED = ("mm", "cm", "m")
+GUESSED: tuple[str, ...] = ("mm", "cm", "m")
 GUESSED_BY_EYES = (*GUESSED, "in")  # heads differ less in their eyes than in how much neck comes with them
 AXES = {f"{sign}{'xyz'[i]}": (i, -1.0 if sign else 1.0) for i in range(3) for sign in ("", "-")}
 HEAD_HEIGHT_MM = 250.0  # a head with neck; only tells metres, centimetres and millimetres apart

@@ -39,10 +39,21 @@ def read_beside(path: Path, make: Callable[[np.lib.npyio.NpzFile], Made], hint: 
 
 
 def write_beside(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
-    """Keep arrays by name, all or none of them; returns the file's path."""
+    """Keep arrays by name, all or none of them; returns the file's path.
+
+    Raises
+    ------
+    HeadFileError : the file cannot be written, or the disk is full.
+    """
     new = path.with_suffix(".npz.new")
     packed: dict[str, Any] = dict(arrays)
-    with new.open("wb") as stream:
-        np.savez_compressed(stream, **packed)
-    new.replace(path)
+    try:
+        with new.open("wb") as stream:
+            np.savez_compressed(stream, **packed)
+        new.replace(path)
+    except OSError as error:
+        raise HeadFileError(f"{path}: cannot be written ({error})", hint="make room on the disk") from error
+    finally:
+        if path.parent.is_dir():
+            new.unlink(missing_ok=True)
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -198,22 +199,49 @@ def _rule(src: Source, t: dict[str, Any], i: int) -> Rule:
     return Rule(src.value(t, "group", str, where), tuple(terms), float(src.numbers(t, "power", (), where)))
 
 
+def check_writable(folder: str | Path) -> None:
+    """Raise HeadFileError where :func:`save_data` could not write, before a long fit finds out."""
+    folder = place = Path(folder)
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir():
+        raise HeadFileError(f"{folder}: cannot be written: {place} is no folder", hint="choose another --out folder")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise HeadFileError(f"{folder}: {place} may not be written to", hint="choose another --out folder")
+
+
 def save_data(folder: str | Path, head: HeadData) -> None:
-    """Write head.toml and head.npz; either both are replaced or none is."""
+    """Write head.toml and head.npz; either both are replaced or none is.
+
+    Raises
+    ------
+    HeadFileError : the folder cannot be written to, or the disk is full; what stood there stands as before.
+    """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    new = folder / "head.npz.new", folder / "head.toml.new"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with new[0].open("wb") as f:
+            np.savez_compressed(f, **_arrays(head))  # type: ignore[arg-type]
+        new[1].write_text(toml_text(_table(head)), encoding="utf-8")
+        for path in new:
+            path.replace(path.with_suffix(""))
+    except OSError as e:
+        hint = "choose another folder, or make room on the disk"
+        raise HeadFileError(f"{folder}: the head cannot be written ({e})", hint=hint) from e
+    finally:  # interrupted ones, too, leave nothing half-written
+        for path in new if folder.is_dir() else ():
+            path.unlink(missing_ok=True)
+
+
+def _arrays(head: HeadData) -> dict[str, NDArray]:
+    """Everything that goes into head.npz."""
     arrays: dict[str, NDArray] = {}
     for p in head.parts:
         arrays |= {f"{p.name}/{k}": v for k, v in _part_arrays(p).items()}
     for i, s in enumerate(head.seams):
         arrays |= {f"seams/{i}/a": s.uv_a, f"seams/{i}/b": s.uv_b}
-    arrays |= {f"contacts/{i}": c.places.astype(np.float32) for i, c in enumerate(head.contacts)}
-    new_npz, new_toml = folder / "head.npz.new", folder / "head.toml.new"
-    with new_npz.open("wb") as f:
-        np.savez_compressed(f, **arrays)  # type: ignore[arg-type]
-    new_toml.write_text(toml_text(_table(head)), encoding="utf-8")
-    new_npz.replace(folder / "head.npz")
-    new_toml.replace(folder / "head.toml")
+    return arrays | {f"contacts/{i}": c.places.astype(np.float32) for i, c in enumerate(head.contacts)}
 
 
 def _part_arrays(p: PartData) -> dict[str, NDArray]:

@@ -43,6 +43,9 @@ class Gltf:
     def __init__(self, path: Path) -> None:
         self.path = path
         raw = read_bytes(path)
+        if raw[:4] != b"glTF" and raw.lstrip()[:1] != b"{":
+            why = "is no glTF file: neither its binary form nor JSON" if raw else "is empty"
+            raise FitError(f"{path}: {why}", hint="export the head as .glb")
         text, self._chunk = self._chunks(raw) if raw[:4] == b"glTF" else (raw, None)
         try:
             self.document = json.loads(text.decode("utf-8"))

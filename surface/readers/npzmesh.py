@@ -62,6 +62,9 @@ def _arrays(path: Path) -> dict[str, NDArray]:
     if not path.is_file():
         raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
     try:
+        with path.open("rb") as f:
+            if f.read(2) != b"PK":
+                raise FitError(f"{path}: is no .npz archive", hint=f"save {', '.join(KEYS)} with numpy.savez")
         with path.open("rb") as f, np.load(f, allow_pickle=False) as z:
             missing = [k for k in KEYS if k not in z.files]
             if missing:

@@ -36,6 +36,8 @@ def read_obj(path: Path, shapes: Path | None = None) -> MeshData:
     parser = _Parser(path)
     parser.read()
     vertices = parser.points(parser.vertices, "v")
+    if not len(vertices):
+        raise FitError(f"{path}: holds no vertex: no line begins with v", hint="export the mesh as .obj with UVs")
     check_size(str(path), len(vertices), len(files))
     deltas = np.zeros((len(files), len(vertices), 3))
     for k, file in enumerate(files):

@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from controller.cli import app
-from controller.errors import ParameterError
+from controller.errors import ConfigError, ParameterError
 from controller.identity import parse_identity
-from surface.errors import ExportError, FitError
+from surface.errors import ExportError, FitError, HeadFileError
 
 SURFACE = str(Path(__file__).parent.parent / "surface")
 
@@ -54,6 +54,8 @@ def test_export_writes_what_fit_wrote(sheet, tmp_path):
         (["export", "x.glb", "--set", "jawOpn=1"], ParameterError, "jawOpn"),
         (["fit", "none.glb", "-o", "h"], FitError, "no such mesh file"),
         (["fit", "none.glb", "-o", "h", "--unit", "ell"], FitError, "no such mesh file"),
+        (["fit", "none.glb", "-o", "h", "--keep"], ConfigError, "--keep: fits nothing"),
+        (["fit", "none.glb", "-o", "/dev/null/h"], HeadFileError, "/dev/null is no folder"),
     ],
 )
 def test_mistakes_leave_nothing_behind(tmp_path, monkeypatch, words, kind, message):

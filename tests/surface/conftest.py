@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import resource
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -20,3 +22,11 @@ def gl() -> None:
         open_context().release()
     except ViewError as error:
         pytest.skip(f"{error}; try: {error.hint}")
+
+
+@pytest.fixture
+def full_disk() -> Iterator[Callable[[int], None]]:
+    """Call it with a number of bytes: a file of this process can get no larger until the test ends."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda most: resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)

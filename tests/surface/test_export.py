@@ -181,3 +181,13 @@ def test_the_validator_of_khronos_finds_no_fault(tmp_path, head):
     (path,) = export_head(head, tmp_path / "h.glb")
     said = subprocess.run([node, "-e", VALIDATE, str(path)], capture_output=True, text=True, check=True)
     assert said.stdout.split() == ["0", "0"]
+
+
+@pytest.mark.parametrize("name", ["h.glb", "h.obj"])
+def test_a_full_disk_leaves_what_was_there(tmp_path, head, full_disk, name):
+    (tmp_path / name).write_text("old")
+    full_disk(2000)
+    with pytest.raises(ExportError, match=r"cannot be written \(.*File too large"):
+        export_head(head, tmp_path / name)
+    full_disk(-1)
+    assert [p.name for p in tmp_path.iterdir()] == [name] and (tmp_path / name).read_text() == "old"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -37,3 +38,11 @@ def test_what_is_missing_in_it_is_named(tmp_path: Path) -> None:
     path = write_beside(tmp_path / "more.npz", {"a": np.arange(3)})
     with pytest.raises(HeadFileError, match="b is not a file"):
         read_beside(path, lambda z: z["b"], "")
+
+
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path, full_disk: Callable[[int], None]) -> None:
+    path = write_beside(tmp_path / "more.npz", {"a": np.arange(3)})
+    full_disk(2000)
+    with pytest.raises(HeadFileError, match=r"more\.npz: cannot be written \(.*File too large"):
+        write_beside(path, {"a": np.random.default_rng(1).random(9999)})
+    assert [entry.name for entry in tmp_path.iterdir()] == ["more.npz"] and path.stat().st_size < 2000

@@ -5,7 +5,7 @@ import pytest
 from small_head import small_head
 
 from surface.errors import HeadFileError
-from surface.head.file import load_data, save_data
+from surface.head.file import check_writable, load_data, save_data
 
 
 @pytest.fixture
@@ -136,3 +136,29 @@ def test_a_group_without_a_name(folder):
 def test_a_seam_of_an_unknown_part(folder):
     edit(folder, 'b = "b"', 'b = "c"')
     broken(folder, "no part is named 'c'")
+
+
+def test_a_full_disk_leaves_the_old_head(folder, full_disk):
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    full_disk(2000)
+    with pytest.raises(HeadFileError, match=r"the head cannot be written \(.*File too large"):
+        save_data(folder, small_head())
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_an_interrupt_leaves_the_old_head(folder, monkeypatch):
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    monkeypatch.setattr("surface.head.file.toml_text", lambda table: exec("raise KeyboardInterrupt"))
+    with pytest.raises(KeyboardInterrupt):
+        save_data(folder, small_head())
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_places_that_cannot_be_written_are_known_beforehand(folder, tmp_path, monkeypatch):
+    check_writable(tmp_path / "new" / "deep")
+    assert not (tmp_path / "new").exists()
+    with pytest.raises(HeadFileError, match=r"head\.npz is no folder"):
+        check_writable(folder / "head.npz" / "deep")
+    monkeypatch.setattr("os.access", lambda place, mode: place != folder)
+    with pytest.raises(HeadFileError, match="h may not be written to"):
+        check_writable(folder / "new")
