@@ -151,6 +151,8 @@ def _place_corners(
 
     So the sides at a corner are edges of the mesh, and a wedge narrower than a triangle is not lost.
     """
+    for mark in np.asarray(domain.marks):
+        flat, line, fixed = _place(flat, mark, line, fixed, slides=True)
     tips = _all_corners(domain, scale)
     for tip in tips:
         flat, line, fixed = _place(flat, tip, line, fixed)
@@ -161,15 +163,22 @@ def _place_corners(
     return flat, line, fixed
 
 
-def _place(flat: Flat, point: Floats, line: Ints, fixed: np.ndarray) -> tuple[Flat, Ints, np.ndarray]:
-    """Move a close free vertex to ``point``, or split a triangle there."""
+def _place(
+    flat: Flat, point: Floats, line: Ints, fixed: np.ndarray, *, slides: bool = False
+) -> tuple[Flat, Ints, np.ndarray]:
+    """Move a close free vertex to ``point``, or split a triangle there.
+
+    ``slides``: one of the rectangle's border, too, along it or where it is so close that the border bends by nothing.
+    """
     inside = _weights_in(flat, point)
     triangle = int(np.argmax(inside.min(axis=1)))
     share = inside[triangle]
     if share.min() < -1e-9:
         return flat, line, fixed
     nearest = flat.triangles[triangle, int(np.argmax(share))]
-    if share.max() > 0.7 and line[nearest] == -1 and not fixed[nearest]:
+    axis = line[nearest] // 2  # borders 0 and 1 fix u, 2 and 3 fix v
+    border = slides and 0 <= axis < 2 and (flat.uv[nearest, axis] == point[axis] or share.max() >= 0.9)
+    if share.max() > 0.7 and (border or line[nearest] == -1) and not fixed[nearest]:
         flat.uv[nearest] = point
         fixed[nearest] = True
     elif share.max() < 0.9:

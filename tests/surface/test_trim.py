@@ -63,6 +63,15 @@ def test_the_border_has_a_vertex_at_every_mark(scale: tuple[float, float]) -> No
     assert (areas(flat) > 0).all()
 
 
+def test_a_mark_on_the_rectangle_is_reached_along_it() -> None:
+    square, mark = DOMAINS["the whole square"][0], np.array([[0.51, 1.0]])
+    bare = trim.trim(grid(8), Domain((0, 1, 0, 1), loops=[square]), (1.0, 1.0))
+    flat = trim.trim(grid(8), Domain((0, 1, 0, 1), loops=[square], marks=mark), (1.0, 1.0))
+    assert (flat.uv == mark).all(axis=1).any() and not (bare.uv == mark).all(axis=1).any()
+    assert areas(flat).sum() == pytest.approx(areas(bare).sum()) and (areas(flat) > 0).all()
+    assert len(flat.uv) == len(bare.uv)
+
+
 def test_nothing_inside_leaves_nothing() -> None:
     away = Domain((0, 1, 0, 1), loops=[shapes.circle(4, 4, 0.5)])
     assert len(trim.trim(grid(4), away, (1.0, 1.0)).triangles) == 0
