@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -155,11 +157,24 @@ def _run(
     identity: dict[str, float] | None = None,
     picture: dict[str, object] | None = None,
 ) -> None:
-    from controller.picture import with_picture
-    from controller.session import Session, has_display, write_report
+    from controller.waiting import WaitingBody
 
-    with console.status("starting") as status:
-        session = Session.load(stage, take, status.update, mirror=mirror, voice=voice, record=record, identity=identity)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: its threads would spin where others have work
+    gc.disable()  # until it runs: next to nothing of what is loaded is garbage, and looking takes a tenth of the start
+    with console.status("starting") as status, WaitingBody() as waiting:
+        from controller.picture import with_picture
+        from controller.session import Session, has_display, write_report
+
+        session = Session.load(
+            stage,
+            take,
+            status.update,
+            mirror=mirror,
+            voice=voice,
+            record=record,
+            identity=identity,
+            waiting=waiting,
+        )
         session.stage = with_picture(session.stage, picture or {})
         if no_face:
             measured = session.run_without_face(seconds)

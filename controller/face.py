@@ -197,6 +197,8 @@ class HeadlessFace:
         self._recorder = recorder
         self._settings = settings
         self._log = FrameLog()
+        self._screen.go_live()
+        self._screen.draw(np.zeros(len(head.parameters)), self._camera)  # what loads at the first frame loads now
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Draw until ``keep_going()`` is false, at most ``fps`` times a second."""

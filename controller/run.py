@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import time
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnContext
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -16,9 +13,9 @@ from controller.insight import Insight, insight_size
 from controller.mailbox import Mailbox
 from controller.mixer import by_priority
 from controller.parameters import Parameters
-from controller.signals import interrupts_held
 from controller.sources import Voice, pump
 from controller.stage import Stage
+from controller.waiting import WaitingBody
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show, Stop
 
 _START_TIMEOUT_S = 60.0
@@ -36,6 +33,7 @@ class BodyProcess:
     take : a recorded take to play instead of the links.
     mirror : leave the servos limp; the face shows where somebody moves them.
     voice : a voice that moves the mouth. record : file to write every command and tick to.
+    waiting : a process that waits for orders; without one it is started here.
     """
 
     def __init__(
@@ -47,17 +45,14 @@ class BodyProcess:
         mirror: bool = False,
         voice: Voice | None = None,
         record: Path | None = None,
+        waiting: WaitingBody | None = None,
     ) -> None:
-        from controller.body import body_main
-
+        waiting = waiting or WaitingBody()
         self.mailbox = Mailbox.create(len(parameters.names))
         self._insights = Mailbox.create(insight_size(parameters))
         self.insight = Insight(self._insights, [layer.name for layer in by_priority(stage.layers)], parameters)
         self.finished = False
         self.report: dict[str, object] = {}
-        context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        mine, voice = _through_pipe(context, voice)
         orders = BodyOrders(
             str(stage.path),
             self.mailbox.path,
@@ -67,13 +62,12 @@ class BodyProcess:
             str(record) if record else None,
             self._insights.path,
         )
-        self._process = context.Process(target=body_main, args=(orders, theirs), name="omote body")
-        with interrupts_held():
-            self._process.start()
-        theirs.close()
-        if mine is not None and voice is not None and voice.pipe is not None:
-            voice.pipe.close()
-            pump(mine)
+        self._pipe, self._process = waiting.pipe, waiting.process
+        waiting.send(orders)
+        if voice is not None and voice.path == "-":
+            pump(waiting.voice)
+        else:
+            waiting.voice.close()
 
     def wait_ready(self) -> Ready:
         """Wait until the servos stand.
@@ -181,14 +175,6 @@ class BodyProcess:
             self.stop()
         except ControllerError:
             self._end_process()
-
-
-def _through_pipe(context: SpawnContext, voice: Voice | None) -> tuple[Connection | None, Voice | None]:
-    """Our end of a pipe and the voice at the other, where it comes from standard input, which a child has not."""
-    if voice is None or voice.path != "-":
-        return None, voice
-    theirs, mine = context.Pipe(duplex=False)
-    return mine, replace(voice, pipe=theirs)
 
 
 @dataclass

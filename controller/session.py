@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import sys
@@ -26,6 +27,7 @@ from controller.stage import Stage, load_stage
 from drivers.priority import yield_to_servos
 
 if TYPE_CHECKING:
+    from controller.waiting import WaitingBody
     from surface.head import Head
 
 
@@ -51,6 +53,7 @@ class Session:
     tell : hears in a few words what is being done.
     mirror : leave the servos limp; the face shows where somebody moves them.
     voice : a voice that moves the mouth. record : file to write every command and tick to.
+    waiting : the body's process, where it has been started already.
     """
 
     def __init__(
@@ -62,6 +65,7 @@ class Session:
         mirror: bool = False,
         voice: Voice | None = None,
         record: Path | None = None,
+        waiting: WaitingBody | None = None,
     ) -> None:
         self.stage = stage
         self.take = take
@@ -69,6 +73,7 @@ class Session:
         self.mirror = mirror
         self.voice = voice
         self.record = record
+        self.waiting = waiting
 
     @classmethod
     def load(
@@ -81,6 +86,7 @@ class Session:
         voice: Voice | None = None,
         record: Path | None = None,
         identity: Mapping[str, float] | None = None,
+        waiting: WaitingBody | None = None,
     ) -> Session:
         """Find and check a stage and, where given, a take; raises before anything is opened.
 
@@ -94,7 +100,7 @@ class Session:
             check_take(take, found)
         if mirror and not found.robots:
             raise ConfigError(f"{found.path}: robots: a stage without a robot has nothing to mirror")
-        return cls(found, take, tell, mirror=mirror, voice=voice, record=record)
+        return cls(found, take, tell, mirror=mirror, voice=voice, record=record, waiting=waiting)
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display; returns the report.
@@ -138,7 +144,16 @@ class Session:
 
     def _body(self) -> BodyProcess:
         self.tell("starting")
-        return BodyProcess(self.stage, PARAMETERS, self.take, mirror=self.mirror, voice=self.voice, record=self.record)
+        waiting, self.waiting = self.waiting, None
+        return BodyProcess(
+            self.stage,
+            PARAMETERS,
+            self.take,
+            mirror=self.mirror,
+            voice=self.voice,
+            record=self.record,
+            waiting=waiting,
+        )
 
     def _head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
         """The head and its values; the servos come up meanwhile in the body's process."""
@@ -148,6 +163,8 @@ class Session:
 
     def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:
         """Wait for the servos, let commands in; gives the question whether to go on."""
+        gc.enable()
+        gc.freeze()  # what was loaded stays: no collection has to look at it while pictures are drawn
         body.wait_ready()
         body.begin()
         self.tell("running" + (f" for {seconds:g} s" if seconds else ""))

@@ -1,12 +1,19 @@
-"""The DCP engine: control-point surfaces, their tessellation and their deformation."""
+"""The DCP engine: control-point surfaces, their tessellation and their deformation.
+
+What stands here is loaded when it is first asked for: whoever only needs an error's name does not wait for numpy.
+"""
 
 from __future__ import annotations
 
-from .basis import blending
-from .dcp import DCPSurface
-from .domain import Domain, Slit
-from .errors import FitError, HeadFileError, SurfaceError, SurfaceFileError, ViewError
-from .mesh import Mesh
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .basis import blending
+    from .dcp import DCPSurface
+    from .domain import Domain, Slit
+    from .errors import FitError, HeadFileError, SurfaceError, SurfaceFileError, ViewError
+    from .mesh import Mesh
 
 __all__ = [
     "DCPSurface",
@@ -20,3 +27,16 @@ __all__ = [
     "ViewError",
     "blending",
 ]
+_ERRORS = ("FitError", "HeadFileError", "SurfaceError", "SurfaceFileError", "ViewError")
+_WHERE = {"DCPSurface": "dcp", "Domain": "domain", "Mesh": "mesh", "Slit": "domain", "blending": "basis"}
+_WHERE |= dict.fromkeys(_ERRORS, "errors")
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_WHERE[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

@@ -82,6 +82,14 @@ class Offscreen:
         self._wanted = self._pace.wanted
         self.target = Target(self.ctx, size, *self._wanted)
 
+    def go_live(self) -> None:
+        """Make ready what only moving pictures need, which the first :meth:`draw` would do otherwise."""
+        self._pace.begin_live()
+        self.ctx.__enter__()
+        if self._pace.hurried:
+            self.renderer.hurry()
+        self._fit_target()
+
     def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
         """Pose the head with `values` (P,) and draw it, without reading the picture back.
 

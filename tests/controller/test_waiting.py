@@ -1,0 +1,42 @@
+"""controller.waiting"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from controller.waiting import WaitingBody
+from controller.wire import BodyOrders, Failed
+
+
+def test_it_ends_with_the_block_where_nobody_has_orders() -> None:
+    with pytest.raises(RuntimeError, match="no such stage"), WaitingBody() as waiting:
+        raise RuntimeError("no such stage")
+    assert waiting.process.exitcode is not None
+    assert waiting.pipe.closed and waiting.voice.closed
+
+
+def test_it_does_as_it_is_told_and_is_left_alone_then() -> None:
+    with WaitingBody() as waiting:
+        waiting.send(BodyOrders("no such stage", "/nowhere"))
+    assert not waiting.pipe.closed
+    assert waiting.pipe.poll(30.0)
+    answer = waiting.pipe.recv()
+    assert isinstance(answer, Failed) and "no such stage" in answer.message
+    waiting.process.join(30.0)
+    assert waiting.process.exitcode == 0
+    waiting.pipe.close()
+    waiting.voice.close()
+
+
+def test_it_ends_when_main_is_gone() -> None:
+    program = "from controller.waiting import WaitingBody\nif __name__ == '__main__': print(WaitingBody().process.pid)"
+    main = subprocess.run([sys.executable, "-c", program + "; import os; os._exit(0)"], capture_output=True, timeout=30)
+    assert main.returncode == 0 and int(main.stdout) > 0  # its standard output closes when both have ended
+
+
+def test_the_command_line_comes_without_numpy() -> None:
+    program = "import sys, controller.cli, controller.waiting; print('numpy' in sys.modules, 'pydantic' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", program], text=True).split() == ["False", "False"]
