@@ -33,7 +33,7 @@ from surface.head.file import check_writable, save_data
 from surface.head.meshes import pack, tessellate
 from surface.head.parameters import NAMES, read_pose
 from surface.head.part import make_surface
-from surface.head.rig import SkinRig
+from surface.head.rig import SkinRig, optical_axis
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -160,7 +160,16 @@ def prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
     if recipe.frown:
         mesh = draw_brows(mesh, **recipe.frown)
     balls = recipe.eyeballs(mesh)
-    return mesh if balls is None else seat_lids(mesh, *balls, recipe.seated)
+    return mesh if balls is None else seat_lids(mesh, *balls, recipe.seated, _gazes(mesh))
+
+
+def _gazes(mesh: FitMesh) -> Floats:
+    """(k, 2, 3) where the left and the right eye look in every shape of a mesh."""
+    out = np.tile([0.0, 0.0, 1.0], (len(mesh.names), 2, 1))
+    for name, indices in sources_of(mesh.names).items():
+        pose = read_pose(np.array([float(n == name) for n in NAMES]))
+        out[indices] = [optical_axis(gaze) for gaze in pose.gaze]
+    return out
 
 
 def recipe_plan(mesh: FitMesh, recipe: Recipe) -> Plan:

@@ -39,6 +39,16 @@ def eyeball_surface(centre: Floats, radius: float) -> DCPSurface:
     )
 
 
+def surface_height(directions: Floats, gaze: Floats) -> Floats:
+    """(m,) distance of an eyeball's surface from its centre, in radii, in unit directions (m, 3), while it looks along
+    unit vectors ``gaze``, (3,) or (m, 3)."""
+    limbus, edge = np.arcsin(IRIS), np.arcsin(IRIS / CORNEA)
+    centre = np.cos(limbus) - CORNEA * np.cos(edge)
+    along = (directions * gaze).sum(axis=1)
+    root = np.maximum(CORNEA**2 - centre**2 * (1.0 - along**2), 0.0)
+    return np.where(along > np.cos(limbus), centre * along + np.sqrt(root), 1.0)
+
+
 def _arc(start: float, end: float, radius: float, z: float) -> tuple[Floats, Floats]:
     """Control points (3, 2) as (distance from the axis, z), and weights, of a circular arc by polar angle."""
     half = 0.5 * (end - start)

@@ -17,7 +17,9 @@ from surface.fit.solve import basis
 Floats = NDArray[np.float64]
 DEGREES = (3, 2)
 END_LASH = 0.045  # how far from the strip's ends the first and the last lash stand
+TIP = 0.003  # half the width of a lash's tip, in the strip's length: a finer one would be cut into pieces
 LASH_LEAN, LASH_LIFT = 0.85, 0.5  # of a lash's length: away from the eyeball, up along it
+ROOT_MM = 0.3  # how far above the skin lashes begin: it is cut into triangles that may come up to a quarter through
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: 
     up /= np.linalg.norm(up, axis=2, keepdims=True)
     reach = length[None, :, None]
     rows = [
-        at + 0.15 * away,
+        at + ROOT_MM * away,
         at + reach * (0.55 * LASH_LEAN * away + 0.12 * LASH_LIFT * up),
         at + reach * (LASH_LEAN * away + LASH_LIFT * up),
     ]
@@ -90,7 +92,7 @@ def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: 
 
 
 def _comb(hairs: int, *, lean: float, thick: float) -> Floats:
-    """One closed line: a thin continuous root, and hairs that taper to points; ``thick`` in their distances."""
+    """One closed line: a thin continuous root, and hairs that taper to :data:`TIP`; ``thick`` in their distances."""
     rng, root = np.random.default_rng(5), 0.22 * thick
     tops = []
     for k in range(hairs):
@@ -98,7 +100,7 @@ def _comb(hairs: int, *, lean: float, thick: float) -> Floats:
         half = thick / hairs
         tip = 1.0 - 0.35 * rng.random()
         shift = lean * (2 * s - 1) * 4 + 0.6 * (rng.random() - 0.5) / hairs
-        tops += [(s - half, root), (s + shift, tip), (s + half, root)]
+        tops += [(s - half, root), (s + shift - TIP, tip), (s + shift + TIP, tip), (s + half, root)]
     line = np.array([(0.0, 0.0), *tops, (1.0, 0.0)])
     return np.clip(line, 0.0, 1.0)
 

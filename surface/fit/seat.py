@@ -11,10 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.fit.eyeball import surface_height
 from surface.fit.mesh import FitMesh
 
 Floats = NDArray[np.float64]
 LID_MM = (0.1, 1.2)  # a lid that lies on the eyeball is this far above it: its inner edge, its skin
+LOOSE_MM = 1.6  # what stands further above it at rest may come off it; what lies nearer stays as near in every shape
+AHEAD = np.array([0.0, 0.0, 1.0])
 FRONT_MM = (0.0, 5.0)  # in front of an eyeball's centre: where lids begin to lie on it, and where they do
 HELD = 0.93  # of the radius: further out a sphere's front is too steep to seat a lid on
 
@@ -34,17 +37,27 @@ def fit_sphere(points: Floats) -> tuple[Floats, float]:
     return x[:3], float(np.sqrt(x[3] + x[:3] @ x[:3]))
 
 
-def seat_lids(mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: NDArray[np.int64]) -> FitMesh:
-    """Move the chosen vertices so that what touched the old eyeballs touches the new ones."""
-    rest = mesh.vertices.copy()
+def seat_lids(
+    mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: NDArray[np.int64], gazes: Floats | None = None
+) -> FitMesh:  # fmt: skip
+    """Move the chosen vertices so that what touched the old eyeballs touches the new ones, their corneas included.
+
+    Parameters
+    ----------
+    gazes : (k, 2, 3) where the left and the right eye look in every shape; straight ahead if not given.
+    """
+    ahead = np.tile(AHEAD, (2, 1))
+    rest, deltas = mesh.vertices.copy(), mesh.deltas.copy()
     warped = _warp(mesh.vertices[vertices], old, new)
-    thick = np.clip(_above(warped, new), *LID_MM)
-    rest[vertices] = _lift(warped, new, thick)
-    deltas = mesh.deltas.copy()
+    thick = np.clip(_above(warped, new, ahead), *LID_MM)
+    rest[vertices] = _lay(warped, new, ahead, thick, np.full(len(vertices), np.inf))
+    most = _above(rest[vertices], new, ahead)
+    most[most > LOOSE_MM] = np.inf
     for k, delta in enumerate(mesh.deltas):
         moved = np.flatnonzero(np.abs(delta[vertices]).max(axis=1) > 1e-4)
-        at = vertices[moved]
-        deltas[k, at] = _lift(_warp(mesh.vertices[at] + delta[at], old, new), new, thick[moved]) - rest[at]
+        at, gaze = vertices[moved], ahead if gazes is None else gazes[k]
+        warped = _warp(mesh.vertices[at] + delta[at], old, new)
+        deltas[k, at] = _lay(warped, new, gaze, thick[moved], most[moved]) - rest[at]
     return mesh.moved(rest, deltas)
 
 
@@ -55,17 +68,21 @@ def _from_eye(points: Floats, ball: Eyeball) -> tuple[Floats, Floats]:
     return points - centre, centre
 
 
-def _above(points: Floats, ball: Eyeball) -> Floats:
-    """(m,) height of points above the eyeball on their side."""
-    return np.linalg.norm(_from_eye(points, ball)[0], axis=1) - ball.radius
-
-
-def _lift(points: Floats, ball: Eyeball, thick: Floats) -> Floats:
-    """Points in front of an eyeball moved away from its centre until they are ``thick (m,)`` above it."""
-    offset, centre = _from_eye(points, ball)
+def _above(points: Floats, ball: Eyeball, gaze: Floats) -> Floats:
+    """(m,) height of points above the eyeball on their side, which looks along ``gaze (2, 3)``."""
+    offset, _ = _from_eye(points, ball)
     length = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
-    lack = np.maximum(ball.radius + thick - length, 0.0) * _smooth(offset[:, 2], *FRONT_MM)
-    return centre + offset * (1.0 + lack / length)[:, None]
+    own = gaze[(points[:, 0] < 0).astype(int)]
+    return length - ball.radius * surface_height(offset / length[:, None], own)
+
+
+def _lay(points: Floats, ball: Eyeball, gaze: Floats, least: Floats, most: Floats) -> Floats:
+    """Points in front of an eyeball moved to or from its centre until they are at least ``least (m,)`` and at most
+    ``most (m,)`` above it."""
+    offset, centre = _from_eye(points, ball)
+    above = _above(points, ball, gaze)
+    move = (np.clip(above, least, most) - above) * _smooth(offset[:, 2], *FRONT_MM)
+    return centre + offset * (1.0 + move / np.maximum(np.linalg.norm(offset, axis=1), 1e-9))[:, None]
 
 
 def _warp(points: Floats, old: Eyeball, new: Eyeball) -> Floats:

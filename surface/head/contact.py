@@ -1,5 +1,5 @@
-"""Lips and lids that meet: where the two sides of an opening would pass through each other, both give way; and lids
-that lie on an eyeball do not sink into it.
+"""Lips and lids that meet: where the two sides of an opening would pass through each other, both give way; and what
+lies on an eyeball stays on it, wherever the cornea is.
 
 Columns of samples run across an opening's upper and lower side. What overlaps is found column by column in every
 pose, so that any mixture of parameters is covered, and control points near the rim move by it. How they move is
@@ -12,19 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.dcp import DCPSurface
-from surface.head.contact_kernels import find_overlap, find_sinking, move_points, place_samples
+from surface.head.contact_kernels import find_heights, find_lifts, find_overlap, lift_points, move_points, place_samples
 from surface.head.data import Contact, HeadData, PartData
 from surface.lists import LANES
 
 Floats = NDArray[np.float64]
 MEET = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
 SOFT_MM = 0.1
-PRESS_MM = (0.25, 0.15)  # so deep lips and lids may overlap: triangles cut about that off the round of both sides
+PRESS_MM = (0.28, 0.9)  # so deep lips and lids may overlap: triangles cut about that off the edges of both sides
 PASSES, AGAIN_MM = 3, 0.1  # further passes take what bending left over of more than that
-RAISE = 1.85  # of what a lid sinks in: least squares hold it back, because its neighbours need not move
+RAISE = 1.6  # of what a lid is off: least squares hold it back, because its neighbours need not move
 LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
 TOUCH_MM = 0.05  # what rests on the eyeball keeps this far away
-STIFF = (0.02, 0.06)  # for lips and lids: weight of moving no control point, beside a sample's
+HELD_MM = (1.2, 2.4)  # what rests nearer to the eyeball than that never comes off it; what rests further may
+AHEAD = np.array([0.0, 0.0, 1.0])
+STIFF = (0.02, 0.05)  # for lips and lids: weight of moving no control point, beside a sample's
 FELT = 0.004  # of a sample: points with less are left out of it
 FAR_MM = 18.0  # from every sample: points of large spans that stand there would move brow and chin
 LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
@@ -46,13 +48,13 @@ class Feeler:
         self._tiles, self._room = tiled(start, ids, share), np.empty(3 * LANES, np.float32)
         self._samples = np.empty((*contact.places.shape[:3], 3))
         self._meeting = meeting_rows(contact)
-        self._sinking = np.empty(len(start) - 1)
         self._place(surface.points)
-        self._thick = np.clip(self._samples[..., 2].ravel() - self.radius, TOUCH_MM, LID_MM)
-        self.ids, self._lift = _inverse(start, ids, share, surface.points, STIFF[self.radius > 0])
-        self._away = _spread(contact).T @ self._lift
+        self._cushion = _cushion(self._samples, self.radius)
+        self.ids, table = _inverse(start, ids, share, surface.points, STIFF[self.radius > 0])
+        self._lift, self._away = table.astype(np.float32), _spread(contact).T @ table
         self._overlap = np.zeros((2, contact.places.shape[1]))
-        self.push = np.zeros_like(self._overlap)
+        self._before = np.empty((2, *self._overlap.shape, self._meeting))
+        self.push = np.zeros(self._before.size if self.radius > 0 else self._overlap.size)
         self._found = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
 
     def _place(self, points: Floats) -> None:
@@ -60,10 +62,11 @@ class Feeler:
         place_samples(*self._tiles, points, self.eye, self.radius, self._room, flat)
 
     def apply(self, axis: Floats, points: Floats) -> Floats:
-        """Mend control points (n, 3) in place; returns the overlap (2, k) in mm that was found.
+        """Mend control points (n, 3) in place; returns what :meth:`Follower.apply` takes.
 
-        ``axis (3,)`` is where the eye looks. The result is the feeler's own and is overwritten each time. Where
-        neither the points near the opening nor the eye have moved, the last answer holds.
+        For lips that is the overlap (2 k,) in mm that was found in each column, for lids how far their samples (2 k m,)
+        slid and how far they were lifted. ``axis (3,)`` is where the eye looks. The result is the feeler's own and is
+        overwritten each time. Where neither the points near the opening nor the eye have moved, the last answer holds.
         """
         before, (looked, found, moved) = points[self._near], self._found
         if np.array_equal(axis, looked) and np.array_equal(before, found):
@@ -74,33 +77,74 @@ class Feeler:
         return self.push
 
     def _mend(self, axis: Floats, points: Floats) -> None:
-        """Move control points (n, 3) in place, and leave the overlap that was found in ``push``.
+        """Move control points (n, 3) in place, and leave in ``push`` what was asked of them.
 
-        Lids are raised before they are parted: raising opens them.
+        Lids are laid on the eyeball before they are parted: that opens them.
         """
         self.push[:] = 0.0
+        self._place(points)
+        self._before[:] = self._now()
         for _ in range(PASSES):
+            laid = self._lay(axis, points)
+            off = max(laid, self._part(points))
             self._place(points)
-            sunk = self._raise(axis, points) if self.radius > 0 else 0.0
-            if sunk > 0.0:
-                self._place(points)
-            if max(sunk, self._part(points)) < AGAIN_MM:
+            if off < AGAIN_MM:
                 break
+        if self.radius > 0:
+            self.push[:] = (self._now() - self._before).ravel()
+
+    def _now(self) -> Floats:
+        """(2, 2, k, m) height and depth of the samples that can meet, as they are placed."""
+        return self._samples[:, :, : self._meeting, 1:].transpose(3, 0, 1, 2)
 
     def _part(self, points: Floats) -> float:
         """Move the sides, whose samples are placed, apart where they overlap; returns the deepest overlap, mm."""
         find_overlap(self._samples[:, :, : self._meeting], PRESS_MM[self.radius > 0], SOFT_MM, self._overlap)
-        self.push += self._overlap
+        if self.radius <= 0:
+            self.push += self._overlap.ravel()
         move_points(self.ids, self._overlap.ravel(), self._away, self.eye, self.radius, False, points)
         return float(self._overlap.max())
 
-    def _raise(self, axis: Floats, points: Floats) -> float:
-        """Move lids, whose samples are placed, out of the eyeball; returns how deep the deepest was, mm."""
-        find_sinking(self._samples.reshape(-1, 3), self.radius, self._thick, axis, self._sinking)
-        deepest = float(self._sinking.max())
-        self._sinking *= RAISE
-        move_points(self.ids, self._sinking, self._lift, self.eye, self.radius, True, points)
-        return deepest
+    def _lay(self, axis: Floats, points: Floats) -> float:
+        """Keep lids, whose samples are placed, on the eyeball, and place them anew; returns how far the furthest was
+        off, mm."""
+        if self._cushion is None:
+            return 0.0
+        samples = self._samples.reshape(-1, 3)
+        off = self._cushion.find(samples, axis)
+        if off > 0.0:
+            lift_points(self.ids, self._cushion.lifts, samples, self.radius, self._lift, points)
+            self._place(points)
+        return off
+
+
+class Cushion:
+    """Says how samples of a lid must move so that it lies on an eyeball as it does at rest.
+
+    Parameters
+    ----------
+    samples : (s, 3) at rest, as :func:`place_samples` gives them; radius : the eyeball's. The eye looks ahead.
+    held : do they stay on the eyeball? If not, they only keep out of it.
+
+    Attributes
+    ----------
+    lifts : (s,) what :meth:`find` found, mm.
+    """
+
+    def __init__(self, samples: Floats, radius: float, *, held: bool) -> None:
+        self._radius = radius
+        self._heights, self.lifts = np.empty(len(samples)), np.empty(len(samples))
+        find_heights(samples, radius, AHEAD, self._heights)
+        self._most = np.maximum(self._heights, TOUCH_MM)
+        self._least = np.minimum(self._most, LID_MM if held else TOUCH_MM)
+        t = np.clip((HELD_MM[1] - self._most) / (HELD_MM[1] - HELD_MM[0]), 0.0, 1.0)
+        self._hold = t * t * (3.0 - 2.0 * t) * held
+
+    def find(self, samples: Floats, axis: Floats) -> float:
+        """Fill ``lifts`` for samples (s, 3) over an eye that looks along ``axis (3,)``; returns how far the furthest
+        is off, mm."""
+        find_heights(samples, self._radius, axis, self._heights)
+        return float(find_lifts(self._heights, self._least, self._most, self._hold, RAISE, self.lifts))
 
 
 class Follower:
@@ -114,21 +158,57 @@ class Follower:
     def __init__(self, contact: Contact, points: Floats, surface: DCPSurface, head: HeadData) -> None:
         self.eye, self.radius = eye_of(contact, head)
         places = contact.places[:, :, : meeting_rows(contact)]
-        at, columns = surface.evaluate(places.reshape(-1, 2)).reshape(*places.shape[:3], 3), places.shape[1]
+        at = surface.evaluate(places.reshape(-1, 2)).reshape(*places.shape[:3], 3)
+        _, columns, rows, _ = at.shape
         distance = np.stack([_nearest(points, side.reshape(-1, 3)) for side in at])
         side = (distance[1] < distance[0]).astype(int)
         t = np.clip(distance[side, np.arange(len(points))] / contact.reach_mm, 0.0, 1.0)
-        weight = (1.0 - t * t * (3.0 - 2.0 * t)) * np.where(side == 1, contact.share - 1.0, contact.share)
-        self.ids = np.flatnonzero(np.abs(weight) > 1e-3).astype(np.int64)
-        self._away = np.zeros((2 * columns, len(self.ids)))
+        near = 1.0 - t * t * (3.0 - 2.0 * t)
+        share = np.ones(len(points)) if self.radius > 0 else np.where(side == 1, contact.share - 1.0, contact.share)
+        self.ids = np.flatnonzero(near > 1e-3).astype(np.int64)
+        self._with = np.zeros((2, columns, rows if self.radius > 0 else 1, len(self.ids)))
         for k, i in enumerate(self.ids):
-            x = np.interp(points[i, 0], at[side[i], ..., 0].mean(axis=1), np.arange(columns))
+            own = at[side[i]]
+            x = np.interp(points[i, 0], own[..., 0].mean(axis=1), np.arange(columns))
             left = min(int(x), columns - 2)
-            self._away[side[i] * columns + left + np.array([0, 1]), k] = weight[i] * np.array([1 - x + left, x - left])
+            row = np.linalg.norm(own[left : left + 2] - points[i], axis=2).argmin(axis=1) % self._with.shape[2]
+            parts = near[i] * share[i] * np.array([1 - x + left, x - left])
+            self._with[side[i], [left, left + 1], row, k] = parts
+        self._with = self._with.reshape(-1, len(self.ids))
 
     def apply(self, push: Floats, points: Floats) -> None:
-        """Add what ``push (2, k)`` asks of control points (n, 3)."""
-        move_points(self.ids, push.ravel(), self._away, self.eye, self.radius, False, points)
+        """Add what :meth:`Feeler.apply` asks of control points (n, 3)."""
+        for k, asked in enumerate(push.reshape(-1, len(self._with))):
+            move_points(self.ids, asked, self._with, self.eye, self.radius, k == 1, points)
+
+
+class Lining:
+    """Keeps what lines the lids out of the eyeball.
+
+    Parameters
+    ----------
+    surface : of the lining; places : (s, 2) in (u, v), all over what lies near the eyeball; eye, radius : the eyeball.
+    """
+
+    def __init__(self, surface: DCPSurface, places: Floats, eye: Floats, radius: float) -> None:
+        self.eye, self.radius = np.ascontiguousarray(eye, np.float64), radius
+        start, ids, share = shares_at(surface, places)
+        self._tiles, self._room = tiled(start, ids, share), np.empty(3 * LANES, np.float32)
+        self.ids, table = _inverse(start, ids, share, surface.points, STIFF[1])
+        self._lift, self._samples = table.astype(np.float32), np.empty((len(places), 3))
+        self._place(surface.points)
+        self._cushion = Cushion(self._samples, radius, held=False)
+
+    def _place(self, points: Floats) -> None:
+        place_samples(*self._tiles, points, self.eye, self.radius, self._room, self._samples)
+
+    def apply(self, axis: Floats, points: Floats) -> None:
+        """Mend control points (n, 3) in place; ``axis (3,)`` is where the eye looks."""
+        for _ in range(PASSES):
+            self._place(points)
+            if self._cushion.find(self._samples, axis) < AGAIN_MM:
+                return
+            lift_points(self.ids, self._cushion.lifts, self._samples, self.radius, self._lift, points)
 
 
 def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:
@@ -136,6 +216,11 @@ def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:
     if contact.eye < 0:
         return np.zeros(3), 0.0
     return np.ascontiguousarray(head.eyes[contact.eye], np.float64), head.eye_radius
+
+
+def _cushion(samples: Floats, radius: float) -> Cushion | None:
+    """What keeps lids on an eyeball; None for lips."""
+    return Cushion(samples.reshape(-1, 3), radius, held=True) if radius > 0 else None
 
 
 def shares_at(surface: DCPSurface, uv: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:

@@ -100,24 +100,67 @@ def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> No
 
 
 @kernel
-def find_sinking(samples: Floats, size: float, thick: Floats, axis: Floats, sinking: Floats) -> None:
-    """How far samples (s, 3) as (x, height, depth) lie too near to an eyeball of radius ``size``: ``sinking (s,)``.
+def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) -> None:
+    """How high samples (s, 3) as (x, height, depth) lie above an eyeball of radius ``size``: ``heights (s,)``.
 
-    Each keeps ``thick (s,)`` mm away. The eye looks along ``axis (3,)``; its cornea stands out.
+    The eye looks along ``axis (3,)``; its cornea stands out.
     """
     for s in range(len(samples)):
-        x, depth = samples[s, 0], samples[s, 2]
-        sinking[s] = 0.0
-        if depth < 1e-6 or depth > size * (CORNEA_AT + CORNEA_RADIUS) + thick[s]:
-            continue
+        x, depth = samples[s, 0], max(samples[s, 2], 1e-6)
         across = np.sqrt(max(depth * depth - x * x, 0.0))
         y, z = across * np.sin(samples[s, 1] / size), across * np.cos(samples[s, 1] / size)
         along = (x * axis[0] + y * axis[1] + z * axis[2]) / depth
         root = CORNEA_RADIUS**2 - CORNEA_AT**2 * (1.0 - along * along)
-        height = 1.0
+        ground = 1.0
         if along > 0.0 and root > 0.0:
-            height = max(1.0, CORNEA_AT * along + np.sqrt(root))
-        sinking[s] = max(0.0, size * height + thick[s] - depth)
+            ground = max(1.0, CORNEA_AT * along + np.sqrt(root))
+        heights[s] = depth - size * ground
+
+
+@kernel
+def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, eager: float, lifts: Floats) -> float:
+    """How far samples that lie at ``heights (s,)`` must be lifted or, below 0, laid down: ``lifts (s,)``.
+
+    Below ``least (s,)`` they lack height, above ``most (s,)`` they have too much, of which the share ``hold (s,)``
+    counts; they move ``eager`` times as far as they are off. Returns how far the furthest is off.
+    """
+    worst = 0.0
+    for s in range(len(heights)):
+        lifts[s], h = 0.0, heights[s]
+        if h < least[s]:
+            lifts[s] = eager * (least[s] - h)
+            worst = max(worst, least[s] - h)
+        elif h > most[s] and hold[s] > 0.0:
+            lifts[s] = eager * hold[s] * (most[s] - h)
+            worst = max(worst, hold[s] * (h - most[s]))
+    return worst
+
+
+@kernel
+def lift_points(
+    ids: NDArray[np.int64], lifts: Floats, samples: Floats, size: float, table: Floats32, points: Floats
+) -> None:
+    """Move ``points (n, 3)`` with the numbers ``ids (k,)`` by ``lifts (s,) @ table (s, k)``, mm, each lift away from
+    the eyeball of radius ``size`` where its sample (s, 3) as (x, height, depth) stands."""
+    count = len(ids)
+    x, y, z = np.zeros(count, np.float32), np.zeros(count, np.float32), np.zeros(count, np.float32)
+    for s in range(len(lifts)):
+        if lifts[s] == 0.0:
+            continue
+        depth = max(samples[s, 2], 1e-6)
+        across, share = np.sqrt(max(depth * depth - samples[s, 0] ** 2, 0.0)), lifts[s] / depth
+        a = np.float32(share * samples[s, 0])
+        b = np.float32(share * across * np.sin(samples[s, 1] / size))
+        c = np.float32(share * across * np.cos(samples[s, 1] / size))
+        row = table[s]
+        for k in range(count):
+            x[k] += a * row[k]
+            y[k] += b * row[k]
+            z[k] += c * row[k]
+    for k in range(count):
+        points[ids[k], 0] += x[k]
+        points[ids[k], 1] += y[k]
+        points[ids[k], 2] += z[k]
 
 
 @kernel

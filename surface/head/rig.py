@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.head.contact import LID_MM, Feeler, Follower
+from surface.head.contact import LID_MM, Feeler, Follower, Lining
 from surface.head.data import HeadData, Jaw, PartData
 from surface.head.kernels import keep_on_eyeball, mix_rows, swing_jaw
-from surface.head.meshes import make_surface
+from surface.head.meshes import domain_of, make_surface
 from surface.head.moves import Moves
 from surface.head.parameters import SHAPES, Pose, rotation
 from surface.head.rules import Drivers
 
 Floats = NDArray[np.float64]
+LINING_GRID = (72, 36)  # places looked at all over what lines the lids, along u and v
+LINED = 1.4  # in radii: so near to an eye what lines its lids is kept out of it
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
 
 
@@ -46,6 +48,7 @@ class SkinRig:
         self._swings, self._whole = bool(self._open.any()), jaw_path(head.jaw, 1.0)
         self._undo = _undo_share(part)
         self._feelers, self._followers = _contacts(part, head)
+        self._linings = _linings(part, head)
         self._lids = Lids(part, head, self._moves)
         self._amounts = np.zeros(len(self._moves.used))
         self._asked: tuple[object, ...] = ()
@@ -83,11 +86,13 @@ class SkinRig:
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)
+        for eye, lining in self._linings:
+            lining.apply(optical_axis(pose.gaze[eye]), points)
 
     def _asks(self, pose: Pose) -> tuple[object, ...]:
         """All that the part's points depend on, to compare with the pose before."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
-        gaze = pose.gaze.tobytes() if self._feelers else b""
+        gaze = pose.gaze.tobytes() if self._feelers or self._linings else b""
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
         return self._amounts.tobytes(), jaw, gaze, *pushes
 
@@ -146,6 +151,24 @@ def _contacts(part: PartData, head: HeadData) -> tuple[list[Feeler], list[tuple[
             follower = Follower(contact, part.points, make_surface(opening), head)
             followers.append((contact.name, follower))
     return feelers, followers
+
+
+def _linings(part: PartData, head: HeadData) -> list[tuple[int, Lining]]:
+    """What keeps the part out of the eyeballs, if it is sewn to lids from behind."""
+    lids = [c for c in head.contacts if c.eye >= 0 and part.name in c.followers]
+    if not any(s.part_b == part.name and s.part_a == c.part for s in head.seams for c in lids):
+        return []
+    domain, surface = domain_of(part), make_surface(part)
+    u0, u1, v0, v1 = domain.rect
+    grid = np.stack(np.meshgrid(np.linspace(u0, u1, LINING_GRID[0]), np.linspace(v0, v1, LINING_GRID[1])), axis=-1)
+    places = grid.reshape(-1, 2)[domain.inside(grid.reshape(-1, 2))]
+    at, out = surface.evaluate(places), []
+    for eye in (c.eye for c in lids):
+        local = at - head.eyes[eye]
+        near = (np.linalg.norm(local, axis=1) < LINED * head.eye_radius) & (local[:, 2] > 0.0)
+        if near.any():
+            out.append((eye, Lining(surface, places[near], head.eyes[eye], head.eye_radius)))
+    return out
 
 
 def _undo_share(part: PartData) -> Floats:

@@ -293,19 +293,26 @@ def eye_height(directions: np.ndarray, gaze: np.ndarray) -> np.ndarray:
     return np.maximum(1.0, np.where(root > 0, axis_z * along + np.sqrt(np.maximum(root, 0)), 0.0))
 
 
-def eye_cut(head: Head, side: int, *parts: str) -> float:
-    """How deep a lid reaches into an eyeball that looks where the pose says; the head must not be turned."""
+def above_eye(head: Head, side: int, points: np.ndarray) -> np.ndarray:
+    """Height (m,) of points (m, 3) above an eyeball that looks where the pose says, cornea included; the head must not
+    be turned."""
     eye, radius = head.data.eyes[side], head.data.eye_radius
     ball = head.part(("eye_left", "eye_right")[side])
     pole = ball.vertices[np.argmin(ball.mesh.uv[:, 1])] - eye
-    gaze = pole / np.linalg.norm(pole)
+    local = points.astype(float) - eye
+    distance = np.linalg.norm(local, axis=1)
+    return distance - radius * eye_height(local / distance[:, None], pole / np.linalg.norm(pole))
+
+
+def eye_cut(head: Head, side: int, *parts: str) -> float:
+    """How deep a lid reaches into an eyeball, in front of its middle."""
+    eye, radius = head.data.eyes[side], head.data.eye_radius
     worst = 0.0
     for name in parts:
-        local = head.part(name).vertices.astype(float) - eye
-        distance = np.linalg.norm(local, axis=1)
-        near = (distance < 1.3 * radius) & (local[:, 2] > 0)
-        height = radius * eye_height(local[near] / distance[near, None], gaze)
-        worst = max(worst, float((height - distance[near]).max(initial=0.0)))
+        points = head.part(name).vertices
+        local = points - eye
+        near = (np.linalg.norm(local, axis=1) < 1.3 * radius) & (local[:, 2] > 0)
+        worst = max(worst, float(-above_eye(head, side, points[near]).min(initial=0.0)))
     return worst
 
 
@@ -319,6 +326,15 @@ def eye_opening(head: Head, side: int, step: float = 0.1) -> tuple[float, float,
     rows = np.flatnonzero(seen[:, seen.shape[1] // 2])
     ends = (rows.max() * step - 14.0, rows.min() * step - 14.0) if len(rows) else (0.0, 0.0)
     return float(seen.sum(axis=0).max() * step), *ends
+
+
+def eye_seen(head: Head, side: int, pitch: float, step: float = 0.1) -> float:
+    """mm^2 of an eyeball that are seen from ``pitch`` rad above (below 0: from below)."""
+    turn = np.array([[1, 0, 0], [0, np.cos(pitch), -np.sin(pitch)], [0, np.sin(pitch), np.cos(pitch)]])
+    x, y, _ = turn @ head.data.eyes[side]
+    window = Window((x - 16.0, x + 16.0), (y - 15.0, y + 15.0), step, turn)
+    skin = window.depth(head.part("face"), head.part("sockets"))
+    return float((window.depth(head.part(("eye_left", "eye_right")[side])) > skin).sum() * step**2)
 
 
 def lips_gap(head: Head, step: float = 0.1) -> float:

@@ -1,6 +1,7 @@
 """Warps before the fit: lids onto another eyeball, lips together."""
 
 import numpy as np
+from face_measures import eye_height
 from slit_sheet import slit_sheet
 
 from surface.fit.mesh import FitMesh
@@ -21,21 +22,46 @@ def cloud(points: np.ndarray, delta: np.ndarray) -> FitMesh:
     return FitMesh(points, none, np.zeros((0, 2)), none, ("s",), delta[None])
 
 
-def test_what_touched_the_old_ball_touches_the_new_one():
+def above(points: np.ndarray, gaze: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> np.ndarray:
+    """Height above the new eyeball, its cornea included."""
+    local = points - NEW.centre
+    length = np.linalg.norm(local, axis=1)
+    return length - NEW.radius * eye_height(local / length[:, None], np.array(gaze))
+
+
+def test_what_touched_the_old_ball_touches_the_new_one_and_its_cornea():
     across = np.linspace(-9, 9, 13)
     points = on_ball(OLD, across)
     seated = seat_lids(cloud(points, np.zeros_like(points)), OLD, NEW, np.arange(13)).vertices
-    distance = np.linalg.norm(seated - NEW.centre, axis=1)
-    assert np.abs(distance - NEW.radius).max() < 0.25
-    assert distance.min() > NEW.radius + 0.09  # touches, and does not sink in
-    assert np.abs(seated[:, :2] - points[:, :2]).max() < 0.2
+    assert np.abs(above(seated)).max() < 0.25
+    assert above(seated).min() > 0.09  # touches, and does not sink in
+    assert np.linalg.norm(seated[6] - NEW.centre) > NEW.radius + 1.1  # over the cornea
+    assert np.abs(seated[:, :2] - points[:, :2]).max() < 0.4
 
 
 def test_shapes_slide_over_the_new_ball_too():
     start, end = on_ball(OLD, np.array([-6.0])), on_ball(OLD, np.array([5.0]))
     mesh = seat_lids(cloud(start, end - start), OLD, NEW, np.array([0]))
-    reached = mesh.vertices + mesh.deltas[0]
-    assert abs(np.linalg.norm(reached - NEW.centre) - NEW.radius) < 0.25
+    assert abs(above(mesh.vertices + mesh.deltas[0])[0]) < 0.25
+
+
+def test_what_lies_on_the_eyeball_comes_off_it_in_no_shape_and_what_stands_off_may():
+    start = on_ball(OLD, np.array([-6.0]))
+    near, far = (start + s * (start - OLD.centre) / OLD.radius for s in (0.5, 3.0))
+    out = 2.0 * (start - OLD.centre) / OLD.radius
+    mesh = seat_lids(cloud(np.vstack([near, far]), np.vstack([out, out])), OLD, NEW, np.arange(2))
+    gone = above(mesh.vertices + mesh.deltas[0]) - above(mesh.vertices)
+    assert abs(gone[0]) < 0.01 and gone[1] > 1.0
+
+
+def test_lids_lie_on_the_cornea_where_a_shape_has_the_eye_look():
+    start = on_ball(OLD, np.array([-6.0]))
+    aside = np.array([-np.sin(0.5), 0.0, np.cos(0.5)])
+    gazes = np.broadcast_to(aside, (1, 2, 3))
+    mesh = seat_lids(cloud(start, np.full((1, 3), 1e-3)), OLD, NEW, np.array([0]), gazes)
+    moved = mesh.vertices + mesh.deltas[0]
+    assert abs(above(moved, tuple(aside))[0]) < 0.25
+    assert above(moved)[0] > 0.8
 
 
 def test_both_eyes_are_mirror_images_and_far_points_stay():

@@ -2,7 +2,20 @@
 
 import numpy as np
 import pytest
-from face_measures import Window, crossing, eye_cut, eye_opening, lips_gap, poke, rim, seams_gape, seen_through, sides
+from face_measures import (
+    Window,
+    above_eye,
+    crossing,
+    eye_cut,
+    eye_opening,
+    eye_seen,
+    lips_gap,
+    poke,
+    rim,
+    seams_gape,
+    seen_through,
+    sides,
+)
 from scipy.spatial import cKDTree
 
 from surface.head import NAMES, Head
@@ -53,12 +66,36 @@ def test_a_blink_closes_both_eyes_at_every_gaze(head, yaw, pitch):
     assert max(eye_opening(head, side)[0] for side in (0, 1)) < 0.15
 
 
-@pytest.mark.parametrize("pitch", [-1.0, 0.0, 1.0])
-@pytest.mark.parametrize("closed", [0.0, 1.0])
-def test_lids_do_not_cut_the_eyeball_at_any_gaze(head, pitch, closed):
-    for yaw in (-0.86, 0.0, 0.86):
-        head.pose(head.values(looking(yaw, pitch) | {"eyeBlinkLeft": closed, "eyeBlinkRight": closed}))
-        assert max(eye_cut(head, side, "face") for side in (0, 1)) < 0.5
+LIDS = {"rest": {}, "wide": {"eyeWide": 1.0}, "half": {"eyeBlink": 0.5}, "shut": {"eyeBlink": 1.0},
+        "squint": {"eyeSquint": 1.0}, "half squint": {"eyeBlink": 0.5, "eyeSquint": 1.0}}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LIDS)
+def test_lids_touch_the_eyeball_and_do_not_cut_it_at_any_gaze(head, loops, name):
+    head.pose(head.values({}))
+    face = head.part("face")
+    rims = [rim(face, loop) for loop in loops[2:4]]
+    middles = [ids[np.abs(face.vertices[ids, 0] - x) < 9.5] for ids, x in zip(rims, (31.8, -31.8), strict=True)]
+    shut = name == "shut"  # what has slid furthest; nobody can see it then
+    for yaw in (-0.86, -0.43, 0.0, 0.43, 0.86):
+        for pitch in (-1.0, -0.5, 0.0, 0.5, 1.0):
+            shapes = {n + s: v for n, v in LIDS[name].items() for s in ("Left", "Right")}
+            head.pose(head.values(looking(yaw, pitch) | shapes))
+            for side, ids in enumerate(middles):
+                assert above_eye(head, side, face.vertices[ids]).max() < (1.0 if shut else 0.7)
+                assert eye_cut(head, side, "face") < 0.35
+                assert eye_cut(head, side, "sockets") < (0.65 if shut else 0.4)
+
+
+@pytest.mark.parametrize("pitch", [-35.0, -20.0, 0.0, 20.0])
+def test_nobody_sees_an_eyeball_behind_shut_lids(head, pitch):
+    head.pose(head.values({"eyeBlinkLeft": 1, "eyeBlinkRight": 1}))
+    assert max(eye_seen(head, side, np.radians(pitch)) for side in (0, 1)) < 0.4
+
+
+def test_the_measure_of_eyeballs_that_are_seen_finds_one(head):
+    head.pose(head.values({}))
+    assert 120.0 < eye_seen(head, 0, 0.0) < 260.0
 
 
 @pytest.mark.parametrize("side", ["Left", "Right"])

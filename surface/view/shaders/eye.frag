@@ -1,5 +1,8 @@
 uniform sampler2D detail;
-uniform mat3 eye_rotation;
+uniform mat3 eye_rotation;            // eye's own frame to world
+uniform vec3 lid_upper[LID_POINTS];   // lid margins now, world, mm
+uniform vec3 lid_lower[LID_POINTS];
+uniform float lids;                   // 1 where the head has lid margins
 uniform vec3 iris_colour;
 uniform vec3 sclera_colour;
 uniform float glow;                   // of the iris itself
@@ -8,9 +11,28 @@ uniform float pupil_radius;
 
 in vec3 v_local;
 in vec3 v_view;
-in vec2 v_lid;
+in vec3 v_position;
 
 out vec4 colour;
+
+float to_segment(vec3 a, vec3 b) {
+    vec3 ab = b - a;
+    vec3 ap = v_position - a;
+    vec3 off = ap - ab * clamp(dot(ap, ab) / (dot(ab, ab) + 1e-6), 0.0, 1.0);
+    return dot(off, off);
+}
+
+// mm to the upper lid, to the lower lid, and to the lower one without its ends, which go round the corners: by pixel, for
+// an eyeball's triangles are larger than what lies along a lid.
+vec3 to_lids() {
+    vec3 near = vec3(1e4);
+    for (int i = 0; i + 1 < LID_POINTS; ++i) {
+        float lower = to_segment(lid_lower[i], lid_lower[i + 1]);
+        near.xy = min(near.xy, vec2(to_segment(lid_upper[i], lid_upper[i + 1]), lower));
+        near.z = min(near.z, i > 1 && i + 3 < LID_POINTS ? lower : 1e4);
+    }
+    return mix(vec3(20.0), sqrt(near), lids);
+}
 
 vec3 sclera(vec3 d, float r) {
     float vein = texture(detail, d.xy * 0.55).w + texture(detail, d.yx * vec2(0.21, 0.9)).w - 1.0;
@@ -34,6 +56,7 @@ void main() {
     vec3 v = normalize(v_view);
     vec3 n = eye_rotation * d;
     float r = length(d.xy);
+    vec3 lid = to_lids();
 
     // The iris lies under the cornea: looked at from the side it slides away from the viewer.
     vec3 v_own = v * eye_rotation;
@@ -47,8 +70,8 @@ void main() {
     // They are made from directions alone, since the rim of a modelled cornea would split each lamp's image.
     vec3 axis = eye_rotation[2];
     vec3 cornea = normalize(n + 0.9 * (n - axis * dot(n, axis)) * (1.0 - smoothstep(0.5, 2.2, r / iris_radius)));
-    float upper = smoothstep(-0.5, 5.0, v_lid.x);
-    float lower = smoothstep(-0.8, 2.4, v_lid.y);
+    float upper = smoothstep(-0.5, 5.0, lid.x);
+    float lower = smoothstep(-0.8, 2.4, lid.y);
     float shade = (0.15 + 0.85 * upper) * (0.45 + 0.55 * lower);
 
     vec3 light = key_colour * wrapped(dot(n, key_direction), vec3(0.35, 0.25, 0.22))
@@ -66,12 +89,13 @@ void main() {
     float fill = smoothstep(0.965, 0.990, dot(mirrored, fill_direction)) * 0.5;
     float fresnel = 1.0 - clamp(dot(cornea, v), 0.0, 1.0);
     fresnel = 0.03 + 0.5 * fresnel * fresnel * fresnel;
-    lit += (key * key_colour + fill * fill_colour) * smoothstep(0.0, 1.2, v_lid.x);
+    lit += (key * key_colour + fill * fill_colour) * smoothstep(0.0, 1.2, lid.x);
     lit += fresnel * ambient(mirrored) * shade;
     // Tears stand along the lower lid, a bright line with a darker one above it.
-    float tears = 1.0 - smoothstep(0.12, 0.55, v_lid.y);
-    lit *= 1.0 - 0.25 * (smoothstep(0.25, 0.6, v_lid.y) - smoothstep(0.6, 1.3, v_lid.y));
-    lit += tears * 0.34 * key_colour * clamp(dot(n, key_direction) + 0.3, 0.0, 1.0);
+    float corner = min(distance(v_position, lid_lower[2]), distance(v_position, lid_lower[LID_POINTS - 3]));
+    float tears = smoothstep(0.0, 4.0, corner) * (1.0 - smoothstep(0.15, 0.50, lid.z));
+    lit *= 1.0 - 0.18 * (smoothstep(0.25, 0.6, lid.z) - smoothstep(0.6, 1.3, lid.z));
+    lit += tears * 0.24 * key_colour * clamp(dot(n, key_direction) + 0.3, 0.0, 1.0);
     float ring = smoothstep(0.50, 0.62, q) * (1.0 - smoothstep(0.80, 0.94, q));
     lit += glow * iris_colour * (ring + 0.25 * (1.0 - smoothstep(0.0, 0.30, q)));
     colour = vec4(encode(lit), 1.0);
