@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+import surface.jit  # noqa: F401  first of all: it keeps numba from importing scipy
 from controller.parameters import Floats
 
 _ROUNDS = 200
@@ -52,6 +53,33 @@ def _reach(x: float, step: float, low: float, high: float) -> float:
 
 
 @njit(cache=True, nogil=True)
+def _solve(matrix: Floats, right: Floats) -> None:
+    """Gauss elimination with pivots: leaves in ``right (n,)`` the solution, in ``matrix (n, n)`` nothing of use.
+
+    numba's own products and solutions would import scipy, which takes longer than all else of this module.
+    """
+    n = len(right)
+    for i in range(n):
+        best = i + int(np.argmax(np.abs(matrix[i:, i])))
+        if best != i:
+            for k in range(i, n):
+                matrix[i, k], matrix[best, k] = matrix[best, k], matrix[i, k]
+            right[i], right[best] = right[best], right[i]
+        if matrix[i, i] == 0.0:
+            raise ValueError("the values inside their bounds do not determine each other")
+        for j in range(i + 1, n):
+            share = matrix[j, i] / matrix[i, i]
+            if share != 0.0:
+                for k in range(i + 1, n):
+                    matrix[j, k] -= share * matrix[i, k]
+                right[j] -= share * right[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+
+
+@njit(cache=True, nogil=True)
 def _leap(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> None:
     """Newton step of all values inside their bounds at once, as far as the first bound; in place."""
     free = np.flatnonzero((x > low) & (x < high) & (x != 0.0))
@@ -63,7 +91,8 @@ def _leap(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: f
         slope[i] = gradient[free[i]] + sparsity * np.sign(x[free[i]])
         for j in range(len(free)):
             block[i, j] = gram[free[i], free[j]]
-    step = -np.linalg.solve(block, slope)
+    _solve(block, slope)
+    step = -slope
     reach = 1.0
     for i in range(len(free)):
         k = free[i]
@@ -80,8 +109,12 @@ def _descend(
     gram: Floats, wanted: Floats, low: Floats, high: Floats, sparsity: float, tolerance: float, x: Floats
 ) -> int:
     """Minimise for ``gram`` : (n, n) and ``wanted`` : (n,), in place on ``x``; returns the rounds it took."""
+    gradient = np.empty(len(x))
     for round_ in range(_ROUNDS):
-        gradient = gram @ x - wanted
+        for i in range(len(x)):
+            gradient[i] = -wanted[i]
+            for j in range(len(x)):
+                gradient[i] += gram[i, j] * x[j]
         if _sweep(gram, gradient, low, high, sparsity, x) < tolerance:
             return round_ + 1
         _sweep(gram, gradient, low, high, sparsity, x)
