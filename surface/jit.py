@@ -17,10 +17,15 @@ from numba import njit
 
 
 def _leave_scipy() -> None:
-    """Keep numba from importing scipy's linear algebra, 0.4 s, before a kernel asks for it; none here does."""
+    """Keep numba from importing scipy's linear algebra, 0.4 s, before a kernel asks for it; none here does.
+
+    This is inside numba: where a version of it is made otherwise, scipy is imported, and nothing else changes.
+    """
     from numba.np import linalg
 
-    ask = linalg.ensure_blas
+    ask = getattr(linalg, "ensure_blas", None)
+    if ask is None:
+        return
     linalg.ensure_blas = lambda: None
     try:
         import_module("numba.np.arraymath")  # asks once, when it is imported; products of matrices ask again
