@@ -19,7 +19,7 @@ DEGREES = (3, 2)
 END_LASH = 0.045  # how far from the strip's ends the first and the last lash stand
 TIP = 0.003  # half the width of a lash's tip, in the strip's length: a finer one would be cut into pieces
 LASH_LEAN, LASH_LIFT = 0.85, 0.5  # of a lash's length: away from the eyeball, up along it
-ROOT_MM = 0.3  # how far above the skin lashes begin: it is cut into triangles that may come up to a quarter through
+ROOT_MM = 0.4  # how far above the skin lashes begin: it is cut into triangles that may come up to a quarter through
 
 
 @dataclass(frozen=True)

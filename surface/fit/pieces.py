@@ -21,7 +21,7 @@ from surface.head.data import Jaw, PartData
 
 Floats = NDArray[np.float64]
 STILL = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
-LASH_ROOT = 0.0145  # how far outside the hole in the skin the lashes stand, in v
+LASH_ROOT = (0.0145, 0.0188)  # how far outside the hole in the skin lower and upper lashes stand, in v: where lids meet
 LASH_MM, LOWER_LASH_MM = 8.0, 3.2
 STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.2, 7)}  # fine enough for single hairs
 LASHES, LOWER_LASHES = 24, 14
@@ -122,7 +122,7 @@ def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, F
     half = rim[(rim[:, 1] > middle) == upper]
     order = np.argsort(half[:, 0])
     v = np.interp(u, half[order, 0], half[order, 1])
-    return np.column_stack([u, v + (LASH_ROOT if upper else -LASH_ROOT)]), along
+    return np.column_stack([u, v + LASH_ROOT[upper] * (1.0 if upper else -1.0)]), along
 
 
 def _strips_part(name: str, material: str, strips: list[Strip], body: Body) -> PartData:
