@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.errors import FitError
+from surface.fit.chart import TILE
 from surface.fit.frame import head_scale
 from surface.fit.islands import Island, find_islands
 from surface.fit.layout import lay_out, separate, signed_areas
@@ -21,6 +22,7 @@ from surface.fit.refine import Wish
 from surface.fit.relax import open_flat_holes
 from surface.fit.rigging import rigid_fit
 from surface.fit.seat import fit_sphere
+from surface.tessellate import MOST_ROOTS
 
 Floats = NDArray[np.float64]
 WORDS = {  # in the name of an object or material -> material of the part; the first that fits
@@ -32,6 +34,7 @@ POINTS, REST = 2450, 560  # control points of the face and of a part of the same
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.6  # in spacings of a mesh whose triangles may be of any size, since the largest around a place count
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
+DEPTH = 8  # of the cells; more where many islands lie side by side, since roots are shared by all
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
 TOOTH_MM, TEETH = 24.0, 12  # so many pieces no larger than this are teeth
 ROUND = 0.07  # how far a ball may stray from a sphere, in radii
@@ -198,7 +201,8 @@ def _part(
     face = name == "face"
     wish = Wish(points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, finest=FINEST,
                 growth=GROWTH if face else 1.25)  # fmt: skip
-    recipe = PartRecipe(name, material, "skin", [], wish, (0, 0.24 * scale if face else 0.5 * scale, 8))
+    depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
+    recipe = PartRecipe(name, material, "skin", [], wish, (0, 0.24 * scale if face else 0.5 * scale, depth))
     return recipe, [open_flat_holes(i) for i in lay_out(mesh, islands)]
 
 
