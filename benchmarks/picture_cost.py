@@ -92,11 +92,11 @@ class Bench:
         ]
 
     def poser(self) -> Callable[[], None]:
-        """A call that poses the head differently each time."""
+        """A call that poses what is drawn of the head differently each time."""
         random = np.random.default_rng(1)
 
         def pose() -> None:
-            self.head.pose(random.uniform(0.0, 0.5, len(self.values)))
+            self.renderer.evaluator.pose(random.uniform(0.0, 0.5, len(self.values)))
 
         return pose
 
