@@ -148,7 +148,8 @@ class Cushion:
 
 
 class Follower:
-    """Moves the control points of another part that lie near an opening along with it.
+    """Moves the control points of another part that lie near an opening along with it: at lids, each as the sample
+    next to it in two columns; at lips, by what each side gives way.
 
     Parameters
     ----------
@@ -166,15 +167,15 @@ class Follower:
         near = 1.0 - t * t * (3.0 - 2.0 * t)
         share = np.ones(len(points)) if self.radius > 0 else np.where(side == 1, contact.share - 1.0, contact.share)
         self.ids = np.flatnonzero(near > 1e-3).astype(np.int64)
-        self._with = np.zeros((2, columns, rows if self.radius > 0 else 1, len(self.ids)))
+        table = np.zeros((2, columns, rows if self.radius > 0 else 1, len(self.ids)))
         for k, i in enumerate(self.ids):
             own = at[side[i]]
             x = np.interp(points[i, 0], own[..., 0].mean(axis=1), np.arange(columns))
             left = min(int(x), columns - 2)
-            row = np.linalg.norm(own[left : left + 2] - points[i], axis=2).argmin(axis=1) % self._with.shape[2]
+            row = np.linalg.norm(own[left : left + 2] - points[i], axis=2).argmin(axis=1) % table.shape[2]
             parts = near[i] * share[i] * np.array([1 - x + left, x - left])
-            self._with[side[i], [left, left + 1], row, k] = parts
-        self._with = self._with.reshape(-1, len(self.ids))
+            table[side[i], [left, left + 1], row, k] = parts
+        self._with = table.reshape(-1, len(self.ids))
 
     def apply(self, push: Floats, points: Floats) -> None:
         """Add what :meth:`Feeler.apply` asks of control points (n, 3)."""
