@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -157,11 +156,10 @@ def _run(
     identity: dict[str, float] | None = None,
     picture: dict[str, object] | None = None,
 ) -> None:
-    from controller.waiting import WaitingBody
+    from controller.waiting import WaitingBody, uncollected
 
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: its threads would spin where others have work
-    gc.disable()  # until it runs: next to nothing of what is loaded is garbage, and looking takes a tenth of the start
-    with console.status("starting") as status, WaitingBody() as waiting:
+    with console.status("starting") as status, WaitingBody() as waiting, uncollected():
         from controller.picture import with_picture
         from controller.session import Session, has_display, write_report
 

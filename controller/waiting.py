@@ -68,6 +68,16 @@ class WaitingBody:
 
 
 @contextmanager
+def uncollected() -> Iterator[None]:
+    """Collect no garbage: next to nothing of what a start loads is any, and looking takes a tenth of the start."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+@contextmanager
 def _main_left_out() -> Iterator[None]:
     """A spawned process imports the program it was started from; the body needs no command line."""
     main = sys.modules["__main__"].__dict__
@@ -81,10 +91,8 @@ def _main_left_out() -> Iterator[None]:
 def _wait(pipe: Connection, heard: Connection) -> None:
     """Load the body's code, then be the body."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
-    gc.disable()  # next to nothing of what is loaded is garbage
-    from controller.body import body_main
-
-    gc.enable()
+    with uncollected():
+        from controller.body import body_main
     try:
         orders: BodyOrders = pipe.recv()
     except (EOFError, OSError):
