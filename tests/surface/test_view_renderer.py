@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ball_head import BallHead, values
+from ball_head import RADII, BallHead, BallPart, ball, values
 
 from surface.errors import ViewError
 from surface.head import Head
@@ -171,6 +171,26 @@ def pixel(camera: Camera, point: np.ndarray, size: tuple[int, int]) -> tuple[int
     """Column and row of a point in head space."""
     clip = camera.matrix(size[0] / size[1]).astype(float) @ [*point, 1.0]
     return int((clip[0] / clip[3] * 0.5 + 0.5) * size[0]), int((0.5 - clip[1] / clip[3] * 0.5) * size[1])
+
+
+class Bearded(BallHead):
+    """Lashes over a whole ball, as deep under the skin as is asked for."""
+
+    def __init__(self, depth_mm: float) -> None:
+        super().__init__()
+        points, normals, triangles = ball(RADII - depth_mm, 61, 81)
+        hair = BallPart("lashes", "lash", triangles, points, normals)
+        hair.uv[:] = 0.5, 0.1
+        self.parts = (*self.parts, hair)
+
+
+@pytest.mark.parametrize(("depth_mm", "shown"), [(1.0, True), (3.0, False)])
+def test_skin_hides_hair_only_where_it_is_well_under_it(gl: None, depth_mm: float, shown: bool) -> None:
+    with Offscreen(BallHead(), SIZE) as bare, Offscreen(Bearded(depth_mm), SIZE) as bearded:
+        forehead = middle(bare.render(values()), 0.5, 0.3), middle(bearded.render(values()), 0.5, 0.3)
+    assert (forehead[1].sum() < 0.6 * forehead[0].sum()) == shown
+    if not shown:
+        assert forehead[1] == pytest.approx(forehead[0])
 
 
 def test_a_hurried_picture_is_hardly_another(screen: Offscreen) -> None:
