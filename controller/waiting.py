@@ -61,10 +61,13 @@ class WaitingBody:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if not self._sent:
-            self.process.terminate()
-            self.process.join(_END_S)
             self.pipe.close()
             self.voice.close()
+            self.process.terminate()
+            self.process.join(_END_S)
+            if self.process.exitcode is None:  # what is asked of a process while it starts can be lost
+                self.process.kill()
+                self.process.join(_END_S)
 
 
 @contextmanager
