@@ -247,11 +247,12 @@ class _Seams:
 
     def close(self, vertices: Floats32, normals: Floats32) -> None:
         """Put borders onto each other among ``vertices`` and ``normals`` (m, 3)."""
-        touched = [two for one, two in self._pairs if one.changed or two.changed]
+        touched = False
+        for one, two in self._pairs:
+            if one.changed or two.changed:  # by the pose, or by a seam before
+                two.changed, touched = [(0, len(two.kept))], True
         if touched:
             zip_border(vertices, normals, vertices, normals, *self._rows)
-        for two in touched:
-            two.changed = [(0, len(two.kept))]
 
 
 _NO_SHARE = np.zeros(0, np.float32)

@@ -78,11 +78,10 @@ class SkinRig:
 
     def meet(self, pose: Pose, points: Floats) -> None:
         """Let the part's own openings close, and what goes with others' openings follow, in control points (n, 3) that
-        everything else has moved; what the openings ask for is left in ``pose.pushes``."""
+        everything else has moved; what the openings ask for is left in ``pose.pushes``. The rig's own pose stays."""
         for feeler in self._feelers:
             axis = optical_axis(pose.gaze[max(feeler.contact.eye, 0)])
-            self._pushes[feeler.contact.name] = feeler.apply(axis, points)
-        pose.pushes.update(self._pushes)
+            pose.pushes[feeler.contact.name] = feeler.apply(axis, points)
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)
@@ -108,6 +107,8 @@ class SkinRig:
                       pose.jaw, undo, self.points)  # fmt: skip
         self._lids.apply(self._amounts, self.points)
         self.meet(pose, self.points)
+        own = (feeler.contact.name for feeler in self._feelers)
+        self._pushes = {name: pose.pushes[name].copy() for name in own}  # others may use the feelers meanwhile
 
 
 class Lids:

@@ -58,3 +58,13 @@ def test_positions_are_those_of_the_head(screen: Offscreen, head: Head) -> None:
     for name, ids in screen.renderer.openings.read_vertices().items():
         found = screen.renderer.evaluator.positions(head.part(name), ids)
         assert np.array_equal(found, head.part(name).vertices[ids])
+
+
+def test_the_head_poses_as_before_whatever_is_drawn(screen: Offscreen, head: Head) -> None:
+    values = head.values({"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0, "mouthRollLower": 0.5})
+    head.pose(values)
+    before = {part.name: part.vertices.copy() for part in head.parts}
+    screen.draw(head.values({"eyeWideLeft": 1.0, "eyeLookDownRight": 1.0, "mouthClose": 0.5}))
+    head.pose(values)
+    for part in head.parts:
+        assert np.array_equal(part.vertices, before[part.name]), part.name
