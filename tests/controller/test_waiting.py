@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 
@@ -37,6 +38,25 @@ def test_it_ends_when_main_is_gone() -> None:
     assert main.returncode == 0 and int(main.stdout) > 0  # its standard output closes when both have ended
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux which signals a process holds back")
+def test_an_interrupt_waits_from_the_first_moment_of_the_first_process_on() -> None:
+    program = """
+from pathlib import Path
+from controller.waiting import WaitingBody
+if __name__ == "__main__":
+    with WaitingBody() as waiting:
+        print(Path(f"/proc/{waiting.process.pid}/status").read_text())
+"""
+    said = subprocess.check_output([sys.executable, "-c", program], text=True, timeout=30)
+    held = next(int(line.split()[1], 16) for line in said.splitlines() if line.startswith("SigBlk"))
+    assert held >> signal.SIGINT - 1 & 1
+
+
 def test_the_command_line_comes_without_numpy() -> None:
-    program = "import sys, controller.cli, controller.waiting; print('numpy' in sys.modules, 'pydantic' in sys.modules)"
+    program = """
+import sys, controller.waiting
+from controller.cli import make_app
+make_app()
+print("numpy" in sys.modules, "pydantic" in sys.modules)
+"""
     assert subprocess.check_output([sys.executable, "-c", program], text=True).split() == ["False", "False"]
