@@ -8,33 +8,43 @@ from __future__ import annotations
 
 import os
 import sys
+from typing import TYPE_CHECKING
 
-import typer
-from rich.console import Console
-
-from controller import cli_bench, cli_bus, cli_calibrate, cli_check, cli_fit, cli_picture, cli_run
-from controller.errors import OMOTE_ERRORS
-
-app = typer.Typer(
-    name="omote",
-    help="Drives a robot's face: a CG face and a servo head that make the same expression.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    add_completion=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-for module in (cli_run, cli_picture, cli_fit, cli_bus, cli_calibrate, cli_check, cli_bench):
-    module.register(app)
+if TYPE_CHECKING:
+    from typer import Typer
 
 
-def report_error(error: BaseException) -> None:
+def make_app() -> Typer:
+    """All commands."""
+    from typer import Typer
+
+    from controller import cli_bench, cli_bus, cli_calibrate, cli_check, cli_fit, cli_picture, cli_run
+
+    app = Typer(
+        name="omote",
+        help="Drives a robot's face: a CG face and a servo head that make the same expression.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        add_completion=False,
+        rich_markup_mode="rich",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    for module in (cli_run, cli_picture, cli_fit, cli_bus, cli_calibrate, cli_check, cli_bench):
+        module.register(app)
+    return app
+
+
+def report_error(error: BaseException, remark: str = "") -> None:
     """Print what failed and what to do next on standard error."""
+    from rich.console import Console
+
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     console.print(f"[bold red]error:[/] {_plain(error)}")
     hint = getattr(error, "hint", "")
     if hint:
         console.print(f"[bold]try:[/] {_escape(hint)}")
+    if remark:
+        console.print(remark, style="dim")
 
 
 def _plain(error: BaseException) -> str:
@@ -46,20 +56,21 @@ def _escape(text: str) -> str:
 
 
 def main() -> None:
-    """Entry point of the ``omote`` command."""
+    """Entry point of the ``omote`` command; nothing is imported before Ctrl-C would end it quietly."""
     try:
-        app()
+        from controller.errors import OMOTE_ERRORS
+
+        make_app()()
+    except KeyboardInterrupt:
+        sys.exit(130)
     except OMOTE_ERRORS as error:
         report_error(error)
         sys.exit(1)
-    except KeyboardInterrupt:
-        sys.exit(130)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except Exception as error:
         if os.environ.get("OMOTE_DEBUG"):
             raise
-        report_error(error)
-        Console(stderr=True).print("This is a fault in omote. OMOTE_DEBUG=1 shows where.", style="dim")
+        report_error(error, "This is a fault in omote. OMOTE_DEBUG=1 shows where.")
         sys.exit(70)

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from controller.checking import check_anything
-from controller.cli import app
+from controller.cli import make_app
 from controller.commands import CommandState
 from controller.errors import ControllerError, TakeError
 from controller.parameters import PARAMETERS
@@ -57,7 +57,7 @@ def test_damaged_surfaces_are_one_error(tmp_path: Path, name: str) -> None:
 
 def test_the_command_prints_it(tmp_path: Path) -> None:
     write_surfaces(tmp_path / "b.json", [sheet()])
-    result = CliRunner().invoke(app, ["check", str(tmp_path / "b.json")])
+    result = CliRunner().invoke(make_app(), ["check", str(tmp_path / "b.json")])
     assert result.exit_code == 0
     assert "surface cheek: 4 control points" in result.output
 

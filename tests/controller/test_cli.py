@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from controller.cli import app, main
+from controller.cli import main, make_app
 
 COMMANDS = [
     ("demo",),
@@ -68,7 +68,7 @@ def omote(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_every_command_has_help_with_an_example(command: tuple[str, ...]) -> None:
-    result = CliRunner().invoke(app, [*command, "--help"])
+    result = CliRunner().invoke(make_app(), [*command, "--help"])
     assert result.exit_code == 0
     assert f"Example: omote {' '.join(command)}" in " ".join(result.output.split())
 
@@ -114,6 +114,25 @@ def test_a_process_of_its_own_ends_with_that_code_and_says_it_on_stderr() -> Non
     assert result.returncode == 1
     assert result.stdout == ""
     assert result.stderr.startswith("error: ")
+
+
+@pytest.mark.parametrize("module", ["controller.errors", "rich.console", "controller.cli_run"])
+def test_an_interrupt_while_the_command_line_loads_says_nothing(module: str) -> None:
+    program = """
+import signal, sys
+from controller.cli import main
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1]:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Finder())
+main()
+"""
+    command = [sys.executable, "-c", program, module]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
 
 
 def test_a_missing_or_busy_port_ends_a_run_with_one_message(omote: Omote, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 from typer.testing import CliRunner
 
-from controller.cli import app
+from controller.cli import make_app
 from controller.cli_bench import console
 from controller.errors import ControllerError
 from surface.head.file import save_data
@@ -23,7 +23,7 @@ def wide_tables(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def said(*words: str) -> str:
-    result = CliRunner().invoke(app, ["bench", *words])
+    result = CliRunner().invoke(make_app(), ["bench", *words])
     assert result.exit_code == 0, result.output
     return " ".join(result.output.split())  # a title is broken where its table ends
 
@@ -76,7 +76,7 @@ def test_quad_trees_are_drawn_side_by_side(tmp_path: Path, head: str) -> None:
 def test_places_that_cannot_be_written_are_refused_at_once(tmp_path: Path, place: str, why: str) -> None:
     (tmp_path / "file").touch()
     words = ["bench", "surface", "--growth", str(tmp_path / place)]
-    error = CliRunner().invoke(app, words).exception
+    error = CliRunner().invoke(make_app(), words).exception
     assert isinstance(error, ControllerError)
     assert why in str(error)
     assert error.hint

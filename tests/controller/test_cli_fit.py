@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from controller.cli import app
+from controller.cli import make_app
 from controller.errors import ConfigError, ParameterError
 from controller.identity import parse_identity
 from surface.errors import ExportError, FitError, HeadFileError
@@ -26,7 +26,7 @@ def sheet(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fit")
     mesh, head = folder / "me.glb", folder / "me"
     mesh.write_bytes(glb(slit_sheet()).bytes())
-    said = CliRunner().invoke(app, ["fit", str(mesh), "-o", str(head), "--report", str(folder / "report")])
+    said = CliRunner().invoke(make_app(), ["fit", str(mesh), "-o", str(head), "--report", str(folder / "report")])
     assert said.exit_code == 0, said.output
     return mesh, head, said.output
 
@@ -41,9 +41,9 @@ def test_fit_says_what_it_did_and_guessed(sheet):
 
 def test_export_writes_what_fit_wrote(sheet, tmp_path):
     out = tmp_path / "out.glb"
-    said = CliRunner().invoke(app, ["export", str(out), "--head", str(sheet[1]), "--set", "jawOpen=0.5"])
+    said = CliRunner().invoke(make_app(), ["export", str(out), "--head", str(sheet[1]), "--set", "jawOpen=0.5"])
     assert said.exit_code == 0 and out.read_bytes()[:4] == b"glTF", said.output
-    back = CliRunner().invoke(app, ["export", str(tmp_path / "out.obj"), "--head", str(sheet[1])])
+    back = CliRunner().invoke(make_app(), ["export", str(tmp_path / "out.obj"), "--head", str(sheet[1])])
     assert back.exit_code == 0 and "out_shapes" in back.output.replace("\n", "")
 
 
@@ -60,7 +60,7 @@ def test_export_writes_what_fit_wrote(sheet, tmp_path):
 )
 def test_mistakes_leave_nothing_behind(tmp_path, monkeypatch, words, kind, message):
     monkeypatch.chdir(tmp_path)
-    said = CliRunner().invoke(app, words)
+    said = CliRunner().invoke(make_app(), words)
     assert isinstance(said.exception, kind) and message in str(said.exception)
     assert list(tmp_path.iterdir()) == []
 
@@ -70,7 +70,7 @@ def test_a_damaged_mesh_leaves_the_old_head(sheet, tmp_path):
     before = (head / "head.npz").read_bytes()
     bad = tmp_path / "bad.glb"
     bad.write_bytes(mesh.read_bytes()[:9000])
-    said = CliRunner().invoke(app, ["fit", str(bad), "-o", str(head), "--report", str(tmp_path / "r")])
+    said = CliRunner().invoke(make_app(), ["fit", str(bad), "-o", str(head), "--report", str(tmp_path / "r")])
     assert isinstance(said.exception, FitError) and "bad.glb" in str(said.exception)
     assert (head / "head.npz").read_bytes() == before and not (tmp_path / "r").exists()
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from controller.cli import app
+from controller.cli import make_app
 from controller.parameters import PARAMETERS
 from controller.plan import plan_rows, rehearse
 from controller.robot import load_robot
@@ -61,7 +61,8 @@ def test_a_take_is_rehearsed(tmp_path: Path) -> None:
 def test_the_command_opens_no_port_and_writes_every_angle(tmp_path: Path) -> None:
     report = tmp_path / "r.json"
     path = stage_file(tmp_path, '[[links]]\nport = "/dev/none"')
-    result = CliRunner().invoke(app, ["run", str(path), "--dry-run", "--seconds", "0.5", "--report", str(report)])
+    words = ["run", str(path), "--dry-run", "--seconds", "0.5", "--report", str(report)]
+    result = CliRunner().invoke(make_app(), words)
     assert result.exit_code == 0, result.output
     assert "no port was opened" in result.output
     written = json.loads(report.read_text())

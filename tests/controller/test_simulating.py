@@ -135,8 +135,8 @@ def test_boards_take_their_time_on_the_wire_and_faults_at_a_socket(tmp_path: Pat
     ],
 )
 def test_what_cannot_be_simulated_is_told(words: tuple[str, ...], why: str) -> None:
-    from controller.cli import app
+    from controller.cli import make_app
 
-    result = CliRunner().invoke(app, ["simulate", *words])
+    result = CliRunner().invoke(make_app(), ["simulate", *words])
     assert result.exit_code != 0
     assert why in f"{result.output}{result.exception}"
