@@ -24,6 +24,8 @@ _DETAIL_TILES = 18
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
 _DETAIL_SIZE = 128
+#: How bright skin is seen from its back, as the hollow bust is from below and behind.
+_INSIDE = "0.25"
 #: A baked sky that hides nothing.
 _OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
 _LOWER_LASHES = 0.42
@@ -68,9 +70,9 @@ def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, mod
 
 def skin_program(ctx: moderngl.Context, quality: str, theme: Theme, *, hurried: bool = False) -> moderngl.Program:
     """The program of skin; a `hurried` one takes its grain unfiltered, for moving pictures drawn in software."""
+    defines: dict[str, int | str] = {"INSIDE": _INSIDE}
     if quality != "full":
-        return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), ("flat.frag",))
-    defines: dict[str, int | str] = {}
+        return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), ("flat.frag",), defines=defines)
     if theme.seams:
         defines |= {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
     if hurried:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from surface.view.leandraw import LeanDrawn
 
 QUALITIES = ("full", "fast")
+_LOW_DEG = -12.0  # from further below, as from behind, the bust is seen to be hollow
 
 
 class Renderer:
@@ -74,6 +75,7 @@ class Renderer:
         self._static: dict[str, materials.Arrays] = {part.name: self._shown(part) for part in parts}
         self._parts: list[PartBuffers] | list[LeanDrawn] = [self._buffers(part) for part in parts]
         self._camera: tuple[Camera, float] | None = None
+        self._into_bust = False
         #: Grows with every upload: equal revisions, cameras and themes draw equal pictures.
         self.revision = 0
         self._apply_theme()
@@ -171,7 +173,8 @@ class Renderer:
         material = materials.of(part.material)
         put(self._programs[material.program], material.uniforms(part, self.theme, self.openings))
         flags = self.ctx.DEPTH_TEST
-        flags |= 0 if material.two_sided else self.ctx.CULL_FACE
+        hollow = self._into_bust and material.program == "skin"
+        flags |= 0 if material.two_sided or hollow else self.ctx.CULL_FACE
         flags |= self.ctx.BLEND if material.blended else 0
         self.ctx.enable_only(flags)
         buffers.draw()
@@ -204,6 +207,7 @@ class Renderer:
         if self._camera == (camera, aspect):
             return
         self._camera = (camera, aspect)
+        self._into_bust = camera.eye[2] < 0.0 or camera.pitch_deg < _LOW_DEG
         turn = self.theme.lights_follow * camera.yaw_deg
         shared = {
             "view_projection": camera.matrix(aspect),

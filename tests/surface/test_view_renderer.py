@@ -173,6 +173,22 @@ def pixel(camera: Camera, point: np.ndarray, size: tuple[int, int]) -> tuple[int
     return int((clip[0] / clip[3] * 0.5 + 0.5) * size[0]), int((0.5 - clip[1] / clip[3] * 0.5) * size[1])
 
 
+@pytest.mark.parametrize("quality", ["full", "fast"])
+@pytest.mark.parametrize(("yaw_deg", "pitch_deg", "inside", "outside"), [(180, -10, 0.59, 0.3), (0, -50, 0.8, 0.12)])
+def test_a_hollow_bust_is_dark_inside(
+    gl: None, quality: str, yaw_deg: float, pitch_deg: float, inside: float, outside: float
+) -> None:
+    head = BallHead()
+    skin = head.parts[0]
+    skin.triangles = skin.triangles[skin.rest[skin.triangles].mean(axis=1)[:, 1] > 0.0]  # all below is cut away
+    camera = Camera.around(yaw_deg, pitch_deg, target=(0.0, 20.0, 0.0), fov_deg=12.0)
+    with Offscreen(head, SIZE, quality=quality) as screen:
+        picture = screen.render(values(), camera)
+    dark = middle(picture, 0.5, inside)
+    assert dark.sum() < 0.5 * middle(picture, 0.5, outside).sum()
+    assert np.abs(dark - middle(picture, 0.04, inside)).max() > 15, "no hole through which the background shows"
+
+
 class Bearded(BallHead):
     """Lashes over a whole ball, as deep under the skin as is asked for."""
 

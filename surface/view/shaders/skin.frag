@@ -41,5 +41,6 @@ void main() {
 #ifdef SEAMS
     lit *= 1.0 - 0.88 * min(seams(v_uv / DETAIL_PER_RADIAN), 1.0);
 #endif
-    colour = vec4(encode(lit), 1.0);
+    vec3 shown = encode(lit);
+    colour = vec4(gl_FrontFacing ? shown : INSIDE * shown, 1.0);
 }
