@@ -24,7 +24,7 @@ _PAPER = (24, 26, 29)
 _INK = (232, 233, 235)
 _GAP = 4
 _LEGIBLE = 9.0
-_LIFT_MM, _CLOSER = 30.0, 1.36
+_LIFT_MM, _CLOSER, _LONGER = 30.0, 1.36, 0.2  # a head is longer than it is wide
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,8 @@ def contact_sheet(
 def closer(camera: Camera) -> Camera:
     """The camera moved nearer, so that the head without its shoulders fills a small picture."""
     x, y, z = camera.target
-    return camera.aimed((x, y + _LIFT_MM, z)).zoom(_CLOSER)
+    side = abs(np.sin(np.radians(camera.yaw_deg)))
+    return camera.aimed((x, y + _LIFT_MM, z)).zoom(_CLOSER - _LONGER * side)
 
 
 def compose(pictures: Sequence[np.ndarray], labels: Sequence[str], *, columns: int | None = None) -> Image:
