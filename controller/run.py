@@ -48,6 +48,10 @@ class BodyProcess:
         waiting: WaitingBody | None = None,
     ) -> None:
         waiting = waiting or WaitingBody()
+        if voice is not None and voice.path == "-":
+            pump(waiting.voice)
+        else:
+            waiting.voice.close()
         self.mailbox = Mailbox.create(len(parameters.names))
         self._insights = Mailbox.create(insight_size(parameters))
         self.insight = Insight(self._insights, [layer.name for layer in by_priority(stage.layers)], parameters)
@@ -64,10 +68,6 @@ class BodyProcess:
         )
         self._pipe, self._process = waiting.pipe, waiting.process
         waiting.send(orders)
-        if voice is not None and voice.path == "-":
-            pump(waiting.voice)
-        else:
-            waiting.voice.close()
 
     def wait_ready(self) -> Ready:
         """Wait until the servos stand.

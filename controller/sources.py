@@ -76,8 +76,17 @@ class PipeStream(io.RawIOBase):
 
 
 def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
-    """Send a stream, standard input without one, down a pipe from a thread of its own, and close it at the end."""
-    source = sys.stdin.fileno() if stream is None else stream.fileno()
+    """Send a stream, standard input without one, down a pipe from a thread of its own, and close it at the end.
+
+    Raises
+    ------
+    TakeError : standard input is closed.
+    """
+    found = stream or sys.stdin
+    if found is None:
+        hint = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le - | omote play -"
+        raise TakeError("standard input is closed: no voice can come from it", hint=hint)
+    source = found.fileno()
 
     def run() -> None:
         with suppress(OSError):  # the body is gone, or the stream was closed

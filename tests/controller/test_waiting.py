@@ -8,6 +8,11 @@ import sys
 
 import pytest
 
+from controller.errors import TakeError
+from controller.parameters import PARAMETERS
+from controller.run import BodyProcess
+from controller.sources import Voice
+from controller.stage import load_stage
 from controller.waiting import WaitingBody
 from controller.wire import BodyOrders, Failed
 
@@ -36,6 +41,14 @@ def test_it_ends_when_main_is_gone() -> None:
     program = "from controller.waiting import WaitingBody\nif __name__ == '__main__': print(WaitingBody().process.pid)"
     main = subprocess.run([sys.executable, "-c", program + "; import os; os._exit(0)"], capture_output=True, timeout=30)
     assert main.returncode == 0 and int(main.stdout) > 0  # its standard output closes when both have ended
+
+
+def test_it_ends_where_the_voice_cannot_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", None)
+    stage = load_stage("everything", PARAMETERS)
+    with pytest.raises(TakeError, match="standard input is closed"), WaitingBody() as waiting:
+        BodyProcess(stage, PARAMETERS, voice=Voice("-"), waiting=waiting)
+    assert waiting.process.exitcode is not None
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux which signals a process holds back")
