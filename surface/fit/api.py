@@ -146,7 +146,9 @@ def _fit_parts(
 
 def part_chart(mesh: FitMesh, part: PartRecipe, islands: list[Island]) -> Chart:
     """The chart of one part of a plan: its islands in tiles, or one skin around them."""
-    return wrap_chart(mesh, islands) if part.wrapped else make_chart(mesh, islands, normalise=part.tiled)
+    if part.wrapped:
+        return wrap_chart(mesh, islands)
+    return make_chart(mesh, islands, normalise=part.tiled, doubt_slivers=part.doubt_slivers)
 
 
 def _still(mesh: FitMesh) -> FitMesh:

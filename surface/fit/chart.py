@@ -64,12 +64,14 @@ class Chart:
     size: float = 1.0
 
 
-def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True) -> Chart:
+def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True, doubt_slivers: bool = False) -> Chart:
     """Lay the islands side by side and sample them.
 
     ``normalise=False`` keeps the mesh's own (u, v), for a single island that is known to fill the unit square.
+    ``doubt_slivers`` : faces may be of any form (see :func:`surface.fit.slopes.face_slopes`).
     """
-    pieces = [_piece(mesh, _place(island, k) if normalise else island) for k, island in enumerate(islands)]
+    placed = [_place(island, k) if normalise else island for k, island in enumerate(islands)]
+    pieces = [_piece(mesh, island, doubt_slivers=doubt_slivers) for island in placed]
     from scipy.sparse import vstack
 
     return Chart(
@@ -81,7 +83,7 @@ def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True) 
     )  # fmt: skip
 
 
-def _piece(mesh: FitMesh, island: Island) -> Chart:
+def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
     """The chart of one island."""
     rows, on_border = _sample_rows(island)
     n = len(mesh.vertices)
@@ -93,7 +95,7 @@ def _piece(mesh: FitMesh, island: Island) -> Chart:
         _loosened(sampled) * np.where(on_border, BORDER_WEIGHT, 1.0), rows @ _spacing(island), sampled > 0.5,
         [island.uv[loop] for loop in around], [island.vertex[loop] for loop in around],
         [c for loop in around[1:] if (c := slit_of(island.uv[loop])) is not None],
-        face_slopes(island, n, SLOPE_WEIGHT * _loosened(fold)),
+        face_slopes(island, n, SLOPE_WEIGHT * _loosened(fold), doubt_slivers=doubt_slivers),
     )  # fmt: skip
 
 

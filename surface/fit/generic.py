@@ -202,7 +202,8 @@ def _part(
     wish = Wish(points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, finest=FINEST,
                 growth=GROWTH if face else 1.25)  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
-    recipe = PartRecipe(name, material, "skin", [], wish, (0, 0.24 * scale if face else 0.5 * scale, depth))
+    budget = 0, 0.24 * scale if face else 0.5 * scale, depth
+    recipe = PartRecipe(name, material, "skin", [], wish, budget, doubt_slivers=True)
     return recipe, [open_flat_holes(i) for i in lay_out(mesh, islands)]
 
 

@@ -21,7 +21,8 @@ RECIPES = Path(__file__).parent / "recipes"
 class PartRecipe:
     """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted.
 
-    ``tiled`` : its islands are still to be laid into tiles of their own; ``wrapped`` : one skin goes round all of them.
+    ``tiled`` : its islands are still to be laid into tiles of their own; ``wrapped`` : one skin goes round all of them;
+    ``doubt_slivers`` : nothing is known of its faces' forms.
     """
 
     name: str
@@ -32,6 +33,7 @@ class PartRecipe:
     budget: tuple[int, float, int]
     tiled: bool = False
     wrapped: bool = False
+    doubt_slivers: bool = False
 
     def holds(self, vertex: float) -> bool:
         """Is the vertex in one of the ranges?"""

@@ -3,7 +3,10 @@
 import numpy as np
 from slit_sheet import SIZE_MM, N, slit_sheet
 
+from surface.fit.chart import make_chart
 from surface.fit.islands import find_islands
+from surface.fit.mesh import FitMesh
+from surface.fit.refine import Wish, fit_chart
 from surface.fit.slopes import face_slopes, join_slopes
 
 MESH = slit_sheet()
@@ -29,3 +32,31 @@ def test_joined_slopes_stand_one_after_the_other():
     two = join_slopes([one, one])
     assert two.mix_u.shape == (2 * one.mix_u.shape[0], one.mix_u.shape[1])
     np.testing.assert_array_equal(two.uv[len(one.uv) :], one.uv)
+
+
+def sliver_sheet() -> FitMesh:
+    """The sheet with one quad cut in two: a corner lies beside the diagonal, 0.3 mm off where (u, v) says."""
+    a, b, c, d = MESH.faces[60]
+    uv, vertices = MESH.uv.copy(), MESH.vertices.copy()
+    uv[b] = 0.5 * (uv[a] + uv[c]) + [1e-4, -1e-4]
+    vertices[b] = 0.5 * (vertices[a] + vertices[c]) + [0.2, -0.2, 0.0]
+    faces = np.vstack([np.delete(MESH.faces, 60, axis=0), [[a, b, c, -1], [a, c, d, -1]]])
+    return FitMesh(vertices, faces, uv, faces.copy(), MESH.names, MESH.deltas)
+
+
+def test_slivers_in_uv_say_little_of_the_slope_across_them():
+    mesh = sliver_sheet()
+    (island,) = find_islands(mesh)
+    s = face_slopes(island, len(mesh.vertices), np.ones(len(island.uv)), doubt_slivers=True)
+    assert s.weight[-2] < 1e-3  # the sliver; half a square that is left has 1 - r^2 = 3/4
+    np.testing.assert_allclose(s.weight[-1], 0.75, atol=1e-6)
+    np.testing.assert_allclose(np.median(s.weight), 1.0, atol=1e-6)
+
+
+def test_a_sliver_in_uv_raises_no_spike():
+    mesh = sliver_sheet()
+    worst = []
+    for doubt in (True, False):
+        chart = make_chart(mesh, find_islands(mesh), normalise=False, doubt_slivers=doubt)
+        worst.append(fit_chart(mesh, chart, Wish(200, coarse=0.2)).error.max())
+    assert worst[0] < 1.0 < 3.0 < worst[1]
