@@ -24,12 +24,12 @@ def project(points: Any, matrix: Any, near: Any, pixels: Any) -> bool:
     a, b, c, d = matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3]
     e, f, g, h = matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3]
     p, q, r, s = matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[3, 3]
-    least = near
+    least, one = near, np.float32(1.0)
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         depth = p * x + q * y + r * z + s
         least = min(least, depth)
-        over = np.float32(1.0) / depth
+        over = one / (depth if depth != 0.0 else one)  # none is drawn where it is 0, but dividing would end the loop
         pixels[i, 0] = (a * x + b * y + c * z + d) * over
         pixels[i, 1] = (e * x + f * y + g * z + h) * over
     return least >= near

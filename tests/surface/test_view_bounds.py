@@ -26,9 +26,10 @@ def test_a_triangle_fills_every_band_it_crosses() -> None:
     assert (y, height) == (0, 3 * ROWS) and x > 20 and width < 70
 
 
-def test_what_is_too_near_is_not_told() -> None:
+@pytest.mark.parametrize("depth", [-1.0, 0.0, 0.4])
+def test_what_is_too_near_is_not_told(depth: float) -> None:
     near = FLAT.copy()
-    near[3] = [0.0, 0.0, -1.0, 0.0]
+    near[3] = [0.0, 0.0, depth, 0.0]
     assert not Silhouette(SIZE, near, 0.5).add(np.ones((3, 3)), np.array([[0, 1, 2]], np.int32))
 
 
