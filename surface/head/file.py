@@ -111,7 +111,7 @@ def load_data(path: str | Path) -> HeadData:
         parts=[_part(src, p, f"parts[{i}].") for i, p in enumerate(t["parts"])],
         seams=[_seam(src, s, i, names) for i, s in enumerate(src.value(t, "seams", list))],
         paint=src.value(t, "paint", list),
-        contacts=[_contact(src, c, i) for i, c in enumerate(t.get("contacts", []))],
+        contacts=[_contact(src, c, i, names) for i, c in enumerate(t.get("contacts", []))],
         rules=[_rule(src, r, i) for i, r in enumerate(t.get("rules", []))],
     )
 
@@ -178,7 +178,7 @@ def _seam(src: Source, t: dict[str, Any], i: int, names: list[str]) -> Seam:
     return Seam(parts[0], parts[1], uv_a, src.array(f"seams/{i}/b", (len(uv_a), 2)))
 
 
-def _contact(src: Source, t: dict[str, Any], i: int) -> Contact:
+def _contact(src: Source, t: dict[str, Any], i: int, names: list[str]) -> Contact:
     where = f"contacts[{i}]."
     reach, share = (float(src.numbers(t, k, (), where)) for k in ("reach_mm", "share"))
     name, part, eye = (
@@ -186,8 +186,16 @@ def _contact(src: Source, t: dict[str, Any], i: int) -> Contact:
         src.value(t, "part", str, where),
         src.value(t, "eye", int, where),
     )
+    followers = src.value(t, "followers", list, where)
+    if part not in names:
+        raise src.bad(src.toml_path, f"{where}part", f"no part is named {part!r}")
+    for follower in followers:
+        if follower not in names[names.index(part) + 1 :]:
+            raise src.bad(src.toml_path, f"{where}followers", f"no part named {follower!r} stands after {part!r}")
+    if eye not in (-1, 0, 1):
+        raise src.bad(src.toml_path, f"{where}eye", f"{eye} is not -1 (lips), 0 (left eye) or 1 (right eye)")
     places = src.array(f"contacts/{i}", (2, -1, -1, 2)).astype(float)
-    return Contact(name, part, tuple(src.value(t, "followers", list, where)), eye, reach, share, places)
+    return Contact(name, part, tuple(followers), eye, reach, share, places)
 
 
 def _rule(src: Source, t: dict[str, Any], i: int) -> Rule:

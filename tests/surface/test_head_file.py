@@ -5,6 +5,7 @@ import pytest
 from small_head import small_head
 
 from surface.errors import HeadFileError
+from surface.head.data import Contact
 from surface.head.file import check_writable, load_data, save_data
 
 
@@ -136,6 +137,21 @@ def test_a_group_without_a_name(folder):
 def test_a_seam_of_an_unknown_part(folder):
     edit(folder, 'b = "b"', 'b = "c"')
     broken(folder, "no part is named 'c'")
+
+
+@pytest.mark.parametrize(
+    ("part", "follower", "eye", "match"),
+    [
+        ("c", "b", -1, r"contacts\[0\]\.part: no part is named 'c'"),
+        ("a", "c", -1, r"contacts\[0\]\.followers: no part named 'c' stands after 'a'"),
+        ("b", "a", -1, "no part named 'a' stands after 'b'"),
+        ("a", "b", 2, r"contacts\[0\]\.eye: 2 is not -1"),
+    ],
+)
+def test_a_contact_of_what_is_not_there(folder, part, follower, eye, match):
+    wrong = Contact("lips", part, (follower,), eye, 5.0, 0.5, np.zeros((2, 3, 3, 2)))
+    save_data(folder, small_head(contacts=[wrong]))
+    broken(folder, match)
 
 
 def test_a_full_disk_leaves_the_old_head(folder, full_disk):
