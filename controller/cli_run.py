@@ -164,15 +164,9 @@ def _run(
         from controller.session import Session, has_display, write_report
 
         session = Session.load(
-            stage,
-            take,
-            status.update,
-            mirror=mirror,
-            voice=voice,
-            record=record,
-            identity=identity,
-            waiting=waiting,
-        )
+            stage, take, status.update,
+            mirror=mirror, voice=voice, record=record, identity=identity, waiting=waiting,
+        )  # fmt: skip
         session.stage = with_picture(session.stage, picture or {})
         if no_face:
             measured = session.run_without_face(seconds)

@@ -149,6 +149,6 @@ def lean_drawn(
         buffers, first = LeanBuffers(ctx, lean, parts, programs[name], lambda p: static(p.part)), 0
         for _, alike in groupby(parts, lambda p: materials.told(p.part)):
             own = list(alike)
-            drawn.append(LeanDrawn(buffers, own, first, owner=first == 0))
+            drawn.append(LeanDrawn(buffers, own, first, owner=own[0] is parts[0]))
             first += sum(len(p.triangles) for p in own)
     return drawn
