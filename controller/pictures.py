@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from controller.errors import ControllerError
 from controller.face import Recorder
 
 _MOMENTS = 12
@@ -17,15 +18,19 @@ def write_pictures(recorder: Recorder, folder: Path) -> list[str]:
 
     Raises
     ------
-    ViewError
-        when they cannot be written.
+    ControllerError, ViewError
+        when the folder cannot be made, or a picture cannot be written.
     """
     from surface.view.clip import write_clip
     from surface.view.sheet import compose, write_png
 
     if not recorder.frames:
         return []
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        hint = "choose another folder for the pictures"
+        raise ControllerError(f"{folder}: cannot be made: {error.strerror}", hint=hint) from error
     chosen = np.unique(np.linspace(0, len(recorder.frames) - 1, _MOMENTS).round().astype(int))
     labels = [f"{recorder.times_s[i]:.1f} s" for i in chosen]
     sheet, clip = folder / "sheet.png", folder / "face.webp"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from controller.errors import ControllerError
 from controller.face import FrameLog, HeadValues, Recorder
 from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS
+from controller.pictures import write_pictures
 from controller.stage import FaceSettings
 
 
@@ -39,6 +43,15 @@ def test_a_long_recording_keeps_all_of_its_time_in_no_more_pictures() -> None:
     assert 8 <= len(recorder.frames) <= 17 and len(recorder.times_s) == len(recorder.frames)
     assert recorder.times_s[0] == 0.0 and recorder.times_s[-1] > 18.0
     assert np.diff(recorder.times_s) == pytest.approx(1 / recorder.clip_hz, abs=0.06)
+
+
+def test_a_folder_for_pictures_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    recorder = Recorder()
+    recorder.keep(np.zeros((4, 4, 3), dtype=np.uint8), 0.0)
+    (tmp_path / "file").touch()
+    with pytest.raises(ControllerError, match=r"file: cannot be made: File exists") as told:
+        write_pictures(recorder, tmp_path / "file")
+    assert told.value.hint
 
 
 def test_frames_with_motion_are_counted() -> None:
