@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from small_head import small_head
+from small_head import all_points, part, small_head
 
 from surface.head import Head
+from surface.head.data import Seam
 from surface.head.leanhead import LeanHead
 
 VALUES = ({}, {"mouthPucker": 0.7, "headYaw": 0.3}, {"jawOpen": 0.4, "headYaw": 0.3}, {"jawOpen": 0.4})
@@ -53,6 +56,18 @@ def test_only_what_moved_is_said_to_have_changed(head: Head, lean: LeanHead) -> 
         lean.pose(head.values(given))
         changed.append({part.part.name for part in lean.parts if part.changed})
     assert changed == [{"a", "b"}, set(), {"tooth"}, {"a", "b", "tooth"}]
+
+
+def test_what_hangs_on_a_border_that_hangs_on_another_is_said_to_have_changed() -> None:
+    line, data = np.linspace(0, 1, 6), small_head()
+    under = Seam("b", "c", np.column_stack([line, np.zeros(6)]), np.column_stack([line, np.ones(6)]))
+    parts = [part("a", -40, groups=[all_points("mouthPucker", (0, 0, 6))]), part("b", 0), part("c", 0)]
+    head = Head(replace(data, parts=parts, seams=[*data.seams, under]))
+    lean = LeanHead(head, head.parts, "fast", {})
+    last = lean.parts[2]
+    before = lean.vertices[last.first :].copy()
+    lean.pose(head.values({"mouthPucker": 1.0}))
+    assert (lean.vertices[last.first :] != before).any() and last.changed
 
 
 def test_points_at_rest_that_are_changed_are_seen(head: Head, lean: LeanHead) -> None:
