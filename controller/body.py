@@ -249,16 +249,24 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
 def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     parameters = PARAMETERS
     stage = load_stage(orders.stage, parameters)
-    mailbox = Mailbox(orders.mailbox, len(parameters.names))
+    mailbox = _reached(orders.mailbox, len(parameters.names))
+    insights = None if orders.insight is None else _reached(orders.insight, insight_size(parameters))
     body = _body(orders, stage, mailbox, parameters)
     take_turns_quickly()  # before torque: what collects garbage later finds little to look at
     body.start()
     try:
         _tell(pipe, Ready())
-        _wait(body, pipe, stop, _insight(orders, body, parameters))
+        _wait(body, pipe, stop, _insight(insights, body))
     finally:
         body.stop()
     _tell(pipe, Report(body.report()))
+
+
+def _reached(path: str, count: int) -> Mailbox:
+    """A mailbox of main's, which nobody else has to find from now on."""
+    mailbox = Mailbox(path, count)
+    mailbox.unname()
+    return mailbox
 
 
 def _body(orders: BodyOrders, stage: Stage, mailbox: Mailbox, parameters: Parameters) -> Body:
@@ -271,11 +279,11 @@ def _body(orders: BodyOrders, stage: Stage, mailbox: Mailbox, parameters: Parame
     return Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path), record=record)
 
 
-def _insight(orders: BodyOrders, body: Body, parameters: Parameters) -> Callable[[], None]:
+def _insight(insights: Mailbox | None, body: Body) -> Callable[[], None]:
     """What tells main, now and then, more than the values."""
-    if orders.insight is None:
+    if insights is None:
         return lambda: None
-    return InsightWriter(Mailbox(orders.insight, insight_size(parameters)), body.state, body.reflection).publish
+    return InsightWriter(insights, body.state, body.reflection).publish
 
 
 def _wait(body: Body, pipe: Connection, stop: threading.Event, publish: Callable[[], None]) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import mmap
 import os
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -83,6 +84,14 @@ class Mailbox:
             if int(self._head[0]) - sequence < 1:
                 break
         return sequence, stamp
+
+    def unname(self) -> None:
+        """Remove the file; those that have reached the memory keep it. A maker that is killed then leaves nothing.
+
+        Nothing happens where a file in use cannot be removed, as on Windows.
+        """
+        with suppress(OSError):
+            Path(self.path).unlink(missing_ok=True)
 
     def close(self) -> None:
         """Let go of the memory; the maker also removes the file."""

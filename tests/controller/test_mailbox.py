@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from controller.mailbox import Mailbox
 
@@ -38,6 +40,16 @@ def test_the_file_goes_with_its_maker() -> None:
     assert Path(box.path).exists()
     box.close()
     assert not Path(box.path).exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a file in use cannot be removed there")
+def test_without_a_name_the_memory_is_shared_as_before() -> None:
+    with Mailbox.create(3) as box, Mailbox(box.path, 3) as other:
+        other.unname()
+        assert not Path(box.path).exists()
+        other.publish(np.array([1.0, 2.0, 3.0]), 42)
+        out = np.zeros(3)
+        assert box.read(out) == (1, 42) and out.tolist() == [1.0, 2.0, 3.0]
 
 
 def test_no_torn_vector_from_another_process() -> None:

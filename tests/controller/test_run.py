@@ -124,7 +124,7 @@ def test_main_killed_is_noticed_and_the_servos_stopped(stage: Stage, servos: Sim
         "from controller.stage import load_stage\n"
         "if __name__ == '__main__':\n"
         "    body = BodyProcess(load_stage(sys.argv[1], PARAMETERS), PARAMETERS)\n"
-        "    body.wait_ready(); print('ready', flush=True); time.sleep(60)\n"
+        "    body.wait_ready(); print(body.mailbox.path, body._insights.path, flush=True); time.sleep(60)\n"
     )
     script = stage.path.parent / "main.py"
     script.write_text(program)
@@ -132,10 +132,11 @@ def test_main_killed_is_noticed_and_the_servos_stopped(stage: Stage, servos: Sim
     main = subprocess.Popen([sys.executable, str(script), str(stage.path)], stdout=subprocess.PIPE, env=environment)
     try:
         assert main.stdout is not None
-        assert main.stdout.readline() == b"ready\n"
+        mailboxes = main.stdout.readline().split()
         assert powered(servos) == list(range(1, 25))
         main.send_signal(signal.SIGKILL)
         assert until(lambda: powered(servos) == [])
+        assert len(mailboxes) == 2 and not any(map(os.path.exists, mailboxes))
     finally:
         main.kill()
         main.communicate()
