@@ -14,6 +14,8 @@ from . import flips, keys, loops
 from .basis import Floats, Ints
 from .domain import Domain
 
+ROUNDS = 4  # a triangle at a sharp corner is split so many times at most
+ALONG = 0.5, 0.25, 0.75, 0.1, 0.9  # where on an edge it is looked whether it runs through the inside
 SNAP = 0.28  # of the shortest edge at a vertex: nearer crossings pull the vertex onto the loop
 LOCKED = -2
 
@@ -52,6 +54,7 @@ def trim(flat: Flat, domain: Domain, scale: tuple[float, float]) -> Flat:
     sign = np.where(domain.inside(flat.uv), 1, -1)
     sign[fixed] = 0
     _snap(flat, domain, scale, lines, sign)
+    flat, sign = _uncover(flat, domain, sign)
     flat = _without_flat(_merged(_cut(flat, domain, scale, sign)))
     flips.improve(flat.uv * np.asarray(scale), flat.triangles, lines_of_edges(flat.uv, domain))
     return compact(flat)
@@ -103,7 +106,10 @@ def lines_of_edges(uv: Floats, domain: Domain) -> Ints:
 
 def _near_or_inside(flat: Flat, domain: Domain) -> Flat:
     """Drop triangles with no corner inside: nothing of them is kept."""
-    keep = domain.inside(flat.uv)[flat.triangles].any(axis=1)
+    sign = np.where(domain.inside(flat.uv), 1, -1)
+    keep = np.any(sign[flat.triangles] > 0, axis=1)
+    for a, b in _covered(flat, domain, sign)[0]:
+        keep[_beside(flat.triangles, a, b)] = True
     # A corner of a loop may lie in a triangle whose own corners are all outside.
     for tip in _all_corners(domain, (1.0, 1.0)):
         keep |= _weights_in(flat, tip).min(axis=1) >= 0
@@ -261,6 +267,57 @@ def _snap(flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, si
     chosen = chosen[np.argsort(-near[chosen], kind="stable")]  # the nearest crossing is written last
     flat.uv[vertex[chosen]] = np.concatenate([where, where])[chosen]
     sign[vertex[chosen]] = 0
+
+
+def _uncover(flat: Flat, domain: Domain, sign: Ints) -> tuple[Flat, Ints]:
+    """Split edges that run through the inside though neither end lies there, where they cross a loop.
+
+    At sharp corners such edges are left by vertices that were moved onto a loop; what lies beside them would be lost.
+    """
+    for _ in range(ROUNDS):
+        edges, within = _covered(flat, domain, sign)
+        if not len(edges):
+            break
+        outer = np.where(sign[edges[:, 0]] < 0, edges[:, 0], edges[:, 1])
+        t = loops.crossings(domain.segments, within, flat.uv[outer])
+        points = within + t[:, None] * (flat.uv[outer] - within)
+        for (a, b), point in zip(edges, points, strict=True):
+            flat = _split(flat, int(a), int(b), point)
+        sign = np.append(sign, np.zeros(len(edges), sign.dtype))
+    return flat, sign
+
+
+def _covered(flat: Flat, domain: Domain, sign: Ints) -> tuple[Ints, Floats]:
+    """Edges (e, 2) without an end inside, one outside, that run through the inside; and a point of each in there.
+
+    Edges of triangles that moved vertices turned over are left alone: halves of those would be kept upside down.
+    """
+    a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
+    turned = _edges(flat.triangles[_cross(b - a, c - a) <= 0])
+    edges = _edges(flat.triangles)
+    edges = edges[~np.isin(edges @ [len(flat.uv), 1], turned @ [len(flat.uv), 1])]
+    edges = edges[(sign[edges].max(axis=1) <= 0) & (sign[edges].min(axis=1) < 0)]
+    a, b = flat.uv[edges[:, 0]], flat.uv[edges[:, 1]]
+    tried = np.stack([a + t * (b - a) for t in ALONG])
+    inside = domain.inside(tried.reshape(-1, 2)).reshape(len(ALONG), -1)
+    hit = np.flatnonzero(inside.any(axis=0))
+    return edges[hit], tried[inside[:, hit].argmax(axis=0), hit]
+
+
+def _split(flat: Flat, a: int, b: int, point: Floats) -> Flat:
+    """Put a vertex on the edge between two, for the triangles on both its sides."""
+    beside = _beside(flat.triangles, a, b)
+    halves = [np.where(flat.triangles[beside] == end, len(flat.uv), flat.triangles[beside]) for end in (a, b)]
+    keep = np.ones(len(flat.triangles), dtype=bool)
+    keep[beside] = False
+    triangles = np.concatenate([flat.triangles[keep], *halves])
+    owner = np.concatenate([flat.owner[keep], flat.owner[beside], flat.owner[beside]])
+    return Flat(np.vstack([flat.uv, point]), triangles, owner)
+
+
+def _beside(triangles: Ints, a: int, b: int) -> Ints:
+    """The triangles that have an edge, in whichever direction."""
+    return np.flatnonzero(((triangles == a) | (triangles == b)).sum(axis=1) == 2)
 
 
 def _cut(flat: Flat, domain: Domain, scale: tuple[float, float], sign: Ints) -> Flat:

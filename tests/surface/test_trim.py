@@ -53,6 +53,16 @@ def test_sharp_corners_become_vertices() -> None:
         assert (flat.uv == corner).all(axis=1).any()
 
 
+def test_nothing_is_lost_beside_sharp_corners() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        low, high, t = rng.uniform(0.06, 0.25, 2), rng.uniform(0.7, 0.94, 2), rng.uniform(-0.05, 0.05, 4)
+        square = [low, (high[0], low[1] + t[0]), (high[0] + t[1], high[1]), (low[0] + t[2], high[1] + t[3])]
+        domain = Domain((0, 1, 0, 1), loops=[np.array(square)])
+        area = areas(trim.trim(grid(9), domain, (1.0, 1.0)))
+        assert area.min() > 0 and area.sum() == pytest.approx(domain.area, rel=1e-9)
+
+
 @pytest.mark.parametrize("scale", [(1.0, 1.0), (1.0, 7.0)])
 def test_the_border_has_a_vertex_at_every_mark(scale: tuple[float, float]) -> None:
     ring, marks = shapes.circle(0.5, 0.5, 0.4), shapes.circle(0.5, 0.5, 0.4)[3::17]
