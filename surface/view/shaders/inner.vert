@@ -1,5 +1,7 @@
 // Teeth, gums, tongue and the mouth's lining: lit by what comes in between the lips, per vertex.
 #define WALLS vec3(0.50, 0.18, 0.16)
+#define DEEP_MM vec2(12.0, 40.0)  // behind the lips: where the mouth's inside begins to be deep, and where it is
+#define ROUND_WALLS vec3(1.0, 0.86, 0.78)
 
 uniform mat4 view_projection;
 uniform vec3 camera;
@@ -32,15 +34,20 @@ void main() {
     gl_Position = view_projection * vec4(position, 1.0);
     vec3 v = normalize(camera - position);
     vec3 n = dot(normal, v) < 0.0 ? -normal : normal;
+    vec3 out_of = opening_area / (length(opening_area) + 1e-3);
+    float past = dot(position - opening_centre, out_of);
+    // Far in, light has been round the mouth's red walls and comes from everywhere.
+    float deep = smoothstep(DEEP_MM.x, DEEP_MM.y, -past);
+    n = normalize(mix(n, out_of, 0.55 * deep));
+    vec3 tint = mix(vec3(1.0), ROUND_WALLS, deep);
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
         + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
     // A tongue past the lips is in the open.
-    float past = dot(position - opening_centre, opening_area / (length(opening_area) + 1e-3));
-    float reach = mix(clamp(daylight(n) * occlusion, 0.0, 1.0), 1.0, smoothstep(-8.0, 3.0, past));
+    float reach = mix(clamp(daylight(n) * mix(occlusion, 1.0, 0.5 * deep), 0.0, 1.0), 1.0, smoothstep(-8.0, 3.0, past));
     // Light bounces between here and the red walls of the mouth: the less comes straight in, the more that counts.
     vec3 bounce = 0.5 * (albedo + WALLS);
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach;
-    v_colour = encode(albedo * light * arrives + shine * key_colour);
+    v_colour = encode(albedo * tint * light * arrives + shine * key_colour);
 }
