@@ -64,7 +64,8 @@ def face_slopes(island: Island, vertices: int, weight: Floats, *, doubt_slivers:
         )
         for i in (0, 1)
     )
-    trust = np.linalg.det(moments) / (span**2).prod(axis=1) if doubt_slivers else np.ones(len(corner))
+    decided = np.linalg.det(moments)  # above 0, also without extent in u or v; what asks for nothing there may count
+    trust = decided / np.maximum((span**2).prod(axis=1), decided) if doubt_slivers else np.ones(len(corner))
     return Slopes(centre, span, mix_u, mix_v, trust * np.where(used, weight[corner], np.inf).min(axis=1))
 
 

@@ -1,10 +1,11 @@
 """Slopes of the mesh in (u, v)."""
 
 import numpy as np
+import pytest
 from slit_sheet import SIZE_MM, N, slit_sheet
 
 from surface.fit.chart import make_chart
-from surface.fit.islands import find_islands
+from surface.fit.islands import Island, find_islands
 from surface.fit.mesh import FitMesh
 from surface.fit.refine import Wish, fit_chart
 from surface.fit.slopes import face_slopes, join_slopes
@@ -51,6 +52,14 @@ def test_slivers_in_uv_say_little_of_the_slope_across_them():
     assert s.weight[-2] < 1e-3  # the sliver; half a square that is left has 1 - r^2 = 3/4
     np.testing.assert_allclose(s.weight[-1], 0.75, atol=1e-6)
     np.testing.assert_allclose(np.median(s.weight), 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("squeezed", [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
+def test_faces_without_extent_in_uv_have_finite_slopes(squeezed):
+    flat = Island(ISLAND.vertex, ISLAND.uv * squeezed, ISLAND.faces)
+    s = face_slopes(flat, len(MESH.vertices), np.ones(len(flat.uv)), doubt_slivers=True)
+    assert s.weight.min() >= 0 and s.weight.max() <= 1
+    assert np.isfinite(s.mix_u.data).all() and np.isfinite(s.mix_v.data).all()
 
 
 def test_a_sliver_in_uv_raises_no_spike():
