@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_head import all_points, part, small_head
+from small_head import all_points, small_head
+from small_head import part as patch
 
 from surface.head import Head
 from surface.head.data import Seam
@@ -61,7 +62,7 @@ def test_only_what_moved_is_said_to_have_changed(head: Head, lean: LeanHead) -> 
 def test_what_hangs_on_a_border_that_hangs_on_another_is_said_to_have_changed() -> None:
     line, data = np.linspace(0, 1, 6), small_head()
     under = Seam("b", "c", np.column_stack([line, np.zeros(6)]), np.column_stack([line, np.ones(6)]))
-    parts = [part("a", -40, groups=[all_points("mouthPucker", (0, 0, 6))]), part("b", 0), part("c", 0)]
+    parts = [patch("a", -40, groups=[all_points("mouthPucker", (0, 0, 6))]), patch("b", 0), patch("c", 0)]
     head = Head(replace(data, parts=parts, seams=[*data.seams, under]))
     lean = LeanHead(head, head.parts, "fast", {})
     last = lean.parts[2]
