@@ -3,6 +3,7 @@
 import numpy as np
 
 from surface.fit.eyeball import BACK, CORNEA, IRIS, LIMBUS_V, eyeball_surface
+from surface.head.contact_kernels import CORNEA_AT, CORNEA_RADIUS
 
 CENTRE, RADIUS = np.array([31.0, 36.0, 84.0]), 12.0
 S = eyeball_surface(CENTRE, RADIUS)
@@ -38,3 +39,9 @@ def test_normals_point_outwards():
     uv = np.stack(np.meshgrid(np.linspace(0.01, 0.99, 9), np.linspace(0.05, 0.95, 9)), axis=-1).reshape(-1, 2)
     p, su, sv = S.derivatives(uv)
     assert ((np.cross(su, sv) * (p - CENTRE)).sum(axis=1) > 0).all()
+
+
+def test_lids_are_held_on_the_cornea_that_is_drawn():
+    limbus, edge = np.arcsin(IRIS), np.arcsin(IRIS / CORNEA)
+    assert CORNEA_RADIUS == CORNEA
+    assert abs(CORNEA_AT - (np.cos(limbus) - CORNEA * np.cos(edge))) < 1e-4
