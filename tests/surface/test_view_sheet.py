@@ -11,7 +11,7 @@ from PIL import Image
 
 from surface.errors import ViewError
 from surface.view import Camera, contact_sheet, write_png
-from surface.view.sheet import compose
+from surface.view.sheet import closer, compose
 
 
 def plain(colour: tuple[int, int, int], size: tuple[int, int] = (60, 80)) -> np.ndarray:
@@ -70,3 +70,9 @@ def test_write_png_round_trips(tmp_path: Path) -> None:
     assert (np.asarray(Image.open(tmp_path / "a.png")) == picture).all()
     write_png(Image.fromarray(picture), tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_a_profile_is_seen_from_further_than_a_front() -> None:
+    front, side = closer(Camera.front()), closer(Camera.profile())
+    assert front.distance < side.distance / 1.1
+    assert side.distance < Camera.profile().distance
