@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.dcp import DCPSurface
+from surface.fit.strokes import arc_length
 from surface.head.data import Contact, PartData
 from surface.head.meshes import make_surface
 
@@ -74,7 +75,6 @@ def _along(surface: DCPSurface, loop: Floats, start: Floats, x: Floats, sign: fl
         beyond = (v - place[1]) * sign > 1e-3
         trace = np.column_stack([[np.interp(x[k], np.maximum.accumulate(r[:, 0]), u) for r in at[beyond]], v[beyond]])
         trace = np.concatenate([place[None], trace])
-        points = surface.evaluate(trace)
-        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        length = arc_length(surface.evaluate(trace))
         out[k] = np.column_stack([np.interp(wanted, length, trace[:, i]) for i in (0, 1)])
     return out

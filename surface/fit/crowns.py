@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from surface.fit.chart import TILE, Chart
 from surface.fit.mesh import FitMesh, triangles
+from surface.fit.strokes import evenly
 
 Floats = NDArray[np.float64]
 GRID = (19, 31)  # samples along u and v
@@ -81,8 +82,9 @@ def _sample(mesh: FitMesh, faces: NDArray[np.int64], upper: bool, middle: Floats
     a, b = a[..., None], b[..., None]
     rays = np.cos(a) * across + np.sin(a) * (np.cos(b) * down - np.sin(b) * outward)
     hits = centre + rays * _reach(tri, centre, rays.reshape(-1, 3)).reshape(*RAYS, 1)
-    rows = np.stack([_even(_below(row, row @ down > gum), GRID[1]) for row in hits])
-    return np.stack([_even(column, GRID[0]) for column in rows.swapaxes(0, 1)], axis=1).reshape(-1, 3)
+    # Rays crowd in some places and miss thin edges; samples shall not.
+    rows = np.stack([evenly(_below(row, row @ down > gum), GRID[1]) for row in hits])
+    return np.stack([evenly(column, GRID[0]) for column in rows.swapaxes(0, 1)], axis=1).reshape(-1, 3)
 
 
 def _below(row: Floats, crown: NDArray[np.bool_]) -> Floats:
@@ -91,13 +93,6 @@ def _below(row: Floats, crown: NDArray[np.bool_]) -> Floats:
     start = outside[outside < middle].max(initial=-1) + 1
     end = outside[outside > middle].min(initial=len(row))
     return row[start:end]
-
-
-def _even(line: Floats, count: int) -> Floats:
-    """(count, 3) points along a line of points (k, 3), as far apart along it: rays crowd, and miss a thin edge."""
-    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    at = np.linspace(0.0, length[-1], count)
-    return np.column_stack([np.interp(at, length, x) for x in line.T])
 
 
 def _reach(tri: Floats, origin: Floats, rays: Floats) -> Floats:

@@ -76,3 +76,15 @@ def smooth_line(points: Floats, *, closed: bool) -> Floats:
         a, b, c, d = (padded[(i + k - closed) % len(padded)] for k in range(4))
         out.append(0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * (b - c) + d - a) * t**3))
     return np.vstack(out if closed else [*out, points[-1:]])
+
+
+def arc_length(line: Floats) -> Floats:
+    """How far each point of a line of points (k, n) lies along it, (k,), from 0, in their unit."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+
+
+def evenly(line: Floats, count: int) -> Floats:
+    """(count, n) points along a line of points (k, n), as far apart along it."""
+    length = arc_length(line)
+    at = np.linspace(0.0, length[-1], count)
+    return np.column_stack([np.interp(at, length, x) for x in line.T])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from surface.dcp import DCPSurface
 from surface.fit.chart import Chart
 from surface.fit.mesh import FitMesh
-from surface.fit.strokes import smooth_line, uv_of
+from surface.fit.strokes import arc_length, evenly, smooth_line, uv_of
 from surface.head.data import Group, PartData, Rule
 from surface.head.meshes import make_surface
 
@@ -105,10 +105,8 @@ def _furrow(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMesh) ->
     near = ((samples[None, :, :2] - smooth[:, None]) ** 2).sum(axis=2) - 1e-3 * samples[:, 2] * np.abs(samples[:, 2])
     z = samples[near.argmin(axis=1), 2]
     at = np.column_stack([smooth, np.convolve(np.pad(z, 3, mode="edge"), np.full(7, 1 / 7), "valid")])
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(at, axis=0), axis=1))])
     width = float(table["width"])
-    even = np.linspace(0.0, length[-1], max(3, round(length[-1] / (ALONG * width)) + 1))
-    at = np.column_stack([np.interp(even, length, at[:, i]) for i in range(3)])
+    at = evenly(at, max(3, round(arc_length(at)[-1] / (ALONG * width)) + 1))
     return Furrow(table["group"], uv_of(chart, mesh, at), at, float(table["depth"]), width)
 
 
