@@ -38,8 +38,14 @@ def test_it_does_as_it_is_told_and_is_left_alone_then() -> None:
 
 
 def test_it_ends_when_main_is_gone() -> None:
-    program = "from controller.waiting import WaitingBody\nif __name__ == '__main__': print(WaitingBody().process.pid)"
-    main = subprocess.run([sys.executable, "-c", program + "; import os; os._exit(0)"], capture_output=True, timeout=30)
+    program = """
+import os
+from controller.waiting import WaitingBody
+if __name__ == "__main__":
+    print(WaitingBody().process.pid, flush=True)  # os._exit writes nothing out
+    os._exit(0)
+"""
+    main = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=30)
     assert main.returncode == 0 and int(main.stdout) > 0  # its standard output closes when both have ended
 
 
