@@ -19,7 +19,7 @@ from rich.table import Table
 
 from controller.paths import find_config
 from surface.head import Head
-from surface.head.parameters import SHAPES
+from surface.head.model.parameters import SHAPES
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "surface"))
 from face_measures import Sheet, crossing, seams_gape, sides  # type: ignore[import-not-found]

@@ -18,9 +18,9 @@ from rich.table import Table
 
 from controller.paths import find_config
 from surface.head import Head
-from surface.view.bounds import Bands
-from surface.view.camera import Camera
-from surface.view.offscreen import Offscreen
+from surface.view.pictures.offscreen import Offscreen
+from surface.view.scene.bounds import Bands
+from surface.view.scene.camera import Camera
 
 FRAMES = 40
 Times = tuple[float, float, float]

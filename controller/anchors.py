@@ -23,7 +23,7 @@ from controller.solve import BoundedSolver
 
 if TYPE_CHECKING:
     from surface.head import Head
-    from surface.head.part import HeadPart
+    from surface.head.posing.part import HeadPart
 
 _LEVELS = 4
 _STRAIGHT_MM = 0.02
@@ -111,14 +111,14 @@ def _way(name: str, at) -> Floats:  # type: ignore[no-untyped-def]
 
 
 def _shape_names() -> tuple[str, ...]:
-    from surface.head.parameters import SHAPES
+    from surface.head.model.parameters import SHAPES
 
     return SHAPES
 
 
 def shapes_of(values: Floats, order: NDArray[np.intp]) -> Floats:
     """(s,) shapes of a face ``values`` (p,); ``order`` (h,) leads from omote's parameters to the head's."""
-    from surface.head.parameters import read_pose
+    from surface.head.model.parameters import read_pose
 
     return read_pose(values[order]).shapes
 

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.paths import find_config
-from surface.bench import Measure, build_table, large_table, least, measure, speed_table
+from surface.bench.bench import Measure, build_table, large_table, least, measure, speed_table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from surface.comparison import Variant
+    from surface.base.progress import Progress
+    from surface.bench.comparison import Variant
     from surface.head import Head
-    from surface.progress import Progress
 
 Tell = Callable[[str], None]
 Tables = list[tuple[str, list[Measure]]]
@@ -65,7 +65,7 @@ def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES
 
     Sizes run from a tenth to ten times ``vertices``, and from a thousandth of it to as many control points.
     """
-    from surface import growth
+    from surface.bench import growth
 
     share = vertices / VERTICES
     sizes = tuple(max(256, round(share * count)) for count in growth.VERTICES)
@@ -80,7 +80,7 @@ def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES
 
 def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
     """Random updates of every kind on a head's largest surface, against a fresh evaluation."""
-    from surface.drift import drift
+    from surface.bench.drift import drift
     from surface.head import Head
 
     tell("loading")
@@ -105,9 +105,9 @@ def bench_quadtree(name: str, tell: Tell, level: int = UNIFORM_LEVEL) -> tuple[T
     the pictures are of the second. A way that finds no mesh within the bound is left out. The uniform mesh is
     quartered ``level`` times.
     """
-    from surface.comparison import compare
+    from surface.bench.comparison import compare
     from surface.head import Head
-    from surface.head.meshes import domain_of
+    from surface.head.model.meshes import domain_of
 
     tell("loading")
     head = Head.load(find_config("heads", name))

@@ -11,7 +11,7 @@ import math
 from numba import boolean, float64, njit, void
 from numpy.typing import NDArray
 
-import surface.jit  # noqa: F401  first of all: it keeps numba from importing scipy, which takes longer than all the rest
+import surface.base.jit  # noqa: F401  first of all: it keeps numba from importing scipy, which takes longer than all the rest
 from controller.parameters import Floats
 
 _TINY = 1e-12

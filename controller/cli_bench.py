@@ -15,7 +15,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from controller.benching import Tables
-    from surface.bench import Measure
+    from surface.bench.bench import Measure
 
 console = Console(highlight=False)
 PICTURES = (".png", ".svg", ".jpg", ".webp")
@@ -141,7 +141,7 @@ def _head(what: Subject, head: str, seconds: float, bar: Bar, out: Path | None, 
         return bench_drift(head, updates, bar.tell)
     tables, variants = bench_quadtree(head, bar.tell, level)
     if out is not None:
-        from surface.comparison import draw
+        from surface.bench.comparison import draw
 
         draw(variants, out)
     return tables

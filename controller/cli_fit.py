@@ -45,7 +45,7 @@ def fit(
     """
     from controller.errors import ConfigError
     from controller.fitting import add_with_progress, fit_with_progress
-    from surface.fit.load import LoadOptions
+    from surface.fit.source.load import LoadOptions
 
     if keep and identities is None:
         raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")

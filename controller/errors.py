@@ -12,7 +12,7 @@ The tree::
 from __future__ import annotations
 
 from drivers.errors import DriverError
-from surface.errors import SurfaceError
+from surface.base.errors import SurfaceError
 
 
 class ControllerError(Exception):

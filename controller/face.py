@@ -21,7 +21,7 @@ from controller.stage import FaceSettings
 
 if TYPE_CHECKING:
     from surface.head import Head
-    from surface.view.offscreen import Offscreen
+    from surface.view.pictures.offscreen import Offscreen
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -187,7 +187,7 @@ class HeadlessFace:
         values: Callable[[], Floats],
         recorder: Recorder | None = None,
     ) -> None:
-        from surface.view.offscreen import Offscreen
+        from surface.view.pictures.offscreen import Offscreen
 
         self._screen: Offscreen = Offscreen(
             head, settings.size, quality=settings.quality, theme=settings.make_theme(), evaluator=settings.evaluator

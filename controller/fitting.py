@@ -10,8 +10,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from surface.fit.load import LoadOptions
-    from surface.fit.report import FitReport
+    from surface.fit.points.report import FitReport
+    from surface.fit.source.load import LoadOptions
 
 
 def fit_with_progress(
@@ -65,9 +65,9 @@ def add_with_progress(mesh: Path, head: Path, modes: Path, console: Console) -> 
 
 def _shade(out: Path, console: Console) -> bool:
     """Bake how much light reaches each vertex of the head; False without OpenGL. Find its lean triangles."""
-    from surface.errors import ViewError
-    from surface.view.lean import lean_head
-    from surface.view.occlusion import shade_head
+    from surface.base.errors import ViewError
+    from surface.view.draw.lean import lean_head
+    from surface.view.pictures.occlusion import shade_head
 
     with console.status("finding fewer triangles for live pictures"):
         lean_head(out)
@@ -81,7 +81,7 @@ def _shade(out: Path, console: Console) -> bool:
 
 def remarks(report: FitReport) -> list[str]:
     """How the face keeps its bounds, what was guessed and what is missing, a line each."""
-    from surface.fit.report import face_bounds
+    from surface.fit.points.report import face_bounds
 
     out = [face_bounds(report), *report.notes]
     if report.missing:

@@ -12,7 +12,7 @@ from controller.wire import Hold
 
 if TYPE_CHECKING:
     from surface.head import Head
-    from surface.view.camera import Camera
+    from surface.view.scene.camera import Camera
 
 
 class Hand:

@@ -21,7 +21,7 @@ from controller.parameters import Floats, Parameters
 
 if TYPE_CHECKING:
     from surface.head import Head
-    from surface.view.camera import Camera
+    from surface.view.scene.camera import Camera
 
 PART = "face"
 _POINTS = 900
@@ -247,6 +247,6 @@ def _spread(ids: NDArray[np.int32], moves: Floats, n: int) -> Floats:
 
 def _turn(head_values: Floats) -> Floats:
     """(3, 3) rotation of the head for values (h,) in its own order."""
-    from surface.head.parameters import read_pose, rotation
+    from surface.head.model.parameters import read_pose, rotation
 
     return rotation(*read_pose(head_values).head)

@@ -13,8 +13,8 @@ from controller.errors import ParameterError
 
 if TYPE_CHECKING:
     from controller.stage import Stage
-    from surface.view.camera import Camera
-    from surface.view.theme import Colour, Light, Theme
+    from surface.view.scene.camera import Camera
+    from surface.view.scene.theme import Colour, Light, Theme
 
 HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 Share = Annotated[float, Field(ge=0, le=4)]
@@ -55,7 +55,7 @@ class PictureSettings(Settings):
 
     def make_theme(self) -> Theme:
         """The theme with this background and these lights."""
-        from surface.view.theme import THEMES
+        from surface.view.scene.theme import THEMES
 
         theme, light = THEMES[self.theme], self.light
         lit = replace(
@@ -74,7 +74,7 @@ class PictureSettings(Settings):
 
     def make_camera(self) -> Camera:
         """The camera of that name."""
-        from surface.view.camera import PRESETS
+        from surface.view.scene.camera import PRESETS
 
         return PRESETS[self.camera.replace("_", "-")]()
 

@@ -21,8 +21,8 @@ def write_pictures(recorder: Recorder, folder: Path) -> list[str]:
     ControllerError, ViewError
         when the folder cannot be made, or a picture cannot be written.
     """
-    from surface.view.clip import write_clip
-    from surface.view.sheet import compose, write_png
+    from surface.view.pictures.clip import write_clip
+    from surface.view.pictures.sheet import compose, write_png
 
     if not recorder.frames:
         return []

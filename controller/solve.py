@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-import surface.jit  # noqa: F401  first of all: it keeps numba from importing scipy
+import surface.base.jit  # noqa: F401  first of all: it keeps numba from importing scipy
 from controller.parameters import Floats
 
 _ROUNDS = 200

@@ -133,8 +133,8 @@ def _add_expression(vocabulary: Vocabulary, values: NDArray[np.float64], word: s
 
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
-    from surface.view.offscreen import Offscreen
-    from surface.view.sheet import write_png
+    from surface.view.pictures.offscreen import Offscreen
+    from surface.view.pictures.sheet import write_png
 
     head, look = still.load_head(), still.look
     with Offscreen(head, still.size, quality=look.quality, theme=look.make_theme(), evaluator=look.evaluator) as screen:
@@ -169,7 +169,7 @@ def _vector(values: dict[int, float]) -> NDArray[np.float64]:
 
 def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Draw every parameter and every named expression on one sheet (PNG); ``progress(done, total)`` is told."""
-    from surface.view.sheet import contact_sheet, write_png
+    from surface.view.pictures.sheet import contact_sheet, write_png
 
     head, look = still.load_head(), still.look
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]

@@ -18,7 +18,7 @@ from controller.stage import FaceSettings
 if TYPE_CHECKING:
     from controller.run import BodyProcess
     from surface.head import Head
-    from surface.view.viewpoint import Viewpoint
+    from surface.view.scene.viewpoint import Viewpoint
 
 _TITLE = "omote"
 
@@ -58,7 +58,7 @@ class WindowFace:
         ViewError
             when no window can be opened.
         """
-        from surface.view.viewpoint import Viewpoint
+        from surface.view.scene.viewpoint import Viewpoint
         from surface.view.window import run_window
 
         viewpoint = Viewpoint(self._settings.make_camera())

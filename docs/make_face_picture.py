@@ -12,7 +12,7 @@ from controller.paths import find_config
 from controller.still import for_head, sheet_poses
 from surface.head import Head
 from surface.view import PRESETS, Camera, Offscreen, compose, contact_sheet, write_png
-from surface.view.imagefile import as_image, replacing
+from surface.view.pictures.imagefile import as_image, replacing
 
 HERE = Path(__file__).parent
 EXPRESSIONS = ("neutral", "laugh", "surprise", "sadness")

@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from surface import DCPSurface, Domain, Mesh, Slit
-from surface.basis import blending
+from surface.spline.basis import blending
 
 FOLDER = Path(__file__).parent / "pictures"
 FINE = 3  # pixels drawn per pixel kept

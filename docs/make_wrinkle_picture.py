@@ -11,10 +11,10 @@ import numpy as np
 
 from controller.paths import find_config
 from surface.head import Head
-from surface.head.data import Group, HeadData, PartData
-from surface.head.file import load_data
+from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.file import load_data
 from surface.view import Camera, Offscreen, compose
-from surface.view.imagefile import as_image, replacing
+from surface.view.pictures.imagefile import as_image, replacing
 
 OUT = Path(__file__).parent / "pictures" / "picture-wrinkles.webp"
 SIZE = (400, 300)

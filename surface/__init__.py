@@ -9,11 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .basis import blending
+    from surface.base.errors import FitError, HeadFileError, SurfaceError, SurfaceFileError, ViewError
+    from surface.mesh.domain import Domain, Slit
+    from surface.mesh.mesh import Mesh
+    from surface.spline.basis import blending
+
     from .dcp import DCPSurface
-    from .domain import Domain, Slit
-    from .errors import FitError, HeadFileError, SurfaceError, SurfaceFileError, ViewError
-    from .mesh import Mesh
 
 __all__ = [
     "DCPSurface",
@@ -28,8 +29,8 @@ __all__ = [
     "blending",
 ]
 _ERRORS = ("FitError", "HeadFileError", "SurfaceError", "SurfaceFileError", "ViewError")
-_WHERE = {"DCPSurface": "dcp", "Domain": "domain", "Mesh": "mesh", "Slit": "domain", "blending": "basis"}
-_WHERE |= dict.fromkeys(_ERRORS, "errors")
+_WHERE = {"DCPSurface": "dcp", "Domain": "mesh.domain", "Mesh": "mesh.mesh", "Slit": "mesh.domain"}
+_WHERE |= {"blending": "spline.basis"} | dict.fromkeys(_ERRORS, "base.errors")
 
 
 def __getattr__(name: str) -> Any:

@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .basis import Floats, Ints, check_padded, pad_knots
-from .checks import check_inside, check_length, check_points, check_sides, check_uv, check_weights
-from .closed import Interval, wrap
-from .controlpoints import ControlPoints
-from .progress import Progress, silent
+from surface.base.checks import check_inside, check_length, check_points, check_sides, check_uv, check_weights
+from surface.base.progress import Progress, silent
+from surface.spline.basis import Floats, Ints, check_padded, pad_knots
+from surface.spline.closed import Interval, wrap
+from surface.spline.controlpoints import ControlPoints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-    from .deformation import Deformation
-    from .domain import Domain
-    from .mesh import Mesh
-    from .refine import Refinement
+    from surface.deform.deformation import Deformation
+    from surface.mesh.domain import Domain
+    from surface.mesh.mesh import Mesh
+    from surface.spline.refine import Refinement
 
 
 class DCPSurface(ControlPoints):
@@ -78,11 +78,11 @@ class DCPSurface(ControlPoints):
         control_points: ArrayLike,
         weights: ArrayLike | None = None,
     ) -> DCPSurface:
-        """The same surface as a NURBS surface; arguments and errors as :func:`surface.nurbs.nurbs_arrays`.
+        """The same surface as a NURBS surface; arguments and errors as :func:`surface.spline.nurbs.nurbs_arrays`.
 
         Point (i, j) of the net becomes control point ``i * nv + j``.
         """
-        from .nurbs import nurbs_arrays
+        from surface.spline.nurbs import nurbs_arrays
 
         return cls(*nurbs_arrays(degree_u, degree_v, knots_u, knots_v, control_points, weights))
 
@@ -166,8 +166,8 @@ class DCPSurface(ControlPoints):
         return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
 
     def curvatures(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats]:
-        """Gaussian and mean curvature, each (m,) float64; see :func:`surface.curvature.curvatures`."""
-        from .curvature import curvatures
+        """Gaussian and mean curvature, each (m,) float64; see :func:`surface.spline.curvature.curvatures`."""
+        from surface.spline.curvature import curvatures
 
         return curvatures(self, self._inside(uv), side)
 
@@ -184,7 +184,7 @@ class DCPSurface(ControlPoints):
         -------
         Refinement : the new surface, and how data of the old points is carried over
         """
-        from .refine import insert_knot
+        from surface.spline.refine import insert_knot
 
         return insert_knot(self, axis, value, ids)
 
@@ -193,7 +193,7 @@ class DCPSurface(ControlPoints):
 
         Points whose subdomain does not reach the region stay as they are.
         """
-        from .refine import refine
+        from surface.spline.refine import refine
 
         return refine(self, region)
 
@@ -212,7 +212,7 @@ class DCPSurface(ControlPoints):
         -------
         (m, n) scipy CSR matrix, float64; rows where nothing covers are empty
         """
-        from .matrix import basis_matrix
+        from surface.spline.matrix import basis_matrix
 
         return basis_matrix(self, self._inside(uv), derivative, side)
 
@@ -248,7 +248,7 @@ class DCPSurface(ControlPoints):
         ValueError
             For limits out of range, or where they ask for millions of cells.
         """
-        from .tessellate import tessellate
+        from surface.mesh.tessellate import tessellate
 
         return tessellate(
             self,
@@ -275,7 +275,7 @@ class DCPSurface(ControlPoints):
         threads : how many threads compute everything anew
         progress : as for :meth:`tessellate`
         """
-        from .deformation import Deformation
+        from surface.deform.deformation import Deformation
 
         return Deformation(self, mesh, normals=normals, threads=threads, progress=progress)
 
@@ -292,7 +292,7 @@ class DCPSurface(ControlPoints):
         side : (m,) int64, the limit each evaluation really takes, -1 where nothing covers
         out : (m, 3, 3) float64 with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them
         """
-        from . import kernels
+        from .spline import kernels
 
         samples = wrap(check_uv(uv), self._closed)
         sides = check_sides(samples, side)
@@ -302,7 +302,7 @@ class DCPSurface(ControlPoints):
 
     def sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
         """Checked samples, the side really used (-1: uncovered) and S; as :meth:`sample_derivatives`."""
-        from . import kernels
+        from .spline import kernels
 
         samples = wrap(check_uv(uv), self._closed)
         sides = check_sides(samples, side)

@@ -18,8 +18,8 @@ from controller.parameters import PARAMETERS
 from controller.stage import Stage, load_stage
 from drivers.sim import SimulatedBus
 from surface.head import Head
-from surface.view.camera import Camera
-from surface.view.offscreen import Offscreen
+from surface.view.pictures.offscreen import Offscreen
+from surface.view.scene.camera import Camera
 
 JAW_ID = 4
 

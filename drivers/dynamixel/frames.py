@@ -12,14 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.packet import (
-    BROADCAST_ID,
-    HEADER,
-    Instruction,
-    crc16,
-    encode_fast_head,
-    encode_instruction,
-)
+from drivers.dynamixel.packet import BROADCAST_ID, HEADER, Instruction, crc16, encode_fast_head, encode_instruction
 
 Octets = NDArray[np.uint8]
 

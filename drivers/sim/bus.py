@@ -23,15 +23,7 @@ from drivers.dynamixel.packet import (
 from drivers.sim.chain import Chain
 from drivers.sim.device import SimulatedServo
 from drivers.sim.replies import Reply, collide
-from drivers.sim.requests import (
-    ReadRequest,
-    WriteRequest,
-    bulk_reads,
-    bulk_writes,
-    sync_reads,
-    sync_writes,
-    words,
-)
+from drivers.sim.requests import ReadRequest, WriteRequest, bulk_reads, bulk_writes, sync_reads, sync_writes, words
 
 FACTORY_BROADCAST_FIRMWARE = 42
 """From here on a broadcast factory reset of everything is ignored."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from surface.errors import ExportError
+from surface.base.errors import ExportError
 from surface.head import Head
 
 __all__ = ["SUFFIXES", "export_head"]

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import ExportError
+from surface.base.errors import ExportError
 from surface.export.png import png_bytes
 from surface.export.shapes import Piece, pieces_of
 from surface.head import Head
-from surface.head.parameters import ANGLES
+from surface.head.model.parameters import ANGLES
 
 METRES = np.float32(0.001)
 FLOAT, BYTE, UINT = 5126, 5121, 5125

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.head import Head
-from surface.head.parameters import SHAPES, TONGUE_NEEDS
+from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
 
 Floats32 = NDArray[np.float32]
 LEAST_MM = 0.002  # displacements smaller than this are none

@@ -9,31 +9,31 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.fit.chart import Chart, make_chart
-from surface.fit.finish import finish_head
-from surface.fit.frame import head_scale
-from surface.fit.generic import Plan, make_plan
-from surface.fit.islands import Island, find_islands
-from surface.fit.joins import find_seams
-from surface.fit.load import Loaded, LoadOptions, load_mesh
-from surface.fit.mesh import FitMesh, check_manifold
-from surface.fit.names import sources_of, to_arkit
-from surface.fit.pieces import Body, eyeball_part, hair_parts, skin_part, teeth_part
-from surface.fit.recipe import PartRecipe, Recipe, recipe_for
-from surface.fit.refine import Fitted, fit_chart
-from surface.fit.relax import open_flat_holes
-from surface.fit.report import FitReport, PartReport, measure
-from surface.fit.rigging import find_jaw
-from surface.fit.seat import close_lips, draw_brows, seat_lids, strengthen
-from surface.fit.strokes import make_paint
-from surface.fit.wrap import wrap_chart
-from surface.fit.wrinkles import deepened
-from surface.head.data import HeadData, Neck, PartData
-from surface.head.file import check_writable, save_data
-from surface.head.meshes import pack, tessellate
-from surface.head.parameters import NAMES, read_pose
-from surface.head.part import make_surface
-from surface.head.rig import SkinRig, optical_axis
+from surface.fit.features.finish import finish_head
+from surface.fit.features.generic import Plan, make_plan
+from surface.fit.features.joins import find_seams
+from surface.fit.features.pieces import Body, eyeball_part, hair_parts, skin_part, teeth_part
+from surface.fit.features.rigging import find_jaw
+from surface.fit.features.wrinkles import deepened
+from surface.fit.points.recipe import PartRecipe, Recipe, recipe_for
+from surface.fit.points.refine import Fitted, fit_chart
+from surface.fit.points.report import FitReport, PartReport, measure
+from surface.fit.points.seat import close_lips, draw_brows, seat_lids, strengthen
+from surface.fit.points.strokes import make_paint
+from surface.fit.source.chart import Chart, make_chart
+from surface.fit.source.frame import head_scale
+from surface.fit.source.islands import Island, find_islands
+from surface.fit.source.load import Loaded, LoadOptions, load_mesh
+from surface.fit.source.mesh import FitMesh, check_manifold
+from surface.fit.source.names import sources_of, to_arkit
+from surface.fit.source.relax import open_flat_holes
+from surface.fit.source.wrap import wrap_chart
+from surface.head.model.data import HeadData, Neck, PartData
+from surface.head.model.file import check_writable, save_data
+from surface.head.model.meshes import pack, tessellate
+from surface.head.model.parameters import NAMES, read_pose
+from surface.head.posing.part import make_surface
+from surface.head.posing.rig import SkinRig, optical_axis
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]

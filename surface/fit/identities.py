@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import FitError
+from surface.base.errors import FitError
 from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
-from surface.fit.chart import Chart
-from surface.fit.load import load_mesh
-from surface.fit.mesh import FitMesh
-from surface.fit.net import Net
-from surface.fit.recipe import Recipe, recipe_for
-from surface.fit.solve import basis, solve
-from surface.head.data import Group, HeadData, PartData
-from surface.head.file import load_data
-from surface.head.identity import Identity, fingerprint, save_identities, with_identities
-from surface.head.parameters import NAMES, read_pose
-from surface.head.rig import SkinRig
+from surface.fit.points.net import Net
+from surface.fit.points.recipe import Recipe, recipe_for
+from surface.fit.points.solve import basis, solve
+from surface.fit.source.chart import Chart
+from surface.fit.source.load import load_mesh
+from surface.fit.source.mesh import FitMesh
+from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.file import load_data
+from surface.head.model.identity import Identity, fingerprint, save_identities, with_identities
+from surface.head.model.parameters import NAMES, read_pose
+from surface.head.posing.rig import SkinRig
 from surface.readers.npzmesh import DAMAGED
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import FitError, ViewError
-from surface.fit.chart import TILE
-from surface.fit.nurbsnet import UniformNet, uniform_nets
-from surface.fit.report import Errors, FitReport, face_bounds
+from surface.base.errors import FitError, ViewError
+from surface.fit.points.nurbsnet import UniformNet, uniform_nets
+from surface.fit.points.report import Errors, FitReport, face_bounds
+from surface.fit.source.chart import TILE
 
 if TYPE_CHECKING:
     from surface.fit.api import FitResult, FittedPart
@@ -175,9 +175,9 @@ def _colours(uv: Floats, part: FittedPart, error: Floats) -> NDArray[np.float32]
 
 def _picture(head: Any, path: Path) -> None:
     """Front, three-quarter, profile, and from below into the nostrils."""
-    from surface.view.camera import Camera
-    from surface.view.offscreen import Offscreen
-    from surface.view.sheet import compose, write_png
+    from surface.view.pictures.offscreen import Offscreen
+    from surface.view.pictures.sheet import compose, write_png
+    from surface.view.scene.camera import Camera
 
     views = {
         "front": Camera.front(), "three-quarter": Camera.three_quarter(), "profile": Camera.profile(),

@@ -1,10 +1,10 @@
 """The head: parts, groups, parameters, and the file they are kept in."""
 
-from surface.head.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
-from surface.head.file import load_data, save_data
-from surface.head.head import Head
-from surface.head.parameters import NAMES
-from surface.head.part import HeadPart
+from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
+from surface.head.model.file import load_data, save_data
+from surface.head.model.parameters import NAMES
+from surface.head.posing.head import Head
+from surface.head.posing.part import HeadPart
 
 __all__ = [
     "NAMES",

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from surface.basis import MAX_DEGREE, Floats, Ints
-from surface.checks import check_weights
+from surface.base.checks import check_weights
 from surface.dcp import DCPSurface
-from surface.domain import Domain
-from surface.nurbs import nurbs_arrays
+from surface.mesh.domain import Domain
+from surface.spline.basis import MAX_DEGREE, Floats, Ints
+from surface.spline.nurbs import nurbs_arrays
 
 from . import xmltree
 from .named import NamedSurface, Place, read_text

@@ -2,7 +2,7 @@
 
 Reads ``.glb`` and ``.gltf`` with buffers inside, beside or in data URIs; accessors of all component types, normalised,
 interleaved and sparse (glTF 2.0 specification, sections 3.6, 4.4 and 5.1). What a file says is never trusted: a wrong
-one raises :class:`surface.errors.FitError` with the path and the element.
+one raises :class:`surface.base.errors.FitError` with the path and the element.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import FitError
+from surface.base.errors import FitError
 
 MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 TYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import FitError
+from surface.base.errors import FitError
 from surface.readers.gltf import Gltf
 from surface.readers.meshdata import MeshData, check_size
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import FitError
+from surface.base.errors import FitError
 
 MOST_VERTICES = 400_000
 MOST_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from surface.base.errors import SurfaceFileError
 from surface.dcp import DCPSurface
-from surface.domain import Domain
-from surface.errors import SurfaceFileError
+from surface.mesh.domain import Domain
 
 
 @dataclass(frozen=True)

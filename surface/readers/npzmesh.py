@@ -15,7 +15,7 @@ from zlib import error as ZlibError
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import FitError
+from surface.base.errors import FitError
 from surface.readers.meshdata import MOST_MOVES, MOST_VERTICES, MeshData, check_size
 
 KEYS = ("neutral", "deltas", "names", "faces", "uv", "face_uv")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.errors import FitError
+from surface.base.errors import FitError
 from surface.readers.gltf import read_bytes
 from surface.readers.meshdata import MeshData, check_size
 

@@ -28,7 +28,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from surface.dcp import DCPSurface
-from surface.domain import Domain, Slit
+from surface.mesh.domain import Domain, Slit
 
 from .named import NamedSurface, Place, read_text
 

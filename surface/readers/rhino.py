@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from surface.basis import Floats
+from surface.base.errors import SurfaceError
 from surface.dcp import DCPSurface
-from surface.domain import Domain
-from surface.errors import SurfaceError
-from surface.nurbs import nurbs_arrays
+from surface.mesh.domain import Domain
+from surface.spline.basis import Floats
+from surface.spline.nurbs import nurbs_arrays
 
 from .named import NamedSurface, Place, read_bytes
 from .trims import invert, polyline

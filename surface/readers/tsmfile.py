@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from surface.errors import SurfaceFileError
+from surface.base.errors import SurfaceFileError
 
 from .named import Place
 

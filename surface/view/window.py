@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from surface.errors import ViewError
-from surface.view.camera import Camera
-from surface.view.pace import Pace, is_software
-from surface.view.parts import ViewHead
-from surface.view.renderer import Renderer
-from surface.view.target import Target
-from surface.view.theme import Theme
-from surface.view.viewpoint import Viewpoint
+from surface.base.errors import ViewError
+from surface.view.draw.renderer import Renderer
+from surface.view.draw.target import Target
+from surface.view.scene.camera import Camera
+from surface.view.scene.pace import Pace, is_software
+from surface.view.scene.parts import ViewHead
+from surface.view.scene.theme import Theme
+from surface.view.scene.viewpoint import Viewpoint
 
 if TYPE_CHECKING:
     import moderngl
@@ -67,7 +67,7 @@ def run_window(
     camera : where the picture is taken from at first; a viewpoint stays in the caller's hands.
     seconds : close by itself after this long.
     keep_going : asked once per frame, also while the window is minimised; it closes when told False.
-    quality, theme, evaluator : see :class:`surface.view.renderer.Renderer`.
+    quality, theme, evaluator : see :class:`surface.view.draw.renderer.Renderer`.
     kiosk : cover a whole monitor, hide the cursor, let mouse and keys alone but for Esc, which ends it.
     monitor : which one, from 0.
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from controller.cli import make_app
 from controller.cli_bench import console
 from controller.errors import ControllerError
-from surface.head.file import save_data
+from surface.head.model.file import save_data
 from tests.surface.small_head import part, small_head
 
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from controller.cli import make_app
 from controller.errors import ConfigError, ParameterError
 from controller.identity import parse_identity
-from surface.errors import ExportError, FitError, HeadFileError
+from surface.base.errors import ExportError, FitError, HeadFileError
 
 SURFACE = str(Path(__file__).parent.parent / "surface")
 

@@ -15,7 +15,7 @@ from controller.parameters import PARAMETERS as P
 from controller.paths import find_config
 from controller.stage import load_stage
 from surface.head import Head
-from surface.view.camera import Camera
+from surface.view.scene.camera import Camera
 
 SIZE = (1280.0, 720.0)
 CORNER, BROW = np.array([28.6, -34.0, 102.0]), np.array([18.0, 56.0, 106.0])

@@ -8,8 +8,8 @@ from controller.errors import ParameterError
 from controller.parameters import PARAMETERS
 from controller.picture import LightSettings, PictureSettings, checked, parse_background, with_picture
 from controller.stage import load_stage
-from surface.view.camera import PRESETS
-from surface.view.theme import THEMES
+from surface.view.scene.camera import PRESETS
+from surface.view.scene.theme import THEMES
 
 
 @pytest.mark.parametrize("theme", THEMES)

@@ -55,7 +55,7 @@ from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS as P
 from controller.stage import FaceSettings, load_stage
 from controller.window import WindowFace
-from surface.view.camera import Camera
+from surface.view.scene.camera import Camera
 
 CORNER, BY = np.array([[28.6, -34.0, 102.0]]), -2.0  # the left corner of the mouth
 stage = load_stage("demo", P)

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.dynamixel.packet import (
-    ALERT,
-    BROADCAST_ID,
-    StatusPacket,
-    StatusReader,
-    decode_fast,
-    encode_instruction,
-)
+from drivers.dynamixel.packet import ALERT, BROADCAST_ID, StatusPacket, StatusReader, decode_fast, encode_instruction
 from drivers.dynamixel.packet import ErrorNumber as E
 from drivers.dynamixel.packet import Instruction as I
 from drivers.sim.bus import SimulatedChain

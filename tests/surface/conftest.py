@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 @pytest.fixture(scope="session")
 def gl() -> None:
     """Skips where this machine can draw nothing at all (no OpenGL)."""
-    from surface.errors import ViewError
-    from surface.view.offscreen import open_context
+    from surface.base.errors import ViewError
+    from surface.view.pictures.offscreen import open_context
 
     try:
         open_context().release()

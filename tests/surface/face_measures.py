@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from surface.fit.eyeball import CORNEA, IRIS
+from surface.base.jit import kernel
+from surface.fit.points.eyeball import CORNEA, IRIS
 from surface.head import Head
-from surface.head.part import border_edges
-from surface.jit import kernel
+from surface.head.posing.part import border_edges
 
 LEAST_MM = 0.15  # shallower crossings are not looked for
 ROUND_MM = 4.0  # radius of lips and lids: two that cross by d do so over sqrt(2 r d) on either side

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from surface.fit.mesh import FitMesh, triangles
+from surface.fit.source.mesh import FitMesh, triangles
 
 FLOAT, UINT = 5126, 5125
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from surface.fit.mesh import FitMesh
+from surface.fit.source.mesh import FitMesh
 
 N = 24
 SLIT = (8, 16)  # columns of the missing quads

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface import DCPSurface
-from surface.head.data import Group, HeadData, Jaw, Neck, PartData, Seam
+from surface.head.model.data import Group, HeadData, Jaw, Neck, PartData, Seam
 
 KNOTS = [0, 0, 0, 0, 0.5, 1, 1, 1, 1]
 JAW = Jaw(

@@ -1,0 +1,126 @@
+"""Checks of arguments: each returns a clean copy or says what is wrong, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surface.spline.basis import Floats, Ints
+
+
+def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:
+    """(m,) int64 copy of the wanted limits; ``ValueError`` for another shape or others than 0 to 3."""
+    if side is None:
+        return np.zeros(len(samples), dtype=np.int64)
+    fast = isinstance(side, np.ndarray) and side.dtype == np.int64
+    wanted = np.asarray(side) if fast else numbers(side, "side")
+    if wanted.shape not in ((), (len(samples),)):
+        raise ValueError(f"side: shape {wanted.shape}, expected {(len(samples),)}")
+    sides = np.broadcast_to(wanted, len(samples)).astype(np.int64)
+    bad = (sides < 0) | (sides > 3) | (sides != wanted)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(f"side[{i}]: must be 0, 1, 2 or 3, not {np.broadcast_to(wanted, len(samples))[i]:g}")
+    return sides
+
+
+def numbers(values: ArrayLike, name: str) -> Floats:
+    """A float64 copy; ``ValueError`` naming the first element that is no number, or not of the usual shape."""
+    try:
+        return np.array(values, dtype=np.float64, order="C")
+    except (ValueError, TypeError):
+        if not isinstance(values, Sequence) or isinstance(values, str):
+            raise ValueError(f"{name}: must be numbers, got {values!r:.60}") from None
+        rows = list(values)
+    shapes = []
+    for i, row in enumerate(rows):
+        try:
+            shapes.append(np.shape(np.asarray(row, dtype=np.float64)))
+        except (ValueError, TypeError):
+            raise ValueError(f"{name}[{i}]: must be numbers, got {row!r:.60}") from None
+    usual = max(shapes, key=shapes.count)
+    i = next(k for k, shape in enumerate(shapes) if shape != usual)
+    raise ValueError(f"{name}[{i}]: shape {shapes[i]}, expected {usual}")
+
+
+def check_points(points: ArrayLike, name: str = "points") -> Floats:
+    """(n, 3) float64 copy; ``ValueError`` for another shape, no points, or numbers that are not finite."""
+    xyz = numbers(points, name)
+    if xyz.ndim != 2 or xyz.shape[1] != 3:
+        raise ValueError(f"{name}: shape {xyz.shape}, expected (n, 3)")
+    if len(xyz) == 0:
+        raise ValueError(f"{name}: empty; a surface needs at least one control point")
+    finite = np.isfinite(xyz).all(axis=1)
+    if not finite.all():
+        i = int(np.argmin(finite))
+        raise ValueError(f"{name}[{i}]: must be finite, got {xyz[i].tolist()}")
+    return xyz
+
+
+def check_weights(weights: ArrayLike, name: str = "weights") -> Floats:
+    """(n,) float64 copy; ``ValueError`` for another shape or weights that are not positive and finite."""
+    w = numbers(weights, name)
+    if w.ndim != 1:
+        raise ValueError(f"{name}: shape {w.shape}, expected (n,)")
+    good = np.isfinite(w) & (w > 0)
+    if not good.all():
+        i = int(np.argmin(good))
+        raise ValueError(f"{name}[{i}]: must be positive and finite, got {w[i]}")
+    return w
+
+
+def check_length(weights: Floats, n: int) -> None:
+    """``ValueError`` unless there is one weight per point."""
+    if len(weights) != n:
+        raise ValueError(f"weights: {len(weights)} weights for {n} points")
+
+
+def integers(ids: ArrayLike) -> Ints:
+    """(k,) int64; ``ValueError`` for anything else."""
+    if type(ids) is np.ndarray and ids.dtype == np.int64 and ids.ndim == 1 and ids.flags.c_contiguous:
+        return ids
+    try:
+        which = np.ascontiguousarray(ids)
+    except ValueError:
+        raise ValueError(f"ids: needs a flat sequence of integers, got {ids!r:.60}") from None
+    if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
+        raise ValueError(f"ids: needs a flat sequence of integers, got shape {which.shape} of {which.dtype}")
+    return which.astype(np.int64, copy=False)
+
+
+def check_ids(ids: ArrayLike, n: int) -> Ints:
+    """(k,) int64 numbers of control points; ``ValueError`` for the first that is not one of ``n``."""
+    which = integers(ids)
+    bad = (which < 0) | (which >= n)
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise ValueError(f"ids[{k}]: {which[k]} is not a control point (0 to {n - 1})")
+    return which
+
+
+def check_uv(uv: ArrayLike, name: str = "uv") -> Floats:
+    """(m, 2) float64; ``ValueError`` for another shape or NaN."""
+    fast = isinstance(uv, np.ndarray) and uv.dtype == np.float64
+    samples = np.ascontiguousarray(uv) if fast else numbers(uv, name)
+    if samples.ndim != 2 or samples.shape[1] != 2:
+        raise ValueError(f"{name}: shape {samples.shape}, expected (m, 2)")
+    good = np.isfinite(samples).all(axis=1)
+    if not good.all():
+        i = int(np.argmin(good))
+        raise ValueError(f"{name}[{i}]: must be finite, got {samples[i].tolist()}")
+    return samples
+
+
+def check_inside(
+    samples: Floats, rect: tuple[float, float, float, float], closed: tuple[object, object], name: str = "uv"
+) -> Floats:
+    """``samples (m, 2)``; ``ValueError`` for the first outside ``rect``, whose closed directions have no outside."""
+    for axis, word in enumerate("uv"):
+        low, high = rect[2 * axis], rect[2 * axis + 1]
+        out = (samples[:, axis] < low) | (samples[:, axis] > high)
+        if closed[axis] is None and out.any():
+            i = int(np.argmax(out))
+            raise ValueError(f"{name}[{i}]: {word} = {samples[i, axis]} is outside the domain, {low} to {high}")
+    return samples

@@ -1,0 +1,277 @@
+"""Measures of the engine beside its peers, all in one run on one machine. Prints nothing.
+
+Times are the least of many calls: on a machine with other work that is the steadiest figure.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base.progress import Progress, between, silent
+from surface.dcp import DCPSurface
+from surface.deform.deformation import Deformation
+from surface.mesh.mesh import Mesh
+from surface.spline.basis import Floats
+
+from . import peers
+
+SHARES = (0.02, 0.1)  # of the vertices that groups reach
+BUILD_SECONDS = 10.0  # what building a large tree and its lists may take
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One row of a table.
+
+    Attributes
+    ----------
+    name : what was measured
+    milliseconds : least time of one call; 0 for rows that are a ratio of sizes
+    ratio : against what ``against`` names, or None
+    against : the other side of the ratio
+    reach : the bound the ratio shall keep, as text (``"<= 1.8"``, ``"0.9 to 1.1"``), or empty
+    kept : does it keep the bound? None without one
+    """
+
+    name: str
+    milliseconds: float
+    ratio: float | None = None
+    against: str = ""
+    reach: str = ""
+
+    @property
+    def kept(self) -> bool | None:
+        """Whether the ratio keeps its bound; None without one."""
+        if not self.reach or self.ratio is None:
+            return None
+        first, *_, bound = self.reach.split()
+        if first == "<=":
+            return self.ratio <= float(bound)
+        return self.ratio >= float(bound) if first == ">=" else float(first) <= self.ratio <= float(bound)
+
+
+def least(call: Callable[[], object], seconds: float = 0.3) -> float:
+    """Least time of a call in milliseconds, over at least five calls and ``seconds``."""
+    call()
+    best, count, end = np.inf, 0, time.perf_counter() + seconds
+    while count < 5 or time.perf_counter() < end:
+        begin = time.perf_counter()
+        call()
+        best = min(best, time.perf_counter() - begin)
+        count += 1
+    return 1e3 * float(best)
+
+
+def least_of(calls: list[Callable[[], object]], seconds: float = 0.3) -> list[float]:
+    """As :func:`least` for several calls in turn, so that what disturbs one disturbs the others as well."""
+    for call in calls:
+        call()
+    best, count, end = np.full(len(calls), np.inf), 0, time.perf_counter() + seconds * len(calls)
+    while count < 5 or time.perf_counter() < end:
+        for k, call in enumerate(calls):
+            begin = time.perf_counter()
+            call()
+            best[k] = min(best[k], time.perf_counter() - begin)
+        count += 1
+    return [1e3 * float(x) for x in best]
+
+
+def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, tell: Tell = lambda text: None) -> list[Measure]:
+    """Full evaluation, updates of a point, a group and everything, and peers, for any surface and mesh.
+
+    Parameters
+    ----------
+    surface, mesh : what to measure
+    seconds : how long each row is repeated
+    tell : is told the name of each row before it is measured
+    """
+    rows: list[Measure] = []
+    shaded, bare = surface.deformation(mesh), surface.deformation(mesh, normals=False)
+    weights = bare._lists.value
+
+    def add(name: str, call: Callable[[], object], against: str = "", reach: str = "", base: float = 0.0) -> float:
+        tell(name)
+        took = least(call, seconds)
+        rows.append(Measure(name, took, took / base if base else None, against if base else "", reach))
+        return took
+
+    read = add("one read of the weights", weights.sum)
+    full = add("all positions", bare.refresh, "one read of the weights", "<= 1.8", read)
+    add("all positions and normals", shaded.refresh, "all positions", "<= 3.5", full)
+    everything = shaker(shaded, np.arange(surface.n))
+    add("every point moved, with normals", everything, "all positions", "", full)
+    middle = nearest(surface, 1)
+    add("one point moved, with normals", shaker(shaded, middle), "all positions", "", full)
+    groups = {len(ids): (ids, part) for ids, part in (group(surface, mesh, share) for share in SHARES)}
+    for count, (ids, part) in groups.items():  # one, where a single point reaches more than either share
+        name = f"group of {count} moved, which reaches {100 * part:.1f} %"
+        add(name, shaker(bare, ids), "its part of all positions", "<= 1.5", part * full)
+    return rows + peer_rows(surface, mesh, full, seconds, tell)
+
+
+def peer_rows(surface: DCPSurface, mesh: Mesh, full: float, seconds: float, tell: Tell) -> list[Measure]:
+    """Other ways to the same vertices; their ratios say how many times longer they take than ``full``."""
+    rows = []
+    for name, prepare, reach in (
+        ("scipy CSR @ dense", peers.sparse_matrix, ">= 12"),
+        (f"numpy {peers.BLENDSHAPES} blendshapes, {_megabytes(mesh)}", peers.blendshapes, ">= 3"),
+        ("stencil table, row by row", peers.stencils, ""),
+    ):
+        tell(name)
+        with peers.one_thread():
+            took = least(prepare(surface, mesh), seconds)
+        rows.append(Measure(f"{name}, positions", took, took / full, "all positions", reach))
+    return rows
+
+
+def _megabytes(mesh: Mesh) -> str:
+    """What one product reads: the row is only as slow as memory where this is more than the caches hold."""
+    return f"{peers.BLENDSHAPES * 3 * 4 * len(mesh.vertices) / 1e6:.1f} MB"
+
+
+def library_rows(surface: DCPSurface, mesh: Mesh, full: float, seconds: float, tell: Tell) -> list[Measure]:
+    """Spline libraries that are installed, on a sheet from :func:`sheet`; they evaluate basis functions each time."""
+    rows = []
+    for name, prepare, share in peers.libraries(mesh):
+        tell(name)
+        took = share * least(prepare(surface, mesh), seconds)
+        rows.append(Measure(f"{name}, positions", took, took / full, "all positions"))
+    return rows
+
+
+def sheet(vertices: int = 100_000, points: int | None = None) -> tuple[DCPSurface, Mesh]:
+    """A bicubic sheet whose cells are knot spans of about 8 x 8 vertices, so that 16 points reach each.
+
+    Parameters
+    ----------
+    vertices : about how many
+    points : about how many control points instead of one per 64 vertices
+    """
+    wanted = vertices / 64 if points is None else points
+    spans = max(2, round(np.sqrt(wanted) - (0 if points is None else 3)))
+    level = max(0, round(np.log2(np.sqrt(vertices) / spans)))
+    if points is None:
+        spans = max(2, round(np.sqrt(vertices) / 2**level))
+    surface = bumpy((spans + 3) ** 2)
+    mesh = surface.tessellate(max_points=surface.n + 1, min_depth=level, max_depth=level, roots=(spans, spans))
+    return surface, mesh
+
+
+def bumpy(points: int) -> DCPSurface:
+    """A bumpy bicubic sheet, 200 long and wide, over the unit square, of about so many control points."""
+    side = max(5, round(np.sqrt(points)))
+    knots = np.concatenate([[0.0] * 3, np.linspace(0, 1, side - 2), [1.0] * 3])
+    x, y = np.meshgrid(np.linspace(0, 200, side), np.linspace(0, 200, side), indexing="ij")
+    return DCPSurface.from_nurbs(3, 3, knots, knots, np.stack([x, y, 20 * np.sin(x / 20) * np.cos(y / 25)], axis=-1))
+
+
+def speed_table(vertices: int = 100_000, seconds: float = 0.3, tell: Tell = lambda text: None) -> list[Measure]:
+    """The engine at its memory limit: about 100,000 vertices, 16 influences, one thread, float32."""
+    surface, mesh = sheet(vertices)
+    rows = measure(surface, mesh, seconds=seconds, tell=tell)
+    full = next(row.milliseconds for row in rows if row.name == "all positions")
+    return rows + library_rows(surface, mesh, full, seconds, tell)
+
+
+def large_table(vertices: int = 1_000_000, seconds: float = 0.5, tell: Tell = lambda text: None) -> list[Measure]:
+    """Two threads against one, and memory, for a million vertices."""
+    tell(f"{vertices} vertices")
+    surface, mesh = sheet(vertices)
+    one = surface.deformation(mesh, normals=False)
+    two = surface.deformation(mesh, normals=False, threads=2)
+    weights = one._lists.value
+    tell("two threads")
+    with ThreadPoolExecutor(1) as pool:
+        calls: list[Callable[[], object]] = [one.refresh, two.refresh, weights.sum, _shared_read(weights, pool)]
+        alone, together, read, shared = least_of(calls, seconds)
+    bound = max(0.7, 1.15 * shared / read)  # where two readers gain little, two threads cannot gain more
+    name = f"all positions, {len(mesh.vertices)} vertices"
+    return [
+        Measure(name, alone, alone / read, "one read of the weights", "<= 1.8"),
+        Measure(f"{name}, two threads", together, together / alone, "one thread", f"<= {bound:.2f}"),
+        Measure("one read of the weights, two threads", shared, shared / read, "one thread"),
+        Measure("memory of weights and lists", 0.0, one.nbytes / weights.nbytes, "the weights alone", "<= 1.3"),
+    ]
+
+
+def build_table(points: int = 100_000, level: int = 7, progress: Progress = silent) -> list[Measure]:
+    """Time of building quad tree and lists by either rule, for 100,000 control points and a million vertices.
+
+    Parameters
+    ----------
+    points : about how many
+    level : deepest level of the tree under 8 x 8 roots, which bounds the vertices to (8 * 2**level + 1)**2
+    progress : is called with a stage and the part that is done
+    """
+    bumpy(300).tessellate(max_points=16, chord_error=1.0)  # compiled now, not measured
+    surface, rows = bumpy(points), []
+    for title, limits in (("16 points a cell", {"max_points": 16}), ("chord error", {"chord_error": 1e-9})):
+        begin = time.perf_counter()
+        mesh = surface.tessellate(roots=(8, 8), max_depth=level, **limits, progress=between(progress, 0.0, 0.85))
+        surface.deformation(mesh, progress=between(progress, 0.85, 1.0))
+        took = time.perf_counter() - begin
+        name = f"tree and lists by {title}: {surface.n} points, {len(mesh.vertices)} vertices"
+        rows.append(Measure(name, 1e3 * took, took / BUILD_SECONDS, f"{BUILD_SECONDS:.0f} s", "<= 1"))
+    return rows
+
+
+def _shared_read(weights: np.ndarray, pool: ThreadPoolExecutor) -> Callable[[], object]:
+    """A call that sums an array half by half in two threads."""
+    half = len(weights) // 2
+
+    def call() -> None:
+        other = pool.submit(weights[half:].sum)
+        weights[:half].sum()
+        other.result()
+
+    return call
+
+
+def shaker(deformation: Deformation, ids: np.ndarray) -> Callable[[], object]:
+    """A call that moves the points there and back in turn."""
+    here = deformation.points[ids].copy()
+    places = (here + 0.01 * np.ptp(deformation.points, axis=0).max(), here)
+    turn = [0]
+
+    def call() -> None:
+        turn[0] ^= 1
+        deformation.set_positions(ids, places[1 - turn[0]])
+
+    return call
+
+
+def nearest(surface: DCPSurface, count: int) -> np.ndarray:
+    """The ``count`` points whose subdomains lie nearest to the middle of all."""
+    supports: Floats = surface.supports
+    centre = np.stack([supports[:, :2].mean(axis=1), supports[:, 2:].mean(axis=1)], axis=1)
+    distance = np.linalg.norm(centre - np.median(centre, axis=0), axis=1)
+    return np.sort(np.argsort(distance, kind="stable")[:count])
+
+
+def group(surface: DCPSurface, mesh: Mesh, share: float) -> tuple[np.ndarray, float]:
+    """The fewest neighbouring points that reach ``share`` of the vertices, and the share they really reach."""
+    low, high = 1, surface.n
+    while low < high:
+        count = (low + high) // 2
+        if reached(surface, mesh, nearest(surface, count)) < share:
+            low = count + 1
+        else:
+            high = count
+    ids = nearest(surface, low)
+    return ids, reached(surface, mesh, ids)
+
+
+def reached(surface: DCPSurface, mesh: Mesh, ids: np.ndarray) -> float:
+    """Part of the vertices at which one of the points has weight."""
+    hit = np.zeros(len(mesh.uv), dtype=bool)
+    copies = surface.all_supports.reshape(-1, surface.n, 4)[:, ids].reshape(-1, 4)  # of a closed surface's points
+    u, v = mesh.uv.T
+    for start, end, low, high in copies:
+        hit |= (u > start) & (u < end) & (v > low) & (v < high)
+    return float(hit.mean())

@@ -1,0 +1,166 @@
+"""How time and memory grow with vertices and with control points, and a log-log plot of it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from surface.dcp import DCPSurface
+
+from .bench import Measure, Tell, bumpy, least, least_of, nearest, shaker, sheet
+
+VERTICES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
+POINTS = (100, 1_000, 10_000, 100_000)
+AXES = ("vertices", "control points")
+READ, FULL, MOVE, LISTS, MEMORY = (
+    "one read of the weights, ms",
+    "all positions, ms",
+    "one point moved, ms",
+    "tree and lists built, ms",
+    "weights and lists, MB",
+)
+REACH = {(0, FULL): "0.9 to 1.1", (0, MEMORY): "0.9 to 1.1", (0, MOVE): "-0.1 to 0.1"}
+
+
+@dataclass
+class Series:
+    """One quantity against a size.
+
+    Attributes
+    ----------
+    name : the quantity and its unit
+    axis : 0 against vertices, 1 against control points
+    size, amount : rising sizes, and the quantity
+    """
+
+    name: str
+    axis: int
+    size: list[float] = field(default_factory=list)
+    amount: list[float] = field(default_factory=list)
+
+    @property
+    def slope(self) -> float:
+        """Exponent of a power law through the points: the slope on logarithmic scales."""
+        return float(np.polyfit(np.log(self.size), np.log(self.amount), 1)[0])
+
+
+def growth(
+    vertices: tuple[int, ...] = VERTICES,
+    points: tuple[int, ...] = POINTS,
+    seconds: float = 0.3,
+    tell: Tell = lambda text: None,
+) -> list[Series]:
+    """Measure sheets of rising size.
+
+    Parameters
+    ----------
+    vertices : sizes with one control point per 64 vertices, so that 16 reach each
+    points : numbers of control points under about a quarter of the largest of ``vertices``
+    seconds : how long each call is repeated; the least time counts
+    tell : is told the size that is measured
+    """
+    lines = {(axis, name): Series(name, axis) for axis in range(2) for name in (READ, FULL, MOVE, LISTS, MEMORY)}
+    for count in vertices:
+        tell(f"growth: {count} vertices")
+        surface, mesh = sheet(count)
+        _add(lines, 0, len(mesh.vertices), surface, mesh.leaves, seconds)
+    cells = max(16, round(np.sqrt(max(vertices)) / 2))
+    for count in points:
+        tell(f"growth: {count} control points")
+        surface = bumpy(count)
+        _add(lines, 1, surface.n, surface, cells * cells, seconds)
+    return list(lines.values())
+
+
+def _add(
+    lines: dict[tuple[int, str], Series], axis: int, size: int, surface: DCPSurface, leaves: int, seconds: float
+) -> None:
+    """Measure one surface under a mesh of so many equal cells."""
+    side = round(np.sqrt(leaves))
+    level = max(k for k in range(4) if side % (1 << k) == 0)
+    begin = time.perf_counter()
+    mesh = surface.tessellate(chord_error=1e9, roots=(side >> level, side >> level), min_depth=level, max_depth=level)
+    deformation = surface.deformation(mesh, normals=False)
+    built = 1e3 * (time.perf_counter() - begin)
+    one = shaker(deformation, nearest(deformation.surface, 1))
+    read, full = least_of([deformation._lists.value.sum, deformation.refresh], seconds)
+    amounts = {READ: read, FULL: full, MOVE: least(one, seconds), LISTS: built, MEMORY: deformation.nbytes / 1e6}
+    for name, amount in amounts.items():
+        lines[axis, name].size.append(size)
+        lines[axis, name].amount.append(amount)
+
+
+def slopes(series: list[Series]) -> list[Measure]:
+    """The exponents as rows of a table."""
+    return [
+        Measure(f"{line.name}: {line.amount[0]:.3g} to {line.amount[-1]:.3g}", 0.0, line.slope,
+                f"slope in {AXES[line.axis]}", REACH.get((line.axis, line.name), ""))
+        for line in series
+    ]  # fmt: skip
+
+
+COLOURS = ("#9aa2ad", "#1b6ca8", "#c0392b", "#27865b", "#8e44ad")
+PANEL, EDGE, GAP = (400, 420), (70, 50), 250
+
+
+def plot(series: list[Series], path: str | Path) -> None:
+    """Two log-log panels as SVG, against vertices and against control points; slopes stand at the lines.
+
+    Parameters
+    ----------
+    series : from :func:`growth`
+    path : the file to write
+    """
+    width = 2 * (PANEL[0] + GAP) + EDGE[0]
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{PANEL[1] + 2 * EDGE[1] + 20}" '
+        'font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="white"/>'
+    ]
+    amounts = np.log10([y for line in series for y in line.amount])
+    low, high = np.floor(amounts.min()), np.ceil(amounts.max())
+    for axis in range(2):
+        own = [line for line in series if line.axis == axis]
+        sizes = np.log10([x for line in own for x in line.size])
+        frame = np.floor(sizes.min() + 0.1), np.ceil(sizes.max() - 0.1), low, high
+        parts += _panel(own, frame, EDGE[0] + axis * (PANEL[0] + GAP), AXES[axis])
+    Path(path).write_text("\n".join([*parts, "</svg>"]), encoding="utf-8")
+
+
+def _panel(lines: list[Series], frame: tuple[float, float, float, float], left: float, title: str) -> list[str]:
+    """Grid, lines and labels of one panel; ``frame`` holds powers of ten."""
+    x0, x1, y0, y1 = frame
+
+    def place(x: float, y: float) -> tuple[float, float]:
+        return left + (x - x0) / (x1 - x0) * PANEL[0], EDGE[1] + (y1 - y) / (y1 - y0) * PANEL[1]
+
+    parts = []
+    for power in range(int(x0), int(x1) + 1):
+        (x, top), (_, bottom) = place(power, y1), place(power, y0)
+        parts.append(f'<path d="M{x:.1f} {top:.1f}V{bottom:.1f}" stroke="#ddd"/>')
+        parts.append(f'<text x="{x:.1f}" y="{bottom + 18:.1f}" text-anchor="middle">1e{power}</text>')
+    for power in range(int(y0), int(y1) + 1):
+        (start, y), (end, _) = place(x0, power), place(x1, power)
+        parts.append(f'<path d="M{start:.1f} {y:.1f}H{end:.1f}" stroke="#ddd"/>')
+        parts.append(f'<text x="{start - 8:.1f}" y="{y + 4:.1f}" text-anchor="end">1e{power}</text>')
+    x, y = place((x0 + x1) / 2, y0)
+    parts.append(f'<text x="{x:.1f}" y="{y + 40:.1f}" text-anchor="middle" font-size="14">{title}</text>')
+    ends = [place(*np.log10([line.size[-1], line.amount[-1]])) for line in lines]
+    for colour, line, (x, _), label in zip(COLOURS, lines, ends, _spread([y for _, y in ends]), strict=True):
+        path = "L".join(
+            "{:.1f} {:.1f}".format(*place(*np.log10(pair))) for pair in zip(line.size, line.amount, strict=True)
+        )
+        parts.append(f'<path d="M{path}" fill="none" stroke="{colour}" stroke-width="2"/>')
+        words = f"{line.name}, slope {line.slope:.2f}"
+        parts.append(f'<text x="{x + 8:.1f}" y="{label + 4:.1f}" fill="{colour}">{words}</text>')
+    return parts
+
+
+def _spread(heights: list[float], step: float = 15.0) -> list[float]:
+    """Heights of labels, moved down where they would stand on each other."""
+    out, last = list(heights), -np.inf
+    for k in np.argsort(heights):
+        last = out[k] = max(heights[k], last + step)
+    return out

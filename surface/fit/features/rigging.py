@@ -1,0 +1,129 @@
+"""From fitted displacements to a rig: groups, the jaw's path, shares of jaw, neck and lids."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.source.mesh import FitMesh
+from surface.head.model.data import Group, Jaw, Rule
+from surface.head.model.parameters import TONGUE_NEEDS
+from surface.head.posing.rig import jaw_path
+
+Floats = NDArray[np.float64]
+LEAST_MM = 0.004  # displacements smaller than this are dropped
+LEAST_GROUP_MM = 0.25  # a part in which a shape moves nothing further than this does not take part in it
+DROOP = "tongueDroop"
+DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
+TILTS = ("jawForward", "jawLeft", "jawRight")
+
+
+def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: NDArray[np.int64], hinge: Floats) -> Jaw:
+    """The jaw's path out of the lower teeth, which are rigid: rotation about the hinge and what is left, a glide."""
+    rest = mesh.vertices[teeth]
+    if "jawOpen" not in sources or not len(teeth):
+        return Jaw(tuple(hinge.tolist()), 0.0, (0.0, 0.0, 0.0))
+    turn, shift = rigid_fit(rest, rest + _total(mesh, sources["jawOpen"])[teeth])
+    angle = float(np.arctan2(turn[2, 1], turn[1, 1]))
+    glide = turn @ hinge + shift - hinge
+    glide[0] = 0.0
+    tilts = {n: affine_fit(rest, _total(mesh, sources[n])[teeth]) for n in TILTS if n in sources}
+    return Jaw(tuple(hinge.tolist()), angle, tuple(glide.tolist()), tilts)
+
+
+def _total(mesh: FitMesh, indices: list[int]) -> Floats:
+    return mesh.deltas[indices].sum(axis=0)
+
+
+def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """Rotation (3, 3) and shift (3,) that bring points nearest to others (Kabsch, 1976)."""
+    b0, a0 = before.mean(axis=0), after.mean(axis=0)
+    u, _, vt = np.linalg.svd((before - b0).T @ (after - a0))
+    sign = float(np.sign(np.linalg.det(vt.T @ u.T)))
+    turn = vt.T @ np.diag([1.0, 1.0, sign]) @ u.T
+    return turn, a0 - turn @ b0
+
+
+def affine_fit(points: Floats, moves: Floats) -> Floats:
+    """(3, 4) matrix with moves = points @ matrix[:, :3].T + matrix[:, 3], in least squares."""
+    system = np.column_stack([points, np.ones(len(points))])
+    return np.linalg.lstsq(system, moves, rcond=None)[0].T.astype(np.float64)
+
+
+def jaw_share(points: Floats, opening: Floats, jaw: Jaw) -> Floats:
+    """(n,) how much of the jaw's rotation each point follows, so that little is left of its opening (n, 3)."""
+    turn, shift = jaw_path(jaw, 1.0)
+    whole = points @ turn.T + shift - points
+    share = (opening * whole).sum(axis=1) / np.maximum((whole * whole).sum(axis=1), 1e-9)
+    return np.clip(np.where(np.linalg.norm(opening, axis=1) > 0.05, share, 0.0), 0.0, 1.0)
+
+
+def make_groups(points: Floats, moves: Floats, sources: dict[str, list[int]], jaw: Jaw) -> tuple[list[Group], Floats]:
+    """Groups by parameter, and the jaw's shares; jawOpen keeps only what the rotation leaves over.
+
+    ``moves (k, n, 3)`` are the displacements of the control points for the mesh's k shapes.
+    """
+    share = np.zeros(len(points))
+    groups = []
+    for name, indices in sources.items():
+        field = moves[indices].sum(axis=0)
+        if name == "jawOpen":
+            share = jaw_share(points, field, jaw)
+            turn, shift = jaw_path(jaw, 1.0)
+            field = field - share[:, None] * (points @ turn.T + shift - points)
+        ids = np.flatnonzero(np.linalg.norm(field, axis=1) > LEAST_MM)
+        if np.linalg.norm(field, axis=1).max(initial=0.0) > LEAST_GROUP_MM:
+            groups.append(Group(name, ids.astype(np.int32), np.round(field[ids], 4).astype(np.float32)))
+    return groups, share
+
+
+def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
+    """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_NEEDS`: ``tongueOut``, straight
+    ahead, and :data:`DROOP`, which lets it hang once it is out.
+
+    Parameters
+    ----------
+    points : (n, 3) control points of the tongue at rest.
+    path : (k, 7) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, how much
+        of its thickness and of its width is left, and how much further down it hangs.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    hanging = path[:, 1:6].copy()
+    hanging[:, 1] -= path[:, 6]
+    straight, hung = (
+        _along_path(points, path[0, 0], path[-1, 0], PchipInterpolator(path[:, 0], rows))
+        for rows in (path[:, 1:6], hanging)
+    )
+    turn, shift = jaw_path(jaw, TONGUE_NEEDS)
+    held = np.clip((points[:, 2] - path[0, 0]) / 20.0, 0.0, 1.0)[:, None]
+    ids = np.arange(len(points), dtype=np.int32)
+    moves = straight - (points @ turn.T + shift), hung - straight
+    named = zip(("tongueOut", DROOP), moves, strict=True)
+    return [Group(name, ids, np.round(held * move, 4).astype(np.float32)) for name, move in named]
+
+
+def _along_path(points: Floats, first: float, last: float, path: Callable[..., Floats]) -> Floats:
+    """Points (n, 3) moved along a path of z, its cross-sections square to the line of their middles."""
+    z = np.clip(points[:, 2], first, last)
+    middle, to_y, to_z, thickness, width = path(z).T
+    _, slope_y, slope_z, _, _ = path(z, 1).T
+    over, length = thickness * (points[:, 1] - middle), np.hypot(slope_y, slope_z)
+    return np.column_stack([
+        width * points[:, 0],
+        to_y + over * slope_z / length,
+        to_z - over * slope_y / length + (points[:, 2] - z),
+    ])  # fmt: skip
+
+
+def lid_share(points: Floats, eyes: Floats, radius: float) -> Floats:
+    """(n,) how closely each point keeps to an eyeball: 1 on it, 0 some millimetres away; negative: right eye."""
+    out = np.zeros(len(points))
+    for eye, sign in zip(eyes, (1.0, -1.0), strict=True):
+        local = points - eye
+        above = np.linalg.norm(local, axis=1) - radius
+        t = np.clip((8.0 - above) / 5.0, 0.0, 1.0) * np.clip(local[:, 2] / 3.0 + 1.0, 0.0, 1.0)
+        out += sign * t * t * (3.0 - 2.0 * t)
+    return out

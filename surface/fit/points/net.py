@@ -1,0 +1,152 @@
+"""Where the control points stand: a coarse net, refined by need, cut at slits.
+
+Level (a, b) of the net has spacing ``coarse / 2**a`` in u and ``coarse / 2**b`` in v. A control point has five
+equally spaced knots in u and in v (cubic blending, support four spans wide) and is kept when finer ones are
+added on top of it: the surface is rational, so any set of points that covers the chart will do. No net is finer
+than the samples are in that direction: on a lid they stand much closer across it than along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.source.chart import Cut
+
+STEPS = np.arange(-2.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Net:
+    """Control points without positions.
+
+    Attributes
+    ----------
+    place : (n, 4) int64: levels in u and v, then i and j in the net of that level.
+    knots_u, knots_v : (n, 5) float64.
+    """
+
+    place: NDArray[np.int64]
+    knots_u: NDArray[np.float64]
+    knots_v: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """(n, 2) float64, the means of the inner knots: inside the support, next to a slit too."""
+        return np.column_stack([self.knots_u[:, 1:4].mean(axis=1), self.knots_v[:, 1:4].mean(axis=1)])
+
+    def joined(self, other: Net) -> Net:
+        """This net with another's points after its own."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Net(*(np.concatenate(p) for p in pairs))
+
+
+def net_at(places: NDArray[np.int64], coarse: float, cuts: list[Cut], uv: NDArray[np.float64]) -> Net:
+    """Control points at the places (n, 4); those whose support holds no sample are left out."""
+    places = np.asarray(places, np.int64).reshape(-1, 4)
+    span = coarse / 2.0 ** places[:, :2]
+    knots = [(places[:, 2 + k, None] + STEPS) * span[:, k, None] for k in (0, 1)]
+    net = Net(places, *knots)
+    for cut in cuts:
+        net = _cut(net, cut)
+    return _take(net, _reaches(net, uv))
+
+
+def _cut(net: Net, cut: Cut) -> Net:
+    """Points that straddle the slit along all of their support become one above and one below."""
+    ku, kv = net.knots_u, net.knots_v
+    inside = (ku[:, 0] >= cut.start) & (ku[:, -1] <= cut.end)
+    straddles = inside & (kv[:, 0] < cut.v) & (kv[:, -1] > cut.v)
+    rest, both = _take(net, ~straddles), _take(net, straddles)
+    above = Net(both.place, both.knots_u, np.maximum(both.knots_v, cut.v))
+    below = Net(both.place, both.knots_u, np.minimum(both.knots_v, cut.v))
+    return rest.joined(above).joined(below)
+
+
+def _take(net: Net, chosen: NDArray) -> Net:
+    return Net(*(a[chosen] for a in vars(net).values()))
+
+
+def _reaches(net: Net, uv: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Does the support hold a sample, well inside?"""
+    out = np.zeros(len(net), bool)
+    order = np.argsort(uv[:, 0])
+    u, v = uv[order, 0], uv[order, 1]
+    eps = 0.05 * (net.knots_u[:, 4] - net.knots_u[:, 0])
+    first = np.searchsorted(u, net.knots_u[:, 0] + eps)
+    last = np.searchsorted(u, net.knots_u[:, 4] - eps)
+    rim = 0.05 * (net.knots_v[:, 4] - net.knots_v[:, 0])
+    for k in range(len(net)):
+        inside = v[first[k] : last[k]]
+        out[k] = ((inside > net.knots_v[k, 0] + rim[k]) & (inside < net.knots_v[k, 4] - rim[k])).any()
+    return out
+
+
+def coarse_places(uv: NDArray[np.float64], coarse: float) -> NDArray[np.int64]:
+    """All places of level 0 around the samples."""
+    low = np.floor(uv.min(axis=0) / coarse).astype(int) - 2
+    high = np.ceil(uv.max(axis=0) / coarse).astype(int) + 2
+    i, j = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1), indexing="ij")
+    none = np.zeros(i.size, np.int64)
+    return np.column_stack([none, none, i.ravel(), j.ravel()])
+
+
+def wanted_places(
+    net: Net, uv: NDArray[np.float64], caps: NDArray[np.int64], error: NDArray[np.float64], coarse: float
+) -> NDArray[np.int64]:
+    """Places (k, 4) of new points, most wanted first.
+
+    Every sample with an error above 1 asks for the four points around it one level finer than what it has;
+    ``caps (m, 2)`` are the finest levels in u and v that the samples can decide.
+    """
+    bad = np.flatnonzero(error > 1)
+    level, finer = _next_level(net, uv[bad], caps[bad], coarse)
+    bad, level = bad[finer], level[finer]
+    at = uv[bad] / (coarse / 2.0**level)
+    cell = np.floor(at).astype(np.int64)
+    fraction = at - cell
+    places, wants = [], []
+    for di in (0, 1):
+        for dj in (0, 1):
+            share = np.abs(1 - di - fraction[:, 0]) * np.abs(1 - dj - fraction[:, 1])
+            places.append(np.column_stack([level, cell + np.array([di, dj])]))
+            wants.append(share * error[bad] ** 2)
+    every = np.concatenate(places)
+    _, first, inverse = np.unique(_keys(every), return_index=True, return_inverse=True)
+    want = np.bincount(inverse.ravel(), np.concatenate(wants), len(first))
+    return every[first][np.argsort(-want, kind="stable")]
+
+
+def level_caps(spacing: NDArray[np.float64], coarse: float, deepest: int) -> NDArray[np.int64]:
+    """(m, 2) finest level in u and v whose spacing is not below the samples' own ``spacing (m, 2)``."""
+    finest = np.floor(np.log2(coarse / np.maximum(spacing, 1e-9)) + 1e-6)
+    return np.clip(finest, 0, deepest).astype(np.int64)
+
+
+def _next_level(
+    net: Net, uv: NDArray[np.float64], caps: NDArray[np.int64], coarse: float
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """The first level (m, 2) that does not have all four points around a sample, and whether there is one."""
+    have = np.unique(_keys(net.place))
+    out, found = np.zeros((len(uv), 2), np.int64), np.zeros(len(uv), bool)
+    for level in range(1, int(caps.max(initial=0)) + 1):
+        left = np.flatnonzero(~found & (caps.max(axis=1) >= level))
+        pair = np.minimum(level, caps[left])
+        cell = np.floor(uv[left] * 2.0**pair / coarse).astype(np.int64)
+        lacks = np.zeros(len(left), bool)
+        for corner in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            keys = _keys(np.column_stack([pair, cell + np.array(corner)]))
+            lacks |= have[np.searchsorted(have, keys) % len(have)] != keys
+        out[left[lacks]], found[left[lacks]] = pair[lacks], True
+    return out, found
+
+
+def _keys(places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) one number for each place: levels below 16, i and j within four million of the middle."""
+    level, at = places[:, :2], places[:, 2:] + (1 << 22)
+    return ((level[:, 0] * 16 + level[:, 1]) << 46) + (at[:, 0] << 23) + at[:, 1]

@@ -1,0 +1,106 @@
+"""Fit a chart: solve, measure neutral and every shape, add points where they are off, repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.points.net import Net, coarse_places, level_caps, net_at, wanted_places
+from surface.fit.points.solve import basis, solve
+from surface.fit.source.chart import Chart
+from surface.fit.source.mesh import FitMesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a chart is fitted to.
+
+    Attributes
+    ----------
+    points : most control points; coarse : spacing of the first net, in tiles; deepest : its finest level.
+    neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
+    growth : by how much the net grows between two solves, at most.
+    finest : how fine a net may be, in spacings of the mesh's vertices.
+    """
+
+    points: int
+    coarse: float = 1 / 10
+    deepest: int = 8
+    neutral_mm: float = 0.25
+    shape_mm: float = 0.3
+    fair: float = 1e-4
+    growth: float = 1.25
+    finest: float = 1.2
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fitted chart.
+
+    Attributes
+    ----------
+    net : the knots; points : (n, 3); moves : (k, n, 3), one displacement field per shape.
+    error : (m,) neutral error at the chart's samples, mm; shape_error : (k, m).
+    """
+
+    net: Net
+    points: NDArray[np.float64]
+    moves: NDArray[np.float64]
+    error: NDArray[np.float64]
+    shape_error: NDArray[np.float64]
+
+
+def fit_chart(mesh: FitMesh, chart: Chart, wish: Wish, tell: Callable[[float], None] = lambda _: None) -> Fitted:
+    """Control points for neutral and shapes of one chart; ``tell`` hears the fraction done."""
+    targets = _targets(mesh, chart.mix)
+    slopes = None
+    if chart.slopes is not None:
+        slopes = chart.slopes, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
+    net = net_at(coarse_places(chart.uv, wish.coarse), wish.coarse, chart.cuts, chart.uv)
+    while True:
+        b = basis(net, chart.uv)
+        fitted = _measured(net, b, targets, solve(net, b, chart.weight, targets, wish.fair, slopes))
+        tell(min(1.0, len(net) / wish.points))
+        room = wish.points - len(net)
+        if room <= 0:
+            return fitted
+        net, grown = _grow(net, chart, need(chart, fitted, wish), wish, room)
+        if not grown:
+            return fitted
+
+
+def _targets(mesh: FitMesh, mix: csr_matrix) -> NDArray[np.float64]:
+    """(m, 3 (1 + k)): neutral and shape displacements at rows of ``mix``."""
+    return np.hstack([mix @ mesh.vertices, *(mix @ d for d in mesh.deltas)])
+
+
+def _measured(net: Net, b: csr_matrix, targets: NDArray[np.float64], x: NDArray[np.float64]) -> Fitted:
+    off = np.linalg.norm((b @ x - targets).reshape(len(targets), -1, 3), axis=2)
+    x3 = x.reshape(len(net), -1, 3)
+    return Fitted(net, x3[:, 0].copy(), x3[:, 1:].transpose(1, 0, 2).copy(), off[:, 0], off[:, 1:].T)
+
+
+def need(chart: Chart, fitted: Fitted, wish: Wish) -> NDArray[np.float64]:
+    """(m,) how far each sample is off, 1 = just good enough; the worse of neutral and the worst shape."""
+    worst = fitted.shape_error.max(axis=0) if len(fitted.shape_error) else np.zeros_like(fitted.error)
+    return np.minimum(chart.weight, 1.0) * np.maximum(fitted.error / wish.neutral_mm, worst / wish.shape_mm)
+
+
+def _grow(net: Net, chart: Chart, error: NDArray[np.float64], wish: Wish, room: int) -> tuple[Net, bool]:
+    """Add the most wanted points, at most a share of what stands."""
+    caps = level_caps(wish.finest * chart.spacing, wish.coarse, wish.deepest)
+    places = wanted_places(net, chart.uv, caps, error, wish.coarse)
+    quota = min(room, max(12, int(len(net) * (wish.growth - 1))))
+    standing = {tuple(p) for p in net.place.tolist()}
+    fresh = np.array([p for p in places.tolist() if tuple(p) not in standing], np.int64).reshape(-1, 4)
+    added = net_at(fresh[: 2 * quota], wish.coarse, chart.cuts, chart.uv)
+    rank = {tuple(p): k for k, p in enumerate(fresh.tolist())}
+    chosen = np.argsort([rank[tuple(p)] for p in added.place.tolist()], kind="stable")[:quota]
+    return net.joined(Net(*(a[chosen] for a in vars(added).values()))), len(chosen) > 0

@@ -1,0 +1,180 @@
+"""Shape names of other heads, as ARKit's 52.
+
+The table is ``names.toml`` beside this module; a user's own table comes before it::
+
+    [names]
+    "MyHead_grin_links" = "mouthSmileLeft"
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.errors import FitError
+from surface.fit.source.mesh import FitMesh
+from surface.head.model.parameters import SHAPES
+
+SIDES = {"l": "Left", "left": "Left", "lft": "Left", "r": "Right", "right": "Right", "rgt": "Right"}
+WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
+EXAMPLE = 'a table looks like: [names] "My_Smile_L" = "mouthSmileLeft"'
+MIDDLE = 0.06  # half the band about the middle in which a shape for both sides fades from one to the other, in widths
+
+
+@dataclass(frozen=True)
+class Source:
+    """One shape of the mesh that adds to a parameter; ``side`` cuts it: "" for all of it."""
+
+    index: int
+    side: str = ""
+
+
+@dataclass(frozen=True)
+class NameMap:
+    """Which shapes of a mesh make which of ARKit's 52.
+
+    Attributes
+    ----------
+    sources : parameter -> the shapes that add up to it, in the order of ARKit's list.
+    missing : parameters that no shape makes; left_out : shapes of the mesh that make none.
+    """
+
+    sources: dict[str, list[Source]]
+    missing: tuple[str, ...]
+    left_out: tuple[str, ...]
+
+
+def sources_of(names: tuple[str, ...]) -> dict[str, list[int]]:
+    """For each of ARKit's 52 that the mesh has as a whole: indices of the mesh's shapes that add up to it."""
+    found = map_names(names).sources
+    return {n: [s.index for s in every] for n, every in found.items() if not any(s.side for s in every)}
+
+
+def map_names(names: tuple[str, ...], own: Mapping[str, str] | None = None) -> NameMap:
+    """Find ARKit's 52 among shape names; ``own`` maps further names and comes first."""
+    start = len(_common(names))
+    exact = {n: i for i, n in enumerate(names) if n in SHAPES and n not in (own or {})}
+    given = {own[n]: i for i, n in enumerate(names) if n in own} if own else {}
+    found: dict[str, dict[str, int]] = {}
+    read = [None if n in (own or {}) else _read(n[start:]) or _read(n) for n in names]
+    for i, (key, side) in _by_plainness(read):
+        found.setdefault(key, {}).setdefault(side, i)
+    sources = {}
+    for shape in SHAPES:
+        if shape in given:
+            sources[shape] = [Source(given[shape])]
+        elif shape in exact:
+            sources[shape] = [Source(exact[shape])]
+        elif made := _made(shape, found):
+            sources[shape] = made
+    used = {s.index for every in sources.values() for s in every}
+    missing = tuple(s for s in SHAPES if s not in sources)
+    return NameMap(sources, missing, tuple(n for i, n in enumerate(names) if i not in used))
+
+
+def _made(shape: str, found: dict[str, dict[str, int]]) -> list[Source]:
+    """What makes a parameter: a shape of its own, two halves, or a half of a shape for both sides."""
+    key, side = _split(shape)
+    by_side = found.get(key, {})
+    if side in by_side:
+        return [Source(by_side[side])]
+    if not side and len(by_side) == 2:
+        return [Source(by_side["Left"]), Source(by_side["Right"])]
+    if side and set(by_side) == {""} and key in _table()["sided"]:
+        return [Source(by_side[""], side)]
+    return []
+
+
+def _split(shape: str) -> tuple[str, str]:
+    """One of ARKit's names as its key in the table and its side."""
+    for side in ("Left", "Right"):
+        base = shape.removesuffix(side)
+        if base != shape:
+            return base, side
+    return shape, ""
+
+
+@cache
+def _table() -> dict[str, dict[str, list[str]]]:
+    return tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def _keys() -> dict[str, str]:
+    """Every way to say it, without spaces and sides -> key of the table."""
+    out: dict[str, str] = {}
+    for group in _table().values():
+        for key, ways in group.items():
+            out |= {w.replace(" ", ""): key for w in (key.lower(), *ways)}
+    return out
+
+
+def _by_plainness(read: list[tuple[str, str, bool] | None]) -> list[tuple[int, tuple[str, str]]]:
+    """Index, key and side of every name that was understood; ARKit's own words before other ways to say it."""
+    plain = [(i, r) for i, r in enumerate(read) if r is not None]
+    return [(i, (key, side)) for i, (key, side, own) in sorted(plain, key=lambda x: not x[1][2])]
+
+
+def _read(name: str) -> tuple[str, str, bool] | None:
+    """Key of the table and side that a name means, and whether it is ARKit's own word.
+
+    What stands before the last dot or colon is passed over.
+    """
+    words = [w.lower() for w in WORDS.findall(re.split(r"[.:|](?=[^.:|]{3})", name)[-1])]
+    sides = [SIDES[w] for w in words if w in SIDES]
+    base = "".join(w for w in words if w not in SIDES)
+    key = _keys().get(base)
+    if key is None or len(set(sides)) > 1 or len(sides) > 1:
+        return None
+    return key, sides[0] if sides else "", base == key.lower()
+
+
+def _common(names: tuple[str, ...]) -> str:
+    """What all names begin with, up to a separator."""
+    low, high = (min(names), max(names)) if len(names) > 3 else ("", "")
+    same = next((i for i, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), 0)
+    return low[: max(low[:same].rfind(c) for c in "_. :|-") + 1]
+
+
+def read_names(path: Path) -> dict[str, str]:
+    """A user's table of names.
+
+    Raises
+    ------
+    FitError : the file cannot be read, or maps to something that is not one of ARKit's 52.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8")).get("names")
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as e:
+        raise FitError(f"{path}: cannot be read ({e})", hint=EXAMPLE) from e
+    if not isinstance(table, dict):
+        raise FitError(f"{path}: there is no table [names]", hint=EXAMPLE)
+    for name, shape in table.items():
+        if shape not in SHAPES:
+            raise FitError(f"{path}: names.{name}: {shape!r} is not one of ARKit's 52", hint="for example jawOpen")
+    return table
+
+
+def to_arkit(mesh: FitMesh, mapped: NameMap) -> FitMesh:
+    """The mesh with ARKit's shapes alone: halves added up, shapes for both sides cut in two."""
+    share = {"": np.ones(len(mesh.vertices)), **_halves(mesh.vertices)}
+    deltas = np.zeros((len(mapped.sources), len(mesh.vertices), 3))
+    for row, every in zip(deltas, mapped.sources.values(), strict=True):
+        for source in every:
+            row += share[source.side][:, None] * mesh.deltas[source.index]
+    return mesh.with_shapes(tuple(mapped.sources), deltas)
+
+
+def _halves(vertices: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """(n,) share of each side; they add up to one."""
+    low, high = vertices[:, 0].min(), vertices[:, 0].max()
+    t = np.clip((vertices[:, 0] - 0.5 * (low + high)) / (MIDDLE * max(high - low, 1e-9)), -1.0, 1.0)
+    left = 0.5 + 0.25 * t * (3.0 - t * t)
+    return {"Left": left, "Right": 1.0 - left}

@@ -1,0 +1,92 @@
+"""A tongue: its texture is cut into a back and an underside that part where it bends, so that one skin is wrapped
+round both.
+
+(u, v) go along the tongue, from its root over its length to the tip, and around it, from below over the right, the
+top and the left. Rays from a line in its middle find the mesh; what they hit is a mix of a triangle's corners, so that
+shapes are sampled by the same rows.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.fit.source.chart import BORDER_WEIGHT, CLUTTER_WEIGHT, Chart
+from surface.fit.source.islands import Island
+from surface.fit.source.mesh import FitMesh, triangles
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+Floats = NDArray[np.float64]
+STATIONS, FAN, AROUND = 20, 18, 41  # rays along the line, over its tip, around it
+OVERLAP = 0.125  # of the way around, on either side, is sampled twice, so that slopes match where the skin is sewn
+ROOT, TIP_SHARE = 0.12, 0.22  # of the length: where the line begins, and how far before the tip it ends
+HEIGHT = 0.5  # of the line between the lowest and the highest place
+BOW = np.radians(45.0)  # how far below straight ahead the last ray points, so that the pole lies under the tip
+END = 0.997  # of u: the pole at the tip is left out by a hair, so that normals are defined everywhere
+
+
+def wrap_chart(mesh: FitMesh, islands: list[Island]) -> Chart:
+    """One tile around all islands, which point forwards along z; half as wide as it is long."""
+    faces = np.concatenate([np.where(i.faces >= 0, i.vertex[i.faces], -1) for i in islands])
+    corners = triangles(faces)
+    origins, rays, uv = _rays(mesh.vertices[np.unique(corners)])
+    which, shares = _hits(mesh.vertices[corners], origins, rays)
+    mix = _filled(which, shares, corners, uv, len(mesh.vertices))
+    spacing = np.tile([1.0 / (STATIONS + FAN - 1), (1.0 + 2.0 * OVERLAP) / (AROUND - 1)], (len(uv), 1))
+    loop = np.array([[0.0, 0.0], [END, 0.0], [END, 1.0], [0.0, 1.0]])
+    sewn = np.array([-1, -2, -2, -1])  # both long sides are one line
+    weight = np.where(uv[:, 0] == 1.0, BORDER_WEIGHT, np.where(which < 0, CLUTTER_WEIGHT, 1.0))
+    return Chart(uv, mix, weight, spacing, which < 0, [loop], [sewn])
+
+
+def _rays(points: Floats) -> tuple[Floats, Floats, Floats]:
+    """Origins and directions (r, 3) of rays through a tongue's skin, and where in (u, v) each hits it (r, 2)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, length = low + HEIGHT * (high - low), high[2] - low[2]
+    along = np.concatenate([np.linspace(ROOT, 1.0 - TIP_SHARE, STATIONS), np.full(FAN, 1.0 - TIP_SHARE)])
+    t = np.concatenate([np.zeros(STATIONS), np.linspace(0.0, 1.0, FAN + 1)[1:]])[:, None]
+    v = np.linspace(-OVERLAP, 1.0 + OVERLAP, AROUND)
+    side, up = -np.sin(2.0 * np.pi * v), -np.cos(2.0 * np.pi * v)
+    wide, forward = np.cos(0.5 * np.pi * t), np.sin(0.5 * np.pi * t)
+    cosine, sine = np.cos(BOW * t), np.sin(BOW * t)
+    rays = np.stack([wide * side, wide * up * cosine - forward * sine, wide * up * sine + forward * cosine], axis=2)
+    origins = np.stack([np.broadcast_to(middle[i], along.shape) for i in (0, 1)] + [low[2] + along * length], axis=1)
+    u = np.linspace(0.0, 1.0, len(along))
+    uv = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.repeat(origins, AROUND, axis=0), rays.reshape(-1, 3), uv
+
+
+def _hits(tri: Floats, origins: Floats, rays: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """The furthest triangle (r,) of ``tri (t, 3, 3)`` that each ray meets, -1 for none, and the shares of its corners
+    (r, 3) (Moeller and Trumbore, 1997)."""
+    e1, e2 = tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0]
+    which, shares = np.full(len(rays), -1), np.zeros((len(rays), 3))
+    for k, (origin, ray) in enumerate(zip(origins, rays, strict=True)):
+        p, s = np.cross(ray, e2), origin - tri[:, 0]
+        det = (p * e1).sum(axis=1)
+        inverse = 1.0 / np.where(np.abs(det) < 1e-12, np.inf, det)
+        a, q = (p * s).sum(axis=1) * inverse, np.cross(s, e1)
+        b, t = (q @ ray) * inverse, (q * e2).sum(axis=1) * inverse
+        hit = np.flatnonzero((a > -1e-6) & (b > -1e-6) & (a + b < 1 + 1e-6) & (t > 1e-6))
+        if len(hit):
+            which[k] = hit[np.argmax(t[hit])]
+            shares[k] = 1.0 - a[which[k]] - b[which[k]], a[which[k]], b[which[k]]
+    return which, shares
+
+
+def _filled(
+    which: NDArray[np.int64], shares: Floats, corners: NDArray[np.int64], uv: Floats, n: int
+) -> csr_matrix:  # fmt: skip
+    """(r, n) samples as mixes of vertices; a ray that meets nothing takes the sample that is nearest in (u, v)."""
+    from scipy.sparse import csr_matrix
+    from scipy.spatial import cKDTree
+
+    met = np.flatnonzero(which >= 0)
+    _, near = cKDTree(uv[met]).query(uv)
+    source = met[near]
+    rows = np.repeat(np.arange(len(uv)), 3)
+    return csr_matrix((shares[source].ravel(), (rows, corners[which[source]].ravel())), shape=(len(uv), n))

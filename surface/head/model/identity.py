@@ -1,0 +1,185 @@
+"""Identities: variations of a head as groups of control points, kept beside it in ``identities.npz``.
+
+A head with identities mixed in is another head at rest: parts, eyes and the jaw's hinge stand elsewhere, and all shapes
+go on from there.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.errors import HeadFileError
+from surface.head.model.beside import beside, read_beside, write_beside
+from surface.head.model.data import Group, HeadData, PartData
+
+FILE = "identities.npz"
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """One variation, per unit.
+
+    Attributes
+    ----------
+    name : what a user calls it. groups : part name -> control points and how far they stand away, mm.
+    changes : part name -> what is added to groups of the head, so that lids of another height still close.
+    eyes : (2, 3) shift of the eyeballs' centres, jaw : (3,) of the hinge, mm.
+    fit : :func:`fingerprint` of the head it was made for.
+    """
+
+    name: str
+    groups: dict[str, Group]
+    changes: dict[str, list[Group]]
+    eyes: Floats
+    jaw: Floats
+    fit: int
+
+
+def fingerprint(head: HeadData) -> int:
+    """A number that changes when a head's control points stand elsewhere in (u, v)."""
+    out = 0
+    for part in head.parts:
+        for knots in (part.knots_u, part.knots_v):
+            out = zlib.crc32(np.ascontiguousarray(knots, np.float64).tobytes(), out)
+    return out
+
+
+def load_identities(head: str | Path) -> dict[str, Identity]:
+    """The identities of a head, by name; empty where it has none.
+
+    Parameters
+    ----------
+    head : the head's folder or its head.toml.
+
+    Raises
+    ------
+    HeadFileError : the file is damaged.
+    """
+    hint = "make it again: omote fit MESH -o FOLDER --keep --identities FILE"
+    return read_beside(identities_path(head), _identities, hint) or {}
+
+
+def _identities(z: np.lib.npyio.NpzFile) -> dict[str, Identity]:
+    """By name, as a file has them."""
+    names = [str(n) for n in z["names"]]
+    eyes, jaw = _finite(z["eyes"], (len(names), 2, 3)), _finite(z["jaw"], (len(names), 3))
+    fit = int(z["fit"])
+    return {n: Identity(n, _groups(z, k, n), _changes(z, k), eyes[k], jaw[k], fit) for k, n in enumerate(names)}
+
+
+def _indices(a: NDArray) -> NDArray[np.int32]:
+    if a.ndim != 1 or a.dtype.kind not in "iu" or a.min(initial=0) < 0:
+        raise ValueError("an array of control points holds something else")
+    return a.astype(np.int32)
+
+
+def _finite(a: NDArray, shape: tuple[int, ...]) -> Floats:
+    if a.shape != shape or not np.isfinite(a).all():
+        raise ValueError(f"an array has shape {a.shape}, expected {shape}, or is not finite")
+    return a.astype(np.float64)
+
+
+def _groups(z: np.lib.npyio.NpzFile, k: int, name: str) -> dict[str, Group]:
+    out = {}
+    for key in z.files:
+        if key.startswith(f"{k}/ids/"):
+            part = key.split("/", 2)[2]
+            ids = _indices(z[key])
+            out[part] = Group(name, ids, _finite(z[f"{k}/moves/{part}"], (len(ids), 3)).astype(np.float32))
+    return out
+
+
+def _changes(z: np.lib.npyio.NpzFile, k: int) -> dict[str, list[Group]]:
+    out: dict[str, list[Group]] = {}
+    for key in z.files:
+        if key.startswith(f"{k}/change_ids/"):
+            part, shape = key.split("/", 2)[2].rsplit("/", 1)
+            ids = _indices(z[key])
+            moves = _finite(z[f"{k}/change_moves/{part}/{shape}"], (len(ids), 3)).astype(np.float32)
+            out.setdefault(part, []).append(Group(shape, ids, moves))
+    return out
+
+
+def save_identities(head: str | Path, identities: list[Identity]) -> Path:
+    """Keep identities beside a head; returns the file's path."""
+    arrays: dict[str, NDArray] = {
+        "fit": np.array(identities[0].fit if identities else 0, np.int64),
+        "names": np.array([i.name for i in identities]),
+        "eyes": np.array([i.eyes for i in identities]).reshape(-1, 2, 3),
+        "jaw": np.array([i.jaw for i in identities]).reshape(-1, 3),
+    }
+    for k, identity in enumerate(identities):
+        for part, group in identity.groups.items():
+            arrays |= {f"{k}/ids/{part}": group.ids, f"{k}/moves/{part}": group.moves}
+        for part, changes in identity.changes.items():
+            for g in changes:
+                arrays |= {f"{k}/change_ids/{part}/{g.name}": g.ids, f"{k}/change_moves/{part}/{g.name}": g.moves}
+    return write_beside(identities_path(head), arrays)
+
+
+def identities_path(head: str | Path) -> Path:
+    """Where a head's identities are kept."""
+    return beside(head, FILE)
+
+
+def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mapping[str, float], where: str) -> HeadData:
+    """The head with identities mixed in, each by 0 to 1.
+
+    Raises
+    ------
+    HeadFileError : no identity of that name, an amount out of range, or identities that were made for another fit.
+    """
+    eyes, jaw = head.eyes.copy(), np.array(head.jaw.centre, float)
+    parts = {p.name: p for p in head.parts}
+    for name, amount in wanted.items():
+        if name not in known:
+            there = ", ".join(known) or "none"
+            raise HeadFileError(f"{where}: no identity {name!r}; there are {there}", hint="see docs/heads.md")
+        if not (math.isfinite(amount) and 0.0 <= amount <= 1.0):
+            raise HeadFileError(f"{where}: identity {name}: {amount:g} is not between 0 and 1", hint=f"{name}=0.6")
+        identity = known[name]
+        _check_fit(head, identity, where)
+        eyes += amount * identity.eyes
+        jaw += amount * identity.jaw
+        for part, group in identity.groups.items():
+            parts[part] = _moved(parts[part], group, amount)
+        for part, changes in identity.changes.items():
+            for group in changes:
+                parts[part] = _changed(parts[part], group, amount)
+    moved = replace(head.jaw, centre=tuple(jaw.tolist()))
+    return replace(head, eyes=eyes, jaw=moved, parts=[parts[p.name] for p in head.parts])
+
+
+def _check_fit(head: HeadData, identity: Identity, where: str) -> None:
+    points = {p.name: len(p.points) for p in head.parts}
+    every = [*identity.groups.items(), *((p, g) for p, groups in identity.changes.items() for g in groups)]
+    inside = all(group.ids.max(initial=-1) < points.get(part, -1) for part, group in every)
+    if identity.fit != fingerprint(head) or not inside:
+        raise HeadFileError(f"{where}: identities.npz was made for another fit of this head",
+                            hint="make it again: omote fit MESH -o FOLDER --keep --identities FILE")  # fmt: skip
+
+
+def _moved(part: PartData, group: Group, amount: float) -> PartData:
+    points = part.points.copy()
+    points[group.ids] += amount * group.moves
+    return replace(part, points=points)
+
+
+def _changed(part: PartData, change: Group, amount: float) -> PartData:
+    """The part with something added to its group of the same name."""
+    total = np.zeros((len(part.points), 3), np.float32)
+    total[change.ids] += np.float32(amount) * change.moves
+    groups = [g for g in part.groups if g.name != change.name]
+    for g in part.groups:
+        if g.name == change.name:
+            total[g.ids] += g.moves
+    ids = np.flatnonzero(np.abs(total).max(axis=1) > 0).astype(np.int32)
+    return replace(part, groups=[*groups, Group(change.name, ids, total[ids])])

@@ -1,0 +1,109 @@
+"""The tessellation of a part, kept in the head file so that a face starts at once.
+
+A head without it, or with another budget than it was made with, is tessellated when it is loaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.dcp import DCPSurface
+from surface.head.model.data import PartData, Seam
+from surface.mesh.domain import Domain
+from surface.mesh.mesh import Mesh
+from surface.mesh.tessellate import unit_normals
+
+KEYS = ("mesh_uv", "mesh_triangles", "mesh_side", "mesh_cell_start", "mesh_list_start", "mesh_list_ids", "mesh_made")
+LOOP_SHARE = 0.4  # how near a border follows its loop, in chord errors
+
+
+def make_surface(data: PartData) -> DCPSurface:
+    """The part's DCP surface."""
+    return DCPSurface.from_padded(
+        data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1]
+    )
+
+
+def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) -> Mesh:
+    """Triangles for a part by its budget, with vertices where the head's seams begin and end."""
+    most, chord, depth = data.budget
+    with np.errstate(divide="ignore", invalid="ignore"):  # triangles without area while borders are cut
+        return surface.tessellate(
+            max_points=most or None,
+            chord_error=chord,
+            max_depth=depth,
+            domain=replace(domain_of(data), marks=_ends(seams, data.name)),
+            loop_error=LOOP_SHARE * chord,
+        )
+
+
+def _ends(seams: Sequence[Seam], part: str) -> NDArray[np.float64]:
+    """(k, 2) where seams of a part begin and end: three borders or more meet there. Closed seams have no ends."""
+    lines = [uv for s in seams for name, uv in ((s.part_a, s.uv_a), (s.part_b, s.uv_b)) if name == part]
+    ends = [line[k] for line in lines for k in (0, -1) if not np.array_equal(line[0], line[-1])]
+    return np.unique(np.array(ends, float).reshape(-1, 2), axis=0)
+
+
+def domain_of(data: PartData) -> Domain:
+    """The rectangle around the part's loops, trimmed by them."""
+    every = np.concatenate(data.loops)
+    (u0, v0), (u1, v1) = every.min(axis=0), every.max(axis=0)
+    return Domain((u0, u1, v0, v1), data.loops)
+
+
+def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, NDArray]:
+    """Arrays to keep; positions and normals are left out, the surface gives them."""
+    return {
+        "mesh_uv": mesh.uv,
+        "mesh_triangles": mesh.triangles.astype(np.int32),
+        "mesh_side": mesh.side.astype(np.int8),
+        "mesh_cell_start": mesh.cell_start.astype(np.int32),
+        "mesh_list_start": mesh.list_start.astype(np.int32),
+        "mesh_list_ids": mesh.list_ids.astype(np.int32),
+        "mesh_made": np.array([*budget, mesh.leaves, mesh.flip], float),
+    }
+
+
+def unpack(
+    arrays: dict[str, NDArray], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool
+) -> Mesh | None:
+    """The kept mesh, or None if it is absent, made with another budget, or does not fit the surface.
+
+    ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex then stands
+    in the middle of its cell's control points.
+    """
+    if any(key not in arrays for key in KEYS):
+        return None
+    made = arrays["mesh_made"]
+    uv, triangles = np.asarray(arrays["mesh_uv"], float), np.asarray(arrays["mesh_triangles"], np.int32)
+    start, list_start, ids = (arrays[k] for k in ("mesh_cell_start", "mesh_list_start", "mesh_list_ids"))
+    if made.shape != (5,) or tuple(made[:3]) != tuple(map(float, budget)):
+        return None
+    if not _sound(uv, triangles, start, list_start, ids, surface.n):
+        return None
+    side = arrays["mesh_side"].astype(np.int64)
+    cell = np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start))
+    if rough:
+        sums = np.add.reduceat(surface.points[ids], list_start[:-1]) / np.diff(list_start)[:, None]
+        points, normals = sums[cell], np.zeros((len(uv), 3))
+    else:
+        points, su, sv = surface.derivatives(uv, side=side)
+        normals = unit_normals(points, su, sv, triangles) * (-1.0 if made[4] else 1.0)
+    return Mesh(
+        points, normals, triangles, uv, side, cell, start.astype(np.int64),
+        list_start.astype(np.int64), ids.astype(np.int32), int(made[3]), bool(made[4]),
+    )  # fmt: skip
+
+
+def _sound(uv: NDArray, triangles: NDArray, start: NDArray, list_start: NDArray, ids: NDArray, n: int) -> bool:
+    """Do all indices point at something?"""
+    if uv.ndim != 2 or triangles.ndim != 2 or not len(triangles) or len(start) != len(list_start):
+        return False
+    whole = start[0] == 0 and start[-1] == len(uv) and list_start[0] == 0 and list_start[-1] == len(ids)
+    rising = bool((np.diff(start) > 0).all() and (np.diff(list_start) > 0).all())
+    inside = triangles.min() >= 0 and triangles.max() < len(uv) and ids.min(initial=0) >= 0
+    return bool(whole and rising and inside and ids.max(initial=-1) < n)

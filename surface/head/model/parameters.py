@@ -1,0 +1,118 @@
+"""The parameters a head understands, and what they mean for eyes and head.
+
+Expression parameters run from 0 to 1, angles from -1 to 1. Gaze can be given in two ways, as an angle and as
+eyeLook shapes; both add up to one gaze, which turns the eyeball and moves the lids.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import atan2, cos, hypot, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+SIDES = ("Left", "Right")
+_EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
+_LOWER = (
+    "jawForward", "jawLeft", "jawRight", "jawOpen", "mouthClose", "mouthFunnel", "mouthPucker", "mouthLeft",
+    "mouthRight", "mouthSmileLeft", "mouthSmileRight", "mouthFrownLeft", "mouthFrownRight", "mouthDimpleLeft",
+    "mouthDimpleRight", "mouthStretchLeft", "mouthStretchRight", "mouthRollLower", "mouthRollUpper",
+    "mouthShrugLower", "mouthShrugUpper", "mouthPressLeft", "mouthPressRight", "mouthLowerDownLeft",
+    "mouthLowerDownRight", "mouthUpperUpLeft", "mouthUpperUpRight", "browDownLeft", "browDownRight", "browInnerUp",
+    "browOuterUpLeft", "browOuterUpRight", "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft",
+    "noseSneerRight", "tongueOut",
+)  # fmt: skip
+SHAPES = (*(f"eye{e}{s}" for s in SIDES for e in _EYE), *_LOWER)
+ANGLES = ("headYaw", "headPitch", "headRoll", "leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
+NAMES = SHAPES + ANGLES
+HEAD_RAD = np.radians([60.0, 40.0, 30.0])  # yaw, pitch, roll at full scale
+EYE_RAD = np.radians([35.0, 30.0])  # yaw, pitch at full scale
+_AT = {name: i for i, name in enumerate(NAMES)}
+_ANGLE = [_AT[n] for n in ANGLES]
+_LOOK = np.array([[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] for s in SIDES])
+_BLINK = np.array([_AT[f"eyeBlink{s}"] for s in SIDES])
+_OPENERS = np.array([[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES])
+_JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
+TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # how far the jaw opens at least to let the whole tongue out
+_LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
+
+
+@dataclass
+class Pose:
+    """What a parameter vector asks of the head.
+
+    Attributes
+    ----------
+    shapes : (52,) float64, how far each group is moved; lids already follow the gaze.
+    jaw : how far the jaw is open, 0..1; closed : how much of that the lips make up for, 0..1.
+    head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
+    pushes : by the name of a contact, what moved at it, mm, as :class:`surface.head.posing.contact.Feeler` tells; the
+        part that has the opening fills it in for those that come after it.
+    """
+
+    shapes: NDArray[np.float64]
+    jaw: float
+    closed: float
+    head: NDArray[np.float64]
+    gaze: NDArray[np.float64]
+    pushes: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+
+
+def read_pose(values: NDArray[np.float64]) -> Pose:
+    """Parameter values (59,) in the order of NAMES, clipped, as a pose.
+
+    mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
+    opens the jaw as far as it needs, ahead of the tongue, and keeps the lips off it.
+
+    Raises
+    ------
+    ValueError : wrong shape, or a value that is not a number (names the parameter).
+    """
+    v = np.asarray(values, float)
+    if v.shape != (len(NAMES),):
+        raise ValueError(f"values has shape {v.shape}, expected ({len(NAMES)},)")
+    if np.isnan(v).any():
+        raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
+    v = np.minimum(np.maximum(v, _LOW), 1.0)
+    needed = TONGUE_NEEDS * min(1.0, TONGUE_FIRST * float(v[_TONGUE]))
+    jaw = v[_JAW] = max(float(v[_JAW]), needed)
+    shapes, angle = v[: len(SHAPES)], v[_ANGLE]
+    gaze = np.array([_gaze(v[_LOOK[side]].tolist(), side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)])
+    for side in (0, 1):
+        yaw, pitch = gaze[side]
+        outward = yaw * (1 - 2 * side)
+        shapes[_LOOK[side]] = max(pitch, 0.0), max(-outward, 0.0), max(outward, 0.0), max(-pitch, 0.0)
+        shapes[_OPENERS[side]] *= 1.0 - shapes[_BLINK[side]]  # a closing lid ends closed, wherever it started
+    shapes[_CLOSE] = min(shapes[_CLOSE], jaw - needed)
+    closed = float(shapes[_CLOSE] / jaw) if jaw > 0 else 0.0
+    return Pose(shapes, jaw, closed, angle[:3] * HEAD_RAD, gaze * EYE_RAD)
+
+
+def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float, float]:
+    """Yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes (down, in, out, up) together."""
+    down, inward, outward, up = look
+    yaw, pitch = yaw + (outward - inward) * (1 - 2 * side), pitch + down - up
+    return min(max(yaw, -1.0), 1.0), min(max(pitch, -1.0), 1.0)
+
+
+def rotation(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]:
+    """(3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
+    cy, cp, cr, sy, sp, sr = cos(yaw), cos(pitch), cos(roll), sin(yaw), sin(pitch), sin(roll)
+    return np.array(
+        [
+            [cy * cr + sy * sp * sr, sy * sp * cr - cy * sr, sy * cp],
+            [cp * sr, cp * cr, -sp],
+            [cy * sp * sr - sy * cr, sy * sr + cy * sp * cr, cy * cp],
+        ]
+    )
+
+
+def rotation_vector(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) axis times angle of a rotation by less than 180 degrees."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    axis = (h - f, c - g, d - b)
+    sine = 0.5 * hypot(*axis)
+    if sine < 1e-9:
+        return np.zeros(3)
+    return np.array(axis) * (atan2(sine, 0.5 * (a + e + i - 1)) / (2 * sine))

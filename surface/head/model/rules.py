@@ -1,0 +1,53 @@
+"""What moves groups that are no parameters: creases of the skin, and mends where two shapes do not add up."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.errors import HeadFileError
+from surface.head.model.data import Rule
+from surface.head.model.parameters import SHAPES
+
+Floats = NDArray[np.float64]
+
+
+class Drivers:
+    """Amounts of all groups: the shapes' own, and those of rules.
+
+    Parameters
+    ----------
+    rules : their groups stand behind the 52 shapes, in order; where : the file, for messages.
+
+    Raises
+    ------
+    HeadFileError : a rule names something that is no shape.
+    """
+
+    def __init__(self, rules: list[Rule], where: str = "head") -> None:
+        self.names = (*SHAPES, *(r.group for r in rules))
+        terms = [(i, term) for i, rule in enumerate(rules) for term in rule.terms]
+        self._mix = np.zeros((len(terms), len(SHAPES)))
+        for row, (i, term) in zip(self._mix, terms, strict=True):
+            for name, share in term.items():
+                if name not in SHAPES:
+                    raise HeadFileError(f"{where}: rules[{i}]: no shape {name!r}", hint="see docs/heads.md for names")
+                row[SHAPES.index(name)] = share
+        self._first = np.cumsum([0, *(len(r.terms) for r in rules)])[:-1]
+        self._power = np.array([r.power for r in rules])
+        self._amounts = np.zeros(len(self.names))
+        self._of: Floats | None = None
+
+    def amounts(self, shapes: Floats) -> Floats:
+        """(52 + r,) from the shapes (52,); the array is overwritten each time.
+
+        Asked again for the very same array, as by the parts of one head, it gives what it has.
+        """
+        if shapes is self._of:
+            return self._amounts
+        self._of = shapes
+        self._amounts[: len(SHAPES)] = shapes
+        if len(self._power):
+            terms = np.clip(self._mix @ shapes, 0.0, 1.0)
+            self._amounts[len(SHAPES) :] = np.multiply.reduceat(terms, self._first) ** self._power
+        return self._amounts

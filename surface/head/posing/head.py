@@ -1,0 +1,161 @@
+"""The head: load it, pose it, read vertices and normals of its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.errors import HeadFileError
+from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.file import load_data
+from surface.head.model.identity import load_identities, with_identities
+from surface.head.model.meshes import make_surface, tessellate, unpack
+from surface.head.model.parameters import NAMES, read_pose, rotation
+from surface.head.model.rules import Drivers
+from surface.head.posing.lean import apply_lean, read_lean
+from surface.head.posing.paint import paint_part
+from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
+from surface.head.posing.seams import Zipper
+from surface.head.posing.shade import apply_shade, read_shade
+
+RIGID = ("skull", "jaw", "left_eye", "right_eye")
+
+
+class Head:
+    """A face made of DCP surfaces that follows parameters.
+
+    Use :meth:`load`. One object belongs to one thread at a time.
+
+    Parameters
+    ----------
+    data : everything a head file holds; where : its path, for messages.
+    """
+
+    parameters: tuple[str, ...] = NAMES
+
+    def __init__(self, data: HeadData, where: str = "head") -> None:
+        self.data = data
+        drivers = Drivers(data.rules, where)
+        self.parts: tuple[HeadPart, ...] = tuple(_make_part(p, data, drivers, where) for p in data.parts)
+        by_name = {p.name: p for p in self.parts}
+        self._zippers = [Zipper(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams]
+        for zipper in self._zippers:
+            zipper.close()
+        self._at = {name: i for i, name in enumerate(self.parameters)}
+
+    @classmethod
+    def load(cls, path: str | Path, identity: Mapping[str, float] | None = None) -> Head:
+        """Read a head from its folder or its head.toml.
+
+        Parameters
+        ----------
+        identity : variations of the head to mix in, by name, each by 0 to 1.
+
+        Raises
+        ------
+        HeadFileError : a file is missing, damaged, cut short or of another version; names file and key. Or the head
+            has no identity of that name.
+        """
+        data = load_data(path)
+        if identity:
+            data = with_identities(data, load_identities(path), identity, str(path))
+        head = cls(data, str(path))
+        apply_shade(head.parts, read_shade(path))
+        apply_lean(head.parts, read_lean(path))
+        return head
+
+    @property
+    def name(self) -> str:
+        """The head's short name."""
+        return self.data.name
+
+    def part(self, name: str) -> HeadPart:
+        """The part of that name; KeyError if there is none."""
+        for p in self.parts:
+            if p.name == name:
+                return p
+        raise KeyError(f"no part {name!r}; there are {', '.join(p.name for p in self.parts)}")
+
+    @property
+    def zippers(self) -> tuple[Zipper, ...]:
+        """The head's seams, in the order in which they are closed."""
+        return tuple(self._zippers)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of all groups, in the order of the parameters."""
+        found = {g.name for p in self.data.parts for g in p.groups}
+        return tuple(n for n in self.parameters if n in found)
+
+    def group(self, name: str) -> dict[str, Group]:
+        """The group of that name: part name -> control points and their displacements per unit.
+
+        Raises
+        ------
+        KeyError : no group of that name.
+        """
+        found = {p.name: g for p in self.data.parts for g in p.groups if g.name == name}
+        if not found:
+            raise KeyError(f"no group {name!r}; there are {', '.join(self.groups)}")
+        return found
+
+    def values(self, given: Mapping[str, float]) -> NDArray[np.float64]:
+        """A parameter vector (P,) from names and values, 0 elsewhere; KeyError for an unknown name."""
+        out = np.zeros(len(self.parameters))
+        for name, value in given.items():
+            out[self._at[name]] = value
+        return out
+
+    def pose(self, values: NDArray[np.float64]) -> None:
+        """Move all parts to parameter values (P,) in the order of :attr:`parameters`; values are clipped.
+
+        Raises
+        ------
+        ValueError : wrong shape or a value that is not a number; the head keeps its pose.
+        """
+        pose = read_pose(values)
+        turn = Turn(rotation(*pose.head), self.data.neck.pivot)
+        for part in self.parts:
+            part.pose(pose, turn)
+        for zipper in self._zippers:
+            zipper.close()
+
+    def place_points(self, values: NDArray[np.float64]) -> tuple[list[NDArray[np.float64]], Turn]:
+        """As :meth:`pose`, but only what vertices are summed from; they and their normals stay.
+
+        Returns
+        -------
+        (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
+        :class:`surface.head.posing.influence.Influence`.
+        """
+        pose = read_pose(values)
+        return [part.place_points(pose) for part in self.parts], Turn(rotation(*pose.head), self.data.neck.pivot)
+
+
+def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> HeadPart:
+    if part.follows != "skin" and part.follows not in RIGID:
+        raise HeadFileError(
+            f"{where}: part {part.name!r}: follows: {part.follows!r} is not one of skin, {', '.join(RIGID)}"
+        )
+    try:
+        surface = make_surface(part)
+        kept = unpack(part.mesh, surface, part.budget, rough=part.follows == "skin")
+        mesh = kept or tessellate(part, surface, head.seams)
+    except ValueError as e:
+        raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e
+    attributes = paint_part(head.paint, part.name, mesh.uv, where)
+    attributes |= _eye_directions(part, head, mesh.vertices)
+    if part.follows == "skin":
+        return SkinPart(part, head, mesh, surface, attributes, drivers)
+    return RigidPart(part, head, mesh, surface, attributes)
+
+
+def _eye_directions(part: PartData, head: HeadData, vertices: NDArray) -> dict[str, NDArray[np.float32]]:
+    """``eye_local`` (m, 3): where a vertex of an eyeball lies in the eye's own frame, in radii, +z the pupil."""
+    if part.follows not in ("left_eye", "right_eye"):
+        return {}
+    local = (vertices - head.eyes[int(part.follows == "right_eye")]) / head.eye_radius
+    return {"eye_local": local.astype(np.float32)}

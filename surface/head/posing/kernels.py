@@ -1,0 +1,166 @@
+"""Loops over control points, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.jit import kernel
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+
+@kernel
+def add_moves(
+    amounts: Floats, group: NDArray[np.int64], first: NDArray[np.int64], start: NDArray[np.int64], moves: Floats32,
+    points: Floats,
+) -> None:  # fmt: skip
+    """Add to the numbers ``points (m,)`` runs of ``moves``: the r-th, from ``start[r]`` to ``start[r + 1]``, by
+    ``amounts[group[r]]`` to those that begin at ``first[r]``."""
+    for r in range(group.shape[0]):
+        amount = amounts[group[r]]
+        if amount == 0.0:
+            continue
+        run = moves[start[r] : start[r + 1]]
+        own = points[first[r] : first[r] + len(run)]
+        for k in range(len(run)):
+            own[k] += amount * run[k]
+
+
+@kernel
+def mix_rows(amounts: Floats, rows: Floats, rest: Floats, least: Floats, out: Floats) -> None:
+    """Write ``rest (k,)`` plus ``amounts (g,) @ rows (g, k)``, nowhere less than ``least (k,)``, to ``out (k,)``."""
+    out[:] = rest
+    for g in range(amounts.shape[0]):
+        if amounts[g] != 0.0:
+            for k in range(out.shape[0]):
+                out[k] += amounts[g] * rows[g, k]
+    for k in range(out.shape[0]):
+        out[k] = max(out[k], least[k])
+
+
+@kernel
+def carry(
+    rest: Floats32, rest_normals: Floats32, linear: Floats32, shift: Floats32, vertices: Floats32, normals: Floats32
+) -> None:
+    """Write ``linear (3, 3) @ p + shift (3,)`` of every row of ``rest (m, 3)``, and its normal's ``linear @ n``."""
+    for i in range(rest.shape[0]):
+        x, y, z = rest[i, 0], rest[i, 1], rest[i, 2]
+        p, q, r = rest_normals[i, 0], rest_normals[i, 1], rest_normals[i, 2]
+        for c in range(3):
+            vertices[i, c] = linear[c, 0] * x + linear[c, 1] * y + linear[c, 2] * z + shift[c]
+            normals[i, c] = linear[c, 0] * p + linear[c, 1] * q + linear[c, 2] * r
+
+
+@kernel
+def swing_jaw(
+    rest: Floats, share: Floats, turn: Floats, shift: Floats, full_turn: Floats, full_shift: Floats,
+    amount: float, undo: Floats, points: Floats,
+) -> None:  # fmt: skip
+    """Add to ``points (n, 3)`` each point's ``share`` of the jaw's motion from where it rests.
+
+    ``undo (n,)`` takes back the difference between the arc and the straight way, for lips that mouthClose
+    (a straight displacement) brings together.
+    """
+    for i in range(rest.shape[0]):
+        if share[i] == 0.0:
+            continue
+        for r in range(3):
+            arc = shift[r] - rest[i, r]
+            line = full_shift[r] - amount * rest[i, r]
+            for c in range(3):
+                arc += turn[r, c] * rest[i, c]
+                line += full_turn[r, c] * rest[i, c]
+            points[i, r] += share[i] * (arc + undo[i] * (line - arc))
+
+
+@kernel
+def keep_on_eyeball(ids: NDArray[np.int64], eye: Floats, hold: Floats, radius: Floats, points: Floats) -> None:
+    """Set the distance of points ``ids (k,)`` from ``eye (k, 3)`` to ``radius (k,)``, by the share ``hold (k,)``.
+
+    Straight displacements would cut through the eyeball half-way; distances that are mixed like the
+    displacements themselves do not.
+    """
+    for k in range(ids.shape[0]):
+        i = ids[k]
+        x, y, z = points[i, 0] - eye[k, 0], points[i, 1] - eye[k, 1], points[i, 2] - eye[k, 2]
+        length = np.sqrt(x * x + y * y + z * z)
+        if length < 1e-6:
+            continue
+        scale = hold[k] * (radius[k] / length - 1.0)
+        points[i, 0] += scale * x
+        points[i, 1] += scale * y
+        points[i, 2] += scale * z
+
+
+@kernel
+def turn_head(
+    vertices: Floats32, normals: Floats32, share: Floats32, matrix: Floats, turn: Floats, pivot: Floats, start: int,
+    stop: int, out_vertices: Floats32, out_normals: Floats32,
+) -> None:  # fmt: skip
+    """Rotate rows start..stop about ``pivot (3,)`` by each one's ``share`` of the rotation.
+
+    ``matrix (3, 3)`` is the whole rotation and ``turn (3,)`` its rotation vector. A vertex that follows in part
+    turns by part of the angle (Rodrigues' formula): the neck bends instead of shearing.
+    """
+    own = matrix.copy()
+    angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    a, b, c = turn[0] / angle, turn[1] / angle, turn[2] / angle
+    for i in range(start, stop):
+        whole = share[i] >= 1.0
+        if not whole:
+            s, k = np.sin(share[i] * angle), np.cos(share[i] * angle)
+            m = 1.0 - k
+            own[0, 0], own[0, 1], own[0, 2] = k + a * a * m, a * b * m - c * s, a * c * m + b * s
+            own[1, 0], own[1, 1], own[1, 2] = a * b * m + c * s, k + b * b * m, b * c * m - a * s
+            own[2, 0], own[2, 1], own[2, 2] = a * c * m - b * s, b * c * m + a * s, k + c * c * m
+        x, y, z = vertices[i, 0] - pivot[0], vertices[i, 1] - pivot[1], vertices[i, 2] - pivot[2]
+        p, q, r = normals[i, 0], normals[i, 1], normals[i, 2]
+        for row in range(3):
+            if whole:
+                f, g, h = matrix[row, 0], matrix[row, 1], matrix[row, 2]
+            else:
+                f, g, h = own[row, 0], own[row, 1], own[row, 2]
+            out_vertices[i, row] = pivot[row] + f * x + g * y + h * z
+            out_normals[i, row] = f * p + g * q + h * r
+
+
+@kernel
+def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at: Floats) -> None:
+    """For every point of ``uv (m, 2)``: its distance from the polyline ``line (k, 2)``, and how far along it the
+    nearest place lies, in the line's points; written to ``distance (m,)`` and ``at (m,)``."""
+    steps = line.shape[0] if closed else max(line.shape[0] - 1, 1)
+    for i in range(uv.shape[0]):
+        best = np.inf
+        for k in range(steps):
+            n = (k + 1) % line.shape[0]
+            du, dv = line[n, 0] - line[k, 0], line[n, 1] - line[k, 1]
+            pu, pv = uv[i, 0] - line[k, 0], uv[i, 1] - line[k, 1]
+            t = min(max((pu * du + pv * dv) / max(du * du + dv * dv, 1e-18), 0.0), 1.0)
+            pu, pv = pu - t * du, pv - t * dv
+            d = pu * pu + pv * pv
+            if d < best:
+                best = d
+                at[i] = k + t
+        distance[i] = np.sqrt(best)
+
+
+@kernel
+def zip_border(
+    vertices: Floats32, normals: Floats32, to_vertices: Floats32, to_normals: Floats32, ids: NDArray[np.int64],
+    low: NDArray[np.int64], high: NDArray[np.int64], share: Floats32,
+) -> None:  # fmt: skip
+    """Put rows ``ids`` of ``to_vertices (m, 3)`` between rows ``low`` and ``high`` of ``vertices``, at ``share`` of
+    the way; normals alike, to length 1 where they have any."""
+    for k in range(ids.shape[0]):
+        i, a, b, t = ids[k], low[k], high[k], share[k]
+        square = np.float32(0.0)
+        for c in range(3):
+            to_vertices[i, c] = vertices[a, c] + t * (vertices[b, c] - vertices[a, c])
+            to_normals[i, c] = normals[a, c] + t * (normals[b, c] - normals[a, c])
+            square += to_normals[i, c] ** 2
+        if square > 1e-24:
+            scale = 1.0 / np.sqrt(square)
+            for c in range(3):
+                to_normals[i, c] *= scale

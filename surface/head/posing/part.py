@@ -1,0 +1,192 @@
+"""Parts of a head as the picture sees them: arrays that are current after every pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.dcp import DCPSurface
+from surface.deform.deformation import Deformation
+from surface.head.model.data import HeadData, PartData
+from surface.head.model.meshes import make_surface as make_surface
+from surface.head.model.parameters import Pose, rotation_vector
+from surface.head.model.rules import Drivers
+from surface.head.posing.kernels import carry, turn_head
+from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
+from surface.mesh.mesh import Mesh
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+
+class Turn:
+    """The head's rotation of one pose: matrix (3, 3), rotation vector (3,), pivot (3,)."""
+
+    def __init__(self, matrix: Floats, pivot: tuple[float, float, float]) -> None:
+        self.matrix, self.vector, self.pivot = matrix, rotation_vector(matrix), np.array(pivot)
+        self.none = not self.vector.any()
+
+
+class HeadPart:
+    """One surface of the head, tessellated.
+
+    Attributes
+    ----------
+    name, material : str.
+    triangles : (t, 3) int32; uv : (m, 2) float32.
+    vertices, normals : (m, 3) float32, current, in head space including the head's rotation.
+    changed : vertex ranges [start, stop) that the last pose touched.
+    attributes : static per-vertex arrays (m, k) float32 by name.
+    lean : fewer triangles over the same vertices, by level; see :mod:`surface.head.posing.lean`.
+    borders : (k, 2) directed edges that only one triangle of the tessellation has.
+    surface : the DCP surface at rest.
+    """
+
+    def __init__(self, data: PartData, mesh: Mesh, surface: DCPSurface, attributes: Mapping[str, Floats32]) -> None:
+        self.name, self.material, self.follows = data.name, data.material, data.follows
+        self.surface, self.mesh = surface, mesh
+        self.triangles = np.asarray(mesh.triangles, np.int32)
+        self.uv = np.asarray(mesh.uv, np.float32)
+        self.vertices = np.array(mesh.vertices, np.float32)
+        self.normals = np.array(mesh.normals, np.float32)
+        self.attributes = dict(attributes)
+        self.lean: dict[str, NDArray[np.int32]] = {}
+        self.borders = border_edges(self.triangles)
+        self.changed: list[tuple[int, int]] = [(0, len(self.vertices))]
+        self._turn = Turn(np.eye(3), (0.0, 0.0, 0.0))
+        self._share = np.ones(len(self.vertices), np.float32)
+
+    def pose(self, pose: Pose, turn: Turn) -> None:
+        """Move to a pose; ``turn`` is the head's rotation."""
+        ranges, vertices, normals = self._express(pose)
+        if not np.array_equal(turn.matrix, self._turn.matrix):
+            ranges = [(0, len(vertices))]
+        self._turn, self.changed = turn, ranges
+        for start, stop in ranges:
+            if turn.none:
+                self.vertices[start:stop] = vertices[start:stop]
+                self.normals[start:stop] = normals[start:stop]
+            else:
+                turn_head(vertices, normals, self._share, turn.matrix, turn.vector, turn.pivot, start, stop,
+                          self.vertices, self.normals)  # fmt: skip
+
+    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
+        """Everything but the head's rotation: ranges that changed, vertices, normals."""
+        raise NotImplementedError
+
+    @property
+    def control_points(self) -> Floats:
+        """(n, 3) where the control points stand now, before the head turns."""
+        raise NotImplementedError
+
+    def place_points(self, pose: Pose) -> Floats:
+        """What :class:`surface.head.posing.influence.Influence` sums over, (k, 3), before the head turns.
+
+        Vertices and normals stay where they are.
+        """
+        raise NotImplementedError
+
+    @property
+    def turn(self) -> Floats:
+        """(3, 3) the head's rotation of the last pose."""
+        return self._turn.matrix
+
+    @property
+    def share(self) -> Floats32:
+        """(m,) how much of the head's rotation each vertex of the mesh takes, 0..1."""
+        return self._share
+
+    def append(self, like: NDArray[np.int64], triangles: NDArray[np.int32]) -> None:
+        """Add vertices that look like others, ids ``like (k,)``, and triangles that may use them.
+
+        The new vertices stand behind the part's own; whoever adds them moves them.
+        """
+        for name in ("vertices", "normals", "uv"):
+            array = getattr(self, name)
+            setattr(self, name, np.concatenate([array, array[like]]))
+        self.attributes = {k: np.concatenate([a, a[like]]) for k, a in self.attributes.items()}
+        self.triangles = np.concatenate([self.triangles, triangles.astype(np.int32)])
+
+    def touch(self) -> None:
+        """Report every vertex as changed: a seam has written into the part."""
+        self.changed = [(0, len(self.vertices))]
+
+
+class SkinPart(HeadPart):
+    """A part whose control points move one by one; vertices follow by Eq. (2)."""
+
+    def __init__(
+        self,
+        data: PartData,
+        head: HeadData,
+        mesh: Mesh,
+        surface: DCPSurface,
+        attributes: Mapping[str, Floats32],
+        drivers: Drivers | None = None,
+    ) -> None:
+        super().__init__(data, mesh, surface, attributes)
+        self.rig, self._version = SkinRig(data, head, drivers), 0
+        self.deformation = Deformation(surface, mesh)
+        self.vertices[:], self.normals[:] = self.deformation.vertices, self.deformation.normals
+        self._share[:] = head.neck.share(self.vertices.astype(np.float64))
+
+    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
+        points = self.rig.apply(pose)
+        if self._version == self.rig.version:
+            return [], self.deformation.vertices, self.deformation.normals
+        self._version = self.rig.version
+        self.deformation.set_points(points)
+        return self.deformation.changed, self.deformation.vertices, self.deformation.normals
+
+    @property
+    def control_points(self) -> Floats:
+        return self.deformation.points
+
+    def place_points(self, pose: Pose) -> Floats:
+        return self.rig.apply(pose)
+
+
+class RigidPart(HeadPart):
+    """A part fixed to skull, jaw or eye.
+
+    A rational surface is carried along exactly by an affine map of its control points, so the map is applied
+    to the vertices themselves.
+    """
+
+    def __init__(
+        self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface, attributes: Mapping[str, Floats32]
+    ) -> None:
+        super().__init__(data, mesh, surface, attributes)
+        self._head = head
+        self._rest, self._rest_normals = self.vertices.copy(), self.normals.copy()
+        self._linear, self._shift = np.eye(3), np.zeros(3)
+        self._asked: tuple[object, ...] = ()
+
+    def pose(self, pose: Pose, turn: Turn) -> None:
+        """Move to a pose; ``turn`` is the head's rotation, which a rigid part takes as a whole."""
+        asked = (*motion_asks(self.follows, self._head, pose), turn.matrix.tobytes())
+        self._turn, self.changed = turn, []
+        if asked == self._asked:
+            return
+        self._asked, self.changed = asked, [(0, len(self._rest))]
+        self._linear, self._shift = rigid_motion(self.follows, self._head, pose)
+        linear = (turn.matrix @ self._linear).astype(np.float32)
+        shift = (turn.matrix @ (self._shift - turn.pivot) + turn.pivot).astype(np.float32)
+        carry(self._rest, self._rest_normals, linear, shift, self.vertices, self.normals)
+
+    @property
+    def control_points(self) -> Floats:
+        return self.surface.points @ self._linear.T + self._shift
+
+    def place_points(self, pose: Pose) -> Floats:
+        linear, shift = rigid_motion(self.follows, self._head, pose)
+        return np.vstack([linear.T, shift])
+
+
+def border_edges(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
+    """(k, 2) edges that only one triangle has, in the direction of that triangle."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    key, back = edges[:, 0] << 32 | edges[:, 1], edges[:, 1] << 32 | edges[:, 0]
+    return edges[~np.isin(key, back)]

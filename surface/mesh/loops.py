@@ -1,0 +1,169 @@
+"""Trim loops as line segments: even-odd test, crossings with mesh edges, and how fine a mesh must follow them.
+
+``segments`` is (k, 4) float64: u and v of the first and of the second end.
+"""
+
+# mypy: allow-untyped-defs
+from __future__ import annotations
+
+import numpy as np
+
+from surface.base.jit import kernel
+from surface.spline.basis import Floats, Ints
+
+
+def row_lists(segments: Floats, extra: float = 0.0) -> tuple[float, float, Ints, Ints]:
+    """Segments by band of v: v0, bands per unit of v, list starts (bands + 1,), segment ids."""
+    low, high = float(segments[:, [1, 3]].min()), float(segments[:, [1, 3]].max())
+    bands = max(1, len(segments) // 2)
+    scale = bands / max(high - low, 1e-300)
+    start = np.zeros(bands + 1, dtype=np.int64)
+    _fill_bands(segments, low, scale, start[1:], np.zeros(0, dtype=np.int64), True)
+    np.cumsum(start, out=start)
+    ids = np.zeros(int(start[-1]), dtype=np.int64)
+    _fill_bands(segments, low, scale, start[:-1].copy(), ids, False)
+    return low, scale, start, ids
+
+
+@kernel
+def _band(v, low, scale, bands):
+    return max(0, min(int((v - low) * scale), bands - 1))
+
+
+@kernel
+def _fill_bands(segments, low, scale, start, ids, count_only):
+    bands = start.shape[0]
+    for k in range(segments.shape[0]):
+        first = _band(min(segments[k, 1], segments[k, 3]), low, scale, bands)
+        last = _band(max(segments[k, 1], segments[k, 3]), low, scale, bands)
+        for b in range(first, last + 1):
+            if not count_only:
+                ids[start[b]] = k
+            start[b] += 1
+
+
+def inside(segments: Floats, uv: Floats) -> np.ndarray:
+    """(m,) bool: even-odd rule for ``uv (m, 2)``."""
+    out = np.zeros(len(uv), dtype=np.bool_)
+    _inside(segments, uv, *row_lists(segments), out)
+    return out
+
+
+@kernel
+def _inside(segments, uv, low, scale, start, ids, out):
+    for s in range(uv.shape[0]):
+        u, v = uv[s, 0], uv[s, 1]
+        b = _band(v, low, scale, start.shape[0] - 1)
+        odd = False
+        for q in range(start[b], start[b + 1]):
+            k = ids[q]
+            v0, v1 = segments[k, 1], segments[k, 3]
+            if (v0 <= v) != (v1 <= v):
+                at = segments[k, 0] + (v - v0) / (v1 - v0) * (segments[k, 2] - segments[k, 0])
+                odd ^= u < at
+        out[s] = odd
+
+
+def crossings(segments: Floats, a: Floats, b: Floats) -> Floats:
+    """Where the edges a-b cross a loop, as a fraction of the edge: the crossing nearest to the middle.
+
+    Parameters
+    ----------
+    segments : (k, 4) float64
+    a, b : (e, 2) float64 end points, one inside and one outside
+
+    Returns
+    -------
+    (e,) float64 in 0..1
+    """
+    out = np.zeros(len(a))
+    _crossings(segments, a, b, *row_lists(segments), out)
+    return out
+
+
+@kernel
+def _crossings(segments, a, b, low, scale, start, ids, out):
+    for e in range(a.shape[0]):
+        du, dv = b[e, 0] - a[e, 0], b[e, 1] - a[e, 1]
+        bands = start.shape[0] - 1
+        first = _band(min(a[e, 1], b[e, 1]), low, scale, bands)
+        last = _band(max(a[e, 1], b[e, 1]), low, scale, bands)
+        best = 2.0
+        for q in range(start[first], start[last + 1]):
+            k = ids[q]
+            eu, ev = segments[k, 2] - segments[k, 0], segments[k, 3] - segments[k, 1]
+            det = du * ev - dv * eu
+            if det == 0.0:
+                continue
+            pu, pv = segments[k, 0] - a[e, 0], segments[k, 1] - a[e, 1]
+            t, s = (pu * ev - pv * eu) / det, (pu * dv - pv * du) / det
+            within = -1e-9 <= t <= 1.0 + 1e-9 and -1e-9 <= s <= 1.0 + 1e-9
+            if within and abs(t - 0.5) < abs(best - 0.5):
+                best = t
+        out[e] = 0.5 if best == 2.0 else min(max(best, 0.0), 1.0)
+
+
+def corners(loop: Floats, scale: tuple[float, float], angle: float = 40.0) -> np.ndarray:
+    """(k,) bool: which points of a closed polyline (k, 2) turn by more than ``angle`` degrees.
+
+    ``scale`` turns u and v into lengths.
+    """
+    ring = loop * np.asarray(scale)
+    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+    return np.abs(np.arctan2(cross, (into * out).sum(axis=1))) > np.radians(angle)
+
+
+def resample(loop: Floats, scale: tuple[float, float], step: float) -> tuple[Floats, np.ndarray]:
+    """The loop with points added so that no segment is longer than ``step``; and which of them are corners.
+
+    Returns
+    -------
+    ring : (k, 2) float64
+    sharp : (k,) bool
+    """
+    after = np.roll(loop, -1, axis=0)
+    length = np.linalg.norm((after - loop) * np.asarray(scale), axis=1)
+    pieces = np.maximum(1, np.ceil(length / step).astype(np.int64))
+    owner = np.repeat(np.arange(len(loop)), pieces)
+    position = np.arange(len(owner)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    t = position / pieces[owner]
+    ring = loop[owner] + t[:, None] * (after - loop)[owner]
+    return ring, corners(loop, scale)[owner] & (position == 0)
+
+
+@kernel
+def wanted_size(ring, sharp, error, floor, out):
+    """Largest edge that follows a loop within ``error`` and keeps its two sides apart, at every point.
+
+    ``ring (k, 2)`` is in lengths; ``out (k,)`` gets the size, at least ``floor``.
+    """
+    k = ring.shape[0]
+    arc = np.zeros(k + 1)
+    for i in range(k):
+        j = (i + 1) % k
+        arc[i + 1] = arc[i] + np.hypot(ring[j, 0] - ring[i, 0], ring[j, 1] - ring[i, 1])
+    for i in range(k):
+        size, w = arc[k] / 4.0, 1
+        open_ahead, open_behind = not sharp[i], not sharp[i]
+        while w < k // 4 and open_ahead and open_behind:
+            a, b = (i - w) % k, (i + w) % k
+            du, dv = ring[b, 0] - ring[a, 0], ring[b, 1] - ring[a, 1]
+            chord = np.hypot(du, dv)
+            sag = abs(du * (ring[i, 1] - ring[a, 1]) - dv * (ring[i, 0] - ring[a, 0])) / max(chord, 1e-300)
+            if sag > error:
+                size = min(size, chord * np.sqrt(error / sag))
+                break
+            open_ahead, open_behind = not sharp[b], not sharp[a]
+            w += 1
+        square = size * size
+        for j in range(k):
+            du, dv = ring[i, 0] - ring[j, 0], ring[i, 1] - ring[j, 1]
+            gap = du * du + dv * dv
+            if gap < square:
+                along = abs(arc[i] - arc[j])
+                along = min(along, arc[k] - along)
+                if along * along > 2.25 * gap and along > 0.0:
+                    square = gap
+        size = min(size, np.sqrt(square))
+        out[i] = max(size, floor)

@@ -1,0 +1,222 @@
+"""Quad trees over (u, v): roots on a grid of lines, quartering, 2:1 balance, conforming triangles (paper, 2.3).
+
+Cells are addressed by integers. At level L the domain is a grid of ``roots * 2**L`` cells; cell (i, j) covers the
+lattice square from ``(i, j) * 2**(depth - L)`` on. Lattice lines at root borders are exactly the wanted (u, v).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base.jit import kernel
+from surface.base.progress import Progress, silent
+from surface.spline.basis import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Integer coordinates over the domain.
+
+    Attributes
+    ----------
+    lines_u, lines_v : root borders, rising
+    depth : deepest level a cell can have
+    joined : which directions are joined at their ends, so that cells there are neighbours
+    """
+
+    lines_u: Floats
+    lines_v: Floats
+    depth: int
+    joined: tuple[bool, bool] = (False, False)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Roots along u and v."""
+        return len(self.lines_u) - 1, len(self.lines_v) - 1
+
+    def uv(self, x: Ints, y: Ints) -> Floats:
+        """(m, 2): parameters of lattice points."""
+        return np.stack([self._along(self.lines_u, x), self._along(self.lines_v, y)], axis=-1)
+
+    def _along(self, lines: Floats, x: Ints) -> Floats:
+        unit = 1 << self.depth
+        root = np.minimum(x >> self.depth, len(lines) - 2)
+        part = (x - root * unit) / unit
+        return np.where(part == 1.0, lines[root + 1], lines[root] + part * (lines[root + 1] - lines[root]))
+
+    def key(self, x: Ints, y: Ints) -> Ints:
+        """(m,) one integer per lattice point."""
+        return y * ((self.shape[0] << self.depth) + 1) + x
+
+    def point(self, key: Ints) -> tuple[Ints, Ints]:
+        """The inverse of :meth:`key`."""
+        width = (self.shape[0] << self.depth) + 1
+        return key % width, key // width
+
+
+@dataclass(frozen=True)
+class Leaves:
+    """The leaf cells of a tree.
+
+    Attributes
+    ----------
+    level : (n,) int64
+    cell : (n, 2) int64 indices i, j at that level
+    """
+
+    level: Ints
+    cell: Ints
+
+    def __len__(self) -> int:
+        return len(self.level)
+
+
+SplitTest = Callable[[int, Ints], np.ndarray]
+NEIGHBOURS = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])  # below, right, above, left: the order of edges
+
+
+def grow(lattice: Lattice, split: SplitTest, progress: Progress = silent) -> tuple[Leaves, list[Ints]]:
+    """Quarter cells until none wants to be, then balance 2:1 over edges.
+
+    Parameters
+    ----------
+    lattice : roots and greatest depth
+    split : ``split(level, cells (n, 2)) -> (n,) bool``
+    progress : is told the level; every level is taken for twice the work of the one before
+
+    Returns
+    -------
+    leaves : the leaf cells
+    inner : per level, the sorted codes of cells that were split; see :func:`codes`
+    """
+    cells = np.stack(np.meshgrid(*map(np.arange, lattice.shape), indexing="ij"), axis=-1).reshape(-1, 2)
+    inner: list[Ints] = []
+    for level in range(lattice.depth):
+        progress("quad tree", 0.5 ** (lattice.depth - level))
+        chosen = cells[split(level, cells)] if len(cells) else cells
+        inner.append(chosen)
+        cells = children(chosen)
+    return _balance(lattice, inner)
+
+
+def children(cells: Ints) -> Ints:
+    """(4 n, 2): the four quarters of every cell."""
+    quarters = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+    return (2 * cells[:, None, :] + quarters).reshape(-1, 2)
+
+
+def codes(lattice: Lattice, level: int, cells: Ints) -> Ints:
+    """(n,) one integer per cell of a level; cells outside the domain give -1."""
+    width, height = lattice.shape[0] << level, lattice.shape[1] << level
+    if any(lattice.joined):
+        cells = cells.copy()
+        for axis, size in enumerate((width, height)):
+            if lattice.joined[axis]:
+                cells[:, axis] %= size
+    valid = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
+    return np.where(valid, cells[:, 1] * width + cells[:, 0], -1)
+
+
+def _decode(lattice: Lattice, level: int, code: Ints) -> Ints:
+    width = lattice.shape[0] << level
+    return np.stack([code % width, code // width], axis=1)
+
+
+def contains(sorted_codes: Ints, code: Ints) -> np.ndarray:
+    """(n,) bool: membership in a sorted array."""
+    if not len(sorted_codes):
+        return np.zeros(len(code), dtype=bool)
+    at = np.minimum(np.searchsorted(sorted_codes, code), len(sorted_codes) - 1)
+    return sorted_codes[at] == code
+
+
+def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
+    """Split the parents of every split cell's edge neighbours, from the finest level up; then collect leaves."""
+    split = [np.unique(codes(lattice, level, cells)) for level, cells in enumerate(inner)]
+    for level in range(len(split) - 1, 0, -1):
+        cells = _decode(lattice, level, split[level])
+        around = (cells[:, None, :] + NEIGHBOURS).reshape(-1, 2)
+        code = codes(lattice, level, around)
+        around = _decode(lattice, level, code[code >= 0])
+        parents = codes(lattice, level - 1, around // 2)
+        split[level - 1] = np.union1d(split[level - 1], parents[~contains(split[level - 1], parents)])
+    levels, found = [], []
+    cells = np.stack(np.meshgrid(*map(np.arange, lattice.shape), indexing="ij"), axis=-1).reshape(-1, 2)
+    for level in range(len(split) + 1):
+        code = codes(lattice, level, cells)
+        is_inner = contains(split[level], code) if level < len(split) else np.zeros(len(cells), dtype=bool)
+        found.append(cells[~is_inner])
+        levels.append(np.full(len(found[-1]), level))
+        cells = children(cells[is_inner])
+    return Leaves(np.concatenate(levels), np.concatenate(found)), split
+
+
+def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[Ints, Ints]:
+    """Triangles without cracks: a leaf takes in the edge middles of smaller neighbours.
+
+    Returns
+    -------
+    keys : (t, 3) int64 lattice keys, counter-clockwise in (u, v)
+    owner : (t,) int64 leaf of every triangle
+    """
+    pattern = np.zeros(len(leaves), dtype=np.int64)
+    for level in np.unique(leaves.level):
+        if level >= len(inner):
+            continue
+        at = np.flatnonzero(leaves.level == level)
+        for edge, step in enumerate(NEIGHBOURS):
+            code = codes(lattice, int(level), leaves.cell[at] + step)
+            pattern[at] |= contains(inner[level], code).astype(np.int64) << edge
+    flat = pattern == 0
+    pattern[flat] = 16 * (leaves.cell[flat].sum(axis=1) % 2)
+    count = (TEMPLATES[:, :, 0] >= 0).sum(axis=1)[pattern]
+    keys = np.zeros((int(count.sum()), 3), dtype=np.int64)
+    _emit(leaves.level, leaves.cell, pattern, lattice.depth, (lattice.shape[0] << lattice.depth) + 1, TEMPLATES, keys)
+    return keys, np.repeat(np.arange(len(leaves)), count)
+
+
+@kernel
+def _emit(level, cell, pattern, depth, width, templates, keys):  # type: ignore[no-untyped-def]
+    """Lattice keys of the triangles of every leaf; corners 0-3 and edge middles 4-7, see :func:`_templates`."""
+    x, y = np.array([0, 2, 2, 0, 1, 2, 1, 0]), np.array([0, 0, 2, 2, 0, 1, 2, 1])
+    row = 0
+    for leaf in range(level.shape[0]):
+        step = 1 << (depth - level[leaf])
+        for t in range(templates.shape[1]):
+            for k in range(3):
+                node = templates[pattern[leaf], t, k]
+                if node < 0:
+                    break
+                across, up = cell[leaf, 0] * step + x[node] * step // 2, cell[leaf, 1] * step + y[node] * step // 2
+                keys[row, k] = up * width + across
+                row += k == 2
+
+
+def _templates() -> Ints:
+    """(17, 6, 3): triangles over corners 0-3 and middles 4-7 by pattern of smaller neighbours; -1 fills up.
+
+    Pattern bits: below, right, above, left. Pattern 16 is pattern 0 with the other diagonal.
+    """
+    base = {
+        0b0000: [(0, 1, 2), (0, 2, 3)],
+        0b0001: [(0, 4, 3), (4, 2, 3), (4, 1, 2)],
+        0b0011: [(4, 1, 5), (0, 4, 3), (4, 5, 3), (5, 2, 3)],
+        0b0101: [(0, 4, 6), (0, 6, 3), (4, 1, 2), (4, 2, 6)],
+        0b0111: [(4, 1, 5), (5, 2, 6), (4, 5, 6), (0, 4, 6), (0, 6, 3)],
+        0b1111: [(4, 1, 5), (5, 2, 6), (6, 3, 7), (7, 0, 4), (4, 5, 6), (4, 6, 7)],
+    }
+    table = np.full((17, 6, 3), -1, dtype=np.int64)
+    for pattern, triangles in base.items():
+        for turn in range(4):
+            turned = ((pattern << turn) | (pattern >> (4 - turn))) & 15
+            for row, nodes in enumerate(triangles):
+                table[turned, row] = [(n % 4 + turn) % 4 + n // 4 * 4 for n in nodes]
+    table[0, :2] = [(0, 1, 2), (0, 2, 3)]
+    table[16, :2] = [(0, 1, 3), (1, 2, 3)]
+    return table
+
+
+TEMPLATES = _templates()

@@ -1,0 +1,182 @@
+"""Which cells of a quad tree to quarter: too many control points, too far from the surface, too coarse for a loop."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surface.base import keys
+from surface.spline.basis import Floats, Ints
+
+from . import blocks, loops, quadtree
+from .domain import Domain
+from .quadtree import Lattice
+
+if TYPE_CHECKING:
+    from surface.dcp import DCPSurface
+
+MOST_CELLS = 4_000_000
+RIM = 64  # cells along a side where the border of what is covered is followed
+
+
+class SplitTests:
+    """Which cells are to be quartered."""
+
+    max_points: int | None = None
+    chord_error: float | None = None
+    min_depth = 0
+
+    def __init__(self, surface: DCPSurface, domain: Domain, lattice: Lattice, scale: tuple[float, float]) -> None:
+        self.surface, self.domain, self.lattice, self.scale = surface, domain, lattice, scale
+        self.rings: list[tuple[Floats, Floats]] = []
+        self.anchors: tuple[Floats, Floats] | None = None
+
+    def follow_loops(self, error: float) -> None:
+        """Ask for cells small enough that edges follow the loops within ``error``."""
+        for loop in self.domain.loops:
+            ring = np.asarray(loop)
+            around = np.linalg.norm((np.roll(ring, -1, axis=0) - ring) * self.scale, axis=1).sum()
+            step = max(2.0 * error, float(around) / 2000)
+            points, sharp = loops.resample(ring, self.scale, step)
+            size = np.zeros(len(points))
+            loops.wanted_size(points * np.asarray(self.scale), sharp, error, 3.0 * error, size)
+            self.rings.append((points, size))
+
+    def split(self, level: int, cells: Ints) -> np.ndarray:
+        """(n,) bool: which cells of a level to quarter."""
+        if len(cells) > MOST_CELLS:
+            raise ValueError(
+                f"max_depth: {len(cells)} cells at level {level}; ask for a larger chord_error or max_points"
+            )
+        rect = self._rects(level, cells)
+        active, along_loop = self._active(rect, cells, level)
+        chosen = along_loop | (active & (level < self.min_depth))
+        left = np.flatnonzero(active & ~chosen)
+        if self.max_points is not None and len(left):
+            chosen[left] = self._counts(rect[left]) > self.max_points
+            left = np.flatnonzero(active & ~chosen)
+        if self.chord_error is not None and len(left):
+            chosen[left] = self._errors(level, cells[left]) > self.chord_error
+        return chosen
+
+    def _rects(self, level: int, cells: Ints) -> Floats:
+        """(n, 4): u0, u1, v0, v1."""
+        shift = self.lattice.depth - level
+        low = self.lattice.uv(cells[:, 0] << shift, cells[:, 1] << shift)
+        high = self.lattice.uv((cells[:, 0] + 1) << shift, (cells[:, 1] + 1) << shift)
+        return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
+
+    def _active(self, rect: Floats, cells: Ints, level: int) -> tuple[np.ndarray, np.ndarray]:
+        """Which cells have a part in the domain, and which are too large for a loop that runs through them."""
+        coarse = np.zeros(len(cells), dtype=bool)
+        if not self.rings:
+            return np.ones(len(cells), dtype=bool), coarse
+        middle = np.stack([rect[:, :2].mean(axis=1), rect[:, 2:].mean(axis=1)], axis=1)
+        active = self.domain.inside(middle)
+        size = np.maximum((rect[:, 1] - rect[:, 0]) * self.scale[0], (rect[:, 3] - rect[:, 2]) * self.scale[1])
+        code = quadtree.codes(self.lattice, level, cells)
+        for ring, wanted in self.rings:
+            place = keys.find(code, self._find(level, ring))
+            hit = place >= 0
+            cell, limit = place[hit], wanted[hit]
+            active[cell] = True
+            coarse[cell[size[cell] > limit]] = True
+        return active, coarse
+
+    def _find(self, level: int, uv: Floats) -> Ints:
+        """Codes of the cells that hold ``uv``; -1 outside the rectangle."""
+        index = []
+        for k, lines in enumerate((self.lattice.lines_u, self.lattice.lines_v)):
+            root = np.searchsorted(lines, uv[:, k], side="right") - 1
+            inner = np.clip(root, 0, len(lines) - 2)
+            part = (uv[:, k] - lines[inner]) / (lines[inner + 1] - lines[inner])
+            index.append(np.where(root == inner, (inner << level) + (part * (1 << level)).astype(np.int64), -1))
+        return quadtree.codes(self.lattice, level, np.stack(index, axis=1))
+
+    def _counts(self, rect: Floats) -> Ints:
+        bins = self.surface.bins
+        out = np.zeros(len(rect), dtype=np.int64)
+        blocks.count_open(rect, self.surface.all_supports, bins.grid, bins.shape, bins.start, bins.ids, out)
+        return out
+
+    def _errors(self, level: int, cells: Ints) -> Floats:
+        """Greatest distance of the surface from the cell's chords, at edge middles and the centre; 0 if uncovered."""
+        shift = self.lattice.depth - level
+        step = 1 << shift
+        corner = cells << shift
+        grid = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0, 2], [1, 2], [2, 2]]) * (step // 2)
+        x, y = corner[:, :1] + grid[:, 0], corner[:, 1:] + grid[:, 1]
+        uv = self.lattice.uv(x, y)
+        side = inner_side(uv, uv[:, 4], self.domain)
+        first, back = keys.number(self.lattice.key(x, y) * 4 + side)
+        corners = self.surface.sample(uv.reshape(-1, 2)[first], side.reshape(-1)[first])[2][back]
+        worst = _chord_errors(corners)
+        self._add_anchors(level, cells, corners, worst)
+        held = np.isfinite(corners[:, :, 0])
+        partly = held.any(axis=1) & ~held.all(axis=1)
+        worst[partly & (self.lattice.shape[0] << level < RIM) & (self.lattice.shape[1] << level < RIM)] = np.inf
+        return worst
+
+    def _add_anchors(self, level: int, cells: Ints, p: Floats, worst: Floats) -> None:
+        """Raise ``worst`` to how far the surface is from its cell where control points stand.
+
+        So a feature between the samples of a large cell is not overlooked: where there is detail there are points.
+        """
+        if self.anchors is None:
+            self.anchors = _anchors(self.surface, self.domain)
+        uv, points = self.anchors
+        place = keys.find(quadtree.codes(self.lattice, level, cells), self._find(level, uv))
+        hit = np.flatnonzero(place >= 0)
+        cell = place[hit]
+        rect = self._rects(level, cells[cell])
+        s = ((uv[hit, 0] - rect[:, 0]) / (rect[:, 1] - rect[:, 0]))[:, None]
+        t = ((uv[hit, 1] - rect[:, 2]) / (rect[:, 3] - rect[:, 2]))[:, None]
+        a, b, c, d = (p[cell, k] for k in (0, 2, 6, 8))
+        normal = np.cross(d - a, c - b)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        offset = points[hit] - (1 - t) * ((1 - s) * a + s * b) - t * ((1 - s) * c + s * d)
+        np.fmax.at(worst, cell, np.abs((offset * normal).sum(axis=1)))
+
+
+def _anchors(surface: DCPSurface, domain: Domain) -> tuple[Floats, Floats]:
+    """(k, 2) and (k, 3): the surface where the blending functions of its points are near their greatest."""
+    knots, degrees = surface.padded, surface.degrees
+    uv = np.zeros((surface.n, 2))
+    for k in range(2):
+        column = np.arange(knots[k].shape[1])
+        inner = (column >= 1) & (column <= degrees[k][:, None])
+        total = np.where(inner, knots[k], 0).sum(axis=1)
+        middle = (knots[k][:, 0] + knots[k][:, -1]) / 2
+        uv[:, k] = np.where(degrees[k] > 0, total / np.maximum(degrees[k], 1), middle)  # Greville abscissa
+    uv = uv[domain.inside(uv)]
+    points = surface.sample(uv, None)[2]
+    covered = np.isfinite(points[:, 0])
+    return uv[covered], points[covered]
+
+
+def inner_side(uv: Floats, centre: Floats, domain: Domain) -> Ints:
+    """(n, k): limits that points of cells (n, k, 2) take so that they belong to their cell's side of every slit."""
+    side = np.zeros(uv.shape[:-1], dtype=np.int64)
+    for slit in domain.slits:
+        axis, bit = (1, 2) if slit.axis == "u" else (0, 1)
+        on = slit.holds(uv.reshape(-1, 2)).reshape(side.shape)
+        side[on & (centre[:, None, axis] < slit.at)] |= bit
+    return side
+
+
+def _chord_errors(p: Floats) -> Floats:
+    """(n,): distances for the nine points ``p (n, 9, 3)`` of cells, rows of three from the low corner up."""
+    worst = np.zeros(len(p))
+    for a, middle, b in ((0, 1, 2), (0, 3, 6), (2, 5, 8), (6, 7, 8)):
+        worst = np.fmax(worst, _off_line(p[:, a], p[:, middle], p[:, b]))
+    bow = np.fmin(_off_line(p[:, 0], p[:, 4], p[:, 8]), _off_line(p[:, 2], p[:, 4], p[:, 6]))
+    return np.fmax(worst, bow)
+
+
+def _off_line(a: Floats, middle: Floats, b: Floats) -> Floats:
+    """Distance of ``middle`` from the line a-b."""
+    along, offset = b - a, middle - a
+    length = np.maximum((along * along).sum(axis=1), 1e-300)
+    part = np.clip((offset * along).sum(axis=1) / length, 0, 1)
+    return np.linalg.norm(offset - part[:, None] * along, axis=1)

@@ -1,0 +1,252 @@
+"""From a surface and a domain to a watertight mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surface.base import keys
+from surface.base.progress import Progress, between, silent
+from surface.spline.basis import Floats, Ints
+
+from . import blocks, quadtree
+from .domain import Domain
+from .mesh import Mesh
+from .quadtree import Lattice, Leaves
+from .splitting import MOST_CELLS, SplitTests, inner_side
+from .trim import Flat, trim
+
+if TYPE_CHECKING:
+    from surface.dcp import DCPSurface
+
+MOST_ROOTS = 24  # along the longer side
+CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
+
+
+def tessellate(
+    surface: DCPSurface,
+    *,
+    max_points: int | None = None,
+    chord_error: float | None = None,
+    max_depth: int = 9,
+    min_depth: int = 0,
+    domain: Domain | None = None,
+    loop_error: float | None = None,
+    roots: tuple[int, int] | None = None,
+    flip: bool = False,
+    progress: Progress = silent,
+) -> Mesh:
+    """See :meth:`surface.DCPSurface.tessellate`."""
+    _check_limits(max_points, chord_error, max_depth, min_depth)
+    _check_sizes(loop_error, roots)
+    where = Domain.of(surface) if domain is None else domain
+    size = float(np.linalg.norm(np.ptp(surface.points, axis=0))) or 1.0
+    if max_points is None and chord_error is None:
+        chord_error = 1e-3 * size
+    scale = _lengths(surface, where)
+    joined = _joined(surface, where)
+    lattice = _lattice(where, scale, max_depth, roots, joined)
+    tests = SplitTests(surface, where, lattice, scale)
+    tests.max_points, tests.chord_error, tests.min_depth = max_points, chord_error, min_depth
+    if len(where.segments):
+        tests.follow_loops(loop_error if loop_error is not None else chord_error or 5e-4 * size)
+    leaves, inner = quadtree.grow(lattice, tests.split, between(progress, 0.0, 0.45))
+    progress("triangles", 0.45)
+    corners, owner = quadtree.triangulate(lattice, leaves, inner)
+    nodes, _, triangles = keys.unique(corners)
+    flat = Flat(lattice.uv(*lattice.point(nodes)), triangles, owner)
+    if len(where.segments):
+        progress("trimming", 0.55)
+        flat = trim(flat, where, scale)
+    return _finish(surface, flat, where, lattice, leaves, flip, between(progress, 0.6, 1.0))
+
+
+def _check_limits(max_points: int | None, chord_error: float | None, max_depth: int, min_depth: int) -> None:
+    if max_points is not None and max_points < 1:
+        raise ValueError(f"max_points: must be at least 1, not {max_points}")
+    if chord_error is not None and not chord_error > 0:
+        raise ValueError(f"chord_error: must be positive, not {chord_error}")
+    if not 0 <= min_depth <= max_depth <= 20:
+        raise ValueError(f"min_depth, max_depth: need 0 <= {min_depth} <= {max_depth} <= 20")
+
+
+def _check_sizes(loop_error: float | None, roots: tuple[int, int] | None) -> None:
+    if loop_error is not None and not loop_error > 0:
+        raise ValueError(f"loop_error: must be positive, not {loop_error}")
+    if roots is None:
+        return
+    if np.shape(roots) != (2,) or not all(int(count) == count >= 1 for count in roots):
+        raise ValueError(f"roots: needs two whole numbers of 1 or more, got {roots!r}")
+    if roots[0] * roots[1] > MOST_CELLS:
+        raise ValueError(f"roots: {roots[0]} x {roots[1]} cells are more than {MOST_CELLS}")
+
+
+def _lengths(surface: DCPSurface, domain: Domain) -> tuple[float, float]:
+    """Mean length on the surface per unit of u and of v."""
+    u0, u1, v0, v1 = domain.rect
+    steps = (np.arange(24) + 0.5) / 24
+    uv = np.stack(np.meshgrid(u0 + steps * (u1 - u0), v0 + steps * (v1 - v0)), axis=-1).reshape(-1, 2)
+    uv = uv[domain.inside(uv)]
+    out = surface.sample_derivatives(uv)[1]
+    su, sv = out[:, 1], out[:, 2]
+    found = np.isfinite(su).all(axis=1) & np.isfinite(sv).all(axis=1)
+    if not found.any():
+        return 1.0, 1.0
+    lengths = [float(np.linalg.norm(d[found], axis=1).mean()) for d in (su, sv)]
+    low = 1e-6 * max(*lengths, 1e-300)
+    return max(lengths[0], low), max(lengths[1], low)
+
+
+def _lattice(
+    domain: Domain, scale: tuple[float, float], depth: int, roots: tuple[int, int] | None, joined: tuple[bool, bool]
+) -> Lattice:
+    """Roots bordered by the rectangle and by the lines of all slits, roughly square on the surface."""
+    u0, u1, v0, v1 = domain.rect
+    cuts: tuple[list[float], list[float]] = ([u0, u1], [v0, v1])
+    for slit in domain.slits:
+        along, across = (0, 1) if slit.axis == "u" else (1, 0)
+        cuts[along].extend([slit.start, slit.end])
+        cuts[across].append(slit.at)
+    lines_u, lines_v = np.unique(np.clip(cuts[0], u0, u1)), np.unique(np.clip(cuts[1], v0, v1))
+    if roots is not None:
+        return Lattice(_divide(lines_u, (u1 - u0) / roots[0]), _divide(lines_v, (v1 - v0) / roots[1]), depth, joined)
+    extent = (u1 - u0) * scale[0], (v1 - v0) * scale[1]
+    least = min(float(np.diff(lines_u).min()) * scale[0], float(np.diff(lines_v).min()) * scale[1])
+    edge = max(min(*extent, 1.2 * least), max(extent) / MOST_ROOTS)
+    edge_u = min(edge, extent[0] / 3) if joined[0] else edge  # a ring of fewer than three cells would fold flat
+    edge_v = min(edge, extent[1] / 3) if joined[1] else edge
+    return Lattice(_divide(lines_u, edge_u / scale[0]), _divide(lines_v, edge_v / scale[1]), depth, joined)
+
+
+def _joined(surface: DCPSurface, domain: Domain) -> tuple[bool, bool]:
+    """In which directions does the rectangle go once around a closed surface?"""
+    u0, u1, v0, v1 = domain.rect
+    return surface.closed[0] == (u0, u1), surface.closed[1] == (v0, v1)
+
+
+def _divide(borders: Floats, edge: float) -> Floats:
+    """Borders with equal parts of about ``edge`` put between them."""
+    pieces = np.maximum(1, np.rint(np.diff(borders) / edge).astype(np.int64))
+    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(borders, borders[1:], pieces, strict=False)]
+    return np.concatenate([*parts, borders[-1:]])
+
+
+def _finish(
+    surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool, progress: Progress
+) -> Mesh:
+    """Split vertices on slits, evaluate, drop uncovered triangles, order by cell, make the lists."""
+    flat, side = _open_slits(flat, domain)
+    code = _codes(flat, lattice, leaves)
+    place, out = _evaluated(surface, flat.uv, side, code, between(progress, 0.1, 0.7))
+    keep = (side >= 0)[flat.triangles].all(axis=1)
+    if not keep.all():
+        flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])
+        code = _codes(flat, lattice, leaves)
+    if any(lattice.joined):
+        flat = _weld(flat, side, domain, lattice.joined)
+    progress("cells", 0.7)
+    order = _used_in_order(flat, code)
+    code, out = code[order], out[place[order]]
+    rank = np.zeros(len(flat.uv), dtype=np.int32)
+    rank[order] = np.arange(len(order))
+    triangles = rank[flat.triangles]
+    uv, supports = np.ascontiguousarray(flat.uv[order]), surface.all_supports
+    start = blocks.group(code, lattice.depth, uv, supports, surface.bins) if len(order) else np.zeros(1, np.int64)
+    list_start, list_ids = blocks.point_lists(start, uv, supports, surface.bins)
+    vertices = out[:, 0].copy()
+    normals = unit_normals(vertices, out[:, 1], out[:, 2], triangles)
+    progress("cells", 1.0)
+    return Mesh(
+        vertices=vertices,
+        normals=-normals if flip else normals,
+        triangles=np.ascontiguousarray(triangles[:, ::-1]) if flip else triangles,
+        uv=uv,
+        side=side[order],
+        cell=np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start)),
+        cell_start=start,
+        list_start=list_start,
+        list_ids=list_ids,
+        leaves=len(leaves),
+        flip=flip,
+    )
+
+
+def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
+    """Give the vertices on an open slit one copy per side; returns the limit each vertex takes."""
+    if not domain.slits:
+        return flat, np.zeros(len(flat.uv), dtype=np.int64)
+    side = inner_side(flat.uv[flat.triangles], flat.uv[flat.triangles].mean(axis=1), domain)
+    copies, _, triangles = keys.unique(flat.triangles * 4 + side)
+    return Flat(flat.uv[copies // 4], triangles, flat.owner), copies % 4
+
+
+def _evaluated(surface: DCPSurface, uv: Floats, side: Ints, code: Ints, progress: Progress) -> tuple[Ints, Floats]:
+    """S, S_u and S_v ``(m, 3, 3)``, neighbours after each other, and where each vertex stands in that.
+
+    ``side`` gets the limits that were taken.
+    """
+    order, out = np.argsort(code, kind="stable"), np.zeros((len(uv), 3, 3))
+    for first in range(0, len(order), CHUNK):
+        progress("vertices", first / len(order))
+        part = order[first : first + CHUNK]
+        side[part], out[first : first + CHUNK] = surface.sample_derivatives(uv[part], side[part])
+    place = np.zeros(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    return place, out
+
+
+def _weld(flat: Flat, side: Ints, domain: Domain, joined: tuple[bool, bool]) -> Flat:
+    """Use the vertices at the start of a closed direction instead of those at its end."""
+    target = np.arange(len(flat.uv))
+    for axis in range(2):
+        if not joined[axis]:
+            continue
+        start, end = domain.rect[2 * axis : 2 * axis + 2]
+        low, high = np.flatnonzero(flat.uv[:, axis] == start), np.flatnonzero(flat.uv[:, axis] == end)
+        ours, theirs = (_seam_keys(flat.uv[at, 1 - axis], side[at], 1 - axis) for at in (low, high))
+        _, first, second = np.intersect1d(ours, theirs, assume_unique=True, return_indices=True)
+        target[high[second]] = low[first]
+    target = target[target]  # the corner of a torus goes both ways
+    triangles = target[flat.triangles]
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return Flat(flat.uv, triangles[whole], flat.owner[whole])
+
+
+def _seam_keys(along: Floats, side: Ints, axis: int) -> np.ndarray:
+    """(k,) complex: place along a seam, and the limit in that direction."""
+    return along + 1j * (side >> axis & 1)
+
+
+def _codes(flat: Flat, lattice: Lattice, leaves: Leaves) -> Ints:
+    """(m,) code of the first leaf that uses a vertex; the greatest number for vertices that none uses."""
+    shift = lattice.depth - leaves.level
+    x, y = leaves.cell[:, 0] << shift, leaves.cell[:, 1] << shift
+    unit = 1 << lattice.depth
+    root = (y >> lattice.depth) * lattice.shape[0] + (x >> lattice.depth)
+    leaf_code = (root << (2 * lattice.depth)) | blocks.morton(x % unit, y % unit)
+    code = np.full(len(flat.uv), np.iinfo(np.int64).max)
+    blocks.least_codes(flat.triangles, flat.owner, leaf_code, code)
+    return code
+
+
+def _used_in_order(flat: Flat, code: Ints) -> Ints:
+    """Used vertices, rising by code."""
+    used = np.zeros(len(flat.uv), dtype=bool)
+    used[flat.triangles] = True
+    order = np.argsort(code, kind="stable")
+    return order[used[order]]
+
+
+def unit_normals(points: Floats, su: Floats, sv: Floats, triangles: np.ndarray) -> Floats:
+    """(m, 3) unit vectors along S_u x S_v; where that vanishes, the mean of the triangles around."""
+    normal, bad = np.zeros(su.shape), np.zeros(len(su), dtype=np.bool_)
+    blocks.unit_cross(su, sv, normal, bad)
+    if bad.any():
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        face = np.cross(b - a, c - a)
+        total = np.zeros_like(points)
+        for k in range(3):
+            np.add.at(total, triangles[:, k], face)
+        normal[bad] = total[bad] / np.maximum(np.linalg.norm(total[bad], axis=1), 1e-300)[:, None]
+    return normal

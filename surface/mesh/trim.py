@@ -1,0 +1,381 @@
+"""Cut a conforming triangulation of (u, v) along trim loops, without slivers.
+
+The way is that of isosurface stuffing (Labelle and Shewchuk 2007) in two dimensions: vertices that lie close to
+a loop are moved onto it, then the remaining crossed edges are cut, each once for both its triangles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base import keys
+from surface.spline.basis import Floats, Ints
+
+from . import flips, loops
+from .domain import Domain
+
+ROUNDS = 4  # a triangle at a sharp corner is split so many times at most
+ALONG = 0.5, 0.25, 0.75, 0.1, 0.9  # where on an edge it is looked whether it runs through the inside
+SNAP = 0.28  # of the shortest edge at a vertex: nearer crossings pull the vertex onto the loop
+LOCKED = -2
+
+
+@dataclass
+class Flat:
+    """A triangulation of (u, v).
+
+    Attributes
+    ----------
+    uv : (m, 2) float64
+    triangles : (t, 3) int64, counter-clockwise
+    owner : (t,) int64 leaf cell of every triangle
+    """
+
+    uv: Floats
+    triangles: Ints
+    owner: Ints
+
+
+def trim(flat: Flat, domain: Domain, scale: tuple[float, float]) -> Flat:
+    """The part of ``flat`` inside the domain's loops.
+
+    Parameters
+    ----------
+    flat : a conforming triangulation of the rectangle
+    domain : with loops
+    scale : lengths per unit of u and of v, so that "near" means near on the surface
+    """
+    flat = _near_or_inside(flat, domain)
+    if not len(flat.triangles):
+        return flat
+    lines = _lines(flat.uv, domain)
+    fixed = np.zeros(len(flat.uv), dtype=bool)
+    flat, lines, fixed = _place_corners(flat, domain, scale, lines, fixed)
+    sign = np.where(domain.inside(flat.uv), 1, -1)
+    sign[fixed] = 0
+    _snap(flat, domain, scale, lines, sign)
+    flat, sign = _uncover(flat, domain, sign)
+    flat = _without_flat(_merged(_cut(flat, domain, scale, sign)))
+    flips.improve(flat.uv * np.asarray(scale), flat.triangles, lines_of_edges(flat.uv, domain))
+    return compact(flat)
+
+
+def _merged(flat: Flat) -> Flat:
+    """Make one vertex of the ends of edges without length: a loop's point that two vertices were moved to."""
+    edges = _edges(flat.triangles)
+    edges = edges[(flat.uv[edges[:, 0]] == flat.uv[edges[:, 1]]).all(axis=1)]
+    target = np.arange(len(flat.uv))
+    while (target[edges[:, 0]] != target[edges[:, 1]]).any():
+        least = np.minimum(target[edges[:, 0]], target[edges[:, 1]])
+        np.minimum.at(target, edges.ravel(), np.repeat(least, 2))
+    triangles = target[flat.triangles]
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return Flat(flat.uv, triangles[whole], flat.owner[whole])
+
+
+def _without_flat(flat: Flat) -> Flat:
+    """Drop triangles without area that have two edges on the border: what they leave is the same domain."""
+    while True:
+        a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
+        directed = np.sort(flat.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        width = int(directed.max(initial=0)) + 1
+        _, _, back = keys.unique(directed[:, 0] * width + directed[:, 1])
+        alone = (np.bincount(back)[back].reshape(-1, 3) == 1).sum(axis=1)
+        drop = (_cross(b - a, c - a) <= 0) & (alone >= 2)
+        if not drop.any():
+            return flat
+        flat = Flat(flat.uv, flat.triangles[~drop], flat.owner[~drop])
+
+
+def compact(flat: Flat) -> Flat:
+    """Drop vertices that no triangle uses."""
+    used = np.zeros(len(flat.uv), dtype=bool)
+    used[flat.triangles] = True
+    return Flat(flat.uv[used], (np.cumsum(used) - 1)[flat.triangles], flat.owner)
+
+
+def lines_of_edges(uv: Floats, domain: Domain) -> Ints:
+    """(m,) bit mask per vertex: which slits it stands on. An edge lies on a slit if its ends share a bit."""
+    mask = np.zeros(len(uv), dtype=np.int64)
+    for bit, slit in enumerate(domain.slits):
+        across, along = (1, 0) if slit.axis == "u" else (0, 1)
+        on = (uv[:, across] == slit.at) & (uv[:, along] >= slit.start) & (uv[:, along] <= slit.end)
+        mask[on] |= 1 << bit
+    return mask
+
+
+def _near_or_inside(flat: Flat, domain: Domain) -> Flat:
+    """Drop triangles with no corner inside: nothing of them is kept."""
+    sign = np.where(domain.inside(flat.uv), 1, -1)
+    keep = np.any(sign[flat.triangles] > 0, axis=1)
+    for a, b in _covered(flat, domain, sign)[0]:
+        keep[_beside(flat.triangles, a, b)] = True
+    # A corner of a loop may lie in a triangle whose own corners are all outside.
+    for tip in _all_corners(domain, (1.0, 1.0)):
+        keep |= _weights_in(flat, tip).min(axis=1) >= 0
+    return compact(Flat(flat.uv, flat.triangles[keep], flat.owner[keep]))
+
+
+def _all_corners(domain: Domain, scale: tuple[float, float]) -> Floats:
+    rings = [np.asarray(loop) for loop in domain.loops]
+    return np.concatenate([*(ring[loops.corners(ring, scale)] for ring in rings), np.asarray(domain.marks)])
+
+
+def _lines(uv: Floats, domain: Domain) -> Ints:
+    """(m,) the slit or border each vertex may slide along, -1 for free ones, LOCKED where two meet or at an end."""
+    line = np.full(len(uv), -1, dtype=np.int64)
+    u0, u1, v0, v1 = domain.rect
+    groups = [uv[:, 0] == u0, uv[:, 0] == u1, uv[:, 1] == v0, uv[:, 1] == v1]
+    groups += [(lines_of_edges(uv, domain) >> bit & 1).astype(bool) for bit in range(len(domain.slits))]
+    for index, on in enumerate(groups):
+        line[on] = np.where(line[on] == -1, index, LOCKED)
+    for slit in domain.slits:
+        along = 0 if slit.axis == "u" else 1
+        ends = (uv[:, 1 - along] == slit.at) & ((uv[:, along] == slit.start) | (uv[:, along] == slit.end))
+        line[ends] = LOCKED
+    return line
+
+
+def _weights_in(flat: Flat, point: Floats) -> Floats:
+    """(t, 3): barycentric coordinates of a point in every triangle; -inf in those without area, which hold nothing."""
+    a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
+    area = _cross(b - a, c - a)
+    parts = np.stack([_cross(b - point, c - point), _cross(c - point, a - point), _cross(a - point, b - point)], 1)
+    shares = parts / np.where(area > 0, area, 1.0)[:, None]
+    shares[area <= 0] = -np.inf
+    return shares
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _place_corners(
+    flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, fixed: np.ndarray
+) -> tuple[Flat, Ints, np.ndarray]:
+    """Put a vertex at every sharp corner and mark of a loop, and one where each of its sides leaves the corner's fan.
+
+    So the sides at a corner are edges of the mesh, and a wedge narrower than a triangle is not lost.
+    """
+    for mark in np.asarray(domain.marks):
+        flat, line, fixed = _place(flat, mark, line, fixed, slides=True)
+    tips = _all_corners(domain, scale)
+    for tip in tips:
+        flat, line, fixed = _place(flat, tip, line, fixed)
+    for tip in tips:
+        at = np.flatnonzero((flat.uv == tip).all(axis=1) & fixed)
+        for point in _leaving(flat, domain, int(at[0])) if len(at) else ():
+            flat, line, fixed = _place(flat, point, line, fixed)
+    return flat, line, fixed
+
+
+def _place(
+    flat: Flat, point: Floats, line: Ints, fixed: np.ndarray, *, slides: bool = False
+) -> tuple[Flat, Ints, np.ndarray]:
+    """Move a close free vertex to ``point``, or split a triangle there.
+
+    ``slides``: one of the rectangle's border, too, along it or where it is so close that the border bends by nothing.
+    """
+    inside = _weights_in(flat, point)
+    triangle = int(np.argmax(inside.min(axis=1)))
+    share = inside[triangle]
+    if share.min() < -1e-9:
+        return flat, line, fixed
+    nearest = flat.triangles[triangle, int(np.argmax(share))]
+    axis = line[nearest] // 2  # borders 0 and 1 fix u, 2 and 3 fix v
+    border = slides and 0 <= axis < 2 and (flat.uv[nearest, axis] == point[axis] or share.max() >= 0.9)
+    if share.max() > 0.7 and (border or line[nearest] == -1) and not fixed[nearest]:
+        flat.uv[nearest] = point
+        fixed[nearest] = True
+    elif share.max() < 0.9:
+        flat = _insert(flat, point, triangle, share)
+        line, fixed = np.append(line, -1), np.append(fixed, True)
+    return flat, line, fixed
+
+
+def _leaving(flat: Flat, domain: Domain, vertex: int) -> Floats:
+    """(k, 2): where loops cross the edges opposite to a vertex in the triangles around it."""
+    around = flat.triangles[(flat.triangles == vertex).any(axis=1)]
+    opposite = around[around != vertex].reshape(-1, 2)
+    a, b = flat.uv[opposite[:, 0]][:, None], flat.uv[opposite[:, 1]][:, None]
+    start, along = domain.segments[None, :, :2], domain.segments[None, :, 2:] - domain.segments[None, :, :2]
+    det = _cross(b - a, along)
+    safe = np.where(det == 0, 1.0, det)
+    t, s = _cross(start - a, along) / safe, _cross(start - a, b - a) / safe
+    hit = (det != 0) & (t >= 0) & (t <= 1) & (s >= 0) & (s < 1)
+    edge, segment = np.nonzero(hit)
+    return a[edge, 0] + t[edge, segment][:, None] * (b - a)[edge, 0]
+
+
+def _insert(flat: Flat, point: Floats, triangle: int, share: Floats) -> Flat:
+    """Split one triangle in three at ``point``, or the two beside an edge in four where it is close to that edge."""
+    new = len(flat.uv)
+    a, b, c = np.roll(flat.triangles[triangle], -int(np.argmin(share)))  # b-c is the nearest edge
+    hit = [triangle]
+    added = [(a, b, new), (a, new, c)]
+    if share.min() < 0.15:
+        beside = _across(flat.triangles, b, c)
+        if beside is not None:
+            d = int(flat.triangles[beside].sum() - b - c)
+            hit.append(beside)
+            added += [(d, c, new), (d, new, b)]
+    if len(hit) == 1:
+        added.append((b, c, new))
+    keep = np.ones(len(flat.triangles), dtype=bool)
+    keep[hit] = False
+    owner = [flat.owner[triangle]] * len(added)
+    if len(hit) == 2:
+        owner[2:] = [flat.owner[hit[1]]] * 2
+    return Flat(
+        np.vstack([flat.uv, point]),
+        np.vstack([flat.triangles[keep], added]),
+        np.concatenate([flat.owner[keep], owner]),
+    )
+
+
+def _across(triangles: Ints, b: int, c: int) -> int | None:
+    """The triangle that holds the directed edge c-b, if any."""
+    for k in range(3):
+        found = np.flatnonzero((triangles[:, k] == c) & (triangles[:, (k + 1) % 3] == b))
+        if len(found):
+            return int(found[0])
+    return None
+
+
+def _edges(triangles: Ints) -> Ints:
+    """(e, 2) undirected edges, each once, smaller index first."""
+    pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    width = int(triangles.max(initial=0)) + 1
+    key = np.unique(pairs[:, 0] * width + pairs[:, 1])
+    return np.stack([key // width, key % width], axis=1)
+
+
+def _snap(flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, sign: Ints) -> None:
+    """Move vertices close to a loop onto it, in place, and set their sign to 0."""
+    edges = _edges(flat.triangles)
+    length = np.linalg.norm((flat.uv[edges[:, 1]] - flat.uv[edges[:, 0]]) * np.asarray(scale), axis=1)
+    shortest = np.full(len(flat.uv), np.inf)
+    np.minimum.at(shortest, edges.ravel(), np.repeat(length, 2))
+    crossed = sign[edges[:, 0]] * sign[edges[:, 1]] < 0
+    edges, length = edges[crossed], length[crossed]
+    t = loops.crossings(domain.segments, flat.uv[edges[:, 0]], flat.uv[edges[:, 1]])
+    where = flat.uv[edges[:, 0]] + t[:, None] * (flat.uv[edges[:, 1]] - flat.uv[edges[:, 0]])
+    near = np.concatenate([t, 1 - t]) * np.concatenate([length, length])
+    vertex, other = np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([edges[:, 1], edges[:, 0]])
+    may = (line[vertex] == -1) | ((line[vertex] >= 0) & (line[vertex] == line[other]))
+    chosen = np.flatnonzero(may & (near < SNAP * shortest[vertex]))
+    chosen = chosen[np.argsort(-near[chosen], kind="stable")]  # the nearest crossing is written last
+    flat.uv[vertex[chosen]] = np.concatenate([where, where])[chosen]
+    sign[vertex[chosen]] = 0
+
+
+def _uncover(flat: Flat, domain: Domain, sign: Ints) -> tuple[Flat, Ints]:
+    """Split edges that run through the inside though neither end lies there, where they cross a loop.
+
+    At sharp corners such edges are left by vertices that were moved onto a loop; what lies beside them would be lost.
+    """
+    for _ in range(ROUNDS):
+        edges, within = _covered(flat, domain, sign)
+        if not len(edges):
+            break
+        outer = np.where(sign[edges[:, 0]] < 0, edges[:, 0], edges[:, 1])
+        t = loops.crossings(domain.segments, within, flat.uv[outer])
+        points = within + t[:, None] * (flat.uv[outer] - within)
+        for (a, b), point in zip(edges, points, strict=True):
+            flat = _split(flat, int(a), int(b), point)
+        sign = np.append(sign, np.zeros(len(edges), sign.dtype))
+    return flat, sign
+
+
+def _covered(flat: Flat, domain: Domain, sign: Ints) -> tuple[Ints, Floats]:
+    """Edges (e, 2) without an end inside, one outside, that run through the inside; and a point of each in there.
+
+    Edges of triangles that moved vertices turned over are left alone: halves of those would be kept upside down.
+    """
+    a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
+    turned = _edges(flat.triangles[_cross(b - a, c - a) <= 0])
+    edges = _edges(flat.triangles)
+    edges = edges[~np.isin(edges @ [len(flat.uv), 1], turned @ [len(flat.uv), 1])]
+    edges = edges[(sign[edges].max(axis=1) <= 0) & (sign[edges].min(axis=1) < 0)]
+    a, b = flat.uv[edges[:, 0]], flat.uv[edges[:, 1]]
+    tried = np.stack([a + t * (b - a) for t in ALONG])
+    inside = domain.inside(tried.reshape(-1, 2)).reshape(len(ALONG), -1)
+    hit = np.flatnonzero(inside.any(axis=0))
+    return edges[hit], tried[inside[:, hit].argmax(axis=0), hit]
+
+
+def _split(flat: Flat, a: int, b: int, point: Floats) -> Flat:
+    """Put a vertex on the edge between two, for the triangles on both its sides."""
+    beside = _beside(flat.triangles, a, b)
+    halves = [np.where(flat.triangles[beside] == end, len(flat.uv), flat.triangles[beside]) for end in (a, b)]
+    keep = np.ones(len(flat.triangles), dtype=bool)
+    keep[beside] = False
+    triangles = np.concatenate([flat.triangles[keep], *halves])
+    owner = np.concatenate([flat.owner[keep], flat.owner[beside], flat.owner[beside]])
+    return Flat(np.vstack([flat.uv, point]), triangles, owner)
+
+
+def _beside(triangles: Ints, a: int, b: int) -> Ints:
+    """The triangles that have an edge, in whichever direction."""
+    return np.flatnonzero(((triangles == a) | (triangles == b)).sum(axis=1) == 2)
+
+
+def _cut(flat: Flat, domain: Domain, scale: tuple[float, float], sign: Ints) -> Flat:
+    """Keep inner triangles, drop outer ones, clip crossed ones."""
+    signs = sign[flat.triangles]
+    low, high = signs.min(axis=1), signs.max(axis=1)
+    keep = (low >= 0) & (high > 0)
+    on = (low == 0) & (high == 0)
+    keep[on] = domain.inside(flat.uv[flat.triangles[on]].mean(axis=1))
+    crossed = np.flatnonzero((low < 0) & (high > 0))
+    uv, new, owner = _clip(flat, domain, scale, sign, crossed)
+    return Flat(
+        uv,
+        np.concatenate([flat.triangles[keep], new]),
+        np.concatenate([flat.owner[keep], flat.owner[owner]]),
+    )
+
+
+def _clip(
+    flat: Flat, domain: Domain, scale: tuple[float, float], sign: Ints, crossed: Ints
+) -> tuple[Floats, Ints, Ints]:
+    """Vertices with the cut ones appended, triangles of the clipped cells, and the triangle each came from."""
+    triangles = flat.triangles[crossed]
+    width = len(flat.uv)
+    pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 3, 2), axis=2)
+    is_cut = sign[pairs[:, :, 0]] * sign[pairs[:, :, 1]] < 0
+    key = pairs[:, :, 0] * width + pairs[:, :, 1]
+    cut_keys = np.unique(key[is_cut])
+    a, b = flat.uv[cut_keys // width], flat.uv[cut_keys % width]
+    t = loops.crossings(domain.segments, a, b)[:, None]
+    uv = np.concatenate([flat.uv, a + t * (b - a)])
+    node = np.where(is_cut, width + np.searchsorted(cut_keys, key), -1)  # (n, 3) cut vertex on edges 01, 12, 20
+    # Turn every triangle so that its odd one out (the only negative, else the only positive) comes first.
+    signs = sign[triangles]
+    first = np.where((signs < 0).sum(axis=1) == 1, np.argmin(signs, axis=1), np.argmax(signs, axis=1))
+    turn = (first[:, None] + np.arange(3)) % 3
+    tri, edge, s = (np.take_along_axis(array, turn, axis=1) for array in (triangles, node, signs))
+    return uv, *_assemble(tri, edge, s, uv * np.asarray(scale), crossed)
+
+
+def _assemble(tri: Ints, edge: Ints, s: Ints, xy: Floats, crossed: Ints) -> tuple[Ints, Ints]:
+    """Triangles of the inner parts by case of corner signs; see :func:`_clip`."""
+    tip = s[:, 0] > 0  # one positive, two negative
+    left = (s[:, 0] < 0) & (s[:, 1] > 0) & (s[:, 2] == 0)
+    right = (s[:, 0] < 0) & (s[:, 1] == 0) & (s[:, 2] > 0)
+    quad = (s[:, 0] < 0) & (s[:, 1] > 0) & (s[:, 2] > 0)
+    p, q, c, d = edge[:, 0], tri[:, 1], tri[:, 2], edge[:, 2]
+    short = np.linalg.norm(xy[p] - xy[c], axis=1) < np.linalg.norm(xy[q] - xy[d], axis=1)
+    parts = [
+        (tip, tri[:, 0], p, d),
+        (left, p, q, c),
+        (right, q, c, d),
+        (quad & short, p, q, c),
+        (quad & short, p, c, d),
+        (quad & ~short, p, q, d),
+        (quad & ~short, q, c, d),
+    ]
+    new = np.concatenate([np.stack([i[m], j[m], k[m]], axis=1) for m, i, j, k in parts])
+    return new, np.concatenate([crossed[m] for m, *_ in parts])

@@ -1,0 +1,80 @@
+"""The rational weights of a surface as a sparse matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surface.base.checks import check_sides, check_uv
+
+from .basis import Floats, Ints
+from .closed import wrap
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+    from surface.dcp import DCPSurface
+
+CHUNK = 8192  # samples per pass: bounds the scratch memory
+
+
+def basis_matrix(surface: DCPSurface, uv: ArrayLike, derivative: tuple[int, int], side: ArrayLike | None) -> csr_matrix:
+    """See :meth:`surface.DCPSurface.basis_matrix`."""
+    return basis_matrices(surface, uv, [derivative], side)[0]
+
+
+def basis_matrices(
+    surface: DCPSurface, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None = None
+) -> list[csr_matrix]:
+    """Several of :func:`basis_matrix` at the same samples, for hardly more than the time of one."""
+    from scipy.sparse import csr_matrix
+
+    from .kernels import TINY
+
+    for wanted in derivatives:
+        if tuple(wanted) not in ((0, 0), (1, 0), (0, 1)):
+            raise ValueError(f"derivative: must be (0, 0), (1, 0) or (0, 1), not {wanted!r}")
+    samples = wrap(check_uv(uv), surface.closed)
+    data, columns, start = _rows(surface, samples, check_sides(samples, side))
+    rows, total = _sums(data, start)
+    if not (total[:, 0] > TINY).all():  # nothing covers there, or only the limit from another side
+        data, columns, start = _rows(surface, samples, surface.sample(uv, side)[1])
+        rows, total = _sums(data, start)
+    columns %= surface.n  # shifted copies are the same point
+    value = data[:, 0] / total[rows, 0]
+    out = []
+    for u, v in derivatives:
+        k = 2 * v + u
+        ratio = value if k == 0 else (data[:, k] - value * total[rows, k]) / total[rows, 0]
+        matrix = csr_matrix((ratio, columns.copy(), start.copy()), shape=(len(samples), surface.n))
+        matrix.sum_duplicates()
+        out.append(matrix)
+    return out
+
+
+def _sums(data: Floats, start: Ints) -> tuple[Ints, Floats]:
+    """The row of every entry of ``data (k, 3)``, and the sums (m, 3) over each row."""
+    rows = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    return rows, np.stack([np.bincount(rows, data[:, k], len(start) - 1) for k in range(3)], axis=1)
+
+
+def _rows(surface: DCPSurface, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:
+    """b w and its derivatives (k, 3), columns (k,) and row starts (m + 1,), a chunk at a time."""
+    from . import kernels
+
+    data, columns, counts = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int32)], []
+    arrays, bins = surface.arrays(), surface.bin_arrays()
+    for first in range(0, len(samples), CHUNK):
+        part, sub = samples[first : first + CHUNK], sides[first : first + CHUNK]
+        capacity = kernels.row_capacity(*bins[:3], part)
+        chunk, ids = np.zeros((capacity, 3)), np.zeros(capacity, dtype=np.int32)
+        start = np.zeros(len(part) + 1, dtype=np.int64)
+        used = kernels.fill_rows(*arrays[:4], arrays[5], *bins, part, sub, chunk, ids, start)
+        data.append(chunk[:used].copy())
+        columns.append(ids[:used].copy())
+        counts.append(np.diff(start))
+    starts = np.concatenate([[0], *counts]).cumsum()
+    return np.concatenate(data), np.concatenate(columns), starts

@@ -1,0 +1,75 @@
+"""NURBS surfaces as control points with local knots."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surface.base.checks import numbers
+
+from .basis import MAX_DEGREE, Floats
+
+
+def nurbs_arrays(
+    degree_u: int,
+    degree_v: int,
+    knots_u: ArrayLike,
+    knots_v: ArrayLike,
+    control_points: ArrayLike,
+    weights: ArrayLike | None = None,
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Control points of a NURBS surface, each with its own slice of the knot vectors.
+
+    Parameters
+    ----------
+    degree_u, degree_v : 0 to 7
+    knots_u, knots_v : (nu + degree_u + 1,), (nv + degree_v + 1,) float64
+    control_points : (nu, nv, 3) float64
+    weights : (nu, nv) float64, positive; ones if left out
+
+    Returns
+    -------
+    points (nu * nv, 3), weights (nu * nv,), knots_u (nu * nv, degree_u + 2), knots_v (nu * nv, degree_v + 2)
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit together, a degree that is no whole number from 0 to 7, numbers that are not
+        finite, weights that are not positive, knots that decrease; names the argument and the index.
+    """
+    net = numbers(control_points, "control_points")
+    if net.ndim != 3 or net.shape[2] != 3:
+        raise ValueError(f"control_points: shape {net.shape}, expected (nu, nv, 3)")
+    if not net.size:
+        raise ValueError(f"control_points: empty, shape {net.shape}")
+    _check_grid(np.asarray(np.isfinite(net).all(axis=2)), net, "control_points", "finite")
+    nu, nv = net.shape[:2]
+    w = np.ones((nu, nv)) if weights is None else numbers(weights, "weights")
+    if w.shape != (nu, nv):
+        raise ValueError(f"weights: shape {w.shape}, expected {(nu, nv)}")
+    _check_grid(np.asarray(np.isfinite(w) & (w > 0)), w, "weights", "positive and finite")
+    local_u = _windows(knots_u, "u", nu, degree_u)
+    local_v = _windows(knots_v, "v", nv, degree_v)
+    return net.reshape(-1, 3), w.ravel(), np.repeat(local_u, nv, axis=0), np.tile(local_v, (nu, 1))
+
+
+def _check_grid(good: np.ndarray, values: Floats, name: str, wanted: str) -> None:
+    if not good.all():
+        i, j = np.argwhere(~good)[0]
+        raise ValueError(f"{name}[{i}, {j}]: must be {wanted}, got {values[i, j].tolist()}")
+
+
+def _windows(knots: ArrayLike, axis: str, count: int, degree: int) -> Floats:
+    """(count, degree + 2): the knots each blending function along one direction stands on."""
+    if degree != int(degree) or not 0 <= degree <= MAX_DEGREE:
+        raise ValueError(f"degree_{axis}: must be a whole number from 0 to {MAX_DEGREE}, not {degree}")
+    row = numbers(knots, f"knots_{axis}")
+    if row.shape != (count + degree + 1,):
+        raise ValueError(
+            f"knots_{axis}: shape {row.shape}, expected ({count + degree + 1},): {count} points of degree {degree}"
+        )
+    falls = ~(np.diff(row) >= 0)
+    if falls.any():
+        k = int(np.argmax(falls)) + 1
+        raise ValueError(f"knots_{axis}[{k}]: {row[k]} after {row[k - 1]}; knots must be finite and not decrease")
+    return np.lib.stride_tricks.sliding_window_view(row, degree + 2).copy()

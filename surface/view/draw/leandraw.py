@@ -1,0 +1,154 @@
+"""Drawing a head in a hurry: one set of buffers for all parts of a program, one draw for all that are told the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from surface.head.posing.leanhead import LeanHead, LeanPart
+from surface.view.draw import materials
+from surface.view.scene.parts import Moving, ViewPart, static_buffers
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from surface.head import Head
+    from surface.view.scene.openings import Openings
+
+Ranges = Sequence[tuple[int, int]]
+
+
+class LeanEvaluator:
+    """The head's own engine for what is drawn of it, see :class:`surface.head.posing.leanhead.LeanHead`.
+
+    Parameters
+    ----------
+    head : its parts have lean triangles.
+    level : "full" or "fast". openings : whose vertices are read, too. reason : why it was chosen.
+    """
+
+    name = "cpu"
+
+    def __init__(self, head: Head, level: str, openings: Openings, reason: str) -> None:
+        parts = sorted(head.parts, key=lambda part: materials.order(part.material))
+        self.reason, self.lean = reason, LeanHead(head, parts, level, openings.read_vertices())
+        self._of = {lean.part.name: lean for lean in self.lean.parts}
+        self._rows: dict[tuple[str, int], tuple[np.ndarray, np.ndarray]] = {}
+
+    def pose(self, values: np.ndarray) -> None:
+        self.lean.pose(values)
+
+    def positions(self, part: ViewPart, ids: np.ndarray) -> np.ndarray:
+        key = part.name, id(ids)
+        if key not in self._rows:
+            self._rows[key] = ids, self._of[part.name].rows(ids)
+        return self.lean.vertices[self._rows[key][1]]
+
+    def rotation(self) -> np.ndarray:
+        return self.lean.turn
+
+    def update(self, drawn: Sequence[Any]) -> int:
+        return sum(one.upload() for one in drawn)
+
+    def release(self) -> None:
+        pass
+
+
+class LeanBuffers:
+    """Buffers of all parts that one program draws, one after the other.
+
+    Parameters
+    ----------
+    parts : neighbours in the lean head. static : per-vertex data of a part that never changes, by shader input.
+    """
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        lean: LeanHead,
+        parts: Sequence[LeanPart],
+        program: moderngl.Program,
+        static: Callable[[LeanPart], Mapping[str, np.ndarray]],
+    ) -> None:
+        self._parts, self._rows = parts, slice(parts[0].first, parts[-1].last)
+        self._lean, self.triangles = lean, np.vstack([p.triangles + (p.first - parts[0].first) for p in parts])
+        each = [{name: data[p.kept] for name, data in static(p).items()} for p in parts]
+        together = {name: np.concatenate([data[name] for data in each]) for name in each[0]}
+        self._static, content = static_buffers(ctx, together)
+        self._moving = Moving(ctx, self._rows.stop - self._rows.start)
+        self._index = ctx.buffer(np.ascontiguousarray(self.triangles, np.int32).tobytes())
+        kept = [entry for entry in (*content, *self._moving.content) if entry[2] in program]
+        self.array = ctx.vertex_array(program, kept, index_buffer=self._index, index_element_size=4)
+        self.upload(whole=True)
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Positions now, (m, 3) float32."""
+        return self._lean.vertices[self._rows]
+
+    def upload(self, *, whole: bool = False) -> int:
+        """Send what the last pose changed; returns how many vertices were sent."""
+        first = self._rows.start
+        ranges = [(p.first - first + a, p.first - first + b) for p in self._parts for a, b in p.changed]
+        if whole:
+            ranges = [(0, self._rows.stop - first)]
+        return self._moving.upload(self.vertices, self._lean.normals[self._rows], ranges)
+
+    def release(self) -> None:
+        """Give the buffers back."""
+        self.array.release()
+        self._moving.release()
+        for buffer in (self._index, *self._static):
+            buffer.release()
+
+
+class LeanDrawn:
+    """Some of the buffers' parts, drawn at once: they stand together and are told the same.
+
+    Attributes
+    ----------
+    part : one of them. triangles : (t, 3) that are drawn, of the buffers' vertices.
+    """
+
+    def __init__(self, buffers: LeanBuffers, parts: Sequence[LeanPart], first: int, *, owner: bool) -> None:
+        self._buffers, self._owner = buffers, owner
+        self.part, count = parts[0].part, sum(len(p.triangles) for p in parts)
+        self._first, self.triangles = first, buffers.triangles[first : first + count]
+
+    def upload(self) -> int:
+        """Send what the last pose changed, of all parts in the buffers."""
+        return self._buffers.upload() if self._owner else 0
+
+    def outline(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions now (m, 3) and the triangles drawn of them (t, 3)."""
+        return self._buffers.vertices, self.triangles
+
+    def draw(self) -> None:
+        """Draw the triangles with the buffers' program."""
+        self._buffers.array.render(vertices=self.triangles.size, first=3 * self._first)
+
+    def release(self) -> None:
+        """Give the buffers back."""
+        if self._owner:
+            self._buffers.release()
+
+
+def lean_drawn(
+    ctx: moderngl.Context,
+    lean: LeanHead,
+    programs: Mapping[str, moderngl.Program],
+    static: Callable[[ViewPart], Mapping[str, np.ndarray]],
+) -> list[LeanDrawn]:
+    """All of a lean head, in the order in which it is drawn."""
+    drawn = []
+    for name, group in groupby(lean.parts, lambda p: materials.of(p.part.material).program):
+        parts = list(group)
+        buffers, first = LeanBuffers(ctx, lean, parts, programs[name], lambda p: static(p.part)), 0
+        for _, alike in groupby(parts, lambda p: materials.told(p.part)):
+            own = list(alike)
+            drawn.append(LeanDrawn(buffers, own, first, owner=own[0] is parts[0]))
+            first += sum(len(p.triangles) for p in own)
+    return drawn

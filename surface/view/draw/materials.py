@@ -1,0 +1,234 @@
+"""Materials: which program draws a part, and what it is told about the part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from surface.view.draw.programs import build
+from surface.view.scene.apertures import LID_POINTS
+from surface.view.scene.openings import Openings
+from surface.view.scene.parts import ViewPart
+from surface.view.scene.theme import Theme
+
+if TYPE_CHECKING:
+    import moderngl
+
+Arrays = dict[str, np.ndarray]
+#: Tiles of the detail texture once round the head; whole, so that its seam at the back of the head does not show.
+_DETAIL_TILES = 18
+#: Middle of the ball that the detail is wrapped on, mm.
+_DETAIL_CENTRE = (0.0, 10.0, 5.0)
+_DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
+_DETAIL_SIZE = 128
+#: How bright skin is seen from its back, as the hollow bust is from below and behind.
+_INSIDE = "0.25"
+#: A baked sky that hides nothing.
+_OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
+_LOWER_LASHES = 0.42
+#: Materials of what the skin surrounds, in whatever pose.
+INSIDE = ("eye", "teeth", "gums", "mouth")
+
+
+@dataclass(frozen=True)
+class Material:
+    """How one kind of part is drawn.
+
+    Parameters
+    ----------
+    program : name in :func:`programs`.
+    static : part, theme, openings -> per-vertex data that never changes.
+    uniforms : part, theme, openings -> uniforms of this frame.
+    two_sided : whether back faces are drawn.
+    blended : whether the fragment's alpha mixes it with what is behind.
+    order : lower is drawn earlier; what hides most comes first.
+    """
+
+    program: str
+    static: Callable[[ViewPart, Theme, Openings], Arrays]
+    uniforms: Callable[[ViewPart, Theme, Openings], Mapping[str, Any]]
+    two_sided: bool = False
+    blended: bool = False
+    order: int = 0
+
+
+def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, moderngl.Program]:
+    """Every program of a quality and a theme, by name."""
+    flat = ("flat.frag",)
+    made = {
+        "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
+        "inner": build(ctx, ("light.glsl", "inner.vert"), flat),
+        "hair": build(ctx, ("light.glsl", "hair.vert"), ("hair.frag",)),
+        "background": build(ctx, ("background.vert",), ("background.frag",)),
+    }
+    made["skin"] = skin_program(ctx, quality, theme)
+    return made
+
+
+def skin_program(ctx: moderngl.Context, quality: str, theme: Theme, *, hurried: bool = False) -> moderngl.Program:
+    """The program of skin; a `hurried` one takes its grain unfiltered, for moving pictures drawn in software."""
+    defines: dict[str, int | str] = {"INSIDE": _INSIDE}
+    if quality != "full":
+        return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), ("flat.frag",), defines=defines)
+    if theme.seams:
+        defines |= {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
+    if hurried:
+        defines["GRAIN_TEXELS"] = f"{_DETAIL_SIZE // 2}.0"
+    shared = ("light.glsl", "skin.glsl")
+    return build(ctx, (*shared, "skin.vert"), (*shared, "skin.frag"), defines=defines)
+
+
+def of(name: str) -> Material:
+    """The material of that name; an unknown one draws as skin."""
+    return MATERIALS.get(name, MATERIALS["skin"])
+
+
+def told(part: ViewPart) -> tuple[str, str]:
+    """Equal for parts that are told the same in every frame: those of a material, but each eye looks for itself."""
+    return part.material, part.name if part.material == "eye" else ""
+
+
+def order(name: str) -> int:
+    """Drawing order of a material."""
+    return of(name).order
+
+
+def attribute(part: ViewPart, name: str, default: tuple[float, ...]) -> np.ndarray:
+    """A part's static attribute (m, k) float32, or `default` for every vertex."""
+    data = part.attributes.get(name)
+    if data is None:
+        return np.tile(np.asarray(default, np.float32), (len(part.vertices), 1))
+    return np.asarray(data, np.float32).reshape(len(part.vertices), -1)
+
+
+def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
+    albedo = attribute(part, "albedo", theme.albedo)[:, :3]
+    if not theme.use_painted:
+        albedo = np.tile(np.asarray(theme.albedo, np.float32), (len(albedo), 1))
+    gloss = attribute(part, "gloss", (0.3,))[:, :1]
+    if not theme.use_painted:  # what is wet on a face is darker on a mask
+        albedo = albedo * (1.0 - theme.lips * np.clip((gloss - 0.30) / 0.3, 0.0, 1.0))
+    occlusion = attribute(part, "occlusion", (1.0,))[:, :1]
+    packed = np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), np.clip(occlusion, 0.0, 1.0)])
+    thin = attribute(part, "thin", (0.0,))[:, :1]
+    return {
+        "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
+        "around": np.rint(attribute(part, "visible", _OPEN_SKY)[:, :4] * 255.0).astype(np.uint8),
+        "surface_uv_gloss": np.hstack([detail_uv(part), gloss, thin]).astype(np.float32),
+    }
+
+
+def detail_uv(part: ViewPart) -> np.ndarray:
+    """Where the detail texture lies on a part at rest, (m, 2), in tiles.
+
+    Longitude and latitude on the skull, height and reach on neck and shoulders: a head's own (u, v) are
+    stretched, and differ from part to part.
+    """
+    x, y, z = (np.asarray(part.vertices, np.float64) - _DETAIL_CENTRE).T
+    reach = np.hypot(x, z)
+    below = np.clip(-y / _DETAIL_BLEND, 0.0, 1.0)
+    down = (y - 0.7 * (reach - _DETAIL_RADIUS)) / _DETAIL_RADIUS
+    height = np.arctan2(y, reach) * (1.0 - below) + down * below
+    return np.column_stack([np.arctan2(x, z), height]) * (_DETAIL_TILES / (2.0 * np.pi))
+
+
+def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
+    return {
+        "wrap": theme.wrap,
+        "through": theme.through,
+        "gloss_scale": theme.gloss,
+        "detail_strength": 0.16 * theme.detail,
+    }
+
+
+def _eye_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
+    return {"local": openings.local(part)}
+
+
+def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
+    return {
+        "iris_colour": theme.iris,
+        "sclera_colour": theme.sclera,
+        "glow": theme.glow,
+        "iris_radius": 0.49,
+        "pupil_radius": 0.185,
+        **openings.eye(part),
+    }
+
+
+def _inner(albedo: tuple[float, float, float], wrap: float, wetness: float, **options: Any) -> Material:
+    """A material inside the mouth."""
+
+    def static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
+        return {"occlusion": attribute(part, "occlusion", (1.0,))[:, :1]}
+
+    def uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
+        return {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness, **openings.mouth()}
+
+    return Material("inner", static, uniforms, **options)
+
+
+def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0.0) -> Material:
+    """Lashes and brows; `colour` names the theme's, `fade` and `edges` as in hair.frag."""
+    return Material(
+        "hair",
+        lambda part, theme, openings: {"along": np.hstack([strip_uv(part), strip_strength(part, theme)])},
+        lambda part, theme, openings: {"albedo": getattr(theme, colour), "fade": fade, "edges": edges},
+        two_sided=True,
+        blended=True,
+        order=2,
+    )
+
+
+def strip_uv(part: ViewPart) -> np.ndarray:
+    """Along and across a strip of hair, 0..1 (m, 2): several strips of one part lie two units of u apart."""
+    uv = np.array(part.uv, np.float32)
+    uv[:, 0] -= 2.0 * np.floor(uv[:, 0] / 2.0)
+    return np.clip(uv, 0.0, 1.0)
+
+
+def strip_strength(part: ViewPart, theme: Theme) -> np.ndarray:
+    """How strong each hair is, (m, 1): lashes of the lower lid are the fainter ones."""
+    strength = np.full((len(part.vertices), 1), theme.hair, np.float32)
+    if part.material == "lash":
+        strip = np.floor(np.asarray(part.uv)[:, 0] / 2.0)
+        height = {s: float(part.vertices[strip == s, 1].mean()) for s in np.unique(strip)}
+        middle = float(np.mean(list(height.values())))
+        lower = np.array([height[s] < middle for s in strip])
+        strength[lower] *= _LOWER_LASHES
+    return strength
+
+
+MATERIALS: dict[str, Material] = {
+    "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
+    "eye": Material("eye", _eye_static, _eye_uniforms, order=1),
+    "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
+    "brow": _hair("brow", (0.72, 0.50, 0.30, 2.4), 1.0),
+    "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, order=3),
+    "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.22, order=4),
+    "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),
+    "mouth": _inner((0.32, 0.09, 0.08), 0.3, 0.08, two_sided=True, order=6),
+}
+
+
+def detail_texture(ctx: moderngl.Context) -> moderngl.Texture:
+    """Tiling noise (rgb: bumps, a: mottling), the same every time."""
+    random = np.random.default_rng(7)
+    layers = [_tiling_noise(random, falloff) for falloff in (0.5, 0.5, 0.5, 1.0)]
+    data = np.clip(np.stack(layers, axis=-1) * 0.17 + 0.5, 0.0, 1.0)
+    texture = ctx.texture((_DETAIL_SIZE, _DETAIL_SIZE), 4, np.rint(data * 255.0).astype(np.uint8).tobytes())
+    texture.build_mipmaps()
+    texture.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
+    return texture
+
+
+def _tiling_noise(random: np.random.Generator, falloff: float) -> np.ndarray:
+    """Noise (size, size) that tiles, zero mean, unit deviation; amplitude falls as frequency**-falloff."""
+    frequency = np.fft.fftfreq(_DETAIL_SIZE) * _DETAIL_SIZE
+    radius = np.hypot(frequency[:, None], frequency[None, :])
+    shape = np.where(radius > 2.0, np.maximum(radius, 1.0) ** -falloff, 0.0)
+    noise = np.fft.ifft2(np.fft.fft2(random.standard_normal((_DETAIL_SIZE, _DETAIL_SIZE))) * shape).real
+    return (noise - noise.mean()) / noise.std()

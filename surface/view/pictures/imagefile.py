@@ -1,0 +1,57 @@
+"""Writing image files whole: into a neighbour first, then moved into place."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surface.base.errors import ViewError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+
+def as_image(pixels: np.ndarray) -> Image:
+    """Pillow image of (height, width, 3) uint8 pixels.
+
+    Raises
+    ------
+    ViewError : Pillow is missing.
+    """
+    try:
+        from PIL import Image as pillow
+    except ImportError as error:
+        raise ViewError(f"image files need Pillow ({error})", hint="pip install '.[view]' in the checkout") from error
+    return pillow.fromarray(np.ascontiguousarray(pixels))
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path beside `path` to write to; moved over `path` on success, removed on failure.
+
+    Raises
+    ------
+    ViewError : the folder is missing or cannot be written.
+    """
+    if not path.parent.is_dir():
+        raise ViewError(f"cannot write {path}: there is no folder {path.parent}", hint=f"mkdir -p {path.parent}")
+    try:
+        handle, name = tempfile.mkstemp(prefix=".", suffix=path.suffix, dir=path.parent)
+        os.close(handle)
+    except OSError as error:
+        raise ViewError(f"cannot write {path}: {error.strerror}", hint="choose another folder with -o") from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except OSError as error:
+        raise ViewError(f"cannot write {path}: {error}", hint="check the free space and the folder's rights") from error
+    finally:
+        temporary.unlink(missing_ok=True)

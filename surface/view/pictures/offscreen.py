@@ -1,0 +1,159 @@
+"""Pictures without a window: an EGL context, a multisampled target, numpy arrays out."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surface.base.errors import ViewError
+from surface.view.draw.renderer import Renderer
+from surface.view.draw.target import Target
+from surface.view.scene.camera import Camera
+from surface.view.scene.pace import Pace, is_software
+from surface.view.scene.parts import ViewHead
+from surface.view.scene.theme import Theme
+
+if TYPE_CHECKING:
+    import moderngl
+
+NO_OPENGL_HINT = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
+
+
+def open_context() -> moderngl.Context:
+    """A context of its own: EGL first (no display needed), then the platform's.
+
+    Raises
+    ------
+    ViewError : moderngl is missing, or no OpenGL 3.1 is to be had.
+    """
+    try:
+        import moderngl
+    except ImportError as error:
+        raise ViewError(f"pictures need moderngl ({error})", hint="pip install '.[view]' in the checkout") from error
+    reasons = []
+    for settings in ({"backend": "egl"}, {}):
+        try:
+            ctx = moderngl.create_context(standalone=True, require=310, **settings)  # type: ignore[arg-type]
+        except Exception as error:  # noqa: BLE001 - glcontext raises bare Exception for every cause
+            reasons.append(str(error).strip())
+            continue
+        ctx.clear_errors()
+        return ctx
+    raise ViewError(f"no OpenGL 3.1 without a window: {'; '.join(reasons)}", hint=NO_OPENGL_HINT)
+
+
+class Offscreen:
+    """A head drawn without a display; use as a context manager.
+
+    Parameters
+    ----------
+    head : anything with the parts of `surface.view.scene.parts.ViewHead`.
+    size : (width, height), pixels.
+    samples : per pixel; None = 4 for quality "full" and 1 with smoothed edges for "fast". Once :meth:`draw` is
+        used, the picture counts as live, and "full" too falls back to 1 where 4 cannot be kept up; "fast" on a
+        software renderer is then drawn at a share of its size (:data:`surface.view.scene.pace.SCALE`) and enlarged.
+    quality, theme, evaluator : see :class:`surface.view.draw.renderer.Renderer`.
+
+    Raises
+    ------
+    ViewError : no OpenGL, or a size that no driver draws.
+    """
+
+    def __init__(
+        self,
+        head: ViewHead,
+        size: tuple[int, int] = (1280, 720),
+        samples: int | None = None,
+        quality: str = "full",
+        theme: str | Theme = "skin",
+        evaluator: str = "auto",
+    ) -> None:
+        self.head, self._closed = head, False
+        self.ctx = open_context()
+        limit = self.ctx.info["GL_MAX_VIEWPORT_DIMS"][0]
+        if not all(1 <= length <= limit for length in size):
+            self.ctx.release()
+            raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
+        self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme, evaluator=evaluator)
+        self._pace = Pace(quality, samples, software=is_software(self.ctx))
+        self._wanted = self._pace.wanted
+        self.target = Target(self.ctx, size, *self._wanted)
+
+    def go_live(self) -> None:
+        """Make ready what only moving pictures need, which the first :meth:`draw` would do otherwise."""
+        self._pace.begin_live()
+        self.ctx.__enter__()
+        if self._pace.hurried:
+            self.renderer.hurry()
+        self._fit_target()
+
+    def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
+        """Pose the head with `values` (P,) and draw it, without reading the picture back.
+
+        The frame before is waited for after the pose, so on a software renderer posing runs beside the
+        filling of the last frame and never more than one frame is under way. :meth:`read` and :meth:`finish`
+        wait for this one.
+        """
+        self._pace.begin_live()
+        self._frame(values, camera)
+
+    def render(self, values: np.ndarray, camera: Camera | None = None) -> np.ndarray:
+        """Pose the head, draw it and return the picture as (height, width, 3) uint8, top row first."""
+        self._frame(values, camera)
+        return self.read()
+
+    def _frame(self, values: np.ndarray, camera: Camera | None) -> None:
+        """Pose and draw."""
+        self.renderer.pose(values)
+        started = time.perf_counter()
+        self.ctx.__enter__()  # another context may have been current since
+        self.target.complete()
+        if self._pace.hurried:  # smoothing has just waited for all that was painted: there is no more than one frame
+            self.renderer.hurry()
+        else:
+            self.ctx.finish()
+        self._fit_target()
+        self.renderer.update()
+        self.target.paint(self.renderer, camera or Camera.front())
+        if self._pace.live:
+            self._pace.note(time.perf_counter() - started)
+
+    def _fit_target(self) -> None:
+        """Make the target anew when the pace asks for other samples."""
+        if self._wanted != self._pace.wanted:
+            self._wanted = self._pace.wanted
+            old = self.target
+            self.target = Target(self.ctx, old.size, *self._wanted)  # before its framebuffer, still bound, is released
+            old.release()
+
+    def read(self) -> np.ndarray:
+        """The picture last drawn, (height, width, 3) uint8, top row first."""
+        self.ctx.__enter__()
+        return self.target.read()
+
+    def finish(self) -> None:
+        """Wait until the last frame is drawn."""
+        self.ctx.__enter__()
+        self.target.complete()
+        self.ctx.finish()
+
+    def close(self) -> None:
+        """Give everything back; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self.ctx.__enter__()
+        self.renderer.release()
+        self.target.release()
+        self.ctx.release()
+
+    def __enter__(self) -> Offscreen:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,183 @@
+"""Where lids, lips and eyeballs are now: the few numbers per frame that the shaders need to shade eyes and mouth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from surface.view.scene.apertures import (
+    LID_POINTS,
+    Aperture,
+    aperture,
+    boundary_loops,
+    leading_edge,
+    nearest_loop,
+    vector_area,
+)
+from surface.view.scene.parts import ViewPart
+
+_INNER = ("teeth", "tongue", "gums", "mouth")
+#: Vertices of an eyeball that its rotation is read from.
+_SAMPLES = 48
+#: How far, in eyeball radii, a lid loop's mean may lie from the eyeball's centre.
+_LID_REACH = 2.0
+#: How far, millimetres, the lips' mean may lie from the front of the teeth.
+_LIP_REACH = 45.0
+#: The skin ends inside the lips; the light comes in this far in front of its edge, mm.
+_LIP_DEPTH = 14.0
+#: Share of the edge's area at rest that is still hidden behind closed lips.
+_SHUT = 0.75
+#: Half the mouth's width, a little less: how far the opening counts to either side.
+_SLIDE = 0.38
+_FALLBACK_AREA = (0.0, 0.0, 250.0)
+
+
+@dataclass(frozen=True)
+class EyeFrame:
+    """How to read an eyeball's rotation from its vertices.
+
+    Parameters
+    ----------
+    local : (m, 3) float32 unit directions in the eye's own frame, +z through the pupil.
+    ids : (k,) vertices used.
+    solve : (4, k) maps their positions to rotation times radius and centre (least squares).
+    lids : the skin's opening over it, or None.
+    """
+
+    local: np.ndarray
+    ids: np.ndarray
+    solve: np.ndarray
+    lids: Aperture | None
+
+
+Read = Callable[[ViewPart, np.ndarray], np.ndarray]
+
+
+def from_vertices(part: ViewPart, ids: np.ndarray) -> np.ndarray:
+    """Positions (k, 3) of vertices `ids` (k,) as the part holds them."""
+    return part.vertices[ids]
+
+
+class Openings:
+    """Lids, lips and eyeballs of a head at rest; reads them again each frame.
+
+    Parameters
+    ----------
+    parts : the head's parts, at rest.
+    read : gives the positions (k, 3) of vertices (k,) of a part as posed now.
+    """
+
+    def __init__(self, parts: Sequence[ViewPart], read: Read = from_vertices) -> None:
+        self._read = read
+        self._skin = max((p for p in parts if p.material == "skin"), key=lambda p: len(p.vertices), default=None)
+        loops = boundary_loops(self._skin.triangles) if self._skin is not None else []
+        self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
+        self._lips = self._find_lips(parts, loops)
+        area = np.array(_FALLBACK_AREA) if self._lips is None else self._edge_area()
+        self._shut_area, self._outward = _SHUT * float(np.linalg.norm(area)), 1.0 if area[2] > 0 else -1.0
+        self.refresh()
+
+    def read_vertices(self) -> dict[str, np.ndarray]:
+        """Which vertices (k,) are read, by part."""
+        found = {name: frame.ids for name, frame in self._eyes.items()}
+        edges = [frame.lids for frame in self._eyes.values() if frame.lids is not None]
+        edges += [self._lips] if self._lips is not None else []
+        if self._skin is not None and edges:
+            found[self._skin.name] = np.unique(np.concatenate([i for e in edges for i in (e.loop, e.upper, e.lower)]))
+        return found
+
+    def read_by(self, read: Read) -> None:
+        """From now on somebody else knows where vertices are."""
+        self._read = read
+
+    def refresh(self) -> None:
+        """Read the mouth anew, once after each pose: five materials ask for it."""
+        self._mouth = self._read_mouth()
+
+    def _eye(self, part: ViewPart, loops: list[np.ndarray]) -> EyeFrame:
+        """Frame and lids of one eyeball."""
+        local = part.attributes.get("eye_local")
+        vertices = np.asarray(part.vertices, float)
+        centre, radius = fit_sphere(vertices)
+        if local is None:
+            local = (vertices - centre) / radius
+        local = np.asarray(local, np.float32)
+        ids = np.unique(np.linspace(0, len(vertices) - 1, min(_SAMPLES, len(vertices))).astype(int))
+        solve = np.linalg.pinv(np.column_stack([local[ids], np.ones(len(ids))]))
+        lids = None
+        if self._skin is not None:
+            loop = nearest_loop(loops, self._skin.vertices, centre, _LID_REACH * radius)
+            lids = None if loop is None else self._lids(loop, centre)
+        return EyeFrame(local, ids, solve, lids)
+
+    def _lids(self, loop: np.ndarray, centre: np.ndarray) -> Aperture:
+        """The margins of both lids over an eyeball."""
+        vertices = np.asarray(self._skin.vertices if self._skin is not None else (), float)
+        edge = aperture(loop, vertices)
+        upper = leading_edge(edge.upper, edge.lower, vertices, centre, 1.0)
+        return replace(edge, upper=upper, lower=leading_edge(edge.lower, edge.upper, vertices, centre, -1.0))
+
+    def _find_lips(self, parts: Sequence[ViewPart], loops: list[np.ndarray]) -> Aperture | None:
+        """The skin's opening nearest to the front of the mouth's inner parts."""
+        inner = [np.asarray(p.vertices) for material in _INNER for p in parts if p.material == material]
+        if not inner or self._skin is None:
+            return None
+        front = max((vertices[np.argmax(vertices[:, 2])] for vertices in inner), key=lambda point: point[2])
+        taken = [eye.lids.loop[0] for eye in self._eyes.values() if eye.lids is not None]
+        free = [loop for loop in loops if not np.isin(taken, loop).any()]
+        loop = nearest_loop(free, self._skin.vertices, np.array([0.0, *front[1:]]), _LIP_REACH)
+        return None if loop is None else aperture(loop, self._skin.vertices)
+
+    def local(self, part: ViewPart) -> np.ndarray:
+        """Directions of an eye part's vertices in the eye's own frame, (m, 3) float32."""
+        return self._eyes[part.name].local
+
+    def eye(self, part: ViewPart) -> dict[str, object]:
+        """Uniforms of an eye now: its rotation and its lid margins."""
+        frame = self._eyes[part.name]
+        columns = (frame.solve @ self._read(part, frame.ids))[:3].T
+        rotation = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
+        if frame.lids is None or self._skin is None:
+            none = np.zeros((LID_POINTS, 3), np.float32)
+            return {"eye_rotation": rotation, "lid_upper": none, "lid_lower": none, "lids": 0.0}
+        upper, lower = self._read(self._skin, frame.lids.upper), self._read(self._skin, frame.lids.lower)
+        return {"eye_rotation": rotation, "lid_upper": upper, "lid_lower": lower, "lids": 1.0}
+
+    def mouth(self) -> dict[str, object]:
+        """Uniforms of the opening between the lips now: centre and vector area, mm and mm^2."""
+        return self._mouth
+
+    def _read_mouth(self) -> dict[str, object]:
+        if self._lips is None or self._skin is None:
+            return {
+                "opening_centre": (0.0, -35.0, 110.0),
+                "opening_area": _FALLBACK_AREA,
+                "opening_side": (18.0, 0.0, 0.0),
+            }
+        ring = self._read(self._skin, self._lips.loop)
+        area = vector_area(ring) * self._outward
+        size = max(math.hypot(*area), 1e-6)
+        centre = ring.mean(axis=0) + area * (_LIP_DEPTH / size)
+        corners = self._read(self._skin, self._lips.upper)[[0, -1]]
+        return {
+            "opening_centre": centre,
+            "opening_area": area * (max(size - self._shut_area, 20.0) / size),
+            "opening_side": (corners[1] - corners[0]) * _SLIDE,
+        }
+
+    def _edge_area(self) -> np.ndarray:
+        """Vector area (3,) inside the edge of the lips now, mm^2."""
+        if self._skin is None or self._lips is None:
+            return np.zeros(3)
+        return vector_area(self._read(self._skin, self._lips.loop))
+
+
+def fit_sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Least-squares sphere of `points` (m, 3): centre (3,) and radius, mm."""
+    system = np.column_stack([2.0 * points, np.ones(len(points))])
+    solution = np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)[0]
+    centre = solution[:3]
+    return centre, float(np.sqrt(max(solution[3] + centre @ centre, 1e-9)))

@@ -1,0 +1,33 @@
+"""Peers compute the same vertices, so that comparing times is fair."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from surface.bench import bench, peers
+from surface.bench.stencils import stencil_evaluator
+
+SURFACE, MESH = bench.sheet(1_500)
+
+
+def test_stencils_and_sparse_matrix() -> None:
+    call, out = stencil_evaluator(SURFACE, MESH)
+    call()
+    assert np.abs(out - MESH.vertices).max() < 1e-4
+    assert np.abs(peers.sparse_matrix(SURFACE, MESH)() - MESH.vertices).max() < 1e-4
+    assert np.shape(peers.blendshapes(SURFACE, MESH)()) == (3 * len(MESH.vertices),)
+
+
+@pytest.mark.parametrize("name", ["splinepy", "geomdl"])
+def test_libraries_where_they_are_installed(name: str) -> None:
+    pytest.importorskip(name)
+    prepare = {found: make for found, make, _ in peers.libraries(MESH)}[name]
+    points = np.asarray(prepare(SURFACE, MESH)())
+    assert np.abs(points - MESH.vertices[: len(points)]).max() < 1e-9
+
+
+def test_the_net_of_a_sheet() -> None:
+    side, points, knots = peers.net_of(SURFACE)
+    assert (len(points), len(knots)) == (side * side, side + 4)
+    assert (np.diff(knots) >= 0).all()

@@ -1,0 +1,211 @@
+"""Eq. (2): a mesh that follows its control points, the same as a fresh evaluation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surface import DCPSurface, Domain, Mesh, Slit
+from surface.deform.deformation import Deformation
+from tests.surface import shapes
+
+SIZE = 100.0
+
+
+def fresh(deformation: Deformation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, normals and sizes of S_u x S_v of the deformation's surface as it stands now, in float64."""
+    mesh, surface = deformation.mesh, deformation.surface
+    points, su, sv = surface.derivatives(mesh.uv, side=mesh.side)
+    normals = np.cross(su, sv)
+    size = np.linalg.norm(normals, axis=1)
+    return points, normals / size[:, None] * (-1 if mesh.flip else 1), size
+
+
+def check(deformation: Deformation) -> None:
+    points, normals, size = fresh(deformation)
+    assert np.abs(deformation.vertices - points).max() < 1e-6 * SIZE
+    error = np.abs(deformation.normals - normals).max(axis=1)
+    assert (error * np.minimum(1, size / np.median(size))).max() < 1e-5  # random moves fold the sheet here and there
+
+
+def interior(surface: DCPSurface, i: int) -> int:
+    """A point near i that is not the only one at a rim of the sheet."""
+    side = int(np.sqrt(surface.n))
+    row, column = np.clip([i // side, i % side], 1, side - 2)
+    return int(row * side + column)
+
+
+@pytest.fixture(scope="module")
+def sheet() -> tuple[DCPSurface, Mesh]:
+    surface = shapes.hills()
+    return surface, surface.tessellate(chord_error=0.1)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+def test_starts_as_the_mesh(flip: bool) -> None:
+    surface = shapes.hills()
+    mesh = surface.tessellate(chord_error=0.3, flip=flip)
+    deformation = surface.deformation(mesh)
+    assert np.allclose(deformation.vertices, mesh.vertices, rtol=0, atol=1e-6 * SIZE)
+    assert np.allclose(deformation.normals, mesh.normals, rtol=0, atol=1e-5)
+    assert deformation.changed == [(0, len(mesh.vertices))]
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 10_000))
+def test_random_updates_of_every_kind_equal_a_fresh_evaluation(sheet: tuple[DCPSurface, Mesh], seed: int) -> None:
+    surface, mesh = sheet
+    rng, deformation = np.random.default_rng(seed), surface.deformation(mesh)
+    for _ in range(30):
+        before = deformation.vertices.copy()
+        some = rng.choice(surface.n, int(rng.integers(1, 40)), replace=False)
+        kind = rng.integers(4)
+        if kind == 0:
+            deformation.move(some, rng.normal(size=(len(some), 3)))
+        elif kind == 1:
+            deformation.set_positions(some, surface.points[some] + rng.normal(size=(len(some), 3)))
+        elif kind == 2:
+            deformation.set_weights(some, rng.uniform(0.3, 3, len(some)))
+        else:
+            a, b = rng.uniform(0, 0.7, 2)
+            knots = [np.sort(rng.uniform(x, x + 0.3, rng.integers(4, 8))) for x in (a, b)]
+            deformation.set_knots(interior(surface, int(some[0])), *knots)
+        touched = np.zeros(len(before), dtype=bool)
+        for start, stop in deformation.changed:
+            touched[start:stop] = True
+        assert np.array_equal(before[~touched], deformation.vertices[~touched])
+    check(deformation)
+
+
+def test_many_small_moves_do_not_drift(sheet: tuple[DCPSurface, Mesh]) -> None:
+    surface, mesh = sheet
+    rng, deformation = np.random.default_rng(0), surface.deformation(mesh)
+    ids, steps = rng.integers(0, surface.n, 30_000), rng.normal(0, 0.05, (30_000, 3))
+    for k in range(30_000):
+        deformation.move(ids[k : k + 1], steps[k : k + 1])
+    points = surface.points.copy()
+    np.add.at(points, ids, steps)
+    assert np.allclose(deformation.points, points, rtol=0, atol=1e-9)
+    check(deformation)
+
+
+def test_moving_everything_and_back(sheet: tuple[DCPSurface, Mesh]) -> None:
+    surface, mesh = sheet
+    deformation = surface.deformation(mesh)
+    start = deformation.vertices.copy()
+    deformation.set_points(surface.points + np.array([1.0, 2.0, 3.0]))
+    assert np.allclose(deformation.vertices, start + np.array([1, 2, 3], "f4"), rtol=0, atol=1e-6 * SIZE)
+    assert deformation.changed == [(0, len(mesh.vertices))]
+    deformation.set_points(surface.points)
+    assert np.array_equal(deformation.vertices, start)
+    deformation.set_points(surface.points)
+    assert deformation.changed == []
+
+
+def test_a_move_touches_its_own_cells_only(sheet: tuple[DCPSurface, Mesh]) -> None:
+    surface, mesh = sheet
+    deformation = surface.deformation(mesh)
+    deformation.move([300], [[0.0, 0.0, 5.0]])
+    reached = surface.basis_matrix(mesh.uv)[:, 300].toarray().ravel() > 0
+    touched = np.zeros(len(reached), dtype=bool)
+    for start, stop in deformation.changed:
+        touched[start:stop] = True
+    assert (touched | ~reached).all()
+    assert touched.mean() < 0.3
+
+
+def test_a_slit_opens_on_one_side_only() -> None:
+    surface = shapes.torn()
+    slit = Slit("u", 0.5, 0.25, 0.75)
+    mesh = surface.tessellate(min_depth=3, domain=Domain((0, 1, 0, 1), slits=[slit]))
+    deformation = surface.deformation(mesh)
+    before = deformation.vertices.copy()
+    half = surface.n // 2
+    deformation.move(np.arange(half), [0.0, -5.0, 0.0])
+    moved = deformation.vertices[:, 1] - before[:, 1]
+    on, low = slit.holds(mesh.uv), mesh.side == 2
+    assert np.allclose(moved[on & low], -5, atol=1e-4)
+    assert (moved[on & ~low] == 0).all()
+
+
+def test_without_normals(sheet: tuple[DCPSurface, Mesh]) -> None:
+    surface, mesh = sheet
+    full, lean = surface.deformation(mesh), surface.deformation(mesh, normals=False)
+    for deformation in (full, lean):
+        deformation.move([10, 20], [[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]])
+    assert np.allclose(full.vertices, lean.vertices, rtol=0, atol=1e-6 * SIZE)
+    assert lean.normals.shape == (0, 3)
+    assert lean.nbytes < 0.45 * full.nbytes
+
+
+def test_ids_that_stand_twice_move_twice(sheet: tuple[DCPSurface, Mesh]) -> None:
+    surface, mesh = sheet
+    deformation = surface.deformation(mesh)
+    deformation.move([7, 7], [[1.0, 0, 0], [2.0, 0, 0]])
+    assert np.allclose(deformation.points[7], surface.points[7] + np.array([3, 0, 0]))
+
+
+BAD = {
+    r"ids\[1\]: 576 is not": lambda d: d.move([0, 576], np.zeros((2, 3))),
+    r"ids\[0\]: -1 is not": lambda d: d.set_positions([-1], np.zeros((1, 3))),
+    "ids: needs a flat sequence of integers": lambda d: d.move([0.5], np.zeros((1, 3))),
+    r"delta: shape \(2, 3\), expected \(1, 3\)": lambda d: d.move([1], np.zeros((2, 3))),
+    r"delta\[1\]: shape \(1,\), expected \(3,\)": lambda d: d.move([1, 2], [[0, 0, 0], [0]]),
+    r"delta\[0\]: must be numbers": lambda d: d.move([1], [["up", 0, 0]]),
+    r"ids: needs a flat sequence of integers, got \[\[1": lambda d: d.move([[1], [1, 2]], np.zeros((2, 3))),
+    r"weights\[0\]: must be numbers": lambda d: d.set_weights([1], ["a"]),
+    r"knots_v\[0\]: not a flat sequence": lambda d: d.set_knots(3, [0, 1, 2], None),
+    r"ids\[0\]: 999 is not": lambda d: d.set_knots(999, [0, 1, 2], [0, 1, 2]),
+    r"xyz\[0\]: must be finite": lambda d: d.set_positions([1], [[0, np.nan, 0]]),
+    r"weights\[1\]: must be positive": lambda d: d.set_weights([1, 2], [1, 0]),
+    r"weights: shape \(1,\)": lambda d: d.set_weights([1, 2], [1]),
+    r"knots_u\[0\]: knots decrease": lambda d: d.set_knots(3, [0, 1, 0], [0, 1, 2]),
+    "would leave vertex": lambda d: d.set_knots(0, [0.5, 0.6, 0.7], [0.5, 0.6, 0.7]),
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_bad_updates_change_nothing(sheet: tuple[DCPSurface, Mesh], message: str) -> None:
+    surface, mesh = sheet
+    deformation = surface.deformation(mesh)
+    before = deformation.vertices.copy()
+    with pytest.raises(ValueError, match=message):
+        BAD[message](deformation)
+    deformation.refresh()
+    assert np.array_equal(deformation.vertices, before)
+    assert np.array_equal(deformation.points, surface.points)
+
+
+def test_a_mesh_without_vertices() -> None:
+    surface = DCPSurface([[0.0, 0, 0]], [1], [[0, 1, 2]], [[0, 1, 2]])
+    mesh = surface.tessellate(max_points=5, domain=Domain((5, 6, 5, 6)))
+    deformation = surface.deformation(mesh)
+    deformation.move([0], [[1.0, 0, 0]])
+    assert deformation.vertices.shape == deformation.normals.shape == (0, 3)
+    assert mesh.triangles.shape == (0, 3)
+
+
+def test_two_threads_give_the_same(sheet: tuple[DCPSurface, Mesh], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("surface.deform.deformation.SMALL", 0)
+    surface, mesh = sheet
+    one, two = surface.deformation(mesh), surface.deformation(mesh, threads=2)
+    for deformation in (one, two):
+        deformation.set_points(surface.points * 1.5)
+    assert np.array_equal(one.vertices, two.vertices)
+    assert np.array_equal(one.normals, two.normals)
+    with pytest.raises(ValueError, match="threads"):
+        surface.deformation(mesh, threads=0)
+
+
+def test_a_mesh_of_a_larger_surface_is_refused(sheet: tuple[DCPSurface, Mesh]) -> None:
+    with pytest.raises(ValueError, match="mesh: was made from another surface: this one has 16 points"):
+        shapes.hills(4).deformation(sheet[1])
+
+
+def test_published_arrays_are_read_only(sheet: tuple[DCPSurface, Mesh]) -> None:
+    deformation = sheet[0].deformation(sheet[1])
+    for array in (deformation.vertices, deformation.normals, deformation.points, sheet[1].uv):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0

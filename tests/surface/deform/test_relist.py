@@ -1,0 +1,63 @@
+"""Lists after changes of knots are those built anew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from surface import Domain, Mesh, blending
+from surface.deform.deformation import Deformation
+
+
+def table(deformation: Deformation, mesh: Mesh) -> dict[tuple[int, int], np.ndarray]:
+    """b w of every pair of cell and point that is not all zero, from the deformation's blocks."""
+    x, out = deformation._lists, {}
+    for c in range(len(x.rows)):
+        tiles = int(x.tile_start[c + 1] - x.tile_start[c])
+        block = x.value[x.at[c] :][: tiles * x.room[c] * 8].reshape(tiles, int(x.room[c]), 8)
+        for row in range(int(x.rows[c])):
+            out[c, int(x.ids[x.ids_at[c] + row])] = block[:, row].ravel()
+    return out
+
+
+def test_rows_after_many_changes_are_blending_functions_times_weights() -> None:
+    surface = shapes.scattered(40, 7)
+    mesh = surface.tessellate(chord_error=0.1, max_depth=4, domain=Domain((0, 1, 0, 1)))
+    assert not mesh.side.any()
+    deformation, rng = surface.deformation(mesh), np.random.default_rng(3)
+    for k in range(60):
+        low = rng.uniform(-0.3, 0.8, 2)
+        knots = [np.sort(rng.uniform(x, x + rng.uniform(0.05, 0.7), int(rng.integers(3, 8)))) for x in low]
+        deformation.set_knots(k % 40, *knots)  # point 40 covers everything and stays
+    mine, now = table(deformation, mesh), deformation.surface
+    for i, (knots_u, knots_v) in enumerate(zip(now.knots_u, now.knots_v, strict=True)):
+        share = blending(knots_u, mesh.uv[:, 0]) * blending(knots_v, mesh.uv[:, 1]) * now.weights[i]
+        for c, (first, last) in enumerate(zip(mesh.cell_start, mesh.cell_start[1:], strict=False)):
+            row = mine.get((c, i), np.zeros(8 * -(-(last - first) // 8)))
+            assert np.allclose(row[: last - first], share[first:last], rtol=1e-6, atol=1e-12)
+    assert np.abs(deformation.vertices - now.evaluate(mesh.uv)).max() < 1e-4
+
+
+def test_back_lists_agree_with_lists() -> None:
+    surface = shapes.hills(10)
+    deformation = surface.deformation(surface.tessellate(chord_error=0.2))
+    for i in (33, 44, 55, 33):
+        deformation.set_knots(i, [0.1, 0.2, 0.5, 0.6, 0.9], [0.2, 0.3, 0.4, 0.8, 0.85])
+    x = deformation._lists
+    pairs = {(c, int(x.ids[x.ids_at[c] + row])) for c in range(len(x.rows)) for row in range(int(x.rows[c]))}
+    for i in range(len(x.back_start)):
+        for e in range(int(x.back_start[i]), int(x.back_start[i] + x.back_count[i])):
+            c, row = int(x.back_cell[e]), int(x.back_row[e])
+            assert x.ids[x.ids_at[c] + row] == i
+            pairs.remove((c, i))
+    assert not pairs
+
+
+def test_a_refused_change_leaves_everything() -> None:
+    surface = shapes.hills(8)
+    deformation = surface.deformation(surface.tessellate(chord_error=1.0))
+    before = deformation._lists.value.copy()
+    with pytest.raises(ValueError, match="uncovered"):
+        deformation.set_knots(0, [0.5, 0.6, 0.7], [0.5, 0.6, 0.7])
+    assert np.array_equal(before, deformation._lists.value)

@@ -1,0 +1,193 @@
+"""Heads for other programs: structure of the GLB, names, shapes, the way back, OBJ, and what is refused."""
+
+import json
+import shutil
+import struct
+import subprocess
+
+import numpy as np
+import pytest
+from small_head import all_points, part, small_head
+
+from surface.base.errors import ExportError
+from surface.export import export_head
+from surface.export.png import png_bytes
+from surface.export.shapes import pieces_of
+from surface.fit.source.load import load_mesh
+from surface.head import Head
+from surface.readers.gltfmesh import read_gltf
+from surface.readers.obj import read_obj
+
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
+SIZES = {5121: 1, 5125: 4, 5126: 4}
+
+
+@pytest.fixture
+def head() -> Head:
+    return Head(small_head())
+
+
+def chunks(path) -> tuple[dict, bytes]:
+    raw = path.read_bytes()
+    magic, version, length = struct.unpack_from("<III", raw)
+    assert (magic, version, length) == (0x46546C67, 2, len(raw))
+    size, kind = struct.unpack_from("<II", raw, 12)
+    assert kind == 0x4E4F534A and size % 4 == 0
+    size2, kind2 = struct.unpack_from("<II", raw, 20 + size)
+    assert kind2 == 0x004E4942 and 28 + size + size2 == len(raw)
+    return json.loads(raw[20 : 20 + size]), raw[28 + size :]
+
+
+def test_the_container_is_whole_and_every_accessor_stays_inside(tmp_path, head):
+    (path,) = export_head(head, tmp_path / "h.glb")
+    document, data = chunks(path)
+    assert document["buffers"] == [{"byteLength": len(data)}]
+    for view in document["bufferViews"]:
+        assert view["byteOffset"] % 4 == 0 and view["byteOffset"] + view["byteLength"] <= len(data)
+    for a in document["accessors"]:
+        each = WIDTHS[a["type"]] * SIZES[a["componentType"]]
+        if "bufferView" in a:
+            assert a["count"] * each == document["bufferViews"][a["bufferView"]]["byteLength"]
+        if "sparse" in a:
+            values = document["bufferViews"][a["sparse"]["values"]["bufferView"]]
+            assert a["sparse"]["count"] * each == values["byteLength"] and "target" not in values
+    for mesh in document["meshes"]:
+        (primitive,) = mesh["primitives"]
+        for attributes in (primitive["attributes"], *primitive.get("targets", [])):
+            assert {"min", "max"} <= set(document["accessors"][attributes["POSITION"]])
+        names = mesh.get("extras", {}).get("targetNames", [])
+        assert len(names) == len(primitive.get("targets", [])) == len(mesh.get("weights", []))
+
+
+def test_parts_materials_and_names_are_kept(tmp_path, head):
+    (path,) = export_head(head, tmp_path / "h.glb")
+    document, _ = chunks(path)
+    assert [m["name"] for m in document["meshes"]] == ["a", "b", "tooth"]
+    assert document["nodes"][0]["children"] == [1, 2, 3]
+    targets = {m["name"]: m.get("extras", {}).get("targetNames") for m in document["meshes"]}
+    assert targets["a"] == ["mouthPucker"] and targets["tooth"] == ["jawForward", "jawOpen"]
+    assert {m["name"] for m in document["materials"]} == {"skin", "skin_painted"}
+    assert "COLOR_0" in document["meshes"][0]["primitives"][0]["attributes"]
+
+
+def test_what_is_read_back_is_what_the_head_shows(tmp_path, head):
+    (path,) = export_head(head, tmp_path / "h.glb")
+    back = read_gltf(path)
+    rest = np.concatenate([p.vertices for p in head.parts])
+    np.testing.assert_allclose(1000 * back.vertices.min(axis=0), rest.min(axis=0), atol=1e-3)
+    for name in ("mouthPucker", "jawOpen"):
+        head.pose(head.values({name: 1.0}))
+        moved = np.concatenate([p.vertices for p in head.parts])
+        got = 1000 * (back.vertices + back.deltas[back.names.index(name)])
+        distance = np.linalg.norm(got[:, None] - moved[None], axis=2).min(axis=1)
+        assert distance.max() < 0.005
+    assert load_mesh(path).named.left_out == ()
+
+
+def test_normals_have_length_one(head):
+    for piece in pieces_of(head):
+        for turned in (piece.normals, *(piece.normals + t for t in piece.turns.values())):
+            np.testing.assert_allclose(np.linalg.norm(turned, axis=1), 1.0, atol=1e-3)
+
+
+def test_closing_lips_are_written_as_what_they_add_to_an_open_jaw():
+    groups = [all_points("mouthClose", (0, 5, 0)), all_points("jawOpen", (0, -7, 0))]
+    head = Head(small_head(parts=[part("a", -40, groups=groups)], seams=[]))
+    (piece,) = pieces_of(head)
+    np.testing.assert_allclose(piece.moves["mouthClose"], np.tile([0, 5, 0], (len(piece.vertices), 1)), atol=0.01)
+
+
+def test_eyeballs_turn_about_their_own_node(tmp_path):
+    ball = part("eye_left", 20, "left_eye")
+    (path,) = export_head(Head(small_head(parts=[part("a", -40), ball], seams=[])), tmp_path / "h.glb")
+    document, _ = chunks(path)
+    node = document["nodes"][2]
+    np.testing.assert_allclose(node["translation"], [0.03, 0.03, 0.0], atol=1e-7)
+    names = document["meshes"][1]["extras"]["targetNames"]
+    assert set(names) == {f"eyeLook{d}Left" for d in ("Up", "Down", "In", "Out")}
+    np.testing.assert_allclose(1000 * read_gltf(path).vertices[:, 0].max(), 60, atol=1e-3)
+
+
+def test_a_pose_becomes_weights(tmp_path, head):
+    (path,) = export_head(head, tmp_path / "h.glb", {"mouthPucker": 0.5})
+    assert chunks(path)[0]["meshes"][0]["weights"] == [0.5]
+    with pytest.raises(ExportError, match="headYaw: angles are no morph targets"):
+        export_head(head, tmp_path / "i.glb", {"headYaw": 0.5})
+    assert not (tmp_path / "i.glb").exists()
+
+
+def test_the_head_rests_afterwards(tmp_path, head):
+    before = [p.vertices.copy() for p in head.parts]
+    export_head(head, tmp_path / "h.glb", {"jawOpen": 1.0})
+    for p, rest in zip(head.parts, before, strict=True):
+        np.testing.assert_allclose(p.vertices, rest, atol=1e-5)
+
+
+def test_obj_and_its_shapes(tmp_path, head):
+    written = export_head(head, tmp_path / "h.obj")
+    assert [p.name for p in written] == ["h.obj", "h.mtl", "h_shapes"]
+    back = read_obj(tmp_path / "h.obj")
+    assert set(back.names) == {"mouthPucker", "jawForward", "jawOpen"}
+    assert back.pieces == ("a/skin", "b/skin", "tooth/skin")
+    np.testing.assert_allclose(back.vertices, np.concatenate([p.vertices for p in head.parts]), atol=1e-4)
+    pucker = back.deltas[back.names.index("mouthPucker")]
+    assert pucker[:, 2].max() > 2 and np.abs(pucker[:, :2]).max() < 0.2
+    assert list(tmp_path.glob(".*")) == []
+
+
+def test_a_posed_obj_has_no_shapes(tmp_path, head):
+    export_head(head, tmp_path / "h.obj")
+    written = export_head(head, tmp_path / "p.obj", {"headYaw": 0.5})
+    assert [p.name for p in written] == ["p.obj", "p.mtl"]
+    turned, rest = (read_obj(tmp_path / name).vertices for name in ("p.obj", "h.obj"))
+    assert np.abs(turned - rest).max() > 1.0
+
+
+def test_other_suffixes_and_places_are_refused(tmp_path, head):
+    with pytest.raises(ExportError, match=r"h\.fbx: is neither"):
+        export_head(head, tmp_path / "h.fbx")
+    for name in ("h.glb", "h.obj"):
+        with pytest.raises(ExportError, match="cannot be written"):
+            export_head(head, tmp_path / "none" / name)
+
+
+def test_png_is_what_pillow_reads():
+    image = pytest.importorskip("PIL.Image", reason="needs Pillow (extra view)")
+    import io
+
+    picture = np.random.default_rng(0).integers(0, 256, (5, 7, 3), np.uint8)
+    np.testing.assert_array_equal(np.asarray(image.open(io.BytesIO(png_bytes(picture)))), picture)
+
+
+def test_trimesh_opens_it(tmp_path, head):
+    trimesh = pytest.importorskip("trimesh", reason="needs trimesh (development only)")
+    (path,) = export_head(head, tmp_path / "h.glb")
+    scene = trimesh.load(path)
+    assert set(scene.geometry) == {"a", "b", "tooth"}
+    rest = np.concatenate([p.vertices for p in head.parts])
+    np.testing.assert_allclose(1000 * scene.bounds, [rest.min(axis=0), rest.max(axis=0)], atol=1e-2)
+
+
+VALIDATE = """
+const bytes = new Uint8Array(require('fs').readFileSync(process.argv[1]));
+require('gltf-validator').validateBytes(bytes).then(r => console.log(r.issues.numErrors, r.issues.numWarnings));
+"""
+
+
+def test_the_validator_of_khronos_finds_no_fault(tmp_path, head):
+    node = shutil.which("node")
+    if node is None or subprocess.run([node, "-e", "require('gltf-validator')"], capture_output=True).returncode:
+        pytest.skip("needs node and its package gltf-validator (npm install gltf-validator, NODE_PATH)")
+    (path,) = export_head(head, tmp_path / "h.glb")
+    said = subprocess.run([node, "-e", VALIDATE, str(path)], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == ["0", "0"]
+
+
+@pytest.mark.parametrize("name", ["h.glb", "h.obj"])
+def test_a_full_disk_leaves_what_was_there(tmp_path, head, full_disk, name):
+    (tmp_path / name).write_text("old")
+    full_disk(2000)
+    with pytest.raises(ExportError, match=r"cannot be written \(.*File too large"):
+        export_head(head, tmp_path / name)
+    full_disk(-1)
+    assert [p.name for p in tmp_path.iterdir()] == [name] and (tmp_path / name).read_text() == "old"

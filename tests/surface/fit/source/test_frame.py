@@ -1,0 +1,78 @@
+"""Axes and units out of a mesh's own shapes."""
+
+import numpy as np
+import pytest
+from slit_sheet import slit_sheet
+
+from surface.base.errors import FitError
+from surface.fit.source.frame import EYES_MM, eye_distance, find_frame, head_scale
+
+TURNS = {  # how the file's axes stand: rows are the file's x, y, z seen from the head
+    "blender": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "backwards": np.array([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]]),
+    "sideways": np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]),
+}
+
+
+def face() -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """A sheet with shapes on both sides, y up, z forward."""
+    vertices = slit_sheet().vertices
+    shapes = {"jawOpen": slit_sheet().deltas[0]}
+    for name, x in (("eyeBlinkLeft", EYES_MM / 2), ("eyeBlinkRight", -EYES_MM / 2)):
+        near = np.exp(-(((vertices[:, :2] - [x, 50]) / 8) ** 2).sum(axis=1))
+        shapes[name] = np.column_stack([0 * near, -near, 0.2 * near])
+    return vertices, shapes
+
+
+@pytest.mark.parametrize("name", TURNS)
+def test_shapes_tell_the_axes(name):
+    vertices, shapes = face()
+    turn = TURNS[name]
+    frame = find_frame(vertices @ turn.T, {n: s @ turn.T for n, s in shapes.items()})
+    np.testing.assert_allclose(frame.turn, turn.T)
+    assert any("turned" in note for note in frame.notes)
+    np.testing.assert_allclose(frame.points(vertices @ turn.T), vertices)
+
+
+def test_without_shapes_y_is_up_and_what_is_told_is_taken():
+    vertices, _ = face()
+    np.testing.assert_array_equal(find_frame(vertices, {}).turn, np.eye(3))
+    blender = TURNS["blender"]
+    np.testing.assert_allclose(find_frame(vertices @ blender.T, {}, up="z").turn, blender.T)
+    told = find_frame(vertices, {}, up="-x", forward="z", unit="in")
+    np.testing.assert_allclose(told.turn, [[0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    assert told.scale == 25.4 and np.linalg.det(told.turn) == pytest.approx(1.0)
+
+
+def test_sides_named_by_the_viewer_are_noticed():
+    vertices, shapes = face()
+    head = np.vstack([vertices, [[0, 0, -300.0]]])
+    padded = {n: np.vstack([s, np.zeros(3)]) for n, s in shapes.items()}
+    swapped = padded | {"eyeBlinkLeft": padded["eyeBlinkRight"], "eyeBlinkRight": padded["eyeBlinkLeft"]}
+    frame = find_frame(head, swapped)
+    np.testing.assert_array_equal(frame.turn, np.eye(3))
+    assert any("as the viewer sees them" in note for note in frame.notes)
+
+
+@pytest.mark.parametrize("unit", [0.001, 1 / 25.4, 0.1, 1.0])
+def test_the_eyes_tell_the_unit_even_of_a_whole_body(unit):
+    vertices, shapes = face()
+    body = unit * np.vstack([vertices, [[0, -1600.0, 0]]])
+    moves = {n: unit * np.vstack([s, np.zeros(3)]) for n, s in shapes.items()}
+    assert find_frame(body, moves).scale == pytest.approx(1 / unit)
+
+
+def test_how_large_a_head_is():
+    vertices, shapes = face()
+    assert eye_distance(vertices, shapes) == pytest.approx(EYES_MM, rel=0.01)
+    assert head_scale(0.5 * vertices, {n: 0.5 * s for n, s in shapes.items()}) == pytest.approx(0.5, rel=0.01)
+    assert eye_distance(vertices, {"eyeBlinkLeft": shapes["eyeBlinkLeft"]}) == 0
+
+
+@pytest.mark.parametrize(("options", "message"), [
+    ({"unit": "ell"}, "--unit ell"), ({"up": "w"}, "--up w"), ({"forward": "+z"}, r"--forward \+z"),
+    ({"up": "z", "forward": "-z"}, "along one axis"),
+])  # fmt: skip
+def test_wrong_words_are_refused(options, message):
+    with pytest.raises(FitError, match=message):
+        find_frame(face()[0], {}, **options)

@@ -1,0 +1,85 @@
+"""Reading meshes: units, and a clear refusal of everything that cannot be fitted."""
+
+import numpy as np
+import pytest
+from slit_sheet import slit_sheet, write_npz
+
+from surface.base.errors import FitError
+from surface.fit.source.frame import find_frame
+from surface.fit.source.load import load_mesh
+from surface.fit.source.mesh import triangles
+
+
+def refused(tmp_path, **other) -> FitError:
+    path = write_npz(tmp_path / "m.npz", slit_sheet(), **other)
+    with pytest.raises(FitError) as e:
+        load_mesh(path)
+    assert str(path) in str(e.value)
+    return e.value
+
+
+def test_a_mesh_comes_back_as_it_was_written(tmp_path):
+    want = slit_sheet()
+    got = load_mesh(write_npz(tmp_path / "m.npz", want)).mesh
+    assert got.names == want.names
+    np.testing.assert_array_equal(got.vertices, want.vertices)
+    np.testing.assert_array_equal(got.deltas, want.deltas)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [(1.0, 1.0), (0.1, 10.0), (0.001, 1000.0)])
+def test_units_are_told_by_height(unit, scale):
+    assert find_frame(slit_sheet().vertices * unit, {}).scale == scale
+
+
+def test_a_missing_file_says_so(tmp_path):
+    with pytest.raises(FitError, match=r"nowhere\.npz: no such mesh file"):
+        load_mesh(tmp_path / "nowhere.npz")
+
+
+def test_a_file_cut_short_is_refused(tmp_path):
+    path = write_npz(tmp_path / "m.npz", slit_sheet())
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(FitError, match="cannot be read"):
+        load_mesh(path)
+
+
+def test_missing_uvs_name_the_key(tmp_path):
+    assert "'uv' is missing" in str(refused(tmp_path, uv=None))
+
+
+def test_faces_without_uvs_are_refused(tmp_path):
+    assert "no texture coordinates" in str(refused(tmp_path, face_uv=np.full_like(slit_sheet().faces, -1)))
+
+
+def test_no_faces_are_refused(tmp_path):
+    none = np.zeros((0, 4), np.int64)
+    assert "faces is empty" in str(refused(tmp_path, faces=none, face_uv=none))
+
+
+def test_nan_in_the_neutral_face_names_the_vertex(tmp_path):
+    bad = slit_sheet().vertices.copy()
+    bad[17, 1] = np.nan
+    assert "neutral[17] is not a finite number" in str(refused(tmp_path, neutral=bad))
+
+
+def test_nan_in_a_shape_names_shape_and_vertex(tmp_path):
+    bad = slit_sheet().deltas.copy()
+    bad[1, 40, 2] = np.inf
+    assert "shape 'mouthSmile_L', vertex 40" in str(refused(tmp_path, deltas=bad))
+
+
+def test_shapes_of_another_mesh_are_refused(tmp_path):
+    assert "deltas has shape (2, 600, 3), expected (2, 625, 3)" in str(
+        refused(tmp_path, deltas=slit_sheet().deltas[:, :600])
+    )
+
+
+def test_an_index_out_of_range_is_refused(tmp_path):
+    bad = slit_sheet().faces.copy()
+    bad[3, 2] = 9999
+    assert "faces[3] points at 9999" in str(refused(tmp_path, faces=bad))
+
+
+def test_quads_are_cut_in_two_and_triangles_kept():
+    faces = np.array([[0, 1, 2, 3], [4, 5, 6, -1]])
+    assert {tuple(t) for t in triangles(faces).tolist()} == {(0, 1, 2), (0, 2, 3), (4, 5, 6)}

@@ -1,0 +1,94 @@
+"""The report of a fit: figures, tables, pictures, and the uniform net beside it."""
+
+import json
+
+import numpy as np
+import pytest
+from slit_sheet import slit_sheet
+
+from surface.base.errors import FitError
+from surface.fit.api import fit_mesh
+from surface.fit.points.nurbsnet import uniform_nets
+from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds
+from surface.fit.reportfile import EXCLUDED, _colours, write_report
+from surface.fit.source.chart import make_chart
+from surface.fit.source.islands import find_islands
+from surface.fit.source.load import Loaded
+from surface.fit.source.names import map_names
+
+
+@pytest.fixture(scope="module")
+def result():
+    mesh = slit_sheet()
+    pit = 1200 * np.maximum(0.0, 1 - np.linalg.norm(mesh.uv - [0.3, 0.3], axis=1) / 0.08)
+    mesh = mesh.moved(mesh.vertices - pit[:, None] * [0, 0, 1.0], mesh.deltas)
+    mesh = mesh.with_shapes((*mesh.names, "odd"), np.concatenate([mesh.deltas, mesh.deltas[:1]]))
+    return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken for mm",)), "sheet", lambda part, done: None)
+
+
+@pytest.fixture(scope="module")
+def folder(result, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report"
+    heard = []
+    write_report(result, path, lambda part, done: heard.append(done))
+    assert heard == [0.5, 1.0]
+    return path
+
+
+def test_the_figures_are_those_of_the_fit(folder, result):
+    table = json.loads((folder / "report.json").read_text())
+    (part,) = table["parts"]
+    assert part["control_points"] == result.report.points and set(part["shapes_mm"]) == {"jawOpen", "mouthSmileLeft"}
+    assert part["neutral_mm"]["rms"] == result.report.parts[0].neutral.rms
+    assert table["left_out"] == ["odd"] and "tongueOut" in table["missing"] and table["notes"] == ["unit taken for mm"]
+    assert part["excluded_samples"] == int(result.parts[0].chart.folded.sum())
+
+
+def test_it_can_be_read(folder):
+    text = (folder / "report.md").read_text()
+    for words in ("left out, not ARKit's: odd", "| jawOpen |", "uniform cubic NURBS net", "unit taken for mm"):
+        assert words in text
+
+
+@pytest.mark.parametrize(("scale", "said"), [(0.5, "within"), (0.04, "beyond")])
+def test_the_face_stands_beside_bounds_that_grow_with_the_head(scale, said):
+    face = PartReport("face", 9, 9, 0, Errors(0.02, 0.05, 0.1), {"jawOpen": Errors(0.003, 0.02, 0.1)})
+    line = face_bounds(FitReport("me", [face], [], scale=scale))
+    assert line.startswith(f"face: {said} the bounds for its size ({scale:.2f}): RMS 0.020 of {0.25 * scale:.3f} mm")
+    assert f"99 % 0.050 of {0.8 * scale:.3f} mm" in line and f"shapes 0.003 of {0.08 * scale:.3f} mm" in line
+
+
+def test_the_error_is_drawn_on_the_face(folder, gl):
+    image = pytest.importorskip("PIL.Image", reason="needs Pillow (extra view)")
+    for name in ("error_neutral.png", "error_shapes.png"):
+        assert name in (folder / "report.md").read_text()
+        pixels = np.asarray(image.open(folder / name).convert("RGB"), int)
+        assert pixels.shape[1] > 1600 and (np.ptp(pixels, axis=2) > 30).mean() > 0.05
+
+
+def test_excluded_places_have_a_colour_of_their_own(result):
+    part = result.parts[0]
+    assert part.chart.folded.any()
+    colours = _colours(part.chart.uv, part, part.fitted.error)
+    violet = (np.abs(colours - EXCLUDED) < 1e-6).all(axis=1)
+    assert violet.any() and (part.chart.folded[violet].mean() > 0.5)
+
+
+def test_nothing_is_left_where_it_cannot_be_written(result, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FitError, match="the report cannot be written"):
+        write_report(result, tmp_path / "file", lambda part, done: None)
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_uniform_nets_grow_until_they_are_as_good():
+    mesh = slit_sheet()
+    (island,) = find_islands(mesh)
+    chart = make_chart(mesh, [island], normalise=False)
+    targets = chart.mix @ mesh.vertices
+    targets[:, 2] = 9 * np.sin(40 * chart.uv[:, 0]) * np.exp(-(((chart.uv[:, 0] - 0.7) / 0.1) ** 2))
+    nets = uniform_nets(chart, targets, 100, 0.05)
+    assert [n.rms for n in nets] == sorted((n.rms for n in nets), reverse=True)
+    assert 80 < nets[0].points < 130 and nets[0].rms > 0.3
+    assert nets[-1].rms <= 0.05 or len(nets) == 5
+    assert len(uniform_nets(chart, targets, 100, 1e9)) == 1

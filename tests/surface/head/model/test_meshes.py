@@ -1,0 +1,53 @@
+"""The tessellation kept in a head file."""
+
+import numpy as np
+import pytest
+from small_head import part
+
+from surface.head.model.data import Seam
+from surface.head.model.meshes import pack, tessellate, unpack
+from surface.head.posing.part import make_surface
+
+DATA = part("a", 0.0)
+SURFACE = make_surface(DATA)
+MESH = tessellate(DATA, SURFACE)
+BUDGET = (0, 0.1, 4)
+
+
+def test_it_comes_back():
+    got = unpack(pack(MESH, BUDGET), SURFACE, BUDGET, rough=False)
+    assert got is not None
+    np.testing.assert_allclose(got.vertices, MESH.vertices, atol=1e-5)
+    np.testing.assert_allclose(got.normals, MESH.normals, atol=1e-5)
+    for key in ("triangles", "cell", "cell_start", "list_start", "list_ids"):
+        np.testing.assert_array_equal(getattr(got, key), getattr(MESH, key))
+
+
+def test_seams_end_at_vertices_of_the_border():
+    line = np.array([[1.0, 0.31], [1.0, 0.5], [1.0, 0.77]])
+    mesh = tessellate(DATA, SURFACE, [Seam("a", "b", line, line - [1, 0]), Seam("b", "c", line - 0.5, line)])
+    assert np.linalg.norm(mesh.uv[:, None] - line[[0, 2]], axis=2).min(axis=0).max() < 1e-12
+    ring = np.array([[0.0, 0.13], [1.0, 0.31], [1.0, 0.77], [0.0, 0.13]])
+    np.testing.assert_array_equal(tessellate(DATA, SURFACE, [Seam("a", "b", ring, ring)]).uv, MESH.uv)
+
+
+def test_rough_positions_are_near():
+    got = unpack(pack(MESH, BUDGET), SURFACE, BUDGET, rough=True)
+    assert got is not None and np.linalg.norm(got.vertices - MESH.vertices, axis=1).max() < 60
+
+
+def test_another_budget_asks_for_another_mesh():
+    assert unpack(pack(MESH, BUDGET), SURFACE, (0, 0.25, 3), rough=False) is None
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("mesh_triangles", np.full((4, 3), 10**6)), ("mesh_list_ids", np.full(len(MESH.list_ids), 99)),
+     ("mesh_cell_start", MESH.cell_start[:-1]), ("mesh_made", np.zeros(3))],
+)  # fmt: skip
+def test_a_mesh_that_does_not_fit_is_made_anew(key, value):
+    assert unpack({**pack(MESH, BUDGET), key: value}, SURFACE, BUDGET, rough=False) is None
+
+
+def test_an_absent_mesh_is_made_anew():
+    assert unpack({}, SURFACE, BUDGET, rough=False) is None

@@ -1,0 +1,97 @@
+"""What parameter values ask of the head."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from surface.head.model.parameters import (
+    EYE_RAD,
+    HEAD_RAD,
+    NAMES,
+    SHAPES,
+    TONGUE_NEEDS,
+    read_pose,
+    rotation,
+    rotation_vector,
+)
+
+
+def pose(**given: float):
+    return read_pose(np.array([given.get(n, 0.0) for n in NAMES]))
+
+
+def shape(p, name: str) -> float:
+    return float(p.shapes[SHAPES.index(name)])
+
+
+def test_names_and_order_are_those_of_the_vocabulary(root):
+    table = tomllib.loads((root / "configs/vocabularies/arkit.toml").read_text())
+    assert len(NAMES) == len(set(NAMES)) == 59 and len(SHAPES) == 52
+    assert tuple(table["parameters"]) == NAMES
+
+
+def test_values_are_clipped():
+    p = pose(jawOpen=7.0, mouthPucker=-1.0, headYaw=-9.0)
+    assert p.jaw == 1.0 and shape(p, "mouthPucker") == 0.0 and p.head[0] == -HEAD_RAD[0]
+
+
+def test_what_is_not_a_number_is_named():
+    with pytest.raises(ValueError, match="mouthPucker is not a number"):
+        pose(mouthPucker=np.nan)
+    with pytest.raises(ValueError, match=r"shape \(3,\)"):
+        read_pose(np.zeros(3))
+
+
+def test_gaze_from_angles_moves_the_lids():
+    p = pose(leftEyeYaw=0.5, leftEyePitch=1.0, rightEyeYaw=0.5)
+    np.testing.assert_allclose(p.gaze, [[0.5 * EYE_RAD[0], EYE_RAD[1]], [0.5 * EYE_RAD[0], 0]])
+    assert (shape(p, "eyeLookOutLeft"), shape(p, "eyeLookInLeft"), shape(p, "eyeLookDownLeft")) == (0.5, 0.0, 1.0)
+    assert (shape(p, "eyeLookOutRight"), shape(p, "eyeLookInRight")) == (0.0, 0.5)
+
+
+def test_gaze_from_shapes_turns_the_eyes():
+    p = pose(eyeLookOutLeft=0.4, eyeLookInRight=0.4, eyeLookUpLeft=1.0)
+    np.testing.assert_allclose(p.gaze[:, 0], 0.4 * EYE_RAD[0])
+    assert p.gaze[0, 1] == -EYE_RAD[1]
+
+
+def test_both_ways_add_up_and_are_clipped():
+    p = pose(leftEyeYaw=0.7, eyeLookOutLeft=0.7)
+    assert p.gaze[0, 0] == EYE_RAD[0] and shape(p, "eyeLookOutLeft") == 1.0
+
+
+def test_a_closed_lid_is_closed_wherever_the_eye_looks():
+    p = pose(eyeBlinkLeft=1.0, leftEyePitch=1.0, eyeWideLeft=1.0)
+    assert shape(p, "eyeBlinkLeft") == 1.0
+    assert shape(p, "eyeLookDownLeft") == shape(p, "eyeWideLeft") == 0.0
+
+
+def test_lips_close_over_an_open_jaw_only():
+    assert shape(pose(mouthClose=1.0), "mouthClose") == 0.0
+    p = pose(mouthClose=0.8, jawOpen=0.4)
+    assert shape(p, "mouthClose") == 0.4 and p.closed == 1.0
+    assert pose(mouthClose=0.1, jawOpen=0.4).closed == pytest.approx(0.25)
+
+
+def test_the_tongue_opens_the_jaw():
+    assert pose(tongueOut=1.0).jaw == TONGUE_NEEDS
+    assert pose(tongueOut=1.0, jawOpen=0.9).jaw == 0.9
+
+
+@pytest.mark.parametrize(
+    ("angles", "point", "goes"),
+    [((0.3, 0, 0), [0, 0, 1], [1, 0]), ((0, 0.3, 0), [0, 0, 1], [-1, 1]), ((0, 0, 0.3), [1, 0, 0], [1, 1])],
+)
+def test_signs_of_yaw_pitch_and_roll(angles, point, goes):
+    sign, axis = goes
+    assert sign * (rotation(*angles) @ point)[axis] > 0.29
+
+
+def test_rotation_vector_is_the_rotations_axis_and_angle():
+    turn = rotation(0.5, -0.3, 0.2)
+    v = rotation_vector(turn)
+    angle = np.linalg.norm(v)
+    k = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]]) / angle
+    np.testing.assert_allclose(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k, turn, atol=1e-12)
+    assert not rotation_vector(np.eye(3)).any()

@@ -1,0 +1,45 @@
+"""Rules move groups that are no parameters."""
+
+import numpy as np
+import pytest
+from small_head import all_points, part, small_head
+
+from surface.base.errors import HeadFileError
+from surface.head import Head, Rule
+from surface.head.model.file import load_data, save_data
+from surface.head.model.parameters import SHAPES
+from surface.head.model.rules import Drivers
+
+
+def shapes(**given: float) -> np.ndarray:
+    return np.array([given.get(n, 0.0) for n in SHAPES])
+
+
+def test_terms_are_multiplied_and_raised():
+    d = Drivers([Rule("crease", ({"mouthSmileLeft": 0.5, "noseSneerLeft": 1.0},), 2.0),
+                 Rule("mend", ({"jawOpen": 1.0}, {"mouthPucker": 1.0}))])  # fmt: skip
+    a = d.amounts(shapes(mouthSmileLeft=0.6, noseSneerLeft=0.1, jawOpen=0.5, mouthPucker=0.4))
+    assert d.names[-2:] == ("crease", "mend")
+    np.testing.assert_allclose(a[-2:], [0.16, 0.2])
+    assert d.amounts(shapes(mouthSmileLeft=1, noseSneerLeft=1))[-2] == 1.0
+
+
+def test_without_rules_there_are_the_shapes_only():
+    np.testing.assert_array_equal(Drivers([]).amounts(shapes(jawOpen=0.3)), shapes(jawOpen=0.3))
+
+
+def test_a_wrong_name_is_named():
+    with pytest.raises(HeadFileError, match=r"rules\[0\]: no shape 'smirk'"):
+        Drivers([Rule("x", ({"smirk": 1.0},))])
+
+
+def test_a_rule_moves_its_group_and_survives_the_file(tmp_path):
+    data = small_head(parts=[part("a", 0, groups=[all_points("fold", (0, 0, 4))])], seams=[])
+    from dataclasses import replace
+
+    save_data(tmp_path, replace(data, rules=[Rule("fold", ({"browInnerUp": 1.0},), 2.0)]))
+    assert load_data(tmp_path).rules == [Rule("fold", ({"browInnerUp": 1.0},), 2.0)]
+    head = Head.load(tmp_path)
+    rest = head.part("a").vertices.copy()
+    head.pose(head.values({"browInnerUp": 0.5}))
+    np.testing.assert_allclose((head.part("a").vertices - rest)[:, 2], 1.0, atol=1e-5)

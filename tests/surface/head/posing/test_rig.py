@@ -1,0 +1,98 @@
+"""Poses become control points."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_head import JAW, all_points, part, small_head
+
+from surface.head.model.parameters import NAMES, read_pose
+from surface.head.posing.rig import LID_MM, SkinRig, jaw_path, rigid_motion
+
+HEAD = small_head()
+
+
+def pose(**given: float):
+    return read_pose(np.array([given.get(n, 0.0) for n in NAMES]))
+
+
+def moved(p, **given: float) -> np.ndarray:
+    return SkinRig(p, HEAD).apply(pose(**given)) - p.points
+
+
+def test_groups_add_up():
+    p = part("a", 0, groups=[all_points("mouthPucker", (0, 0, 6)), all_points("cheekPuff", (2, 0, 0))])
+    np.testing.assert_allclose(moved(p, mouthPucker=0.5, cheekPuff=1), np.tile([2.0, 0, 3], (25, 1)), atol=1e-6)
+    assert not moved(p).any()
+
+
+def test_unknown_groups_are_left_out():
+    assert not moved(part("a", 0, groups=[all_points("earWiggle", (9, 9, 9))]), mouthPucker=1).any()
+
+
+@pytest.mark.parametrize("amount", [0.3, 1.0])
+def test_the_jaw_swings_on_its_arc(amount):
+    p = part("a", 0, jaw=np.ones(25))
+    turn, shift = jaw_path(JAW, amount)
+    np.testing.assert_allclose(moved(p, jawOpen=amount), p.points @ turn.T + shift - p.points, atol=1e-9)
+
+
+def test_the_hinge_turns_and_glides():
+    turn, shift = jaw_path(JAW, 1.0)
+    np.testing.assert_allclose(turn @ JAW.centre + shift, np.add(JAW.centre, JAW.glide))
+    assert (turn @ [0, 0, 100.0])[1] < -35  # what is in front of the hinge goes down
+
+
+def test_closed_lips_stay_together_at_every_opening():
+    turn, shift = jaw_path(JAW, 1.0)
+    bare = part("a", 0, jaw=np.ones(25))
+    far = bare.points + np.array([0, -20.0, 100.0])
+    close = -(far @ turn.T + shift - far)
+    p = replace(bare, points=far, groups=[replace(all_points("mouthClose", (0, 0, 0)), moves=close.astype(np.float32))])
+    for amount in (0.2, 0.5, 0.8, 1.0):
+        assert np.abs(moved(p, jawOpen=amount, mouthClose=amount)).max() < 1e-4
+
+
+def lid(hold: float):
+    angle = np.linspace(0.1, 1.2, 25)
+    eye = HEAD.eyes[0]
+    at = eye + 12.5 * np.column_stack([np.zeros(25), np.sin(angle), np.cos(angle)])
+    down = 12.5 * np.column_stack([np.zeros(25), np.sin(angle - 1.2), np.cos(angle - 1.2)]) + eye - at
+    group = replace(all_points("eyeBlinkLeft", (0, 0, 0)), moves=down.astype(np.float32))
+    return replace(part("a", 0, lids=np.full(25, hold)), points=at, groups=[group])
+
+
+def test_lids_keep_to_the_eyeball_half_way():
+    for amount in (0.25, 0.5, 0.75, 1.0):
+        straight = np.linalg.norm(lid(0.0).points + moved(lid(0.0), eyeBlinkLeft=amount) - HEAD.eyes[0], axis=1)
+        held = np.linalg.norm(lid(1.0).points + moved(lid(1.0), eyeBlinkLeft=amount) - HEAD.eyes[0], axis=1)
+        assert amount == 1.0 or straight.min() < 12.0
+        assert np.abs(held - 12.5).max() < 1e-4
+
+
+def test_no_lid_sinks_into_the_eyeball():
+    p = lid(1.0)
+    inward = replace(p, groups=[replace(p.groups[0], moves=(-0.4 * (p.points - HEAD.eyes[0])).astype(np.float32))])
+    distance = np.linalg.norm(p.points + moved(inward, eyeBlinkLeft=1) - HEAD.eyes[0], axis=1)
+    assert distance.min() > min(12.5, 12.0 + LID_MM) - 1e-4
+
+
+def test_rigid_parts_follow_jaw_and_eyes():
+    p = pose(jawOpen=0.5, jawForward=1.0, leftEyeYaw=1.0, headPitch=0.5)
+    point = np.array([5.0, -10.0, 80.0])
+
+    def at(follows: str, x: np.ndarray) -> np.ndarray:
+        linear, shift = rigid_motion(follows, HEAD, p)
+        return linear @ x + shift
+
+    np.testing.assert_array_equal(at("skull", point), point)
+    jaw_turn, jaw_shift = jaw_path(JAW, 0.5)
+    np.testing.assert_allclose(at("jaw", point), jaw_turn @ point + jaw_shift + [0, 0, 8.0])
+    np.testing.assert_allclose(at("left_eye", HEAD.eyes[0]), HEAD.eyes[0])
+    ahead = at("left_eye", HEAD.eyes[0] + [0, 0, 1.0]) - HEAD.eyes[0]
+    assert ahead[0] > 0.5  # yaw + looks to the subject's left
+
+
+def test_apply_reuses_its_buffer():
+    rig = SkinRig(part("a", 0, groups=[all_points("mouthPucker", (0, 0, 6))]), HEAD)
+    assert rig.apply(pose(mouthPucker=1)) is rig.apply(pose())

@@ -1,0 +1,37 @@
+"""configs/heads/ict: the files beside the head were made from the head as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from surface.head import Head
+from surface.head.posing.lean import LEVELS
+from surface.head.posing.shade import read_shade
+from surface.view.draw import materials
+
+
+@pytest.fixture(scope="module")
+def folder(root: Path) -> Path:
+    return root / "configs" / "heads" / "ict"
+
+
+@pytest.fixture(scope="module")
+def head(folder: Path) -> Head:
+    return Head.load(folder)
+
+
+def test_every_part_has_its_baked_shade(head: Head, folder: Path) -> None:
+    shares = read_shade(folder)
+    sizes = {part.name: len(part.vertices) for part in head.parts}
+    assert {name: len(share) for name, share in shares.items() if "/" not in name} == sizes
+    assert all(len(share) == sizes[name.split("/")[0]] for name, share in shares.items())
+    skins = {part.name for part in head.parts if materials.of(part.material).program == "skin"}
+    assert skins <= {name.split("/")[0] for name in shares if name.endswith("/visible")}
+
+
+def test_every_part_has_its_lean_triangles(head: Head) -> None:
+    for part in head.parts:
+        assert part.lean.keys() == set(LEVELS), part.name
+        assert len(part.triangles) > len(part.lean["full"]) >= len(part.lean["fast"]), part.name

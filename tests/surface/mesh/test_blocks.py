@@ -1,0 +1,50 @@
+"""Cells of a mesh: branches of the tree with complete lists of control points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from surface.mesh import blocks
+
+
+def test_morton_mixes_bits() -> None:
+    x, y = np.array([0, 1, 0, 1, 2, 5]), np.array([0, 0, 1, 1, 0, 3])
+    assert blocks.morton(x, y).tolist() == [0, 1, 2, 3, 4, 0b011011]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lists_hold_every_point_with_weight(seed: int) -> None:
+    surface = shapes.scattered(40, seed)
+    mesh = surface.tessellate(chord_error=0.1, max_depth=5)
+    assert mesh.cell_start[0] == 0
+    assert mesh.cell_start[-1] == len(mesh.uv)
+    assert (np.diff(mesh.cell_start) > 0).all()
+    assert np.diff(mesh.cell_start).max() <= blocks.MOST
+    matrix = surface.basis_matrix(mesh.uv, side=mesh.side)
+    for cell, (first, last) in enumerate(zip(mesh.cell_start, mesh.cell_start[1:], strict=False)):
+        used = np.unique(matrix[int(first) : int(last)].indices)
+        assert np.isin(used, mesh.points_of(cell)).all()
+
+
+def test_open_rectangles_count_points_with_a_common_area() -> None:
+    surface = shapes.scattered(40, 5)
+    rng, bins, s = np.random.default_rng(0), surface.bins, surface.supports
+    low = rng.uniform(-0.4, 1.2, (50, 2))
+    high = low + rng.uniform(0.01, 0.5, (50, 2))
+    rect = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
+    found = np.zeros(50, dtype=np.int64)
+    blocks.count_open(rect, s, bins.grid, bins.shape, bins.start, bins.ids, found)
+    for box, count in zip(rect, found, strict=True):
+        meets = (s[:, 0] < box[1]) & (s[:, 1] > box[0]) & (s[:, 2] < box[3]) & (s[:, 3] > box[2])
+        assert meets.sum() == count
+
+
+def test_unit_vectors_and_where_there_are_none() -> None:
+    a = np.array([[1.0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 2, 0]])
+    b = np.array([[0.0, 3, 0], [1, 0, 0], [0, 1, 0], [0, 0, 5]])
+    out, bad = np.zeros((4, 3)), np.zeros(4, dtype=bool)
+    blocks.unit_cross(a, b, out, bad)
+    assert bad.tolist() == [False, True, True, False]
+    assert out.tolist() == [[0, 0, 1], [0, 0, 0], [0, 0, 0], [1, 0, 0]]

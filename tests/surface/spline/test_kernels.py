@@ -1,0 +1,39 @@
+"""Samples that are taken in runs are those taken one by one, to the last bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from surface.spline.kernels import RUN
+
+
+@pytest.mark.parametrize("order", ["rows", "random"])
+@pytest.mark.parametrize("seed", range(3))
+def test_runs_equal_single_samples(seed: int, order: str) -> None:
+    surface = shapes.scattered(60, seed)
+    u, v = np.meshgrid(np.linspace(-0.6, 1.7, 23), np.linspace(-0.6, 1.7, 29), indexing="ij")
+    uv = np.stack([u.ravel(), v.ravel()], axis=1)
+    if order == "random":
+        uv = np.random.default_rng(seed).permutation(uv)
+    assert len(uv) > 2 * RUN
+    side = np.random.default_rng(seed).integers(0, 4, len(uv))
+    taken, out = surface.sample_derivatives(uv, side, second=True)
+    points = surface.sample(uv, side)[2]
+    for k in range(0, len(uv), 7):
+        alone, single = surface.sample_derivatives(uv[k : k + 1], side[k : k + 1], second=True)
+        assert alone[0] == taken[k]
+        assert np.array_equal(single[0], out[k], equal_nan=True)
+        assert np.array_equal(surface.sample(uv[k : k + 1], side[k : k + 1])[2][0], points[k], equal_nan=True)
+    assert (taken < 0).any()
+    assert (taken >= 0).any()
+
+
+def test_a_fine_run_on_a_net_is_the_same_as_single_samples() -> None:
+    surface = shapes.hills(12)
+    u, v = np.meshgrid(np.linspace(0, 1, 33), np.linspace(0, 1, 33), indexing="ij")
+    uv = np.stack([u.ravel(), v.ravel()], axis=1)
+    together = surface.evaluate(uv)
+    alone = np.concatenate([surface.evaluate(row[None]) for row in uv])
+    assert np.array_equal(together, alone)

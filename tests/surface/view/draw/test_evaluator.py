@@ -1,0 +1,103 @@
+"""surface.view.draw.evaluator"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ball_head import BallHead
+
+from surface.base.errors import ViewError
+from surface.head import Head
+from surface.view import Camera, Offscreen
+from surface.view.draw.evaluator import EVALUATORS, turned, what_lacks
+from surface.view.pictures.offscreen import open_context
+
+SIZE = (220, 200)
+CAMERAS = (Camera.front(), Camera.three_quarter(), Camera.front().zoom(2.5), Camera.profile())
+
+
+@pytest.fixture(scope="module")
+def head(root: Path) -> Head:
+    return Head.load(root / "configs" / "heads" / "ict")
+
+
+@pytest.fixture(scope="module")
+def screens(gl: None, root: Path) -> Iterator[dict[str, Offscreen]]:
+    folder = root / "configs" / "heads" / "ict"
+    made = {name: Offscreen(Head.load(folder), SIZE, evaluator=name) for name in ("cpu", "gpu")}
+    yield made
+    for screen in made.values():
+        screen.close()
+
+
+def poses(head: Head) -> list[np.ndarray]:
+    random = np.random.default_rng(4)
+    return [np.zeros(len(head.parameters)), *(random.uniform(-0.3, 0.8, (3, len(head.parameters))))]
+
+
+def test_both_draw_the_same_picture(screens: dict[str, Offscreen], head: Head) -> None:
+    for values, camera in zip(poses(head), CAMERAS, strict=True):
+        cpu, gpu = (screens[name].render(values, camera).astype(int) for name in ("cpu", "gpu"))
+        assert cpu.std() > 20
+        assert np.abs(cpu - gpu).mean() < 0.01
+        assert (np.abs(cpu - gpu).max(axis=2) > 8).mean() < 1e-3
+
+
+def test_both_know_where_vertices_are(screens: dict[str, Offscreen], head: Head) -> None:
+    values = poses(head)[2]
+    for name in ("cpu", "gpu"):
+        screens[name].render(values)
+    for part in screens["cpu"].head.parts:
+        ids = np.arange(0, len(part.vertices), 7)
+        cpu, gpu = (screens[name].renderer.evaluator.positions(part, ids) for name in ("cpu", "gpu"))
+        assert gpu == pytest.approx(cpu, abs=0.02)
+
+
+def test_on_the_graphics_processor_vertices_here_stand_still(screens: dict[str, Offscreen], head: Head) -> None:
+    screen = screens["gpu"]
+    before = [part.vertices.copy() for part in screen.head.parts]
+    screen.render(poses(head)[1])
+    assert all((part.vertices == old).all() for part, old in zip(screen.head.parts, before, strict=True))
+
+
+def test_a_pose_that_stays_is_not_worked_out_again(screens: dict[str, Offscreen], head: Head) -> None:
+    renderer = screens["gpu"].renderer
+    renderer.pose(poses(head)[3])
+    assert renderer.update() > 20_000
+    revision = renderer.revision
+    renderer.pose(poses(head)[3])
+    assert renderer.update() == 0
+    assert renderer.revision == revision
+
+
+def test_auto_draws_in_software_with_the_processor(gl: None, monkeypatch: pytest.MonkeyPatch, head: Head) -> None:
+    for software, name in ((True, "cpu"), (False, "gpu")):
+        monkeypatch.setattr("surface.view.draw.evaluator.is_software", lambda ctx, software=software: software)
+        with Offscreen(head, (32, 32)) as screen:
+            assert screen.renderer.evaluator.name == name
+            assert screen.ctx.info["GL_RENDERER"] in screen.renderer.evaluator.reason
+
+
+def test_what_cannot_be_had(gl: None, head: Head) -> None:
+    with pytest.raises(ViewError, match="BallHead has no control points") as caught:
+        Offscreen(BallHead(), (32, 32), evaluator="gpu")
+    assert "cpu" in caught.value.hint
+    with Offscreen(BallHead(), (32, 32)) as screen:
+        assert screen.renderer.evaluator.name == "cpu"
+    with pytest.raises(ValueError, match=", ".join(EVALUATORS)):
+        Offscreen(BallHead(), (32, 32), evaluator="abacus")
+    ctx = open_context()
+    info = dict(ctx.info)
+    ctx.release()
+    assert what_lacks(info, head) is None
+    assert "no textures" in str(what_lacks(info | {"GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS": 0}, head))
+    assert "too small" in str(what_lacks(info | {"GL_MAX_TEXTURE_SIZE": 512}, head))
+
+
+def test_turned_by_share() -> None:
+    points, pivot = np.array([[1.0, 5.0, 0.0], [1.0, 5.0, 0.0]]), np.array([0.0, 5.0, 0.0])
+    at = turned(points, np.array([1.0, 0.5]), np.array([0.0, np.pi / 2, 0.0]), pivot)
+    assert at == pytest.approx(np.array([[0, 5, -1], [np.sqrt(0.5), 5, -np.sqrt(0.5)]]), abs=1e-12)

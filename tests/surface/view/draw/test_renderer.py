@@ -1,0 +1,218 @@
+"""surface.view.draw.renderer"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ball_head import RADII, BallHead, BallPart, ball, values
+
+from surface.base.errors import ViewError
+from surface.head import Head
+from surface.view import Camera, Offscreen, Theme
+from surface.view.draw.renderer import light_direction, theme_named
+from surface.view.scene.bounds import Bands
+from surface.view.scene.theme import THEMES, Light
+
+SIZE = (200, 160)
+
+
+@pytest.fixture(scope="module")
+def screens(gl: None) -> Iterator[dict[str, Offscreen]]:
+    made = {quality: Offscreen(BallHead(), SIZE, quality=quality) for quality in ("full", "fast")}
+    yield made
+    for screen in made.values():
+        screen.close()
+
+
+@pytest.fixture(params=["full", "fast"])
+def screen(request: pytest.FixtureRequest, screens: dict[str, Offscreen]) -> Offscreen:
+    return screens[request.param]
+
+
+def middle(picture: np.ndarray, x: float, y: float) -> np.ndarray:
+    """Mean colour round a place given in 0..1 from the upper left corner."""
+    row, column = int(y * SIZE[1]), int(x * SIZE[0])
+    return picture[row - 3 : row + 4, column - 3 : column + 4].reshape(-1, 3).mean(axis=0)
+
+
+def test_skin_is_warm_lit_and_not_blown(screen: Offscreen) -> None:
+    picture = screen.render(values())
+    red, green, blue = middle(picture, 0.5, 0.35)
+    assert red > green > blue
+    assert 120 < red < 250
+    assert (picture[SIZE[1] // 2] < 253).all()
+
+
+def test_the_key_light_comes_from_the_subjects_right(screen: Offscreen) -> None:
+    picture = screen.render(values())
+    assert middle(picture, 0.42, 0.55).sum() > middle(picture, 0.58, 0.55).sum() + 10
+
+
+def test_opening_the_mouth_changes_the_mouth_only(screen: Offscreen) -> None:
+    shut = screen.render(values()).astype(int)
+    opened = screen.render(values(jawOpen=1.0)).astype(int)
+    moved = np.abs(opened - shut).max(axis=2) > 12
+    assert moved[SIZE[1] // 2 :].sum() > 60
+    assert moved[: SIZE[1] // 2].sum() == 0
+
+
+def test_yaw_turns_to_the_subjects_left(screen: Offscreen) -> None:
+    ahead = screen.render(values()).astype(float)
+    turned = screen.render(values(headYaw=0.4)).astype(float)
+    columns = np.arange(SIZE[0])[None, :]
+    red = ahead[..., 0] - ahead[..., 2]
+    eyes = slice(int(0.40 * SIZE[1]), int(0.47 * SIZE[1]))
+    dark_ahead = np.clip(150 - ahead[eyes, 70:130].sum(axis=2) / 3, 0, None)
+    dark_turned = np.clip(150 - turned[eyes, 70:130].sum(axis=2) / 3, 0, None)
+    assert red.max() > 20
+    centre_ahead = (dark_ahead * columns[:, 70:130]).sum() / dark_ahead.sum()
+    centre_turned = (dark_turned * columns[:, 70:130]).sum() / dark_turned.sum()
+    assert centre_turned > centre_ahead + 1
+
+
+def test_gaze_moves_the_pupils(screen: Offscreen) -> None:
+    camera = Camera.around(0, 0, distance=200, target=(30, 20, 80))
+
+    def dark(amount: float) -> float:
+        picture = screen.render(values(leftEyeYaw=amount), camera).astype(float).sum(axis=2)
+        window = picture[60:100, 60:140]
+        weight = np.clip(120 - window, 0, None)
+        return float((weight * np.arange(80)).sum() / weight.sum())
+
+    assert dark(0.5) > dark(0.0) + 4
+    assert dark(-0.5) < dark(0.0) - 4
+
+
+def test_the_picture_depends_on_the_pose_alone(screen: Offscreen) -> None:
+    first = screen.render(values())
+    screen.render(values(jawOpen=1, headYaw=-1, eyeBlinkLeft=1), Camera.profile())
+    assert np.abs(screen.render(values()).astype(int) - first).max() <= 1
+
+
+def test_region_holds_everything_that_differs_from_the_background(screen: Offscreen) -> None:
+    camera = Camera.three_quarter()
+    picture = screen.render(values(headYaw=0.3), camera).astype(int)
+    bands = screen.renderer.region(camera, SIZE)
+    screen.renderer.draw(camera.aimed((5000.0, 0.0, 0.0)), screen.target._drawn)
+    screen.target._pending = Bands.whole(SIZE)
+    differs = np.flipud(np.abs(picture - screen.read()).max(axis=2) > 2)
+    inside = np.zeros_like(differs)
+    for left, bottom, right, top in bands.boxes():
+        inside[bottom:top, left:right] = True
+    assert differs.any()
+    assert not differs[~inside].any()
+    assert inside.mean() < 0.5
+
+
+def test_a_camera_inside_the_head_draws_the_whole_picture(screen: Offscreen) -> None:
+    assert screen.renderer.region(Camera((0, 0, 10), (0, 0, 100)), SIZE).box() == (0, 0, *SIZE)
+
+
+def test_both_qualities_agree(screens: dict[str, Offscreen]) -> None:
+    full, fast = (screens[q].render(values(jawOpen=0.5)).astype(float) for q in ("full", "fast"))
+    assert np.abs(full - fast).mean() < 2.5
+
+
+def test_background_can_be_changed(screen: Offscreen) -> None:
+    theme = screen.renderer.theme
+    screen.renderer.set_background((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+    picture = screen.render(values())
+    screen.renderer.set_background(theme.background_top, theme.background_bottom)
+    assert picture[2, SIZE[0] // 2, 2] > 150
+    assert picture[-3, SIZE[0] // 2, 1] > 150
+    assert screen.render(values())[2, SIZE[0] // 2, 2] < 120
+
+
+def test_themes_differ(gl: None) -> None:
+    with Offscreen(BallHead(), SIZE, theme="mask") as screen:
+        red, _, blue = middle(screen.render(values()), 0.5, 0.35)
+    assert abs(red - blue) < 25
+
+
+def test_names_that_do_not_exist(gl: None) -> None:
+    with pytest.raises(ViewError, match="'clown'") as caught:
+        theme_named("clown")
+    assert "skin" in caught.value.hint
+    assert theme_named(Theme(gloss=2.0)).gloss == 2.0
+    with pytest.raises(ValueError, match="'best'"):
+        Offscreen(BallHead(), SIZE, quality="best")
+
+
+@pytest.mark.parametrize("name", THEMES)
+def test_lights_come_from_where_the_theme_says(name: str) -> None:
+    key = light_direction(THEMES[name].key, 0.0)
+    assert np.linalg.norm(key) == pytest.approx(1.0, abs=1e-6)
+    assert key[0] < 0 < key[1]
+    assert light_direction(Light(0, 0, (1, 1, 1)), 90.0) == pytest.approx([1, 0, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("quality", ["full", "fast"])
+def test_the_shipped_head_looks_at_you(gl: None, root: Path, quality: str) -> None:
+    head = Head.load(root / "configs" / "heads" / "ict")
+    camera, size = Camera.front(), (480, 480)
+    with Offscreen(head, size, quality=quality) as screen:
+        picture = screen.render(np.zeros(len(head.parameters)), camera).astype(int)
+    for part in (p for p in head.parts if p.material == "eye"):
+        column, row = pixel(camera, part.vertices[np.argmax(part.vertices[:, 2])], size)
+        around = picture[row - 3 : row + 4, column - 14 : column + 15]
+        assert around[:, 10:19].sum(axis=2).min() < 120, "a dark pupil"
+        assert around[:, :8].sum(axis=2).max() > 270, "white beside it"
+        assert around[:, -8:].sum(axis=2).max() > 270, "white on the other side"
+    face = picture[120:300, 180:300]
+    assert (face.max(axis=2) > 250).mean() < 0.003, "nothing blown out"
+    assert (face.sum(axis=2) < 45).mean() < 0.02, "no black holes"
+    assert (face[..., 0] > face[..., 2]).mean() > 0.9, "warm skin"
+
+
+def pixel(camera: Camera, point: np.ndarray, size: tuple[int, int]) -> tuple[int, int]:
+    """Column and row of a point in head space."""
+    clip = camera.matrix(size[0] / size[1]).astype(float) @ [*point, 1.0]
+    return int((clip[0] / clip[3] * 0.5 + 0.5) * size[0]), int((0.5 - clip[1] / clip[3] * 0.5) * size[1])
+
+
+@pytest.mark.parametrize("quality", ["full", "fast"])
+@pytest.mark.parametrize(("yaw_deg", "pitch_deg", "inside", "outside"), [(180, -10, 0.59, 0.3), (0, -50, 0.8, 0.12)])
+def test_a_hollow_bust_is_dark_inside(
+    gl: None, quality: str, yaw_deg: float, pitch_deg: float, inside: float, outside: float
+) -> None:
+    head = BallHead()
+    skin = head.parts[0]
+    skin.triangles = skin.triangles[skin.rest[skin.triangles].mean(axis=1)[:, 1] > 0.0]  # all below is cut away
+    camera = Camera.around(yaw_deg, pitch_deg, target=(0.0, 20.0, 0.0), fov_deg=12.0)
+    with Offscreen(head, SIZE, quality=quality) as screen:
+        picture = screen.render(values(), camera)
+    dark = middle(picture, 0.5, inside)
+    assert dark.sum() < 0.5 * middle(picture, 0.5, outside).sum()
+    assert np.abs(dark - middle(picture, 0.04, inside)).max() > 15, "no hole through which the background shows"
+
+
+class Bearded(BallHead):
+    """Lashes over a whole ball, as deep under the skin as is asked for."""
+
+    def __init__(self, depth_mm: float) -> None:
+        super().__init__()
+        points, normals, triangles = ball(RADII - depth_mm, 61, 81)
+        hair = BallPart("lashes", "lash", triangles, points, normals)
+        hair.uv[:] = 0.5, 0.1
+        self.parts = (*self.parts, hair)
+
+
+@pytest.mark.parametrize(("depth_mm", "shown"), [(1.0, True), (3.0, False)])
+def test_skin_hides_hair_only_where_it_is_well_under_it(gl: None, depth_mm: float, shown: bool) -> None:
+    with Offscreen(BallHead(), SIZE) as bare, Offscreen(Bearded(depth_mm), SIZE) as bearded:
+        forehead = middle(bare.render(values()), 0.5, 0.3), middle(bearded.render(values()), 0.5, 0.3)
+    assert (forehead[1].sum() < 0.6 * forehead[0].sum()) == shown
+    if not shown:
+        assert forehead[1] == pytest.approx(forehead[0])
+
+
+def test_a_hurried_picture_is_hardly_another(screen: Offscreen) -> None:
+    calm = screen.render(values(jawOpen=0.4)).astype(int)
+    screen.renderer.hurry()
+    screen.renderer.revision += 1
+    hurried = screen.render(values(jawOpen=0.4)).astype(int)
+    assert np.abs(calm - hurried).mean() < 0.5
+    assert (calm != hurried).any() == (screen.renderer.quality == "full")

@@ -1,0 +1,132 @@
+"""surface.view.pictures.occlusion"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ball_head import BallHead, BallPart, ball, grid, values
+
+from surface.view.pictures.occlusion import bake, bake_head, calm, fit_sky, lit, orthographic, spread, thinness
+
+
+def plate(name: str, y: float, half: float, material: str = "skin") -> BallPart:
+    uv, triangles = grid(15, 15)
+    points = np.column_stack([(uv[:, 0] - 0.5) * 2 * half, np.full(len(uv), y), (0.5 - uv[:, 1]) * 2 * half])
+    return BallPart(name, material, triangles, points, np.tile([0.0, 1.0, 0.0], (len(points), 1)))
+
+
+def test_a_ball_alone_sees_the_whole_sky(gl: None) -> None:
+    points, normals, triangles = ball(50.0, 41, 61)
+    share = bake([BallPart("ball", "skin", triangles, points, normals)], directions=24, resolution=320)["ball"]
+    assert share.shape == (len(points), 1)
+    assert share.min() > 0.97
+
+
+def test_under_a_lid_it_is_dark(gl: None) -> None:
+    share = bake([plate("floor", 0.0, 100.0), plate("lid", 8.0, 100.0)], directions=60, resolution=320)
+    middle = share["floor"].reshape(15, 15)[5:10, 5:10]
+    assert middle.max() < 0.05
+    assert share["lid"].min() > 0.95
+
+
+def test_a_disc_above_hides_its_form_factor(gl: None) -> None:
+    radius, height = 40.0, 30.0
+    points, _, triangles = ball(np.array([radius, 0.01, radius]), 41, 61)
+    disc = BallPart(
+        "disc", "skin", triangles, points + np.array([0.0, height, 0.0]), np.tile([0.0, 1.0, 0.0], (len(points), 1))
+    )
+    share = bake([plate("floor", 0.0, 100.0), disc], directions=300, resolution=192)["floor"]
+    wanted = 1.0 - radius**2 / (radius**2 + height**2)
+    assert share.reshape(15, 15)[7, 7] == pytest.approx(wanted, abs=0.03)
+
+
+def test_the_mouths_inside_is_shaded_by_itself_alone(gl: None) -> None:
+    share = bake(
+        [plate("teeth", 0.0, 20.0, "teeth"), plate("skin", 8.0, 100.0), plate("mouth", -5.0, 9.0, "mouth")],
+        directions=24,
+        resolution=96,
+    )
+    assert share["teeth"].min() > 0.95
+    assert (share["mouth"] == 1.0).all()
+
+
+def test_neighbours_are_calmed_and_lone_vertices_left() -> None:
+    uv, triangles = grid(15, 15)
+    slope = np.column_stack([uv[:, 0], np.ones(len(uv))])
+    noisy = slope + np.random.default_rng(1).normal(0.0, 0.1, slope.shape)
+    lone = np.vstack([noisy, [[7.0, 7.0]]]).astype(np.float32)
+    calmed = calm(lone, triangles)
+    inner = np.abs(uv - 0.5).max(axis=1) < 0.35
+    assert np.abs(calmed[:-1] - slope)[inner].std() < 0.5 * np.abs(noisy - slope)[inner].std()
+    np.testing.assert_allclose(calm(slope, triangles)[inner], slope[inner], atol=1e-6)
+    assert (calmed[-1] == 7.0).all()
+
+
+def test_what_opens_does_not_stay_black(gl: None) -> None:
+    head = BallHead()
+    opened = bake_head(head, values(jawOpen=1.0), directions=12, resolution=96)
+    rest = bake(head.parts, directions=12, resolution=96)
+    assert all((opened[p.name] >= calm(rest[p.name], p.triangles) - 1e-6).all() for p in head.parts)
+    assert (head.parts[0].vertices == BallHead().parts[0].vertices).all()
+
+
+def test_directions_are_even() -> None:
+    directions = spread(200)
+    assert np.linalg.norm(directions, axis=1) == pytest.approx(np.ones(200))
+    assert np.abs(directions.mean(axis=0)).max() < 0.01
+    assert np.cov(directions.T) == pytest.approx(np.eye(3) / 3, abs=0.01)
+
+
+def test_orthographic_depth_grows_away_from_the_viewer() -> None:
+    points = np.random.default_rng(2).uniform(-50, 90, (200, 3))
+    direction = np.array([0.6, 0.0, 0.8])
+    box, matrix, span = orthographic(points, direction)
+    assert box.min() > 0
+    assert box.max() < 1
+    assert np.diff(box[np.argsort(points @ direction), 2]).max() <= 1e-12
+    clip = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    assert (clip[:, :3] + 1) / 2 == pytest.approx(box)
+    assert np.ptp(box[:, 2]) * span == pytest.approx(np.ptp(points @ direction))
+
+
+def test_lit_blends_over_neighbours() -> None:
+    picture = np.zeros((8, 8), np.float32)
+    picture[:, 4:] = 1.0
+    box = np.array([[0.5, 0.5, 0.5], [0.9, 0.5, 0.5], [0.1, 0.5, 0.5], [0.1, 0.5, 0.01]])
+    assert lit(box, picture, 0.02) == pytest.approx([0.5, 1.0, 0.0, 1.0])
+
+
+def test_a_sky_on_one_side_is_found() -> None:
+    directions = spread(400)
+    one = np.column_stack([np.ones(400), directions])
+    seen = (directions[:, 0] > 0).astype(float)
+    normal = (one[:, :, None] * one[:, None, :]).sum(axis=0)[None]
+    sky = fit_sky(normal, (seen[:, None] * one).sum(axis=0)[None])[0]
+    towards = sky[0] + directions @ sky[1:]
+    assert towards[directions[:, 0] > 0.7].min() > 0.75
+    assert towards[directions[:, 0] < -0.7].max() < 0.25
+    assert sky[2:] == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_thin_plate_is_thin_and_a_ball_is_not() -> None:
+    head = BallHead()
+    ball = head.parts[1]  # an eyeball, 26 mm through
+    assert thinness(ball).max() == 0.0
+    ball.vertices[:] = _flattened(ball.rest)
+    assert thinness(ball).max() > 0.6
+
+
+def _flattened(points: np.ndarray) -> np.ndarray:
+    """Pressed to a tenth in z about their middle."""
+    middle = points.mean(axis=0)
+    return middle + (points - middle) * [1.0, 1.0, 0.1]
+
+
+def test_skin_gets_its_sky_and_its_thinness(gl: None) -> None:
+    head = BallHead()
+    baked = bake_head(head, values(jawOpen=1.0), directions=24, resolution=96)
+    face = baked["face/visible"]
+    assert face.shape == (len(head.parts[0].vertices), 4)
+    assert (face.min() >= 0.0, face.max() <= 1.0) == (True, True)
+    assert baked["face/thin"].shape == (len(face), 1)
+    assert "teeth/visible" not in baked

@@ -1,0 +1,109 @@
+"""surface.view.pictures.offscreen"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ball_head import BallHead, values
+
+from surface.base.errors import ViewError
+from surface.head import Head
+from surface.view import Camera, Offscreen
+from surface.view.pictures.offscreen import NO_OPENGL_HINT, open_context
+
+OLD_OPENGL = """
+import sys
+sys.path[:0] = [{root!r}, {here!r}]
+import numpy as np
+from ball_head import BallHead, values
+from surface.head import Head
+from surface.view import Offscreen
+for quality in ("full", "fast"):
+    with Offscreen(BallHead(), (160, 120), quality=quality) as screen:
+        assert screen.ctx.version_code == 310, screen.ctx.version_code
+        np.save({out!r} + quality, screen.render(values(jawOpen=0.6)))
+        screen.draw(values(jawOpen=0.3))
+        screen.finish()
+        assert screen.ctx.error == "GL_NO_ERROR", screen.ctx.error
+head = Head.load(sys.path[0] + "/configs/heads/ict")
+with Offscreen(head, (160, 120), evaluator="gpu") as screen:
+    assert screen.ctx.version_code == 310, screen.ctx.version_code
+    np.save({out!r} + "gpu", screen.render(np.full(len(head.parameters), 0.2)))
+    assert screen.ctx.error == "GL_NO_ERROR", screen.ctx.error
+"""
+
+
+def test_draws_on_opengl_31(gl: None, root: Path, tmp_path: Path) -> None:
+    script = OLD_OPENGL.format(root=str(root), here=str(root / "tests" / "surface"), out=f"{tmp_path}/")
+    old = {"MESA_GL_VERSION_OVERRIDE": "3.1", "MESA_GLSL_VERSION_OVERRIDE": "140", "LIBGL_ALWAYS_SOFTWARE": "1"}
+    done = subprocess.run([sys.executable, "-c", script], env=os.environ | old, capture_output=True, text=True)
+    if "version_code" in done.stderr or "AssertionError: 4" in done.stderr:
+        pytest.skip("this OpenGL driver is not Mesa: its version cannot be lowered")
+    assert done.returncode == 0, done.stderr
+    for quality in ("full", "fast"):
+        with Offscreen(BallHead(), (160, 120), quality=quality) as screen:
+            here = screen.render(values(jawOpen=0.6)).astype(float)
+        assert np.abs(np.load(tmp_path / f"{quality}.npy") - here).mean() < 1.0
+    head = Head.load(root / "configs" / "heads" / "ict")
+    with Offscreen(head, (160, 120), evaluator="cpu") as screen:
+        here = screen.render(np.full(len(head.parameters), 0.2)).astype(float)
+    assert here.std() > 20
+    assert np.abs(np.load(tmp_path / "gpu.npy") - here).mean() < 1.0
+
+
+def test_no_driver_complaint(gl: None) -> None:
+    with Offscreen(BallHead(), (64, 64)) as screen:
+        screen.render(values(jawOpen=1))
+        assert screen.ctx.error == "GL_NO_ERROR"
+
+
+def test_draw_then_read_is_render(gl: None) -> None:
+    with Offscreen(BallHead(), (64, 64)) as screen:
+        screen.draw(values(jawOpen=1), Camera.three_quarter())
+        screen.finish()
+        drawn = screen.read()
+        assert (screen.render(values(jawOpen=1), Camera.three_quarter()) == drawn).all()
+
+
+def test_close_twice_and_again(gl: None) -> None:
+    for _ in range(3):
+        screen = Offscreen(BallHead(), (32, 32))
+        screen.render(values())
+        screen.close()
+        screen.close()
+
+
+def test_two_at_once_do_not_disturb_each_other(gl: None) -> None:
+    with Offscreen(BallHead(), (64, 64)) as one:
+        alone = one.render(values())
+        with Offscreen(BallHead(), (48, 48), quality="fast") as two:
+            two.render(values(jawOpen=1))
+        assert (one.render(values()) == alone).all()
+
+
+@pytest.mark.parametrize("size", [(0, 100), (100, 1_000_000)])
+def test_impossible_sizes(gl: None, size: tuple[int, int]) -> None:
+    with pytest.raises(ViewError, match=f"{size[0]}x{size[1]}"):
+        Offscreen(BallHead(), size)
+
+
+def test_without_opengl_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(**options: object) -> None:
+        raise Exception("libEGL.so not loaded")
+
+    monkeypatch.setattr("moderngl.create_context", refuse)
+    with pytest.raises(ViewError, match=r"libEGL\.so not loaded") as caught:
+        open_context()
+    assert caught.value.hint == NO_OPENGL_HINT
+
+
+def test_without_moderngl_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "moderngl", None)
+    with pytest.raises(ViewError, match="moderngl") as caught:
+        open_context()
+    assert ".[view]" in caught.value.hint

@@ -1,0 +1,78 @@
+"""surface.view.pictures.sheet"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ball_head import BallHead, values
+from PIL import Image
+
+from surface.base.errors import ViewError
+from surface.view import Camera, contact_sheet, write_png
+from surface.view.pictures.sheet import closer, compose
+
+
+def plain(colour: tuple[int, int, int], size: tuple[int, int] = (60, 80)) -> np.ndarray:
+    return np.full((size[1], size[0], 3), colour, np.uint8)
+
+
+def test_compose_places_pictures_in_reading_order() -> None:
+    colours = [(200, 0, 0), (0, 200, 0), (0, 0, 200)]
+    page = np.asarray(compose([plain(c) for c in colours], ["a", "b", "c"], columns=2))
+    height, width = page.shape[:2]
+    assert tuple(page[40, 30]) == colours[0]
+    assert tuple(page[40, width - 30]) == colours[1]
+    assert tuple(page[height - 50, 30]) == colours[2]
+    for colour in colours:
+        assert (page == colour).all(axis=2).sum() == 60 * 80
+
+
+def test_labels_are_written_and_fit() -> None:
+    short = np.asarray(compose([plain((9, 9, 9))], ["jawOpen"]))
+    long = np.asarray(compose([plain((9, 9, 9))], ["a label much too long for its tile"]))
+    for page in (short, long):
+        ink = (page.min(axis=2) > 150).any(axis=0)
+        assert ink.sum() > 10
+        assert not ink[:3].any()
+        assert not ink[-3:].any()
+
+
+def test_contact_sheet_draws_entries_and_views(gl: None) -> None:
+    seen: list[tuple[int, int]] = []
+    entries = [("rest", values()), ("jawOpen", values(jawOpen=1)), ("headYaw", values(headYaw=1))]
+    views = (Camera.front(), Camera.profile())
+    sheet = contact_sheet(
+        BallHead(), entries, views=views, tile=(60, 64), columns=1, progress=lambda *at: seen.append(at)
+    )
+    page = np.asarray(sheet).astype(int)
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+    assert page.shape[1] == 2 * 60 + 8
+    rows = [page[y : y + 64] for y in range(4, page.shape[0] - 64, (page.shape[0] - 4) // 3)]
+    assert len(rows) == 3
+    assert np.abs(rows[0] - rows[1]).max() > 50
+    assert np.abs(rows[0] - rows[2]).max() > 50
+
+
+def test_refusals() -> None:
+    with pytest.raises(ViewError, match="at least one"):
+        compose([], [])
+    with pytest.raises(ValueError, match="1 labels for 2"):
+        compose([plain((1, 1, 1))] * 2, ["a"])
+    with pytest.raises(ValueError, match=r"pictures\[1\]"):
+        compose([plain((1, 1, 1)), plain((1, 1, 1), (10, 10))], ["a", "b"])
+
+
+def test_write_png_round_trips(tmp_path: Path) -> None:
+    picture = np.random.default_rng(0).integers(0, 256, (20, 30, 3), dtype=np.uint8)
+    write_png(picture, tmp_path / "a.png")
+    assert (np.asarray(Image.open(tmp_path / "a.png")) == picture).all()
+    write_png(Image.fromarray(picture), tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_a_profile_is_seen_from_further_than_a_front() -> None:
+    front, side = closer(Camera.front()), closer(Camera.profile())
+    assert front.distance < side.distance / 1.1
+    assert side.distance < Camera.profile().distance

@@ -1,0 +1,158 @@
+"""surface.view.window"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ball_head import BallHead, values
+
+from surface.base.errors import ViewError
+from surface.view import run_window
+from surface.view.scene.viewpoint import Viewpoint
+from surface.view.window import WindowReport, _Window
+
+CHILD = """
+import json, sys
+sys.path[:0] = [{root!r}, {here!r}]
+from ball_head import BallHead, values
+from surface.base.errors import ViewError
+from surface.view import run_window
+calls = dict(source=0, gui=0)
+def source():
+    calls["source"] += 1
+    if {fail!r} and calls["source"] > 3:
+        raise KeyError("the source broke")
+    return values(jawOpen=calls["source"] % 10 / 10)
+def gui():
+    from imgui_bundle import imgui
+    calls["gui"] += 1
+    imgui.begin("panel"); imgui.text("hello"); imgui.end()
+try:
+    report = run_window(BallHead(), source, size=(320, 240), gui=gui, quality={quality!r}, **{options})
+except (KeyError, ViewError) as error:
+    print(json.dumps([type(error).__name__, str(error)]))
+    sys.exit(7)
+from imgui_bundle import hello_imgui
+import numpy as np
+np.save({out!r}, hello_imgui.final_app_window_screenshot())
+print(json.dumps(dict(frames=report.frames, rate=report.rate_hz, **calls)))
+"""
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    """A display of our own (Xvfb)."""
+    program = shutil.which("Xvfb")
+    if program is None:
+        pytest.skip("needs Xvfb (apt-get install xvfb)")
+    reader, writer = os.pipe()
+    command = [program, "-displayfd", str(writer), "-screen", "0", "640x480x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL)
+    os.close(writer)
+    with os.fdopen(reader) as stream:
+        number = stream.readline().strip()
+    if not number:
+        server.wait()
+        pytest.skip("Xvfb did not start")
+    yield f":{number}"
+    server.terminate()
+    server.wait()
+
+
+def child(root: Path, folder: Path, display: str, quality: str = "fast", fail: bool = False, **options: object):
+    script = CHILD.format(
+        root=str(root),
+        here=str(root / "tests" / "surface"),
+        out=str(folder / "shot.npy"),
+        quality=quality,
+        fail=fail,
+        options=repr(options),
+    )
+    settings = {"DISPLAY": display, "LIBGL_ALWAYS_SOFTWARE": "1", "WAYLAND_DISPLAY": ""}
+    return subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | settings,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+@pytest.mark.parametrize("quality", ["full", "fast"])
+def test_the_window_draws_head_and_panel_and_closes(root: Path, tmp_path: Path, display: str, quality: str) -> None:
+    done = child(root, tmp_path, display, quality, seconds=0.6)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert told["frames"] >= 2
+    assert told["source"] == told["frames"]
+    assert told["gui"] >= told["frames"] - 1
+    picture = np.load(tmp_path / "shot.npy")[..., :3].astype(int)
+    middle = picture[90:120, 130:190].reshape(-1, 3).mean(axis=0)
+    assert middle[0] > middle[2] + 10
+    assert [entry.name for entry in tmp_path.iterdir()] == ["shot.npy"], "the window leaves no files behind"
+
+
+def test_what_the_source_raises_comes_through(root: Path, tmp_path: Path, display: str) -> None:
+    done = child(root, tmp_path, display, fail=True, seconds=20)
+    assert done.returncode == 7, done.stderr
+    assert json.loads(done.stdout.splitlines()[-1]) == ["KeyError", "'the source broke'"]
+
+
+def test_a_display_that_is_not_there(root: Path, tmp_path: Path) -> None:
+    done = child(root, tmp_path, ":9876", seconds=1)
+    assert done.returncode == 7, done.stderr
+    kind, message = json.loads(done.stdout.splitlines()[-1])
+    assert kind == "ViewError"
+    assert ":9876" in message
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="these systems always have a display")
+def test_no_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(ViewError, match="no display") as caught:
+        run_window(BallHead(), lambda: values())
+    assert "--headless" in caught.value.hint
+
+
+def test_without_imgui_bundle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setitem(sys.modules, "imgui_bundle", None)
+    with pytest.raises(ViewError, match="imgui-bundle"):
+        run_window(BallHead(), lambda: values())
+
+
+def test_a_kiosk_covers_the_screen(root: Path, tmp_path: Path, display: str) -> None:
+    done = child(root, tmp_path, display, seconds=0.4, kiosk=True)
+    assert done.returncode == 0, done.stderr
+    assert np.load(tmp_path / "shot.npy").shape[:2] == (480, 640)
+
+
+def test_a_minimised_window_still_asks_and_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    window = _Window(BallHead(), lambda: values(), Viewpoint(), "fast", "skin", "auto")
+    closed: list[bool] = []
+    rested: list[float] = []
+    monkeypatch.setattr(window, "close", lambda: closed.append(True))
+    monkeypatch.setattr("surface.view.window._pixels", lambda: (0, 0))
+    monkeypatch.setattr("surface.view.window.time.sleep", rested.append)
+    answers = iter([True, True, False])
+    window.keep_going = lambda: next(answers)
+    for _ in range(3):
+        window.ask()
+    assert len(rested) == 2
+    assert min(rested) >= 0.01
+    assert closed == [True]
+
+
+def test_report_rate() -> None:
+    assert WindowReport(61, 2.0).rate_hz == pytest.approx(30.0)
+    assert WindowReport(1, 0.0).rate_hz == 0.0
