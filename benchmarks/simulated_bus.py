@@ -15,10 +15,10 @@ from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler, PortHand
 from rich.console import Console
 from rich.table import Table
 
-from drivers.dynamixel.packet import Instruction, encode_instruction
+from drivers.packets.packet import Instruction, encode_instruction
 from drivers.sim import SimulatedBus
-from drivers.sim.bus import SimulatedChain
-from drivers.sim.device import SimulatedServo
+from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.device import SimulatedServo
 
 console = Console()
 POSITION = b"\x84\x00\x04\x00"

@@ -19,12 +19,12 @@ from rich.console import Console
 from rich.table import Table
 
 from drivers import open_bus
-from drivers.bus import BusState, ServoSpec
-from drivers.errors import DriverError, PortLost
-from drivers.guard import BURST_S
-from drivers.sim.bus import SimulatedChain
-from drivers.sim.device import SimulatedServo
-from drivers.sim.virtual import VirtualClock, VirtualLink
+from drivers.base.bus import BusState, ServoSpec
+from drivers.base.errors import DriverError, PortLost
+from drivers.core.guard import BURST_S
+from drivers.sim.serving.virtual import VirtualClock, VirtualLink
+from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.device import SimulatedServo
 
 IDS = tuple(range(1, 9))
 RATE_HZ = 50
@@ -43,7 +43,8 @@ FAULTS = (
     "flip:*:p=0.05", "short:{i}:1:every=4", "wrongid:{i}:{j}:every=5", "noise:*:5:p=0.1", "alert:{i}", "hw:{i}:0x20",
     "volts:*:3.0", "temp:{i}:75", "stall:{i}", "eeprom-busy:*:20ms", "echo", "unplug", "pause", "forget:{i}",
 )  # fmt: skip
-"""Faults of ``drivers.sim.faults``; "pause" is a host that stalls, "forget" a servo that loses its supply a moment."""
+"""Faults of ``drivers.sim.wire.faults``; "pause" is a host that stalls, "forget" a servo that loses its
+supply a moment."""
 
 
 @dataclass

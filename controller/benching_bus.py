@@ -23,10 +23,10 @@ import numpy as np
 from controller.clock import Clock, Samples
 from controller.paths import find_config
 from controller.stolen import Stolen
-from drivers.bus import Bus, ServoSpec
+from drivers.base.bus import Bus, ServoSpec
+from drivers.base.priority import ORDINARY, give_priority_back, take_priority, take_turns_quickly
 from drivers.dynamixel.frames import GoalFrame, GroupRead, Run
-from drivers.priority import ORDINARY, give_priority_back, take_priority, take_turns_quickly
-from drivers.serialport import SerialPort
+from drivers.port.serialport import SerialPort
 from drivers.sim import SimulatedBus
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ _FACE = (("as fast as it can, ordinary priority", _AS_FAST_AS_IT_CAN, True),
 _SLEEPER = """
 import select, sys
 from controller.clock import Clock, Samples
-from drivers.priority import take_priority
+from drivers.base.priority import take_priority
 take_priority()
 clock = Clock(float(sys.argv[1]))
 clock.jitter_ms = Samples(int(sys.argv[2]))

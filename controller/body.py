@@ -38,8 +38,8 @@ from controller.sources import Sources, Voice
 from controller.speech import layer_of, load_take
 from controller.stage import Stage, load_stage
 from controller.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
-from drivers.priority import take_priority, take_turns_quickly
-from drivers.shutdown import Closers, with_those_before
+from drivers.base.priority import take_priority, take_turns_quickly
+from drivers.base.shutdown import Closers, with_those_before
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from controller.config import Settings
-from drivers.errors import DriverError
+from drivers.base.errors import DriverError
 
 Seconds = Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)]
 Text = Annotated[str, Field(max_length=200)]

@@ -24,9 +24,9 @@ from controller.robot import BusSettings, ChannelSettings
 from controller.rules import RuleSettings
 from controller.safety import Guard
 from drivers import open_bus
-from drivers.bus import Bus, BusState
-from drivers.errors import DriverError, NoReply, PortLost
-from drivers.priority import take_priority
+from drivers.base.bus import Bus, BusState
+from drivers.base.errors import DriverError, NoReply, PortLost
+from drivers.base.priority import take_priority
 
 if TYPE_CHECKING:
     from controller.anchors import AnchorMap

@@ -19,7 +19,7 @@ from controller.keys import Keyboard
 from controller.robot import BusSettings, ChannelSettings, RobotSettings
 from controller.signals import stop_flag
 from drivers import open_bus
-from drivers.bus import Bus
+from drivers.base.bus import Bus
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from controller.motion import MotionLimiter
 from controller.parameters import Parameters
 from controller.robot import ChannelSettings
 from controller.terms import bend
-from drivers.bus import ServoSpec
+from drivers.base.bus import ServoSpec
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

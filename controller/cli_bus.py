@@ -27,7 +27,7 @@ def ports() -> None:
 
     Example: omote ports
     """
-    from drivers.ports import list_ports
+    from drivers.port.ports import list_ports
 
     found = list_ports()
     if not found:
@@ -94,7 +94,7 @@ def set_id(
 
     Example: omote set-id /dev/ttyUSB0 1 12
     """
-    from drivers.rename import set_id as change
+    from drivers.tools.rename import set_id as change
 
     info = change(port, baud, protocol, old, new, release=release)
     console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}")

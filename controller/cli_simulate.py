@@ -161,7 +161,7 @@ def simulate_maestro(
     """
     from controller.simulating import serve_board
     from drivers.sim import Maestro
-    from drivers.sim.families import MAESTRO_SIZES
+    from drivers.sim.serving.families import MAESTRO_SIZES
 
     if channels not in MAESTRO_SIZES:
         raise ConfigError(f"--channels {channels}: no Maestro has so many", hint="6, 12, 18 or 24")
@@ -204,7 +204,7 @@ def simulate_text(
     Example: omote simulate text --template 'S{ch},{us}\\n' --off 'D{ch}\\n' --link /tmp/board
     """
     from controller.simulating import serve_board
-    from drivers.sim.textboard import TextBoard
+    from drivers.sim.boards.textboard import TextBoard
 
     texts = {"template": template, "off": off, "query": query, "answer": answer}
     texts |= {"begin": begin, "separator": separator, "end": end}
@@ -226,7 +226,7 @@ def simulate_omote(
     """
     from controller.parameters import PARAMETERS
     from controller.simulating import serve_board
-    from drivers.sim.linehead import LineHead
+    from drivers.sim.boards.linehead import LineHead
 
     known = [name.strip() for name in names.split(",") if name.strip()] or [*PARAMETERS.names]
     serve_board(LineHead(known, time.monotonic()), baud, how, console)

@@ -11,7 +11,7 @@ The tree::
 
 from __future__ import annotations
 
-from drivers.errors import DriverError
+from drivers.base.errors import DriverError
 from surface.base.errors import SurfaceError
 
 

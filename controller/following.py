@@ -13,7 +13,7 @@ from controller.commands import StatusValue
 from controller.mirror import Mirror
 from controller.parameters import REGIONS, Floats, Parameters
 from controller.recording import Face
-from drivers.bus import BusState
+from drivers.base.bus import BusState
 
 Flags = NDArray[np.bool_]
 

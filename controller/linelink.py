@@ -14,8 +14,8 @@ from types import TracebackType
 
 from controller.commands import CommandSink
 from controller.linesession import LineSession
-from drivers.errors import PortError
-from drivers.serialport import SerialPort
+from drivers.base.errors import PortError
+from drivers.port.serialport import SerialPort
 
 log = logging.getLogger(__name__)
 

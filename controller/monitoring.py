@@ -13,11 +13,11 @@ from rich.console import Console
 from controller.scanning import Found, scan_port
 from controller.watching import Watch
 from drivers import open_bus
-from drivers.bus import Bus, BusState, ServoInfo, ServoSpec
-from drivers.dynamixel.tables import ControlTable, load_table
-from drivers.errors import DriverError, NoReply, PortLost
-from drivers.serialport import SerialPort, tapped
-from drivers.traffic import Decoder, Decoder1, Decoder2, Heard
+from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
+from drivers.base.errors import DriverError, NoReply, PortLost
+from drivers.port.serialport import SerialPort, tapped
+from drivers.tables.tables import ControlTable, load_table
+from drivers.tools.traffic import Decoder, Decoder1, Decoder2, Heard
 
 FEETECH = ("sts", "scs")
 SHOWN = ("Present Position", "Goal Position")

@@ -189,7 +189,7 @@ def _doubled(robot: RobotSettings) -> list[str]:
 def _models(robot: RobotSettings) -> list[str]:
     """Servo models that their bus does not drive, and settings that mean nothing there."""
     from drivers import check_model
-    from drivers.errors import DriverError
+    from drivers.base.errors import DriverError
 
     faults = []
     buses = {bus.name: bus for bus in robot.buses}

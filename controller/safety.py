@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from controller.channels import ChannelTable
 from controller.rules import LoadRule, PreventRule, RuleSettings, TimingRule
-from drivers.bus import BusState
+from drivers.base.bus import BusState
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

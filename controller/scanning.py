@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from drivers.bus import ServoInfo, ServoSpec
+from drivers.base.bus import ServoInfo, ServoSpec
 
 BAUDS = {
     2: (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600),
@@ -88,8 +88,8 @@ def _protocol_2(port: str, baud: int, step: Callable[[int], None]) -> Iterator[F
 
 
 def _protocol_1(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
-    from drivers.probe1 import describe, ping_all
-    from drivers.serialport import SerialPort
+    from drivers.port.serialport import SerialPort
+    from drivers.tools.probe1 import describe, ping_all
 
     link = SerialPort(port, baud)
     link.open()

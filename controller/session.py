@@ -24,7 +24,7 @@ from controller.run import BodyProcess, Deadline
 from controller.signals import stop_flag
 from controller.sources import Voice
 from controller.stage import Stage, load_stage
-from drivers.priority import yield_to_servos
+from drivers.base.priority import yield_to_servos
 
 if TYPE_CHECKING:
     from controller.waiting import WaitingBody

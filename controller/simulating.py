@@ -22,11 +22,11 @@ from controller.paths import find_config
 from controller.robot import ChannelSettings, load_robot
 from controller.signals import stop_flag
 from controller.watching import Watch
-from drivers.traffic import Decoder
+from drivers.tools.traffic import Decoder
 
 if TYPE_CHECKING:
-    from drivers.sim.line import Line
-    from drivers.sim.serve import PortServer
+    from drivers.sim.serving.serve import PortServer
+    from drivers.sim.wire.line import Line
 
 Where = Path | str | None
 """A path that becomes a link to a pseudo-terminal, or a URL to listen at instead."""
@@ -69,9 +69,9 @@ def serve_servos(servos: list[SimulatedId], baud: int, how: Serving, console: Co
     servos : ids and models; the model decides the protocol.
     baud : rate the servos listen at.
     """
-    from drivers.dynamixel.tables import load_table
-    from drivers.sim.serve import make_chain, make_servos
-    from drivers.traffic import Decoder1, Decoder2
+    from drivers.sim.serving.serve import make_chain, make_servos
+    from drivers.tables.tables import load_table
+    from drivers.tools.traffic import Decoder1, Decoder2
 
     tables = {servo.id: load_table(servo.model) for servo in servos}
     decoder = (Decoder1 if any(table.protocol == 1 for table in tables.values()) else Decoder2)(tables)
@@ -80,7 +80,7 @@ def serve_servos(servos: list[SimulatedId], baud: int, how: Serving, console: Co
 
 
 def _serve(line: Line, baud: int, how: Serving, console: Console, decoder: Decoder) -> None:
-    from drivers.sim import serve
+    from drivers.sim.serving.serve import serve
 
     line.faults.add(how.faults, time.monotonic())
     with _watching(decoder if how.watch else None, console) as look:
@@ -133,7 +133,7 @@ def _say_ready(path: str, console: Console) -> None:
 def serve_board(line: Line, baud: int, how: Serving, console: Console) -> None:
     """Serve a simulated board; prints ``ready PATH`` and returns when interrupted."""
     from drivers.sim import Maestro
-    from drivers.traffic import HexDecoder, TextDecoder
+    from drivers.tools.traffic import HexDecoder, TextDecoder
 
     _serve(line, baud, how, console, HexDecoder() if isinstance(line, Maestro) else TextDecoder())
 
@@ -166,7 +166,7 @@ def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> N
 def _board(bus: BusSettings, channels: list[ChannelSettings]) -> Line:
     """The simulated board of a bus, set to what its driver will expect."""
     from drivers import open_bus
-    from drivers.sim.families import make_line
+    from drivers.sim.serving.families import make_line
 
     options = {key: value for key, value in bus.options().items() if key not in SIMULATION}
     driver = open_bus(bus.family, servo_specs(channels), **{"port": "", **options})

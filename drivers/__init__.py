@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from drivers.errors import DriverError
+from drivers.base.errors import DriverError
 
 if TYPE_CHECKING:
-    from drivers.bus import Bus, ServoSpec
+    from drivers.base.bus import Bus, ServoSpec
 
 SIMULATED = "simulated"
 
@@ -25,12 +25,12 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "dynamixel": Kind("drivers.dynamixel.bus:DynamixelBus", "drivers.models:check_dynamixel"),
+    "dynamixel": Kind("drivers.dynamixel.bus:DynamixelBus", "drivers.tables.models:check_dynamixel"),
     "maestro": Kind("drivers.maestro.bus:MaestroBus", "drivers.boards.hobby:check_hobby"),
-    "ssc32": Kind("drivers.text.ssc32:Ssc32Bus", "drivers.boards.hobby:check_hobby"),
+    "ssc32": Kind("drivers.ssc32.bus:Ssc32Bus", "drivers.boards.hobby:check_hobby"),
     "text": Kind("drivers.text.bus:TextBus", "drivers.boards.hobby:check_hobby"),
-    "omote": Kind("drivers.lineout.bus:LineOutBus", "drivers.lineout.bus:check_lineout"),
-    "feetech": Kind("drivers.feetech.bus:FeetechBus", "drivers.models:check_feetech"),
+    "omote": Kind("drivers.omote.bus:LineOutBus", "drivers.omote.bus:check_lineout"),
+    "feetech": Kind("drivers.feetech.bus:FeetechBus", "drivers.tables.models:check_feetech"),
 }
 
 
@@ -51,7 +51,7 @@ def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynami
     """
     servos = tuple(servos)
     if kind == SIMULATED:
-        from drivers.simulated import simulated
+        from drivers.sim.serving.standin import simulated
 
         driver = simulated(_load(simulates, "driver").fitting(servos), simulates)
     else:

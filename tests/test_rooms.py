@@ -12,7 +12,7 @@ FORBIDDEN = {
     "surface": {"drivers", "controller", "serial", "dynamixel_sdk", "pydantic", "typer"},
     "drivers": {"surface", "controller", "moderngl", "numba", "scipy", "pydantic", "typer"},
 }
-COMPILED = {"drivers/kernels.py": {"numba"}}
+COMPILED = {"drivers/core/kernels.py": {"numba"}}
 """Loaded by whoever drives a bus and by nobody else, so that looking for ports stays quick."""
 
 

@@ -14,11 +14,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from drivers.bus import BusState, Floats, ServoInfo, ServoSpec, frozen
-from drivers.errors import BusError, NoReply, PortLost
-from drivers.serialport import SerialPort, link_to, reply_margin_s
-from drivers.telling import Teller
-from drivers.wirebus import WireBus
+from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec, frozen
+from drivers.base.errors import BusError, NoReply, PortLost
+from drivers.base.telling import Teller
+from drivers.core.wirebus import WireBus
+from drivers.port.serialport import SerialPort, link_to, reply_margin_s
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +28,7 @@ OFF_TRIES = 6
 
 
 class BoardBus(WireBus):
-    """Servos behind a board that does not measure them. See :class:`~drivers.bus.Bus` for the contract.
+    """Servos behind a board that does not measure them. See :class:`~drivers.base.bus.Bus` for the contract.
 
     ``start`` goes on from the pulses that the board puts out already; a servo without any begins where it was last
     known to be, or at its ``rest_rad``.
@@ -36,7 +36,7 @@ class BoardBus(WireBus):
     Parameters
     ----------
     servos : the servos in the order of all arrays.
-    port : device path, or URL; or a :class:`~drivers.sim.virtual.VirtualLink`, with its clock.
+    port : device path, or URL; or a :class:`~drivers.sim.serving.virtual.VirtualLink`, with its clock.
     baud : rate of the port.
     margin_s : longest wait for an answer beyond its time on the wire; None takes it from what the port is.
     stagger_s : pause between switching servos on.

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.bus import Floats, ServoSpec
-from drivers.errors import DriverError
+from drivers.base.bus import Floats, ServoSpec
+from drivers.base.errors import DriverError
 
 Indices = NDArray[np.intp]
 

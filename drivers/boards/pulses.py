@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from drivers.base.bus import Floats, ServoSpec
 from drivers.boards.bus import BoardBus
 from drivers.boards.hobby import PulseScale
-from drivers.bus import Floats, ServoSpec
 
 GROUP = 8
 """Channels asked in one cycle: boards have small input buffers."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drivers.serialport import SerialPort
+from drivers.port.serialport import SerialPort
 
 RETRY_S = 1.0
 """A board that keeps silent is tried once in this time."""

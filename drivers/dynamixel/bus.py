@@ -15,7 +15,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from drivers.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec
+from drivers.base.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec
+from drivers.base.errors import BusError, DriverError, PortLost
+from drivers.core.wirebus import WireBus
 from drivers.dynamixel import startup
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.layout import Block, Scale
@@ -23,10 +25,8 @@ from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
 from drivers.dynamixel.startup import Policy
-from drivers.dynamixel.tables import load_table, model_name, model_number
 from drivers.dynamixel.telemetry import Telemetry
-from drivers.errors import BusError, DriverError, PortLost
-from drivers.wirebus import WireBus
+from drivers.tables.tables import load_table, model_name, model_number
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +35,7 @@ MAP_TRIES = 5
 
 
 class DynamixelBus(WireBus):
-    """Dynamixel servos on one serial port. See :class:`~drivers.bus.Bus` for the contract.
+    """Dynamixel servos on one serial port. See :class:`~drivers.base.bus.Bus` for the contract.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.packet import BROADCAST_ID, HEADER, Instruction, crc16, encode_fast_head, encode_instruction
+from drivers.packets.packet import BROADCAST_ID, HEADER, Instruction, crc16, encode_fast_head, encode_instruction
 
 Octets = NDArray[np.uint8]
 
@@ -37,7 +37,7 @@ class GoalFrame:
     """
 
     def __init__(self, ids: Sequence[int], address: int, size: int, places: NDArray[np.int64]) -> None:
-        from drivers.kernels import put_goals  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import put_goals  # compiled: only who drives servos pays for it
 
         self._put_goals = put_goals
         self._size, self._places = size, places
@@ -96,11 +96,11 @@ class GroupRead:
     frame : the instruction.
     wanted : data bytes expected by id, in the order of the replies.
     size : bytes of all replies, not stuffed.
-    spans, heads, states : where each reply lies and how it begins, see ``drivers.kernels``.
+    spans, heads, states : where each reply lies and how it begins, see ``drivers.core.kernels``.
     """
 
     def __init__(self, runs: Sequence[Run], fast: bool = False) -> None:
-        from drivers.kernels import check_joint, check_replies  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import check_joint, check_replies  # compiled: only who drives servos pays for it
 
         self._check = check_joint if fast else check_replies
         self.runs, self.fast = tuple(runs), fast
@@ -143,7 +143,7 @@ class GroupRead:
 
 
 def _spans(wanted: Mapping[int, int], fast: bool) -> NDArray[np.int64]:
-    """Each servo's id, where its error byte stands and where its reply ends; see ``drivers.kernels.check_replies``."""
+    """Each servo's id, where its error byte stands and where its reply ends; see ``core.kernels.check_replies``."""
     error, extra, begin = (0, PART_SIZE, HEAD_SIZE) if fast else (HEAD_SIZE, STATUS_SIZE, 0)
     spans = np.empty((len(wanted), 3), np.int64)
     for k, (servo, length) in enumerate(wanted.items()):

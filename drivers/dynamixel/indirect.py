@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from drivers.dynamixel.layout import INDIRECT, Block, item_of
 from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.tables import ControlTable
+from drivers.tables.tables import ControlTable
 
 _TRIES = 2
 

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.bus import Floats, ServoSpec
-from drivers.dynamixel.tables import ControlTable, Item
+from drivers.base.bus import Floats, ServoSpec
+from drivers.tables.tables import ControlTable, Item
 
 Ticks = NDArray[np.int32]
 
@@ -41,7 +41,7 @@ class Scale:
     """
 
     def __init__(self, servos: Sequence[ServoSpec], tables: Sequence[ControlTable]) -> None:
-        from drivers.kernels import to_si, to_steps  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import to_si, to_steps  # compiled: only who drives servos pays for it
 
         self._to_steps, self._to_si = to_steps, to_si
         sign = [-1.0 if servo.reverse else 1.0 for servo in servos]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from drivers.bus import ServoSpec
+from drivers.base.bus import ServoSpec
 from drivers.dynamixel.legacy_sdk import Packets1
 from drivers.dynamixel.port import Port
 from drivers.protocol1.bus import Protocol1Bus

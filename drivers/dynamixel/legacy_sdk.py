@@ -2,7 +2,7 @@
 
 :class:`Packets1` runs on :class:`~drivers.dynamixel.port.Port` (S3, S6 to S9 and S12 are mended there) and can be
 given to any SDK code. The numbers are those of ``drivers/dynamixel/sdk.py``, where they apply to Protocol 1.0 too;
-each has a test in tests/drivers/test_legacy_sdk.py that shows it on the bare SDK:
+each has a test in tests/drivers/dynamixel/test_legacy_sdk.py that shows it on the bare SDK:
 
 ====  ========================================================================================================
 S4    a reply must have the id **and the length** that was asked for, and a servo that missed its time must
@@ -24,8 +24,8 @@ from collections.abc import Sequence
 
 from dynamixel_sdk import protocol1_packet_handler, robotis_def
 
-from drivers.dynamixel.packet1 import BROADCAST_ID, HEADER, Error1, Instruction1, Packet1, Reader1, encode
 from drivers.dynamixel.port import Port
+from drivers.packets.packet1 import BROADCAST_ID, HEADER, Error1, Instruction1, Packet1, Reader1, encode
 from drivers.protocol1.exchange import Exchanges
 
 _FRAME = 259

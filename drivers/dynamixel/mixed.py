@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec, frozen
+from drivers.base.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec, frozen
+from drivers.base.errors import DriverError, NoReply, PortLost
+from drivers.core.wirebus import WireBus
 from drivers.dynamixel.bus import DynamixelBus
 from drivers.dynamixel.legacy import LegacyBus
-from drivers.dynamixel.tables import load_table
-from drivers.errors import DriverError, NoReply, PortLost
 from drivers.protocol1.bus import LAST_ID
-from drivers.wirebus import WireBus
+from drivers.tables.tables import load_table
 
 ONLY_LEGACY = ("singles", "torque_limit")
 """Options that mean nothing to Protocol 2.0."""

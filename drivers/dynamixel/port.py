@@ -9,8 +9,8 @@ import threading
 
 from dynamixel_sdk import port_handler
 
-from drivers.errors import DriverError
-from drivers.serialport import SerialPort, link_to, reply_margin_s
+from drivers.base.errors import DriverError
+from drivers.port.serialport import SerialPort, link_to, reply_margin_s
 
 NAP_LEAST_S = 0.0005
 """A shorter sleep costs more than it saves."""
@@ -24,11 +24,11 @@ DOZE_LATE_S = 0.0005
 
 
 class Port(port_handler.PortHandler):
-    """The SDK's port handler on an exclusive, blocking :class:`~drivers.serialport.SerialPort`.
+    """The SDK's port handler on an exclusive, blocking :class:`~drivers.port.serialport.SerialPort`.
 
     Parameters
     ----------
-    path : device path, URL, or a :class:`~drivers.sim.virtual.VirtualLink`.
+    path : device path, URL, or a :class:`~drivers.sim.serving.virtual.VirtualLink`.
     baud : any rate the adapter takes.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
 

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import TypeVar
 
-from drivers.bus import ServoSpec
+from drivers.base.bus import ServoSpec
+from drivers.base.errors import BusError, CorruptReply, NoReply, ServoRefused, together
 from drivers.dynamixel.layout import NAMES, item_of
-from drivers.dynamixel.packet import ErrorNumber, Instruction, StatusPacket, encode_instruction
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.sdk import Exchange, Packets
-from drivers.dynamixel.tables import ControlTable, Item
-from drivers.errors import BusError, CorruptReply, NoReply, ServoRefused, together
+from drivers.packets.packet import ErrorNumber, Instruction, StatusPacket, encode_instruction
+from drivers.tables.tables import ControlTable, Item
 
 TRIES = 4
 T = TypeVar("T")

@@ -1,7 +1,7 @@
 """dynamixel-sdk with its known faults overridden, all in this one place.
 
 :class:`Port` (in drivers/dynamixel/port.py) and :class:`Packets` are the SDK's handlers and can be given to any
-SDK code. What is mended; each fault has a test in tests/drivers/test_sdk.py that shows it on the bare SDK:
+SDK code. What is mended; each fault has a test in tests/drivers/dynamixel/test_sdk.py that shows it on the bare SDK:
 
 ====  ========================================================================================================
 S1    transmitted packets are byte-stuffed (the SDK builds the stuffed packet and throws it away)
@@ -32,10 +32,10 @@ from typing import Any, NamedTuple
 
 from dynamixel_sdk import protocol2_packet_handler, robotis_def
 
-from drivers.dynamixel import packet
 from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Quick, Rows, Run
-from drivers.dynamixel.packet import Instruction, StatusPacket, StatusReader, encode_instruction
 from drivers.dynamixel.port import Port
+from drivers.packets import packet
+from drivers.packets.packet import Instruction, StatusPacket, StatusReader, encode_instruction
 
 PING_DATA = 3
 PING_SLOT_MS = 3.0

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.bus import BusState, Floats
+from drivers.base.bus import BusState, Floats
 from drivers.dynamixel.frames import GroupRead
 from drivers.dynamixel.groups import Question
 
@@ -25,7 +25,7 @@ class Sweep:
     ----------
     questions : what they are asked, everyone once.
     read : the packet that asks it.
-    octets, known : what is known of the servos, see ``drivers.kernels.take_replies``.
+    octets, known : what is known of the servos, see ``drivers.core.kernels.take_replies``.
     axes : of their ``Scale``.
     told : gives error, supply, temperature, hardware error and torque as known, (n,) each, read-only.
 
@@ -43,7 +43,7 @@ class Sweep:
         axes: Floats,
         told: Callable[[], Sequence[NDArray[Any]]],
     ) -> None:
-        from drivers.kernels import take_replies  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import take_replies  # compiled: only who drives servos pays for it
 
         self._take_replies, self.read = take_replies, read
         self._octets, self._known, self.axes, self._told = octets, known, axes, told
@@ -96,9 +96,9 @@ class Sweep:
 
 
 def _fields(question: Question, joint: bool) -> NDArray[np.int64]:
-    """Registers of each servo, (k, 7, 3); see ``drivers.kernels.register``. Data begin behind the error byte, and
+    """Registers of each servo, (k, 7, 3); see ``drivers.core.kernels.register``. Data begin behind the error byte, and
     in a joint reply behind the id."""
-    from drivers.kernels import FIELDS, SIGN_MAGNITUDE, TWOS_COMPLEMENT, UNSIGNED
+    from drivers.core.kernels import FIELDS, SIGN_MAGNITUDE, TWOS_COMPLEMENT, UNSIGNED
 
     block, fields = question.block, np.zeros((len(FIELDS), 3), np.int64)
     for row, name in enumerate(FIELDS):

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.bus import BusReport, BusState, Flags
+from drivers.base.bus import BusReport, BusState, Flags
+from drivers.base.telling import Teller
 from drivers.dynamixel.frames import Octets, Rows
 from drivers.dynamixel.groups import Group, Question, turns_of
 from drivers.dynamixel.layout import TRIPPED, Block, Scale, Ticks, layout_of
-from drivers.dynamixel.packet import ALERT
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Exchange, group_read
 from drivers.dynamixel.sweep import Sweep, sealed
-from drivers.telling import Teller
+from drivers.packets.packet import ALERT
 
 log = logging.getLogger(__name__)
 

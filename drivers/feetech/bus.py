@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from drivers.bus import ServoSpec
-from drivers.models import check_feetech
+from drivers.base.bus import ServoSpec
 from drivers.protocol1.bus import Protocol1Bus
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.port import Port
+from drivers.tables.models import check_feetech
 
 
 class FeetechBus(Protocol1Bus):

@@ -1,0 +1,4 @@
+"""Pololu Maestro boards.
+
+In: goals in rad. Out: pulse targets. Imports base to boards.
+"""

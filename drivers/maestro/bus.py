@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from drivers.base.bus import Floats, ServoSpec
+from drivers.base.errors import DriverError, NoReply, ServoRefused
 from drivers.boards.pulses import PulseBus
 from drivers.boards.unmarked import Conversation
-from drivers.bus import Floats, ServoSpec
-from drivers.errors import DriverError, NoReply, ServoRefused
 from drivers.maestro import protocol as m
 
 log = logging.getLogger(__name__)

@@ -16,19 +16,19 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from drivers.bus import BusReport, BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
+from drivers.base.bus import BusReport, BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
+from drivers.base.errors import DriverError, PortLost
+from drivers.core.keeper import Keeper
+from drivers.core.wirebus import WireBus
 from drivers.dynamixel.layout import Scale
-from drivers.dynamixel.packet1 import Packet1
-from drivers.dynamixel.tables import ControlTable, load_table, model_name
-from drivers.errors import DriverError, PortLost
-from drivers.keeper import Keeper
+from drivers.packets.packet1 import Packet1
 from drivers.protocol1 import startup
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.registers import Registers
 from drivers.protocol1.settings import Started
 from drivers.protocol1.startup import Policy
 from drivers.protocol1.telemetry import Telemetry
-from drivers.wirebus import WireBus
+from drivers.tables.tables import ControlTable, load_table, model_name
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ LAST_ID = 252
 
 
 class Protocol1Bus(WireBus):
-    """Servos with Protocol 1.0 framing on one serial port. See :class:`~drivers.bus.Bus` for the contract.
+    """Servos with Protocol 1.0 framing on one serial port. See :class:`~drivers.base.bus.Bus` for the contract.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Protocol1Bus(WireBus):
     slow_group : servos asked for one slow value (torque) each cycle; 0 asks only those that raise an alert.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
     watchdog_ms : these servos have none; 0 says that they may hold on when this program is killed, any other time
-        keeps a small process beside it that lets them go then (:mod:`drivers.keeper`).
+        keeps a small process beside it that lets them go then (:mod:`drivers.core.keeper`).
     clock : monotonic seconds.
     policy : fields of :class:`~drivers.protocol1.startup.Policy`, such as ``torque_limit``.
 

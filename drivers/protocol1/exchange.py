@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple, Protocol
 
-from drivers.dynamixel.packet1 import BROADCAST_ID, HEADER, Error1, Instruction1, Packet1, Reader1, checksum, encode
+from drivers.packets.packet1 import BROADCAST_ID, HEADER, Error1, Instruction1, Packet1, Reader1, checksum, encode
+from drivers.port.serialport import SerialPort
 from drivers.protocol1 import HELLO
-from drivers.serialport import SerialPort
 
 STATUS_SIZE = 6
 _LATE_CHUNKS = 16

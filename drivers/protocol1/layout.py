@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.bus import Floats
+from drivers.base.bus import Floats
 from drivers.dynamixel.layout import Ticks
-from drivers.dynamixel.tables import ControlTable, Item
 from drivers.protocol1.registers import item_of
+from drivers.tables.tables import ControlTable, Item
 
 
 @dataclass(frozen=True)

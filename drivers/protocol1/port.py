@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import threading
 
-from drivers.errors import DriverError
-from drivers.serialport import SerialPort, link_to, reply_margin_s
+from drivers.base.errors import DriverError
+from drivers.port.serialport import SerialPort, link_to, reply_margin_s
 
 BITS_PER_BYTE = 10
 
 
 class Port:
-    """An exclusive, blocking :class:`~drivers.serialport.SerialPort` with the state of a conversation.
+    """An exclusive, blocking :class:`~drivers.port.serialport.SerialPort` with the state of a conversation.
 
     Parameters
     ----------
-    path : device path, URL, or a :class:`~drivers.sim.virtual.VirtualLink`.
+    path : device path, URL, or a :class:`~drivers.sim.serving.virtual.VirtualLink`.
     baud : any rate the adapter takes.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
     """

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import TypeVar
 
-from drivers.bus import ServoSpec
-from drivers.dynamixel.packet1 import Error1, Instruction1, Packet1
-from drivers.dynamixel.tables import ControlTable, Item
-from drivers.errors import BusError, CorruptReply, NoReply, ServoRefused, together
+from drivers.base.bus import ServoSpec
+from drivers.base.errors import BusError, CorruptReply, NoReply, ServoRefused, together
+from drivers.packets.packet1 import Error1, Instruction1, Packet1
 from drivers.protocol1 import WINDOW
 from drivers.protocol1.exchange import Exchange, Exchanges, WirePort
+from drivers.tables.tables import ControlTable, Item
 
 TRIES = 4
 T = TypeVar("T")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, field
 
-from drivers.errors import ServoRefused
+from drivers.base.errors import ServoRefused
 from drivers.protocol1.registers import TRIES, Registers
 
 log = logging.getLogger(__name__)

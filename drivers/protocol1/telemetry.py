@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.bus import BusReport, BusState, frozen
+from drivers.base.bus import BusReport, BusState, frozen
+from drivers.base.telling import Teller
 from drivers.dynamixel.layout import Scale, Ticks
-from drivers.dynamixel.packet import ALERT
-from drivers.dynamixel.packet1 import Packet1
+from drivers.packets.packet import ALERT
+from drivers.packets.packet1 import Packet1
 from drivers.protocol1.exchange import Exchange
 from drivers.protocol1.layout import Block, Group, layout_of
 from drivers.protocol1.registers import Registers
-from drivers.telling import Teller
 
 log = logging.getLogger(__name__)
 

@@ -4,9 +4,9 @@
 them until interrupted; ``serve`` does the same for a ``Maestro`` or an ``Ssc32``.
 """
 
-from drivers.sim.maestro import Maestro
-from drivers.sim.serve import serve, serve_dynamixel
-from drivers.sim.simulated import ServoView, SimulatedBus
-from drivers.sim.ssc32 import Ssc32
+from drivers.sim.boards.maestro import Maestro
+from drivers.sim.boards.ssc32 import Ssc32
+from drivers.sim.serving.serve import serve, serve_dynamixel
+from drivers.sim.serving.simulated import ServoView, SimulatedBus
 
 __all__ = ["Maestro", "ServoView", "SimulatedBus", "Ssc32", "serve", "serve_dynamixel"]

@@ -13,10 +13,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from drivers.base.bus import Floats, ServoSpec
+from drivers.base.errors import DriverError
 from drivers.boards.pulses import GROUP, PulseBus
-from drivers.bus import Floats, ServoSpec
-from drivers.errors import DriverError
-from drivers.text.scales import ValueScale
+from drivers.boards.scales import ValueScale
 from drivers.text.template import NAMES, VALUES, AnswerPattern, Template, decimals
 
 log = logging.getLogger(__name__)

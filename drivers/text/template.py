@@ -22,7 +22,7 @@ from collections.abc import Iterable, Mapping
 from string import Formatter
 from typing import NamedTuple
 
-from drivers.errors import DriverError
+from drivers.base.errors import DriverError
 
 VALUES = {"us": ("d", 0), "deg": (".1f", 1), "deg10": ("d", 0), "angle": ("d", 0), "unit": (".4f", 4)}
 """What a servo is told: the format without one given, and the decimals that format leaves."""

@@ -13,7 +13,7 @@ from controller.errors import ConfigError
 from controller.parameters import PARAMETERS
 from controller.robot import load_robot
 from drivers import KINDS, open_bus
-from drivers.bus import ServoSpec
+from drivers.base.bus import ServoSpec
 
 FAMILIES = sorted(KINDS)
 MODEL = {"dynamixel": "xl330-m288", "feetech": "sts3215", "omote": "parameter"}

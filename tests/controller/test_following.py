@@ -20,7 +20,7 @@ from controller.paths import find_config
 from controller.robot import load_robot
 from controller.session import Session
 from controller.stage import load_stage
-from drivers.bus import BusState
+from drivers.base.bus import BusState
 from drivers.sim import SimulatedBus
 
 JAW_ID = 4

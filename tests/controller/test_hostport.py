@@ -10,7 +10,7 @@ import pytest
 
 from controller.errors import LinkError
 from controller.hostport import HostPort
-from drivers.serialport import SerialPort
+from drivers.port.serialport import SerialPort
 
 
 def test_bytes_pass_unchanged_both_ways_without_echo() -> None:

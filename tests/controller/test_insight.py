@@ -13,7 +13,7 @@ from controller.mailbox import Mailbox
 from controller.parameters import PARAMETERS as P
 from controller.paths import find_config
 from controller.robot import load_robot
-from drivers.bus import BusState
+from drivers.base.bus import BusState
 
 JAW = P.index("jawOpen")
 

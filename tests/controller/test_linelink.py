@@ -14,7 +14,7 @@ from controller.hostport import HostPort
 from controller.linelink import LineLink
 from controller.lineprotocol import MAX_REPLY, LineDecoder, Reply, format_words, parse_reply
 from controller.parameters import PARAMETERS as P
-from drivers.errors import PortMissing
+from drivers.base.errors import PortMissing
 
 LIMIT_S = 5.0
 

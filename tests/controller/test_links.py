@@ -16,7 +16,7 @@ from controller.hostport import HostPort
 from controller.links import HostProcess, open_links
 from controller.parameters import PARAMETERS as P
 from controller.stage import LinkSettings
-from drivers.errors import PortMissing
+from drivers.base.errors import PortMissing
 
 
 def test_a_simulated_host_drives_the_face_from_its_own_process(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ import pytest
 from rich.console import Console
 
 from controller.monitoring import ask, listen
-from drivers.dynamixel.packet import encode_instruction, encode_status
-from drivers.errors import NoReply, PortMissing
+from drivers.base.errors import NoReply, PortMissing
+from drivers.packets.packet import encode_instruction, encode_status
 from drivers.sim import SimulatedBus
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")

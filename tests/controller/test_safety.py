@@ -11,7 +11,7 @@ from controller.paths import find_config
 from controller.robot import ChannelSettings, load_robot
 from controller.rules import LoadRule, PreventRule, RuleSettings, TimingRule
 from controller.safety import Guard
-from drivers.bus import BusState
+from drivers.base.bus import BusState
 
 DT = 0.02
 JAW = TimingRule(channels=["a"], toward="high", extreme=0.6, hold_s=1.0, fall_s=1.0, rest_s=3.0, recover_s=1.0)

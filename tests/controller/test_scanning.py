@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from controller.scanning import BAUDS, STEPS, Found, plan_scan, scan_port
-from drivers.errors import PortMissing
+from drivers.base.errors import PortMissing
 from drivers.sim import SimulatedBus
 
 

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from drivers.bus import Bus, BusState, ServoSpec
-from drivers.errors import BusError, DriverError, PortLost
+from drivers.base.bus import Bus, BusState, ServoSpec
+from drivers.base.errors import BusError, DriverError, PortLost
 
 SERVOS = (
     ServoSpec(1, "jaw", "xl330-m288", -0.6, 0.4, 8.0, 200.0),

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from drivers import open_bus
-from drivers.bus import ServoSpec
-from drivers.shutdown import stop_on_signals
+from drivers.base.bus import ServoSpec
+from drivers.base.shutdown import stop_on_signals
 
 _FORKED = multiprocessing.get_context("forkserver")
 _FORKED.set_forkserver_preload(
-    ["drivers.kernels", "drivers.dynamixel.mixed", "drivers.feetech.bus", "drivers.maestro.bus"]
+    ["drivers.core.kernels", "drivers.dynamixel.mixed", "drivers.feetech.bus", "drivers.maestro.bus"]
 )
 RAISE = "raise"
 

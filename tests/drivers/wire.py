@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Self
 
-from drivers.dynamixel.packet import InstructionPacket, InstructionReader
+from drivers.packets.packet import InstructionPacket, InstructionReader
 
 Answer = Callable[[InstructionPacket], Iterable["bytes | tuple[float, bytes]"]]
 

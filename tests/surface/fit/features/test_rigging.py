@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from surface.fit.features.rigging import (  # fmt: skip
+from surface.fit.features.rigging import (
     DROOP_RULE,
     affine_fit,
     find_jaw,

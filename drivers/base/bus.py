@@ -1,0 +1,329 @@
+"""What every servo bus promises, whatever protocol is on the wire.
+
+One bus is one wire with many servos. A driver implements :class:`Bus`; the caller owns the clock and calls
+``write`` and ``read`` once a cycle from one thread. Nothing here queues: ``write`` sends the newest target
+and returns what was really sent, ``read`` returns what is known, with an age for everything that is old.
+
+All arrays are ordered as the ``servos`` given to the bus, so ``n`` below is ``len(bus.servos)``.
+
+Angles are the servo's own: radians from the middle of its range (tick 2048 of 4096), positive where ticks
+grow.
+With ``zero_rad`` and ``reverse`` set, ``shaft = zero_rad + (-1 if reverse else 1) * angle``.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from types import TracebackType
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from drivers.base.errors import DriverError
+
+log = logging.getLogger(__name__)
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class ServoSpec:
+    """One servo as the configuration describes it.
+
+    Parameters
+    ----------
+    id : number on the bus, 0 to 252.
+    name : what messages call it, for example ``"jaw"``.
+    model : vendor model name in any case, for example ``"xl330-m288"``.
+    min_rad, max_rad : limits of the angle; nothing outside them is ever sent.
+    max_speed_rad_s, max_accel_rad_s2 : limits of the motion, above zero.
+    reverse : the angle grows where ticks fall.
+    zero_rad : shaft angle from the middle of the range at which the angle is zero.
+    rest_rad : angle at which a servo begins that cannot tell where it is; kept inside the limits.
+    pulse_us : calibrated (angle rad, pulse us) of a hobby servo, two or more; empty takes the model's.
+    wire_name : what it is called on a wire that sends names; empty takes ``name``.
+
+    Raises
+    ------
+    ValueError : a value is not finite, empty or out of order; the message names it.
+    """
+
+    id: int
+    name: str
+    model: str
+    min_rad: float
+    max_rad: float
+    max_speed_rad_s: float
+    max_accel_rad_s2: float
+    reverse: bool = False
+    zero_rad: float = 0.0
+    rest_rad: float = 0.0
+    pulse_us: tuple[tuple[float, float], ...] = ()
+    wire_name: str = ""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.id <= 252:
+            raise ValueError(f"servo {self.name!r}: id must be 0 to 252, got {self.id}")
+        for key in ("min_rad", "max_rad", "max_speed_rad_s", "max_accel_rad_s2", "zero_rad", "rest_rad"):
+            if not math.isfinite(getattr(self, key)):
+                raise ValueError(f"servo {self.name!r} (id {self.id}): {key} must be a finite number")
+        if self.min_rad >= self.max_rad:
+            raise ValueError(f"servo {self.name!r} (id {self.id}): min_rad must be below max_rad")
+        if min(self.max_speed_rad_s, self.max_accel_rad_s2) <= 0:
+            raise ValueError(f"servo {self.name!r} (id {self.id}): max speed and acceleration must be above zero")
+
+
+@dataclass(frozen=True, slots=True)
+class ServoInfo:
+    """What a servo said about itself when it was looked for.
+
+    ``voltage_v``, ``temperature_c``, ``hardware_error`` and ``torque`` are None where it did not say.
+    """
+
+    id: int
+    model_number: int
+    model: str
+    firmware: int
+    voltage_v: float | None = None
+    temperature_c: float | None = None
+    hardware_error: int | None = None
+    torque: bool | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BusState:
+    """What is known of every servo after one read. All arrays are read-only, shape ``(n,)``.
+
+    Attributes
+    ----------
+    time_s : monotonic clock when the read ended.
+    position_rad : last good position; NaN before the first one.
+    velocity_rad_s, current_a : from the same reply; NaN where the model does not measure it.
+    fresh : True where this cycle brought the position. Never use a position that is not fresh as a pose. On a bus
+        that does not measure it is always False, and the position is what the board says it puts out, or was told.
+    age_s : seconds since the position arrived; inf before the first one, and where nothing can be asked.
+    error : error byte of the last reply (bit 7: alert, a hardware error is latched; bits 0-6: a number).
+    silent : True where the servo stopped answering and is only probed now and then.
+    voltage_v, temperature_c : polled in turn; NaN before the first poll.
+    hardware_error : last polled register, 0 is none; the bits are the model's.
+    torque : True where the servo said that its motor is on (polled in turn).
+    """
+
+    time_s: float
+    position_rad: Floats
+    velocity_rad_s: Floats
+    current_a: Floats
+    fresh: Flags
+    age_s: Floats
+    error: Bytes
+    silent: Flags
+    voltage_v: Floats
+    temperature_c: Floats
+    hardware_error: Bytes
+    torque: Flags
+
+
+@dataclass(slots=True)
+class BusReport:
+    """Counters since the bus was opened.
+
+    Attributes
+    ----------
+    cycles, writes : reads and writes done.
+    errors : count by kind: ``no_reply``, ``corrupt``, ``refused``, ``alert``, ``torque_lost``, ``watchdog``,
+        ``reset`` (a servo forgot what it was told, as after a dip of its supply), ``port_lost``, ``held_back`` (goals
+        a line head had no room for) and ``board_...`` (what a board says of itself). A kind that never happened is
+        missing.
+    errors_by_servo : the same by servo id.
+    limits_hit : targets clipped to an angle limit.
+    speed_limited : targets shortened because they asked for more than the servo's top speed.
+    refused_targets : targets that were not a number.
+    stray : replies thrown away because nobody asked for them (late, duplicated, echo or noise).
+    eeprom_writes : one line for every permanent register written.
+    silent : ids that are not answering now.
+    """
+
+    cycles: int = 0
+    writes: int = 0
+    errors: dict[str, int] = field(default_factory=dict)
+    errors_by_servo: dict[int, dict[str, int]] = field(default_factory=dict)
+    limits_hit: int = 0
+    speed_limited: int = 0
+    refused_targets: int = 0
+    stray: int = 0
+    eeprom_writes: list[str] = field(default_factory=list)
+    silent: tuple[int, ...] = ()
+
+    def count(self, kind: str, servo_id: int | None = None) -> None:
+        """Add one error of a kind, for a servo where one is concerned."""
+        self.errors[kind] = self.errors.get(kind, 0) + 1
+        if servo_id is not None:
+            by_kind = self.errors_by_servo.setdefault(servo_id, {})
+            by_kind[kind] = by_kind.get(kind, 0) + 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers, strings, lists and dictionaries, ready for JSON."""
+        return asdict(self)
+
+
+class Bus(ABC):
+    """One wire with servos. Use it as a context manager; one thread only.
+
+    ``with bus:`` opens the port and, on every way out, stops the servos and closes it. A program that is killed
+    (SIGKILL) can stop nothing: servos with a bus watchdog stop by themselves then; for those without one
+    ``drivers/core/keeper.py`` says what is done, and pulses of hobby servos go on.
+
+    Parameters
+    ----------
+    servos : the servos in the order of all arrays.
+
+    Raises
+    ------
+    ValueError : no servo, or two with one id.
+
+    Attributes
+    ----------
+    measures : positions are measured at the shafts. Where they are not (hobby servos) no state is ever fresh.
+    """
+
+    measures: ClassVar[bool] = True
+
+    def __init__(self, servos: Iterable[ServoSpec]) -> None:
+        self.servos: tuple[ServoSpec, ...] = tuple(servos)
+        self.ids: tuple[int, ...] = tuple(servo.id for servo in self.servos)
+        if not self.servos:
+            raise ValueError("a bus needs at least one servo")
+        twice = sorted({i for i in self.ids if self.ids.count(i) > 1})
+        if twice:
+            raise ValueError(f"two servos have the id {', '.join(map(str, twice))}")
+
+    @property
+    @abstractmethod
+    def is_open(self) -> bool:
+        """True while the port is held."""
+
+    @property
+    @abstractmethod
+    def running(self) -> bool:
+        """True between a ``start`` that succeeded and ``stop``: motors may be on."""
+
+    @abstractmethod
+    def open(self) -> None:
+        """Take the port. Nothing is sent.
+
+        Raises
+        ------
+        PortMissing, PortBusy, PortPermission
+        """
+
+    @abstractmethod
+    def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
+        """Look for servos; ``ids`` None asks everybody at once. Nothing moves."""
+
+    @abstractmethod
+    def start(self) -> None:
+        """Check every servo and switch the motors on where they stand, without a movement.
+
+        Raises
+        ------
+        NoReply, WrongModel, ServoFault, ServoRefused, CorruptReply : nothing was moved; see ``servo_ids``.
+        """
+
+    @abstractmethod
+    def write(self, angle_rad: ArrayLike) -> Floats:
+        """Send one target for every servo.
+
+        Parameters
+        ----------
+        angle_rad : (n,) targets. NaN keeps that servo's last target.
+
+        Returns
+        -------
+        (n,) float64, read-only : what was really sent after limits.
+
+        Raises
+        ------
+        PortLost : the port went away; see :meth:`reconnect`.
+        """
+
+    @abstractmethod
+    def read(self) -> BusState:
+        """Ask every servo for its state; silent servos are marked, not raised.
+
+        Raises
+        ------
+        PortLost : the port went away; see :meth:`reconnect`.
+        """
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Switch every motor off, each by itself; does nothing when not running.
+
+        Raises
+        ------
+        NoReply : after everything was tried; ``servo_ids`` are those not confirmed off.
+        """
+
+    @abstractmethod
+    def reconnect(self) -> None:
+        """Open the port again by its path after :class:`~drivers.base.errors.PortLost`; start if it was running.
+
+        Raises
+        ------
+        PortMissing, BusError : still unplugged, or not all servos are back; call again later.
+        """
+
+    @abstractmethod
+    def report(self) -> BusReport:
+        """Counters since the bus was opened, as a copy."""
+
+    def far_end(self) -> dict[str, Any]:
+        """What a simulated far end has to be set to, beyond ids and models; plain values for JSON."""
+        return {}
+
+    @abstractmethod
+    def _release(self) -> None:
+        """Give the port back; never raises."""
+
+    def close(self) -> None:
+        """Stop the servos and give the port back; may be called any number of times.
+
+        Raises
+        ------
+        DriverError : what :meth:`stop` raised, after the port was closed.
+        """
+        try:
+            if self.running:
+                self.stop()
+        finally:
+            self._release()
+
+    def __enter__(self) -> Self:
+        if not self.is_open:
+            self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self.close()
+        except DriverError as closing:
+            if error is None:
+                raise
+            log.error("%s", closing)  # the first error is the one to tell; this one must not hide it
+            error.add_note(f"also: {closing}")
+
+
+def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
+    """A read-only copy of an array."""
+    out = np.array(values, dtype=dtype)
+    out.flags.writeable = False
+    return out

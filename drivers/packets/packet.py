@@ -1,0 +1,385 @@
+"""Dynamixel Protocol 2.0 packets as pure functions: checksum, byte stuffing, encoding, stream readers.
+
+Nothing here opens a port; driver and simulated bus share it. Layout (ROBOTIS e-Manual, Protocol 2.0)::
+
+    FF FF FD 00 | ID | LEN_L LEN_H | INST [ERR] PARAMETERS | CRC_L CRC_H
+
+LEN counts INST, ERR, the stuffed parameters and the CRC. The CRC covers every byte before it, as sent.
+"""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from collections.abc import Iterable, Sequence
+from enum import IntEnum, IntFlag
+from functools import lru_cache
+from typing import NamedTuple
+
+from drivers.packets.framing import FrameReader
+
+HEADER = b"\xff\xff\xfd"
+STUFFED = b"\xff\xff\xfd\xfd"
+BROADCAST_ID = 0xFE
+MAX_ID = 252
+ALERT = 0x80
+"""Bit of a status packet's error byte: the device has latched a hardware error. The data is still valid."""
+MAX_LENGTH = 2048
+"""Largest LEN a reader believes; a larger one is taken for damage."""
+
+_PREFIX = HEADER + b"\x00"
+_HEAD_SIZE = 7
+_MAX_EXPLANATIONS = 3  # each one followed makes a chance match of a CRC likelier
+
+
+class Instruction(IntEnum):
+    """Instruction numbers (e-Manual, Protocol 2.0, section Instruction)."""
+
+    PING = 0x01
+    READ = 0x02
+    WRITE = 0x03
+    REG_WRITE = 0x04
+    ACTION = 0x05
+    FACTORY_RESET = 0x06
+    REBOOT = 0x08
+    CLEAR = 0x10
+    BACKUP = 0x20
+    STATUS = 0x55
+    SYNC_READ = 0x82
+    SYNC_WRITE = 0x83
+    FAST_SYNC_READ = 0x8A
+    BULK_READ = 0x92
+    BULK_WRITE = 0x93
+    FAST_BULK_READ = 0x9A
+
+
+class ErrorNumber(IntEnum):
+    """Bits 0-6 of a status packet's error byte: a number, not flags."""
+
+    NONE = 0
+    RESULT_FAIL = 1
+    INSTRUCTION = 2
+    CRC = 3
+    DATA_RANGE = 4
+    DATA_LENGTH = 5
+    DATA_LIMIT = 6
+    ACCESS = 7
+
+
+class HardwareError(IntFlag):
+    """Hardware Error Status (70) and Shutdown (63) of X-series servos. XL-320 orders its bits differently."""
+
+    INPUT_VOLTAGE = 0x01
+    OVERHEATING = 0x04
+    MOTOR_ENCODER = 0x08
+    ELECTRICAL_SHOCK = 0x10
+    OVERLOAD = 0x20
+
+
+class InstructionPacket(NamedTuple):
+    """One instruction, unstuffed: `id`, `instruction` number, `params`."""
+
+    id: int
+    instruction: int
+    params: bytes
+
+
+class StatusPacket(NamedTuple):
+    """One device's reply, unstuffed: `id`, `error` byte (number in bits 0-6, `ALERT`), `params`."""
+
+    id: int
+    error: int
+    params: bytes
+
+    @property
+    def alert(self) -> bool:
+        """Whether the device has latched a hardware error."""
+        return bool(self.error & ALERT)
+
+    @property
+    def error_number(self) -> int:
+        """Why the instruction failed; 0 when it did not."""
+        return self.error & 0x7F
+
+
+def _byte_table() -> list[int]:
+    """CRC of each single byte: polynomial 0x8005, most significant bit first. Shape (256,)."""
+    table = []
+    for byte in range(256):
+        crc = byte << 8
+        for _ in range(8):
+            crc = ((crc << 1) ^ 0x8005 if crc & 0x8000 else crc << 1) & 0xFFFF
+        table.append(crc)
+    return table
+
+
+def _word_table(table: list[int]) -> array[int]:
+    """CRC of each pair of bytes, shape (65536,): a 16-bit state is used up by one look-up per pair.
+
+    An array and not a list: 128 KiB stay in the processor's cache, two megabytes of integers do not.
+    """
+    words = array("H")
+    for high in table:
+        shifted, first = (high << 8) & 0xFFFF, high >> 8
+        words.extend(shifted ^ table[first ^ low] for low in range(256))
+    return words
+
+
+_BYTES = _byte_table()
+_WORDS = _word_table(_BYTES)
+_UNPACKERS = [struct.Struct(f">{n}H") for n in range(64)]
+
+
+def crc16(data: bytes | bytearray | memoryview, crc: int = 0) -> int:
+    """CRC-16 of `data`, continuing from `crc` (CRC-16/UMTS: 0x8005, initial 0, not reflected, no final xor).
+
+    `crc16(b, crc16(a)) == crc16(a + b)`, so a joint packet's checksum can be carried from device to device.
+    """
+    words = _WORDS
+    pairs, odd = divmod(len(data), 2)
+    unpack = _UNPACKERS[pairs] if pairs < 64 else struct.Struct(f">{pairs}H")
+    for word in unpack.unpack_from(data):
+        crc = words[crc ^ word]
+    if odd:
+        crc = ((crc << 8) & 0xFFFF) ^ _BYTES[(crc >> 8) ^ data[-1]]
+    return crc
+
+
+def stuff(body: bytes) -> bytes:
+    """`body` (INST to last parameter) with FD added after each FF FF FD."""
+    return body.replace(HEADER, STUFFED) if HEADER in body else body
+
+
+def unstuff(body: bytes) -> bytes:
+    """The inverse of `stuff`. Scans the bytes as received, so FF FF FD FF FD FD keeps its last FD."""
+    return body.replace(STUFFED, HEADER) if HEADER in body else body
+
+
+@lru_cache(maxsize=4096)
+def _head(device_id: int, length: int, instruction: int) -> tuple[bytes, int]:
+    """Bytes from the header to INST, and their CRC: the same for every packet of one device and length."""
+    head = _PREFIX + bytes((device_id, length & 0xFF, length >> 8, instruction))
+    return head, crc16(head)
+
+
+def _encode(device_id: int, instruction: int, params: bytes) -> bytes:
+    if HEADER in params:
+        params = params.replace(HEADER, STUFFED)
+    head, crc = _head(device_id, len(params) + 3, instruction)
+    crc = crc16(params, crc)
+    return head + params + bytes((crc & 0xFF, crc >> 8))
+
+
+def encode_instruction(device_id: int, instruction: int, params: bytes = b"") -> bytes:
+    """One instruction packet, stuffed and with its CRC.
+
+    Parameters
+    ----------
+    device_id : 0 to 252, or `BROADCAST_ID`.
+    instruction : an `Instruction`.
+    params : bytes after INST, not stuffed.
+
+    Raises
+    ------
+    ValueError : an id no packet can carry.
+    """
+    if not 0 <= device_id <= BROADCAST_ID or device_id == 0xFD:
+        raise ValueError(f"device_id {device_id}: a packet carries 0-252, or 254 for all")
+    return _encode(device_id, instruction, params)
+
+
+def encode_status(device_id: int, error: int = 0, params: bytes = b"") -> bytes:
+    """One status packet of `device_id`: `error` byte, then `params` (not stuffed)."""
+    return _encode(device_id, Instruction.STATUS, bytes((error,)) + params)
+
+
+def fast_reply_size(lengths: Iterable[int]) -> int:
+    """Bytes of a fast read's joint reply to reads of `lengths` bytes: 8 + sum(4 + L)."""
+    return 8 + sum(4 + length for length in lengths)
+
+
+def encode_fast_head(lengths: Sequence[int]) -> bytes:
+    """First bytes of a fast read's joint reply, up to INST. Its LEN is that of the full, unstuffed reply."""
+    length = 1 + sum(4 + length for length in lengths)
+    return _PREFIX + bytes((BROADCAST_ID, length & 0xFF, length >> 8, Instruction.STATUS))
+
+
+def encode_fast_part(device_id: int, error: int, data: bytes, crc: int) -> tuple[bytes, int]:
+    """One device's part of a joint reply, unstuffed, and the CRC to carry on from.
+
+    Parameters
+    ----------
+    crc : CRC of all bytes of the reply before this part, earlier devices' CRCs included.
+    """
+    part = bytes((error, device_id)) + data
+    crc = crc16(part, crc)
+    tail = bytes((crc & 0xFF, crc >> 8))
+    return part + tail, crc16(tail, crc)
+
+
+def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusPacket]:
+    """Replies in a joint packet, decoded by position. It may be cut short or damaged in places.
+
+    A device's CRC covers everything before it, so one damaged byte would fail all later devices. After a
+    mismatch each explanation is followed (data damaged, CRC damaged at the device, CRC damaged on the way):
+    later devices stay readable and only the damaged one is left out.
+
+    Parameters
+    ----------
+    data : received bytes; anything before the joint packet's header is skipped.
+    devices : (id, bytes read) in request order.
+
+    Returns
+    -------
+    list of StatusPacket : the devices whose id and CRC are right, in request order.
+    """
+    head = encode_fast_head([length for _, length in devices])
+    start = data.find(head)
+    if start < 0:
+        return []
+    at, states, replies = start + len(head), {crc16(head)}, []
+    for device_id, length in devices:
+        end = at + 2 + length
+        if len(data) < end + 2:
+            break
+        part, tail = data[at:end], data[end : end + 2]
+        sums, claimed = {crc16(part, state) for state in states}, tail[0] | tail[1] << 8
+        if claimed in sums:
+            sums = {claimed}
+            if part[1] == device_id:
+                replies.append(StatusPacket(device_id, part[0], part[2:]))
+        else:
+            sums = sums if len(sums) <= _MAX_EXPLANATIONS else set()
+        states = {crc16(tail, total) for total in sums | {claimed}}
+        states |= {crc16(bytes((total & 0xFF, total >> 8)), total) for total in sums}
+        at = end + 2
+    return replies
+
+
+class PacketReader(FrameReader):
+    """Frames of Protocol 2.0, header to CRC, still stuffed.
+
+    Parameters
+    ----------
+    max_length : largest LEN that is believed.
+    """
+
+    MARK = _PREFIX
+
+    def __init__(self, max_length: int = MAX_LENGTH) -> None:
+        super().__init__()
+        self._max_length = max_length
+
+    def _seek_header(self) -> bool:
+        """Drop what cannot begin a frame; True when a whole frame head lies at the start of the buffer."""
+        buffer = self._buffer
+        while True:
+            at = buffer.find(HEADER)
+            if at < 0:
+                self._drop(len(buffer) - _header_tail(buffer))
+                return False
+            if at:
+                self._drop(at)
+            if len(buffer) > 3 and buffer[3]:
+                self._drop(3)
+                continue
+            if len(buffer) < _HEAD_SIZE:
+                return False
+            if self._plausible():
+                return True
+            self.broken_frames += 1
+            self._drop(3)
+
+    def _plausible(self) -> bool:
+        buffer = self._buffer
+        return 3 <= buffer[5] | buffer[6] << 8 <= self._max_length and buffer[4] not in (0xFD, 0xFF)
+
+    def _next(self) -> bytes | None:
+        buffer = self._buffer
+        while self._seek_header():
+            size = _HEAD_SIZE + (buffer[5] | buffer[6] << 8)
+            if len(buffer) < size:
+                inner = self._inner_frame()
+                if not inner:
+                    return None
+                self.broken_frames += 1
+                self._drop(inner)
+                continue
+            frame = bytes(buffer[:size])
+            if _checks(frame):
+                del buffer[:size]
+                return frame
+            self.broken_frames += 1
+            self._drop(3)
+        return None
+
+    def _inner_frame(self) -> int:
+        """Where a complete valid frame begins inside an incomplete one (its LEN is damaged); 0 = nowhere."""
+        buffer = self._buffer
+        at = buffer.find(_PREFIX, 4)
+        while at > 0 and len(buffer) - at >= _HEAD_SIZE:
+            size = _HEAD_SIZE + (buffer[at + 5] | buffer[at + 6] << 8)
+            if size >= 10 and len(buffer) - at >= size and _checks(buffer[at : at + size]):
+                return at
+            at = buffer.find(_PREFIX, at + 1)
+        return 0
+
+
+def _header_tail(buffer: bytearray) -> int:
+    """How many bytes at the end could be the beginning of a header."""
+    if buffer.endswith(b"\xff\xff"):
+        return 2
+    return 1 if buffer.endswith(b"\xff") else 0
+
+
+def _checks(frame: bytes | bytearray) -> bool:
+    return crc16(frame[:-2]) == frame[-2] | frame[-1] << 8
+
+
+class InstructionReader(PacketReader):
+    """Yields the instructions in a byte stream; status packets (a wire's echo) are passed over."""
+
+    def feed(self, data: bytes) -> list[InstructionPacket]:
+        """Add received bytes; return the instructions completed by them."""
+        return _instructions(self.feed_frames(data))
+
+    def flush(self) -> list[InstructionPacket]:
+        """Give up on an incomplete packet; return the instructions found behind its header."""
+        return _instructions(self.flush_frames())
+
+
+class StatusReader(PacketReader):
+    """Yields the status packets in a byte stream; instruction packets (a wire's echo) are passed over.
+
+    A joint reply of a fast read comes as one packet of id `BROADCAST_ID`, error 0, whose `params` are
+    everything behind INST but the last CRC, not unstuffed. To keep what a damaged or cut one holds, collect
+    the raw bytes and use `decode_fast` instead.
+    """
+
+    def feed(self, data: bytes) -> list[StatusPacket]:
+        """Add received bytes; return the status packets completed by them."""
+        return _statuses(self.feed_frames(data))
+
+    def flush(self) -> list[StatusPacket]:
+        """Give up on an incomplete packet; return the status packets found behind its header."""
+        return _statuses(self.flush_frames())
+
+
+def _instructions(frames: list[bytes]) -> list[InstructionPacket]:
+    return [
+        InstructionPacket(frame[4], frame[7], unstuff(frame[8:-2]))
+        for frame in frames
+        if frame[7] != Instruction.STATUS
+    ]
+
+
+def _statuses(frames: list[bytes]) -> list[StatusPacket]:
+    replies = []
+    for frame in frames:
+        if frame[7] != Instruction.STATUS or len(frame) < 11:
+            continue
+        if frame[4] == BROADCAST_ID:
+            replies.append(StatusPacket(BROADCAST_ID, 0, frame[8:-2]))
+        else:
+            replies.append(StatusPacket(frame[4], frame[8], unstuff(frame[9:-2])))
+    return replies

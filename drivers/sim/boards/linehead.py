@@ -1,0 +1,169 @@
+"""A simulated head that takes the omote line protocol, as a small board with a short sketch would."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from drivers.omote.protocol import checksum
+from drivers.sim.boards.board import Board
+from drivers.sim.wire.faults import Fault
+
+MAX_LINE = 200
+SILENCE_S = 1.0
+"""A head that hears nothing for so long lets go."""
+
+
+class HeadReader:
+    """Cuts a byte stream into lines; CR and LF end one."""
+
+    def __init__(self) -> None:
+        self._buffer = b""
+
+    @property
+    def pending(self) -> int:
+        """A line waits for its end as long as it takes."""
+        return len(self._buffer)
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Lines completed by these bytes; empty ones are left out."""
+        *lines, self._buffer = (self._buffer + data).replace(b"\r", b"\n").split(b"\n")
+        self._buffer = self._buffer[: MAX_LINE + 1]
+        return [line for line in lines if line.strip()]
+
+    def flush(self) -> list[bytes]:
+        """Nothing is given up."""
+        return []
+
+    def take_pending(self) -> bytes:
+        """Forget the incomplete line."""
+        data, self._buffer = self._buffer, b""
+        return data
+
+
+class _Refusal(Exception):
+    """A line that is answered with ERR."""
+
+
+class LineHead(Board):
+    """A head with named outputs.
+
+    Parameters
+    ----------
+    names : its outputs.
+    now_s : time. faults : see :data:`drivers.sim.boards.board.FAULTS`. seed : of random faults.
+    simple : it does not know GET.
+
+    Attributes
+    ----------
+    values : by name; None while it is released.
+    refused : lines answered with ERR.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        now_s: float = 0.0,
+        faults: Iterable[str | Fault] = (),
+        seed: int = 0,
+        simple: bool = False,
+    ) -> None:
+        self._names, self.simple = list(names), simple
+        self.refused = 0
+        self.reset(now_s)
+        super().__init__(now_s, faults, seed)
+
+    def reset(self, now_s: float) -> None:
+        """Begin as after power-on: everything released."""
+        self.values: dict[str, float | None] = dict.fromkeys(self._names)
+        self._heard_s = now_s
+
+    def make_reader(self) -> HeadReader:
+        """A reader of lines."""
+        return HeadReader()
+
+    def size(self, packet: bytes) -> int:
+        """Bytes of a line on the wire."""
+        return len(packet) + 1
+
+    def obey(self, packet: bytes, now_s: float) -> list[tuple[int, bytes]]:
+        """Answer a line."""
+        self._let_go_after_silence(now_s)
+        self._heard_s = now_s
+        tag, checked = "", False
+        try:
+            words, checked = _words(packet)
+            if words and words[0].startswith("#"):
+                tag, words = words[0] + " ", words[1:]
+            text = f"OK {self._do(words)}"
+        except _Refusal as refusal:
+            self.refused += 1
+            text = f"ERR {refusal}"
+        data = (tag + text).encode("ascii", "replace")
+        return [(0, data + (b"*%02X\n" % checksum(data) if checked else b"\n"))]
+
+    def describe(self, now_s: float) -> list[dict[str, Any]]:
+        """The value of each output."""
+        self._let_go_after_silence(now_s)
+        return [{"id": k, "name": name, "value": value} for k, (name, value) in enumerate(self.values.items())]
+
+    def _let_go_after_silence(self, now_s: float) -> None:
+        if now_s - self._heard_s > SILENCE_S:
+            self.values = dict.fromkeys(self._names)
+
+    def _do(self, words: Sequence[str]) -> str:
+        commands: dict[str, Callable[[Sequence[str]], str]] = {
+            "HELLO": lambda rest: f"HELLO head protocol=1 parameters={len(self.values)} max_line={MAX_LINE}",
+            "PING": lambda rest: " ".join(("PONG", *rest)),
+            "SET": self._set,
+            "RELEASE": self._let_go,
+        }
+        if not self.simple:
+            commands["GET"] = self._get
+        word = words[0].upper() if words else ""
+        if word not in commands:
+            raise _Refusal(f"20 there is no command {word!r} (there are {', '.join(commands)})")
+        return commands[word](words[1:])
+
+    def _set(self, words: Sequence[str]) -> str:
+        if not words or len(words) % 2:
+            raise _Refusal("21 SET name value [name value ...]")
+        new = {self._known(name): _number(value) for name, value in zip(words[::2], words[1::2], strict=True)}
+        self.values.update(new)
+        return f"SET {len(new)}"
+
+    def _let_go(self, words: Sequence[str]) -> str:
+        names = self._names if [word.upper() for word in words] == ["ALL"] else [self._known(word) for word in words]
+        self.values.update(dict.fromkeys(names))
+        return f"RELEASE {len(names)}"
+
+    def _get(self, words: Sequence[str]) -> str:
+        return " ".join(("GET", *(f"{name}={self.values[self._known(name)] or 0.0:g}" for name in words)))
+
+    def _known(self, name: str) -> str:
+        if name not in self.values:
+            raise _Refusal(f"23 unknown name {name!r}")
+        return name
+
+
+def _words(line: bytes) -> tuple[list[str], bool]:
+    """The words of a line, and whether it came with a checksum, which is right."""
+    if len(line) > MAX_LINE:
+        raise _Refusal(f"10 a line has at most {MAX_LINE} bytes")
+    body, star, sum_ = line.rpartition(b"*")
+    if not star:
+        return line.decode("ascii", "replace").split(), False
+    if sum_.strip().upper() != b"%02X" % checksum(body):
+        raise _Refusal("13 wrong checksum")
+    return body.decode("ascii", "replace").split(), True
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise _Refusal(f"22 {text!r} is not a number")
+    return value

@@ -1,0 +1,133 @@
+"""A simulated Lynxmotion SSC-32 servo controller: lines of text, one byte of pulse width back.
+
+Source: SSC-32U guide, pages 24-33; a pulse of 0 stops the pulses, ``STOP n`` ends a move where it is, ESC forgets the
+line that has begun. `PO` is not modelled.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from drivers.sim.boards.board import Board
+from drivers.sim.boards.rc import RcChannel
+from drivers.sim.wire.faults import Fault
+
+CHANNELS = 32
+MIN_US, MAX_US = 500, 2500
+VERSION = b"SSC32-V2.50USB\r"
+MAX_LINE = 2048
+
+_MOVE = re.compile(r"#(\d+)P(\d+)(?:S(\d+))?")
+_ONE = re.compile(r"(QP|STOP)(\d+)")
+_GROUP = re.compile(r"(?:#\d+P\d+(?:S\d+)?)+(?:T(\d+))?")
+
+
+class LineReader:
+    """Cuts a byte stream into lines: CR ends one, spaces, tabs and LF are passed over, case does not count."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    @property
+    def pending(self) -> int:
+        """A line waits for its end as long as it takes."""
+        return len(self._buffer)
+
+    def feed(self, data: bytes) -> list[str]:
+        """Lines completed by these bytes, without blanks and in capitals; empty ones are left out."""
+        data = (bytes(self._buffer) + data).rpartition(b"\x1b")[2] if b"\x1b" in data else bytes(self._buffer) + data
+        self._buffer = bytearray(byte for byte in data if byte not in b" \t\n")
+        *lines, rest = bytes(self._buffer).split(b"\r")
+        self._buffer = bytearray(rest if len(rest) <= MAX_LINE else b"")
+        return [line.decode("latin-1").upper() for line in lines if line]
+
+    def flush(self) -> list[str]:
+        """Nothing is given up."""
+        return []
+
+    def take_pending(self) -> bytes:
+        """Forget the incomplete line."""
+        data = bytes(self._buffer)
+        self._buffer.clear()
+        return data
+
+
+class Ssc32(Board):
+    """An SSC-32 on one port.
+
+    Parameters
+    ----------
+    now_s : time.
+    faults : see :data:`drivers.sim.boards.board.FAULTS`. seed : of random faults.
+
+    Attributes
+    ----------
+    channels : the outputs, microseconds.
+    refused : lines that were not understood; the board passes over them without a word.
+    """
+
+    def __init__(self, now_s: float = 0.0, faults: Iterable[str | Fault] = (), seed: int = 0) -> None:
+        self.refused = 0
+        self.reset(now_s)
+        super().__init__(now_s, faults, seed)
+
+    def reset(self, now_s: float) -> None:
+        """Begin as after power-on: no pulses."""
+        self.channels = [RcChannel() for _ in range(CHANNELS)]
+
+    def make_reader(self) -> LineReader:
+        """A reader of lines."""
+        return LineReader()
+
+    def size(self, packet: str) -> int:
+        """Bytes of a line on the wire."""
+        return len(packet) + 1
+
+    def obey(self, packet: str, now_s: float) -> list[tuple[int, bytes]]:
+        """Do what a line says."""
+        if packet == "Q":
+            return [(0, b"+" if any(channel.moving(now_s) for channel in self.channels) else b".")]
+        if packet == "VER":
+            return [(0, VERSION)]
+        match = _ONE.fullmatch(packet)
+        if match and int(match[2]) < CHANNELS:
+            return self._one(match[1], int(match[2]), now_s)
+        if not self._move(packet, now_s):
+            self.refused += 1
+        return []
+
+    def _one(self, word: str, number: int, now_s: float) -> list[tuple[int, bytes]]:
+        """What is said of one channel."""
+        pulse = self.channels[number].position(now_s)
+        if word == "QP":
+            return [(number, bytes((round(pulse / 10),)))]
+        self.channels[number].go(pulse, now_s)
+        return []
+
+    def describe(self, now_s: float) -> list[dict[str, Any]]:
+        """Pulse width in microseconds and target of each channel."""
+        return [
+            {"id": k, "pulse_us": channel.position(now_s), "target_us": channel.target}
+            for k, channel in enumerate(self.channels)
+        ]
+
+    def _move(self, line: str, now_s: float) -> bool:
+        """A group move: with T all channels arrive together, with S none is faster; False = not understood.
+
+        A move of several channels takes as long as its slowest member, so that they arrive together.
+        """
+        group = _GROUP.fullmatch(line)
+        if group is None:
+            return False
+        moves = [(int(number), int(pulse), int(speed or 0)) for number, pulse, speed in _MOVE.findall(line)]
+        if any(number >= CHANNELS or (pulse and not MIN_US <= pulse <= MAX_US) for number, pulse, _ in moves):
+            return False
+        seconds = int(group[1] or 0) * 1e-3
+        for number, pulse, speed in moves:
+            if speed:
+                seconds = max(seconds, abs(pulse - self.channels[number].position(now_s)) / speed)
+        for number, pulse, _ in moves:
+            self.channels[number].go_in(float(pulse), now_s, seconds)
+        return True

@@ -1,0 +1,289 @@
+"""A simulated bus as one object: in a thread for tests, in a child process beside a program that is busy."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from drivers.base.errors import PortError
+from drivers.sim.serving.control import Commands
+from drivers.sim.serving.families import make_line
+from drivers.sim.serving.serve import PortServer
+from drivers.sim.servos.chain import Chain
+from drivers.sim.wire.faults import parse_fault
+from drivers.sim.wire.line import Line
+
+START_S = 20.0
+"""A child process that is not ready after this time is given up."""
+
+
+class ServoView:
+    """One servo of a running bus, seen from another thread: always up to date, never in the middle of a packet."""
+
+    def __init__(self, chain: Chain, device_id: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._chain, self._servo, self._clock = chain, chain.servo(device_id), clock
+
+    @property
+    def position_ticks(self) -> int:
+        """Present Position."""
+        with self._chain.lock:
+            return self._servo.position_ticks(self._clock())
+
+    @property
+    def goal(self) -> int:
+        """Goal Position."""
+        with self._chain.lock:
+            return self._servo.goal
+
+    @property
+    def torque(self) -> bool:
+        """Whether the motor is on."""
+        with self._chain.lock:
+            self._servo.look(self._clock())
+            return self._servo.torque
+
+    @property
+    def eeprom_writes(self) -> dict[str, int]:
+        """Writes to permanent registers so far, by name."""
+        with self._chain.lock:
+            return dict(self._servo.eeprom_writes)
+
+    def register(self, name: str) -> int:
+        """Value of a register; KeyError where the model has none of that name."""
+        with self._chain.lock:
+            return self._servo.register(name, self._clock())
+
+    def put(self, name: str, value: int) -> None:
+        """Set a register whatever its access, as it could have been left by somebody else."""
+        with self._chain.lock:
+            self._servo.force(name, value, self._clock())
+
+    def place(self, position: float) -> None:
+        """Move the limp shaft by hand, ticks; ValueError while the motor holds it."""
+        with self._chain.lock:
+            self._servo.place(position, self._clock())
+
+    def latch(self, bits: int) -> None:
+        """Latch hardware errors."""
+        with self._chain.lock:
+            self._servo.latch(bits, self._clock())
+
+
+class SimulatedBus:
+    """A simulated bus of any family behind a port; a context manager.
+
+    Parameters
+    ----------
+    servos : ids, or specs with ``id`` and ``model``.
+    link : path that shall point at the pseudo-terminal, ``socket://HOST:PORT`` to listen there instead (port 0 takes
+        a free one), or ``memory://NAME`` for programs in this process.
+    faults : specs, see ``drivers.sim.wire.faults``.
+    model : of the servos given as bare ids.
+    baud : bit rate of the servos.
+    wire, latency_s : bytes take their time.
+    process : serve from a child process (which ends with this one, however this one ends) instead of a thread.
+    seed : of random faults.
+    family, options : see :func:`drivers.sim.serving.families.make_line`.
+
+    Attributes
+    ----------
+    path : what a client opens.
+    baud : bit rate.
+
+    Raises
+    ------
+    DriverError : on entering: unknown model, unreadable fault, no terminal, or the child does not start.
+    """
+
+    def __init__(
+        self,
+        servos: Iterable[Any],
+        link: str | os.PathLike[str] | None = None,
+        faults: Iterable[str] = (),
+        *,
+        model: str | int = "xl330-m288",
+        baud: int = 1_000_000,
+        wire: bool = False,
+        latency_s: float = 0.0,
+        process: bool = False,
+        seed: int = 0,
+        family: str = "dynamixel",
+        options: Mapping[str, Any] = {},
+    ) -> None:
+        self.baud = baud
+        self._family, self._options = family, dict(options)
+        self._wire, self._latency_s = wire, latency_s
+        self._servos = [(int(getattr(s, "id", s)), getattr(s, "model", model)) for s in servos]
+        self._link, self._faults, self._seed = link, list(faults), seed
+        self._process = process
+        self._path = ""
+        self._child: subprocess.Popen[bytes] | None = None
+        self._server: PortServer | None = None
+        self._line: Line | None = None
+        self._thread: threading.Thread | None = None
+        self._stop: socket.socket | None = None
+        self._obeyed = threading.Event()
+
+    @property
+    def path(self) -> str:
+        """What a client opens; after an unplug and replug the new name (thread mode)."""
+        return self._server.port.path if self._server and self._server.port.is_open else self._path
+
+    @property
+    def line(self) -> Line:
+        """What is at the far end (thread mode only)."""
+        if self._line is None:
+            raise RuntimeError("the servos can be looked at only while the bus runs in a thread of this process")
+        return self._line
+
+    @property
+    def chain(self) -> Chain:
+        """The servos themselves (thread mode only; TypeError where it is a board)."""
+        if not isinstance(self.line, Chain):
+            raise TypeError("a board has no servos to look at; see line")
+        return self.line
+
+    def servo(self, device_id: int) -> ServoView:
+        """One servo (thread mode only); KeyError where nobody has the id."""
+        return ServoView(self.chain, device_id)
+
+    def fault(self, *specs: str) -> None:
+        """Set faults now.
+
+        Raises
+        ------
+        DriverError : a spec cannot be read; then none is set.
+        """
+        for spec in specs:
+            parse_fault(spec)
+        self._tell(" ".join(("fault", *specs)))
+
+    def clear(self, kind: str | None = None) -> None:
+        """End the faults of a kind; None: all."""
+        self._tell(f"clear {kind or ''}")
+
+    def __enter__(self) -> Self:
+        if self._process:
+            self._start_child()
+        else:
+            self._start_thread()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Pull the plug and end the service; harmless when it has ended."""
+        if self._child:
+            _end_child(self._child)
+            self._child = None
+        if self._thread and self._stop:
+            self._stop.close()
+            self._thread.join()
+            self._thread = self._server = self._line = self._stop = None
+
+    # ------------------------------------------------------------ in a thread
+    def _start_thread(self) -> None:
+        now_s = time.monotonic()
+        line = make_line(self._family, self._servos, now_s, baud=self.baud, seed=self._seed, options=self._options)
+        server = PortServer(
+            line,
+            self._link,
+            baud=self.baud,
+            wire=self._wire,
+            latency_s=self._latency_s,
+            on_line=self._obey,
+        )
+        try:
+            line.faults.add(self._faults, now_s)
+        except BaseException:
+            server.close()
+            raise
+        self._commands = Commands(line)
+        self._server, self._line, self._path = server, line, server.port.path
+        reading, self._stop = socket.socketpair()
+        self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
+        self._thread.start()
+
+    def _obey(self, line: str) -> None:
+        self._commands.obey(line)
+        self._obeyed.set()
+
+    # ------------------------------------------------------------ in a child process
+    def _start_child(self) -> None:
+        root = str(Path(__file__).resolve().parents[3])
+        environment = dict(os.environ)
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
+        self._child = subprocess.Popen(
+            [sys.executable, "-m", "drivers.sim.serving.child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+        )
+        settings = {
+            "servos": self._servos,
+            "link": None if self._link is None else os.fspath(self._link),
+            "baud": self.baud,
+            "faults": self._faults,
+            "seed": self._seed,
+            "wire": self._wire,
+            "latency_s": self._latency_s,
+            "family": self._family,
+            "options": self._options,
+        }
+        self._tell(json.dumps(settings))
+        self._path = self._first_line(self._child)
+
+    def _first_line(self, child: subprocess.Popen[bytes]) -> str:
+        """The path the child serves."""
+        timer = threading.Timer(START_S, child.kill)
+        timer.start()
+        try:
+            words = (child.stdout.readline() if child.stdout else b"").decode().strip().partition(" ")
+        finally:
+            timer.cancel()
+        if words[0] == "ready":
+            return words[2]
+        _end_child(child)
+        self._child = None
+        raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
+
+    def _tell(self, command: str) -> None:
+        """Send a command; a bus in a thread has carried it out when this returns."""
+        line = command.encode() + b"\n"
+        if self._child and self._child.stdin:
+            self._child.stdin.write(line)
+            self._child.stdin.flush()
+        elif self._thread and self._stop:
+            self._obeyed.clear()
+            self._stop.sendall(line)
+            self._obeyed.wait(START_S)
+
+
+def _serve(server: PortServer, reading: socket.socket) -> None:
+    with reading:
+        server.run(reading)
+
+
+def _end_child(child: subprocess.Popen[bytes]) -> None:
+    """The child goes when its standard input ends; one that does not is killed."""
+    if child.stdin:
+        child.stdin.close()
+    try:
+        child.wait(timeout=2.0)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
+    if child.stdout:
+        child.stdout.close()

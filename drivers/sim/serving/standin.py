@@ -1,0 +1,116 @@
+"""kind = "simulated": any family's own driver over a bus that is simulated beside it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from drivers.base.bus import ServoSpec
+from drivers.base.errors import DriverError
+from drivers.core.wirebus import WireBus
+
+if TYPE_CHECKING:
+    from drivers.sim import SimulatedBus
+
+
+TRANSPORTS = ("pty", "tcp", "memory")
+
+
+class SimulatedWire(WireBus):
+    """What a driver gets from :func:`simulated`: simulated servos of its own.
+
+    They live in a child process from ``open`` to ``close`` and keep their state over ``reconnect``.
+
+    Parameters
+    ----------
+    servos : the servos in the order of all arrays; the simulated ones have the same ids and models.
+    port : path that shall point at the simulated port, so that other programs can find it; empty for a private one.
+    transport : ``"pty"`` (a pseudo-terminal), ``"tcp"`` (this machine's loopback) or ``"memory"`` (a thread of this
+        process serves); empty takes a pseudo-terminal where the system has them, else TCP.
+    faults, wire, latency_s, seed, process : see :class:`drivers.sim.SimulatedBus`.
+    options : see the driver.
+
+    Raises
+    ------
+    DriverError : unknown transport, and what the driver raises.
+    """
+
+    family: ClassVar[str]
+
+    def __init__(
+        self,
+        servos: Iterable[ServoSpec],
+        *,
+        port: str = "",
+        transport: str = "",
+        baud: int = 1_000_000,
+        faults: Sequence[str] = (),
+        wire: bool = False,
+        latency_s: float = 0.0,
+        seed: int = 0,
+        process: bool = True,
+        **options: Any,
+    ) -> None:
+        super().__init__(servos, port=port, baud=baud, **options)  # type: ignore[call-arg]
+        self.simulation: SimulatedBus | None = None
+        self._transport = transport or ("pty" if hasattr(os, "openpty") else "tcp")
+        if self._transport not in TRANSPORTS:
+            raise DriverError(f"there is no transport {transport!r}", hint=f"use one of {', '.join(TRANSPORTS)}")
+        self._link = port
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._settings: dict[str, Any] = {
+            "faults": tuple(faults),
+            "baud": baud,
+            "wire": wire,
+            "latency_s": latency_s,
+            "seed": seed,
+            "process": process and self._transport != "memory",
+            "family": self.family,
+            "options": self.far_end(),
+        }
+
+    def open(self) -> None:
+        """Start the simulated servos if they do not run yet, and take their port."""
+        if self.simulation is None:
+            self._simulate()
+        try:
+            super().open()
+        except BaseException:
+            if not self.running:
+                self._release()
+            raise
+
+    def _simulate(self) -> None:
+        from drivers.sim import SimulatedBus  # only who simulates pays for it
+
+        simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
+        simulation.__enter__()
+        self.simulation = simulation
+        self._use_path(simulation.path)
+
+    def _private_link(self) -> str:
+        if self._transport == "tcp":
+            return "socket://127.0.0.1:0"
+        if self._transport == "memory":
+            return f"memory://omote-{id(self)}"
+        self._folder = tempfile.TemporaryDirectory(prefix="omote-")
+        return str(Path(self._folder.name) / "servos")
+
+    def _release(self) -> None:
+        super()._release()
+        simulation, self.simulation = self.simulation, None
+        if simulation is not None:
+            simulation.close()
+        folder, self._folder = self._folder, None
+        if folder is not None:
+            folder.cleanup()
+
+
+@cache
+def simulated(driver: type[WireBus], family: str) -> type[WireBus]:
+    """The driver of a family, with simulated servos of its own."""
+    return type(f"Simulated{driver.__name__}", (SimulatedWire, driver), {"family": family})

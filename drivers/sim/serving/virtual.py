@@ -1,0 +1,226 @@
+"""A simulated bus in time that does not pass by itself: hours of running in the time the processor needs.
+
+:class:`VirtualBus` is a far end of any family with drivers over it. Its :class:`VirtualLink` takes the place of a
+driver's port and hands the bytes to the far end directly. Whoever waits for bytes moves the clock on to when they
+arrive, or to the deadline, so nothing ever sleeps, and the same run gives the same figures on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from drivers import open_bus
+from drivers.base.bus import Bus, ServoSpec
+from drivers.base.errors import PortLost, PortMissing
+from drivers.sim.serving.families import make_line
+from drivers.sim.serving.serve import PAUSE_S
+from drivers.sim.serving.simulated import ServoView
+from drivers.sim.servos.chain import Chain
+from drivers.sim.wire.faults import Fault
+from drivers.sim.wire.line import Line
+from drivers.sim.wire.timing import Timed, WireTiming
+
+
+class VirtualClock:
+    """Seconds that pass when somebody says so.
+
+    Parameters
+    ----------
+    now_s : time to begin with.
+    """
+
+    def __init__(self, now_s: float = 0.0) -> None:
+        self.now_s = now_s
+
+    def __call__(self) -> float:
+        """The time, as ``time.monotonic`` gives it."""
+        return self.now_s
+
+    def sleep(self, span_s: float) -> None:
+        """Let time pass, as ``time.sleep`` does."""
+        self.now_s += max(span_s, 0.0)
+
+    def wait_until(self, time_s: float) -> None:
+        """Let time pass up to a moment; one that has passed changes nothing."""
+        self.now_s = max(self.now_s, time_s)
+
+
+class VirtualLink:
+    """A wire-timed far end as a driver's port. Same methods as :class:`~drivers.port.serialport.SerialPort`.
+
+    Parameters
+    ----------
+    line : what is at the far end.
+    clock : the time of driver and far end.
+    baud : bit rate.
+    latency_s : USB latency timer.
+    """
+
+    serial = None
+
+    def __init__(self, line: Line, clock: VirtualClock, baud: int = 1_000_000, latency_s: float = 0.0) -> None:
+        self.path, self.baud, self.low_latency = "virtual", baud, False
+        self.clock, self.sleep = clock, clock.sleep
+        self.tap: Callable[[bool, bytes], None] | None = None
+        self._line = line
+        self._timing = WireTiming(latency_s)
+        self._coming: deque[Timed] = deque()
+        self._given_up_s = math.inf
+        self._open = self._gone = False
+        line.on_unplug = self._unplug
+
+    @property
+    def is_open(self) -> bool:
+        """True while a driver holds it."""
+        return self._open
+
+    def open(self) -> None:
+        """Take it; raises PortMissing while it is unplugged."""
+        self._advance()
+        if self._gone:
+            raise PortMissing("no port virtual: it is unplugged", port=self.path)
+        self._open = True
+        self._line.set_line_baud(self.baud)
+        self._coming.clear()
+
+    def close(self) -> None:
+        """Give it back."""
+        self._open = False
+
+    def write(self, data: bytes) -> None:
+        """Send; the far end acts when the last byte of a packet has arrived."""
+        self._advance()
+        self._check()
+        now_s = self.clock()
+        if self.tap is not None:
+            self.tap(True, data)
+        if self._line.echo:
+            self._coming.append((now_s, data))
+        for packet in self._line.reader.feed(data):
+            self._hand_over(packet, now_s)
+        self._given_up_s = now_s + PAUSE_S if self._line.reader.pending else math.inf
+
+    def put(self, data: bytes) -> int:
+        """Send; there is always room."""
+        self.write(data)
+        return len(data)
+
+    def read(self, deadline_s: float) -> bytes:
+        """What has arrived, waiting for the first byte until a deadline; see ``SerialPort.read``."""
+        self._check()
+        end_s = max(deadline_s, self.clock())
+        while True:
+            due_s = min(self._due(), end_s)
+            self.clock.wait_until(due_s)
+            self._advance()
+            self._check()
+            data = self._arrived()
+            if data or due_s >= end_s:
+                return data
+
+    def drain(self, quiet_s: float = 0.0, limit_s: float = 0.2) -> int:
+        """Throw away what has arrived; returns how many bytes that was."""
+        self.sleep(quiet_s)
+        self._check()
+        return len(self._arrived())
+
+    def _hand_over(self, packet: Any, now_s: float) -> None:
+        at_s = self._timing.arrival(now_s, self._line.size(packet), self.baud)
+        self._coming += self._line.heard(self._timing.deliveries(self._line.handle(packet, at_s), self.baud))
+
+    def _due(self) -> float:
+        """When the next thing happens."""
+        coming_s = self._coming[0][0] if self._coming else math.inf
+        return min(coming_s, self._line.faults.next_change_s, self._given_up_s)
+
+    def _arrived(self) -> bytes:
+        data = b""
+        while self._coming and self._coming[0][0] <= self.clock():
+            data += self._coming.popleft()[1]
+        if data and self.tap is not None:
+            self.tap(False, data)
+        return data
+
+    def _advance(self) -> None:
+        """Faults that are due now, and packets whose end does not come."""
+        if self.clock() >= self._line.faults.next_change_s:
+            with self._line.lock:
+                self._line.faults.advance(self.clock())
+        if self.clock() >= self._given_up_s:
+            self._given_up_s = math.inf
+            for packet in self._line.reader.flush():
+                self._hand_over(packet, self.clock())
+
+    def _check(self) -> None:
+        if self._gone or not self._open:
+            raise PortLost("port virtual went away: it was unplugged", port=self.path)
+
+    def _unplug(self, fault: Fault, begins: bool) -> None:
+        self._gone = begins
+        self._coming.clear()
+        self._line.reader.take_pending()
+
+
+class VirtualBus:
+    """A simulated bus of any family and the time it lives in. Everything runs in the caller's thread.
+
+    Parameters
+    ----------
+    servos : the servos.
+    family : a kind of bus, as ``drivers.KINDS`` names it.
+    driver : options of the drivers over it, such as ``{"margin_s": 0.05}``.
+    faults, baud, latency_s, seed : see :class:`drivers.sim.SimulatedBus`.
+    options : what the far end is set to; None: as the driver wants it.
+
+    Attributes
+    ----------
+    clock : the time; ``clock.sleep(1.0)`` lets a second pass.
+    line, link : the far end, and the port that leads to it.
+    """
+
+    def __init__(
+        self,
+        servos: Sequence[ServoSpec],
+        family: str = "dynamixel",
+        *,
+        driver: Mapping[str, Any] = {},
+        faults: Iterable[str] = (),
+        baud: int = 1_000_000,
+        latency_s: float = 0.0,
+        seed: int = 0,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.servos, self.family, self.clock = tuple(servos), family, VirtualClock()
+        self._driver = dict(driver)
+        if options is None:
+            options = open_bus(family, self.servos, port="", **self._driver).far_end()
+        models = [(servo.id, servo.model) for servo in self.servos]
+        self.line = make_line(family, models, self.clock(), baud=baud, seed=seed, options=options)
+        self.link = VirtualLink(self.line, self.clock, baud, latency_s)
+        self.fault(*faults)
+
+    def bus(self, **options: Any) -> Bus:
+        """A driver over it, closed."""
+        return open_bus(self.family, self.servos, port=self.link, clock=self.clock, **self._driver | options)
+
+    @property
+    def chain(self) -> Chain:
+        """The servos themselves; TypeError where it is a board."""
+        if not isinstance(self.line, Chain):
+            raise TypeError("a board has no servos to look at; see line")
+        return self.line
+
+    def servo(self, device_id: int) -> ServoView:
+        """One servo; KeyError where nobody has the id."""
+        return ServoView(self.chain, device_id, self.clock)
+
+    def fault(self, *specs: str) -> None:
+        """Set faults now; raises DriverError where one cannot be read."""
+        self.line.faults.add(specs, self.clock())
+
+    def clear(self, kind: str | None = None) -> None:
+        """End the faults of a kind; None: all."""
+        self.line.faults.clear(kind, self.clock())

@@ -1,0 +1,195 @@
+"""One simulated servo: what each instruction does to it.
+
+Behaviour follows the ROBOTIS e-Manual (Protocol 2.0 and control tables); where firmware differs or nobody has
+verified it, the choice is said at the method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from drivers.packets.packet import ErrorNumber
+from drivers.sim.servos.drive_x import CURRENT_POSITION, EXTENDED, GOAL_TORQUE
+from drivers.sim.servos.registers import GOALS, Change
+from drivers.sim.servos.state import ServoState
+from drivers.tables.tables import Item
+
+CLEAR_MULTI_TURN = b"\x01\x44\x58\x4c\x22"
+CALIBRATE = 128
+"""Feetech: written to Torque Enable it sets the middle of the turn."""
+
+
+class SimulatedServo(ServoState):
+    """A servo that obeys instructions.
+
+    Parameters
+    ----------
+    device_id, model, settings : see :class:`~drivers.sim.servos.state.ServoState`.
+    """
+
+    def __init__(self, device_id: int, model: str | int = "xl330-m288", **settings: Any) -> None:
+        super().__init__(device_id, model, **settings)
+        self._effects = self._effects_by_name()
+
+    def force(self, name: str, value: int, now_s: float) -> None:
+        """Set a register whatever its access and range, with all that follows from it."""
+        self._store(self.table[name], value, now_s)
+        self._sensed_at = -1.0
+
+    # ------------------------------------------------------------ instructions
+    def read(self, address: int, length: int, now_s: float) -> tuple[int, bytes]:
+        """(error byte, data). A range that leaves the table gives Access (7) and no data."""
+        registers = self.registers
+        if not registers.readable(address, length):
+            return self.alert | ErrorNumber.ACCESS, b""
+        first, end = registers.span(address, length)
+        drive = self.drive
+        if end > drive.first_sensed and first < drive.last_sensed and now_s != self._sensed_at:
+            if drive.motion_at <= first and end <= drive.motion_end:
+                drive.sense_motion(now_s)
+            else:
+                self._sense(now_s)
+        return self.alert, registers.read(address, length)
+
+    def write(self, address: int, data: bytes, now_s: float) -> int:
+        """Error byte of a write; nothing is changed unless all of it is allowed."""
+        changes = self.registers.parse(address, data)
+        if isinstance(changes, ErrorNumber):
+            return self.alert | changes
+        self._apply(changes, now_s)
+        return self.alert
+
+    def reg_write(self, address: int, data: bytes) -> int:
+        """Error byte; keeps an allowed write for `action`."""
+        changes = self.registers.parse(address, data)
+        if isinstance(changes, ErrorNumber):
+            return self.alert | changes
+        self._pending = changes
+        self.registers.put("Registered Instruction", 1)
+        return self.alert
+
+    def action(self, now_s: float) -> int:
+        """Error byte; runs the registered write, Instruction (2) where there is none."""
+        if not self.registers.get("Registered Instruction"):
+            return self.alert | ErrorNumber.INSTRUCTION
+        changes, self._pending = self._pending, []
+        self.registers.put("Registered Instruction", 0)
+        self._apply(changes, now_s)
+        return self.alert
+
+    def reboot(self, now_s: float) -> None:
+        """RAM to its initial values, errors cleared, deaf for `boot_s`."""
+        self._boot(now_s)
+        self.deaf_until = now_s + self.boot_s
+
+    def factory_reset(self, option: int, now_s: float) -> int:
+        """Error byte. 0xFF resets all, 1 keeps the id, 2 keeps id and baud rate."""
+        kept = {0xFF: (), 0x01: ("ID",), 0x02: ("ID", "Baud Rate")}.get(option)
+        if kept is None:
+            return self.alert | ErrorNumber.DATA_RANGE
+        values = {name: self.registers.get(name) for name in kept}
+        self.registers.reset(0, self.table.eeprom_end)
+        for name, value in values.items():
+            self.registers.put(name, value)
+        self.drive.configure()
+        self.reboot(now_s)
+        self.on_change()
+        return 0
+
+    def clear(self, params: bytes, now_s: float) -> int:
+        """Error byte. Multi-turn clear: Present Position back into one turn, only at rest, else Result Fail."""
+        if params != CLEAR_MULTI_TURN:
+            return self.alert | ErrorNumber.DATA_RANGE
+        if self.plant.motion(now_s).velocity:
+            return self.alert | ErrorNumber.RESULT_FAIL
+        self._one_turn(now_s)
+        return self.alert
+
+    # ------------------------------------------------------------ effects of writes
+    def _effects_by_name(self) -> dict[str, Callable[[int, float], None]]:
+        """What writing a register does beyond changing it."""
+        effects: dict[str, Callable[[int, float], None]] = {
+            "Torque Enable": self._write_torque,
+            "Bus Watchdog": self._write_watchdog,
+            "Operating Mode": self._write_mode,
+            "Hardware Error Status": lambda value, now_s: None,
+        }
+        for name in GOALS | {"Moving Speed", "Goal Time"}:
+            effects[name] = partial(self._write_goal, name)
+        if self.table.lock == "Lock":
+            effects["Lock"] = self._write_lock
+        effects.update(dict.fromkeys(("ID", "Secondary(Shadow) ID", "Baud Rate"), self._write_address))
+        for name in self.table:
+            if name.startswith("Indirect Address"):
+                effects[name] = lambda value, now_s: self.registers.remap()
+        return effects
+
+    def _apply(self, changes: list[Change], now_s: float) -> None:
+        for item, value in changes:
+            self._store(item, value, now_s)
+        self._sensed_at = -1.0
+
+    def _store(self, item: Item, value: int, now_s: float) -> None:
+        if item.name == "Torque Enable" and value and self.shut_down and not self._recover():
+            return
+        self.registers.store(item, value)
+        if item.address < self.table.eeprom_end:
+            self.eeprom_writes[item.name] += 1
+            self.deaf_until = max(self.deaf_until, now_s + self.eeprom_busy_s)
+            self.drive.configure()
+        effect = self._effects.get(item.name)
+        if effect is not None:
+            effect(value, now_s)
+
+    def _recover(self) -> bool:
+        """Torque again after a shutdown: with Protocol 2.0 only a reboot gives it, older servos are just told to."""
+        if self.table.protocol == 2:
+            return False
+        self.shut_down, self.hardware_error = False, 0
+        if "Torque Limit" in self.table:
+            self.registers.put("Torque Limit", self.table["Torque Limit"].initial)
+        return True
+
+    def _write_lock(self, value: int, now_s: float) -> None:
+        """Closes the permanent registers. AX and MX open it again only without power."""
+        closed = bool(value) or (self.registers.locked and not self.is_feetech)
+        self.registers.locked = closed
+        self.registers.put("Lock", int(closed))
+
+    def _write_torque(self, value: int, now_s: float) -> None:
+        if value == CALIBRATE:
+            self._calibrate(now_s)
+        elif bool(value) != self.plant.powered:
+            self._set_power(bool(value), now_s)
+
+    def _calibrate(self, now_s: float) -> None:
+        """Feetech: the shaft's present position becomes the middle of the turn; torque stays as it was."""
+        registers = self.registers
+        shaft = round(self.plant.motion(now_s).position)
+        registers.put("Homing Offset", shaft - self.table.center)
+        registers.put("Torque Enable", int(self.plant.powered))
+        self.drive.configure()
+
+    def _write_goal(self, name: str, value: int, now_s: float) -> None:
+        """The goal of the present mode moves a powered motor; with Drive Mode bit 3 any goal powers it."""
+        if self.plant.powered:
+            if name in self.drive.goals:
+                self.drive.plan(now_s)
+        elif self.table.goal_torque and self.registers.get("Drive Mode") & GOAL_TORQUE and not self.shut_down:
+            self.registers.put("Torque Enable", 1)
+            self._set_power(True, now_s)
+
+    def _write_watchdog(self, value: int, now_s: float) -> None:
+        """0 clears a tripped watchdog. (A period written while tripped re-arms it as well.)"""
+        self.registers.goals_locked = False
+
+    def _write_mode(self, value: int, now_s: float) -> None:
+        """Goals go back to those of a servo that stands still; Present Position back into one turn."""
+        self.registers.extended = self.table.protocol == 2 and value in (EXTENDED, CURRENT_POSITION)
+        self._one_turn(now_s)
+        self._reset_goals(now_s)
+
+    def _write_address(self, value: int, now_s: float) -> None:
+        self.on_change()

@@ -1,0 +1,98 @@
+"""What the motor control of every simulated servo has in common; the kinds of servo are in ``drive_x`` and
+``drive_word``."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from drivers.sim.servos.motion import Motion, hold, plan_stop
+from drivers.sim.servos.plant import Plant
+from drivers.sim.servos.registers import Registers
+
+OVERLOAD_AFTER_S = 1.0
+"""How long a jammed motor gives its full torque before it counts as overloaded."""
+
+
+class Drive(ABC):
+    """Turns goal registers into a trajectory and what the shaft does into registers, for one servo.
+
+    Parameters
+    ----------
+    registers : its memory.
+    plant : its shaft.
+    now_s : when it is switched on.
+
+    Attributes
+    ----------
+    goals : names of the registers that move the motor in the present mode.
+    offset : Present Position less the shaft's, ticks; `side` and `mirror` reverse the direction.
+    ticks_s : one step of the speed register, ticks/s.
+    first_sensed, last_sensed : addresses from and to which `sense` writes.
+    motion_at, motion_end : the part of them that `sense_motion` writes; empty where there is no such part.
+    """
+
+    goals: tuple[str, ...]
+    first_sensed: int
+    last_sensed: int
+    motion_at: int
+    motion_end: int
+
+    def __init__(self, registers: Registers, plant: Plant, now_s: float, speed: str) -> None:
+        table = registers.table
+        self.registers, self.plant, self.born_s = registers, plant, now_s
+        self.ticks_s = table[speed].scale / table.rad_per_tick
+        self.side, self.mirror, self.offset = 1, 0.0, 0
+
+    @abstractmethod
+    def configure(self) -> None:
+        """Take over the permanent settings; to be called when one of them changed."""
+
+    @abstractmethod
+    def plan(self, now_s: float) -> None:
+        """Move as the goal registers and the operating mode say, from the present motion on."""
+
+    @abstractmethod
+    def sense(self, now_s: float) -> float:
+        """Write what the sensors see at `now_s` into memory; returns the load (-1 to 1)."""
+
+    @abstractmethod
+    def sense_motion(self, now_s: float) -> None:
+        """Only current, velocity and position, which is what control loops read."""
+
+    def to_register(self, shaft: float) -> int:
+        """Present Position for a shaft position: reversed about the middle of the turn, then offset."""
+        return round(self.mirror + self.side * shaft) + self.offset
+
+    def to_shaft(self, register: int) -> float:
+        """Shaft position for a Goal Position; the inverse of `to_register`."""
+        return self.mirror + self.side * float(register - self.offset)
+
+    def stop(self, now_s: float) -> None:
+        """Stand still at once (bus watchdog: profile acceleration and velocity count as 0)."""
+        self.plant.trajectory = hold(now_s, self.plant.motion(now_s).position)
+
+    def coast(self, now_s: float) -> None:
+        """Without power the shaft runs out."""
+        motion = self.plant.motion(now_s)
+        self.plant.trajectory = plan_stop(now_s, motion.position, motion.velocity, 0.5 * self.plant.top_acceleration)
+
+    def look(self, now_s: float) -> tuple[Motion, Motion, float]:
+        """(motion of the shaft, motion the motor was told, load)."""
+        plant = self.plant
+        wanted = plant.wanted(now_s)
+        motion = wanted if plant.jammed_at is None else plant.motion(now_s)
+        return motion, wanted, plant.load(motion, wanted)
+
+    def hardware_errors(self, now_s: float, load: float) -> int:
+        """Bits of Hardware Error Status whose causes are there now."""
+        registers, plant = self.registers, self.plant
+        cause, bits = registers.table.hardware_error, 0
+        voltage = round(10.0 * plant.voltage(load))
+        if not registers.get("Min Voltage Limit") <= voltage <= registers.get("Max Voltage Limit"):
+            bits |= cause["voltage"]
+        if plant.temperature_c > registers.get("Temperature Limit"):
+            bits |= cause["temperature"]
+        since = plant.jammed_since
+        if abs(load) >= 1.0 and since is not None and now_s - since > OVERLOAD_AFTER_S:
+            bits |= cause["overload"]
+        return bits

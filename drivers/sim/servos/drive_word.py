@@ -1,0 +1,173 @@
+"""The motor control of servos with 16-bit goals: Dynamixel XL-320, AX and MX(1.0), Feetech STS and SCS."""
+
+from __future__ import annotations
+
+from drivers.sim.servos.drive import Drive
+from drivers.sim.servos.motion import Motion, Profile, plan_move, plan_speed, plan_timed
+from drivers.sim.servos.plant import Plant
+from drivers.sim.servos.registers import Registers
+
+MULTI_TURN = 0x10
+"""Feetech's Phase (18): present positions leave the turn."""
+DIRECTION_BIT = 10
+"""AX, MX and XL-320: speeds and loads are magnitudes with the direction in this bit (set = clockwise)."""
+
+
+class WordDrive(Drive):
+    """Plans and senses for one AX, MX(1.0) or XL-320 servo. See :class:`~drivers.sim.servos.drive.Drive`."""
+
+    def __init__(self, registers: Registers, plant: Plant, now_s: float, speed: str = "Present Speed") -> None:
+        super().__init__(registers, plant, now_s, speed)
+        self.goals = ("Goal Position", "Moving Speed")
+        names = [name for name in registers.table if name in SENSED]
+        items = [registers.table[name] for name in names]
+        self._names = names
+        self.first_sensed = min(item.address for item in items)
+        self.last_sensed = max(item.end for item in items)
+        self.motion_at = self.motion_end = registers.table.size
+        self.configure()
+
+    def configure(self) -> None:
+        """Nothing is kept besides the registers."""
+
+    def plan(self, now_s: float) -> None:
+        """To Goal Position at Moving Speed (0 = the motor's top speed); in wheel mode at that share of full power."""
+        registers, plant = self.registers, self.plant
+        now, moving = plant.motion(now_s), registers.get("Moving Speed")
+        magnitude = moving & (1 << DIRECTION_BIT) - 1
+        if self._wheel():
+            share = magnitude / 1023 * (-1 if moving >> DIRECTION_BIT & 1 else 1)
+            plant.trajectory = plan_speed(
+                now_s, now.position, now.velocity, share * plant.top_speed, plant.top_acceleration
+            )
+            return
+        top = min(magnitude * self.ticks_s, plant.top_speed) if magnitude else plant.top_speed
+        goal = self.to_shaft(registers.get("Goal Position"))
+        plant.trajectory = plan_move(
+            now_s, now.position, now.velocity, goal, top, plant.top_acceleration, Profile.RECTANGULAR
+        )
+
+    def _wheel(self) -> bool:
+        """XL-320 has a mode register; AX and MX turn endlessly when both angle limits are 0."""
+        registers = self.registers
+        if "Control Mode" in registers.table:
+            return registers.get("Control Mode") == 1
+        return registers.get("CW Angle Limit") == registers.get("CCW Angle Limit") == 0
+
+    def sense(self, now_s: float) -> float:
+        """Write what the sensors see at `now_s` into memory; returns the load (-1 to 1)."""
+        motion, _, load = self.look(now_s)
+        values = self._values(now_s, motion, load)
+        for name in self._names:
+            self.registers.put(name, values[name])
+        return load
+
+    def sense_motion(self, now_s: float) -> None:
+        """There is no separate block: everything is sensed."""
+        self.sense(now_s)
+
+    def _values(self, now_s: float, motion: Motion, load: float) -> dict[str, int]:
+        plant = self.plant
+        speed = round(motion.velocity / self.ticks_s)
+        if self._unsigned_speed():
+            speed = _direction(speed)
+        return {
+            "Present Position": self._position(motion),
+            "Present Speed": speed,
+            "Present Velocity": speed,
+            "Present Load": _direction(round(1023 * load)) if self._unsigned_speed() else round(1000 * load),
+            "Present Current": round(1000 * load),
+            "Present Voltage": min(max(round(10.0 * plant.voltage(load)), 0), 255),
+            "Present Temperature": min(max(round(plant.temperature_c), 0), 255),
+            "Moving": int(plant.powered and motion.velocity != 0.0),
+            "Realtime Tick": int((now_s - self.born_s) * 1000.0) & 0x7FFF,
+        }
+
+    def _position(self, motion: Motion) -> int:
+        """Present Position, which ends at the ends of the turn."""
+        return min(max(self.to_register(motion.position), 0), self.registers.table.ticks_per_turn - 1)
+
+    def _unsigned_speed(self) -> bool:
+        """Whether the table leaves the direction bit to the host (XL-320, as its vendor writes it)."""
+        return "Control Mode" in self.registers.table
+
+
+class FeetechDrive(WordDrive):
+    """Plans and senses for one Feetech STS or SCS servo. See :class:`~drivers.sim.servos.drive.Drive`.
+
+    STS: Goal Velocity (0 = top speed) and Acceleration in its unit of 100 steps/s²; modes 0 position, 1 speed,
+    2 PWM (in Goal Time), 3 step by step. SCS: Goal Time, when it is not 0, is the duration of the move.
+    """
+
+    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
+        super().__init__(registers, plant, now_s, "Present Velocity")
+        self.goals = ("Goal Position", "Goal Velocity", "Goal Time")
+
+    def configure(self) -> None:
+        """Present Position is the shaft's less Homing Offset."""
+        if "Homing Offset" in self.registers.table:
+            self.offset = -self.registers.get("Homing Offset")
+
+    def plan(self, now_s: float) -> None:
+        """Move as Operating Mode says."""
+        registers, plant = self.registers, self.plant
+        now = plant.motion(now_s)
+        mode = registers.get("Operating Mode") if "Operating Mode" in registers.table else 0
+        if mode in (1, 2):
+            speed = registers.get("Goal Velocity") * self.ticks_s
+            if mode == 2:
+                speed = registers.get("Goal Time") / 1000 * plant.top_speed
+            speed = min(max(speed, -plant.top_speed), plant.top_speed)
+            plant.trajectory = plan_speed(now_s, now.position, now.velocity, speed, self._acceleration())
+            return
+        goal = self.to_shaft(registers.get("Goal Position"))
+        if mode == 3:
+            goal = plant.trajectory.end + registers.get("Goal Position")
+        time_s = registers.get("Goal Time") * 1e-3
+        if time_s > 0.0 and registers.table.ticks_per_turn == 1024:
+            plant.trajectory = plan_timed(now_s, now.position, now.velocity, goal, time_s, 0.0)
+            return
+        speed = abs(registers.get("Goal Velocity")) * self.ticks_s
+        top = min(speed, plant.top_speed) if speed else plant.top_speed
+        plant.trajectory = plan_move(now_s, now.position, now.velocity, goal, top, self._acceleration())
+
+    def _acceleration(self) -> float:
+        item = self.registers.table.get("Acceleration")
+        value = self.registers.get("Acceleration") if item else 0
+        if not item or not value:
+            return self.plant.top_acceleration
+        return min(value * item.scale / self.registers.table.rad_per_tick, self.plant.top_acceleration)
+
+    def _position(self, motion: Motion) -> int:
+        """With multi-turn feedback (STS) it leaves the turn."""
+        registers = self.registers
+        if "Homing Offset" in registers.table and registers.get("Phase") & MULTI_TURN:
+            return self.to_register(motion.position)
+        return super()._position(motion)
+
+    def _values(self, now_s: float, motion: Motion, load: float) -> dict[str, int]:
+        values = super()._values(now_s, motion, load)
+        values["Goal Position 2"] = self.registers.get("Goal Position")
+        return values
+
+
+SENSED = frozenset(
+    {
+        "Present Position",
+        "Present Speed",
+        "Present Velocity",
+        "Present Load",
+        "Present Current",
+        "Present Voltage",
+        "Present Temperature",
+        "Moving",
+        "Realtime Tick",
+        "Goal Position 2",
+    }
+)
+
+
+def _direction(value: int) -> int:
+    """Magnitude in bits 0-9, direction in bit 10 (clear = counter-clockwise)."""
+    magnitude = min(abs(value), (1 << DIRECTION_BIT) - 1)
+    return magnitude | 1 << DIRECTION_BIT if value < 0 else magnitude

@@ -1,0 +1,197 @@
+"""The memory of a simulated Dynamixel servo: its control table as bytes, with access rules and ranges.
+
+What a write *does* is the device's business; this module says what a read returns and whether a write is
+allowed, and with which error number it is refused.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from drivers.packets.packet import ErrorNumber
+from drivers.tables.tables import ControlTable, Item, from_magnitude, to_magnitude
+
+EXTENDED_RANGE = 1_048_575
+"""Goal Position in modes 4 and 5: 256 turns either way (e-Manual, Goal Position)."""
+GOALS = frozenset({"Goal PWM", "Goal Current", "Goal Velocity", "Goal Position"})
+
+Change = tuple[Item, int]
+
+_CODES = {
+    (size, signed, big_endian): struct.Struct("<>"[big_endian] + (code.lower() if signed else code))
+    for size, code in ((1, "B"), (2, "H"), (4, "I"))
+    for signed in (False, True)
+    for big_endian in (False, True)
+}
+
+
+def _cell(item: Item) -> struct.Struct:
+    return _CODES[item.size, item.signed, item.big_endian]
+
+
+class Registers:
+    """Bytes of a control table.
+
+    Parameters
+    ----------
+    table : the model's control table.
+
+    Attributes
+    ----------
+    memory : (table.size,) bytes as they would be read, but for the indirect area.
+    locked : nothing below ``table.eeprom_end`` may be written (torque is on, or Lock is set).
+    goals_locked : the bus watchdog has tripped, so goals may not be written.
+    extended : Goal Position may leave one turn (operating modes 4 and 5).
+    """
+
+    def __init__(self, table: ControlTable) -> None:
+        self.table = table
+        self.memory = bytearray(table.size)
+        self.locked = self.goals_locked = self.extended = False
+        self._cells = {name: (_cell(item), item.address, item.sign_bit) for name, item in table.items()}
+        self._layouts: dict[tuple[int, int], tuple[Item, ...] | ErrorNumber] = {}
+        self._pointers: dict[int, int] = {}
+        self._slots = frozenset(address for _, data, count in table.indirect for address in range(data, data + count))
+        self._first_slot = min(self._slots, default=table.size)
+
+    def reset(self, first: int, end: int) -> None:
+        """Initial values for all items from address `first` up to `end`."""
+        for item in self.table.values():
+            if first <= item.address < end:
+                self.memory[item.address : item.end] = item.encode(item.initial)
+        self.remap()
+
+    def get(self, name: str) -> int:
+        """Value of an item as it lies in memory; KeyError where the model has none of that name."""
+        cell, address, sign_bit = self._cells[name]
+        value: int = cell.unpack_from(self.memory, address)[0]
+        return value if sign_bit is None else from_magnitude(value, sign_bit)
+
+    def put(self, name: str, value: int) -> None:
+        """Set an item whatever its access."""
+        item = self.table[name]
+        self.memory[item.address : item.end] = item.encode(value)
+
+    # ------------------------------------------------------------ reading
+    def readable(self, address: int, length: int) -> bool:
+        """Whether all `length` bytes lie in the table (gaps between items read as 0)."""
+        return length > 0 and address + length <= self.table.size
+
+    def read(self, address: int, length: int) -> bytes:
+        """Bytes as a host reads them: Indirect Data shows what its pointer points at."""
+        memory = self.memory
+        if not self._pointers or address + length <= self._first_slot:
+            return bytes(memory[address : address + length])
+        pointers = self._pointers
+        return bytes(memory[pointers.get(at, at)] for at in range(address, address + length))
+
+    def span(self, address: int, length: int) -> tuple[int, int]:
+        """First and last-plus-one address that a read looks at, through the pointers."""
+        if not self._pointers or address + length <= self._first_slot:
+            return address, address + length
+        seen = [self._pointers.get(at, at) for at in range(address, address + length)]
+        return min(seen), max(seen) + 1
+
+    # ------------------------------------------------------------ writing
+    def parse(self, address: int, data: bytes) -> list[Change] | ErrorNumber:
+        """The items a write changes, or why it is refused. Nothing is changed here.
+
+        A write is refused as a whole: with Access (7) where it touches no item, a read-only one or a locked
+        one, with Data Length (5) where it ends inside an item, with Data Range (4) or Data Limit (6) for a value.
+        """
+        if not data:
+            return ErrorNumber.DATA_LENGTH
+        if self._slots and address in self._slots:
+            return self._parse_indirect(address, data)
+        layout = self._layout(address, len(data))
+        if isinstance(layout, ErrorNumber):
+            return layout
+        changes = []
+        for item in layout:
+            value = _cell(item).unpack_from(data, item.address - address)[0]
+            if item.sign_bit is not None:
+                value = from_magnitude(value, item.sign_bit)
+            error = self._refusal(item, value)
+            if error:
+                return error
+            changes.append((item, value))
+        return changes
+
+    def store(self, item: Item, value: int) -> None:
+        """Put a value that `parse` allowed."""
+        raw = value if item.sign_bit is None else to_magnitude(value, item.sign_bit)
+        _cell(item).pack_into(self.memory, item.address, raw)
+
+    def _layout(self, address: int, length: int) -> tuple[Item, ...] | ErrorNumber:
+        """The items that a write of this size at this address covers; cached, as hosts repeat themselves."""
+        key = (address, length)
+        layout = self._layouts.get(key)
+        if layout is None:
+            layout = self._layouts[key] = self._walk(address, length)
+        return layout
+
+    def _walk(self, address: int, length: int) -> tuple[Item, ...] | ErrorNumber:
+        items, end = [], address + length
+        while address < end:
+            item = self.table.by_address.get(address)
+            if item is None or not item.writable:
+                return ErrorNumber.ACCESS
+            if item.end > end:
+                return ErrorNumber.DATA_LENGTH
+            items.append(item)
+            address = item.end
+        return tuple(items)
+
+    def _refusal(self, item: Item, value: int) -> ErrorNumber:
+        """Why a value may not be written now; NONE where it may."""
+        if self.locked and item.address < self.table.eeprom_end:
+            return ErrorNumber.ACCESS
+        if self.goals_locked and item.name in GOALS:
+            return ErrorNumber.DATA_RANGE
+        if item.minimum is not None and not item.minimum <= value <= (item.maximum or 0):
+            return ErrorNumber.DATA_RANGE
+        if item.values is not None and value not in item.values:
+            return ErrorNumber.DATA_RANGE
+        return self._beyond_limit(item, value) if item.upper else ErrorNumber.NONE
+
+    def _beyond_limit(self, item: Item, value: int) -> ErrorNumber:
+        if self.extended and item.name == "Goal Position":
+            inside = -EXTENDED_RANGE <= value <= EXTENDED_RANGE
+            return ErrorNumber.NONE if inside else ErrorNumber.DATA_RANGE
+        high = self.get(item.upper or "")
+        low = self.get(item.lower) if item.lower else -high
+        return ErrorNumber.NONE if low <= value <= high else ErrorNumber.DATA_LIMIT
+
+    # ------------------------------------------------------------ indirect area
+    def remap(self) -> None:
+        """Take over the pointers; one that points at its own slot makes the slot plain memory."""
+        self._pointers = {}
+        for pointers, data, count in self.table.indirect:
+            for k in range(count):
+                at = pointers + 2 * k
+                target = self.memory[at] | self.memory[at + 1] << 8
+                if target != data + k and target < self.table.size and target not in self._slots:
+                    self._pointers[data + k] = target
+
+    def _parse_indirect(self, address: int, data: bytes) -> list[Change] | ErrorNumber:
+        """A write to Indirect Data is a write to the items that its pointers spell, run by run."""
+        changes: list[Change] = []
+        targets = [self._pointers.get(at, at) for at in range(address, address + len(data))]
+        start = 0
+        for k in range(1, len(targets) + 1):
+            if k < len(targets) and targets[k] == targets[k - 1] + 1:
+                continue
+            part = self._parse_run(targets[start], data[start:k])
+            if isinstance(part, ErrorNumber):
+                return part
+            changes += part
+            start = k
+        return changes
+
+    def _parse_run(self, address: int, data: bytes) -> list[Change] | ErrorNumber:
+        if address not in self._slots:
+            return self.parse(address, data)
+        items = [self.table.by_address.get(at) for at in range(address, address + len(data))]
+        if None in items or any(item.address not in self._slots for item in items if item):
+            return ErrorNumber.ACCESS
+        return [(item, byte) for item, byte in zip(items, data, strict=True) if item]

@@ -1,0 +1,322 @@
+"""The state of one simulated servo and what it does by itself; instructions come on top in ``device``.
+
+A servo takes the time as an argument and never sleeps.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+
+from drivers.packets.packet import ALERT
+from drivers.sim.servos.drive import Drive
+from drivers.sim.servos.drive_word import FeetechDrive, WordDrive
+from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM, XDrive
+from drivers.sim.servos.plant import Plant, Skin
+from drivers.sim.servos.registers import Change, Registers
+from drivers.tables.tables import load_table
+
+TRIPPED = 0xFF
+"""Bus Watchdog (98) after it has expired."""
+WATCHDOG_STEP_S = 0.02
+HEALTH_PERIOD_S = 0.1
+
+
+def same_rate(first: int, second: int) -> bool:
+    """Whether two ends of a wire understand each other: their clocks may differ by 3 %."""
+    return abs(first - second) <= 0.03 * second
+
+
+class Heard:
+    """When the last instruction went over the wire; shared by the servos of a bus."""
+
+    __slots__ = ("at_s",)
+
+    def __init__(self, at_s: float) -> None:
+        self.at_s = at_s
+
+
+class ServoState:
+    """A servo with its control table, motor and faults, as far as it needs no instructions.
+
+    Parameters
+    ----------
+    device_id : 0 to 252.
+    model : model name or number.
+    now_s : time of power-up.
+    firmware : version; None = a current one.
+    baud : bit rate in its Baud Rate register; a rate the model lacks keeps the register's initial value.
+    position : Present Position at power-up, ticks; None = the middle of the range.
+    skin : load on the shaft.
+    boot_s : how long it is deaf after a reboot.
+
+    Attributes
+    ----------
+    eeprom_writes : number of writes by register name (wear).
+    watchdog_ignored : keeps turning when its bus watchdog trips (330-size firmware does, in current mode).
+    forced_alert : sets the alert bit without a hardware error.
+    eeprom_busy_s : how long it is deaf after a write below ``table.eeprom_end``.
+    next_health_s : when it looks after heat, supply and load again.
+    heard : when the last instruction went over the wire; a bus gives all its servos the same object.
+    on_change : called when id, secondary id or baud rate changed.
+    """
+
+    def __init__(
+        self,
+        device_id: int,
+        model: str | int = "xl330-m288",
+        *,
+        now_s: float = 0.0,
+        firmware: int | None = None,
+        baud: int = 1_000_000,
+        position: float | None = None,
+        skin: Skin | None = None,
+        boot_s: float = 0.25,
+    ) -> None:
+        self.table = table = load_table(model, firmware)
+        self.registers = Registers(table)
+        self.registers.reset(0, table.size)
+        self.eeprom_writes: Counter[str] = Counter()
+        self.on_change: Callable[[], None] = lambda: None
+        self.boot_s, self.deaf_until = boot_s, now_s
+        self.watchdog_ignored = self.forced_alert = self.shut_down = False
+        self.eeprom_busy_s = 0.0
+        self.heard = Heard(now_s)
+        self.next_health_s = now_s
+        self._sensed_at = -1.0
+        self._pending: list[Change] = []
+        self._errors = 0
+        self._has_error_register = "Hardware Error Status" in table
+        self.is_feetech = "Response Level" in table
+        self.registers.put("ID", device_id)
+        self.force_baud(baud, self.baud)
+        start = float(table.center if position is None else position)
+        self.plant = Plant(now_s, start, self._no_load_speed(), table.voltage / 10, skin or Skin())
+        self.drive = self._make_drive(now_s)
+        self._boot(now_s)
+
+    def _no_load_speed(self) -> float:
+        table = self.table
+        if table.top_speed:
+            speed = table["Present Speed"] if "Present Speed" in table else table["Present Velocity"]
+            return table.top_speed * speed.scale / table.rad_per_tick
+        limit = table["Velocity Limit"]
+        return limit.initial * limit.scale / table.rad_per_tick
+
+    def _make_drive(self, now_s: float) -> Drive:
+        """The motor control that fits the control table."""
+        if "Profile Velocity" in self.table:
+            return XDrive(self.registers, self.plant, now_s)
+        kind = FeetechDrive if "Goal Velocity" in self.table else WordDrive
+        return kind(self.registers, self.plant, now_s)
+
+    # ------------------------------------------------------------ what the bus needs to know
+    @property
+    def id(self) -> int:
+        """Number on the bus."""
+        return self.registers.memory[self.table["ID"].address]
+
+    @property
+    def secondary_id(self) -> int | None:
+        """Second number it listens to without answering, or None."""
+        item = self.table.get("Secondary(Shadow) ID")
+        value = self.registers.memory[item.address] if item else 255
+        return value if value <= 252 else None
+
+    @property
+    def baud(self) -> int:
+        """Bit rate it listens at."""
+        return self.table.baud[self.registers.get("Baud Rate")]
+
+    @property
+    def return_delay_s(self) -> float:
+        """Pause before a reply."""
+        return self.registers.get("Return Delay Time") * 2e-6
+
+    @property
+    def status_level(self) -> int:
+        """0 answers a ping only, 1 a read too, 2 everything. (Feetech's Response Level has no 0.)"""
+        if self.is_feetech:
+            return 1 + self.registers.get("Response Level")
+        return self.registers.get("Status Return Level")
+
+    @property
+    def alert(self) -> int:
+        """`ALERT` while a hardware error is latched, else 0."""
+        return ALERT if self.forced_alert or self.hardware_error else 0
+
+    @property
+    def hardware_error(self) -> int:
+        """Latched hardware errors, as bits of the model's own order."""
+        return self.registers.get("Hardware Error Status") if self._has_error_register else self._errors
+
+    @hardware_error.setter
+    def hardware_error(self, bits: int) -> None:
+        self._errors = bits
+        if self._has_error_register:
+            self.registers.put("Hardware Error Status", bits)
+
+    # ------------------------------------------------------------ what tests and tools look at
+    @property
+    def torque(self) -> bool:
+        """Whether the motor is on."""
+        return self.plant.powered
+
+    @property
+    def goal(self) -> int:
+        """Goal Position register."""
+        return self.registers.get("Goal Position")
+
+    def position_ticks(self, now_s: float) -> int:
+        """Present Position."""
+        self.look(now_s)
+        return self.drive.to_register(self.plant.motion(now_s).position)
+
+    def register(self, name: str, now_s: float) -> int:
+        """Value of any register, up to date; KeyError where the model has none of that name."""
+        self.look(now_s)
+        self._sense(now_s)
+        return self.registers.get(name)
+
+    def place(self, position: float, now_s: float) -> None:
+        """Move the limp shaft by hand to a Present Position.
+
+        Raises
+        ------
+        ValueError : the motor is on and holds the shaft.
+        """
+        if self.plant.powered:
+            raise ValueError(f"servo {self.id} holds its shaft: switch its torque off before moving it by hand")
+        self.plant.place(now_s, self.drive.to_shaft(round(position)))
+        self._sensed_at = -1.0
+
+    def latch(self, bits: int, now_s: float) -> None:
+        """Latch hardware errors; those in the Shutdown mask switch the motor off until a reboot."""
+        registers = self.registers
+        self.hardware_error |= bits
+        if bits & registers.get("Shutdown") and not self.shut_down:
+            self.shut_down = True
+            if "Torque Limit" in self.table:
+                registers.put("Torque Limit", 0)
+            else:
+                registers.put("Torque Enable", 0)
+            self._set_power(False, now_s)
+
+    # ------------------------------------------------------------ what happens by itself
+    def look(self, now_s: float) -> None:
+        """Catch up: bus watchdog, heat, supply, overload."""
+        self.watch(now_s)
+        if now_s >= self.next_health_s:
+            self.next_health_s = now_s + HEALTH_PERIOD_S
+            self.check_health(now_s)
+
+    def watch(self, now_s: float) -> None:
+        """Trip the bus watchdog when no instruction (for any servo) was heard for its time."""
+        if not self.plant.powered or "Bus Watchdog" not in self.table:
+            return
+        period = self.registers.get("Bus Watchdog")
+        due = self.heard.at_s + period * WATCHDOG_STEP_S
+        if not 0 < period < 128 or now_s <= due:
+            return
+        self.registers.put("Bus Watchdog", TRIPPED)
+        self.registers.goals_locked = True
+        if not self._ignores_watchdog():
+            self.drive.stop(due)
+
+    def _ignores_watchdog(self) -> bool:
+        small = self.table.model.startswith(("xl330", "xc330"))
+        return self.watchdog_ignored or (small and self.registers.get("Operating Mode") == CURRENT)
+
+    def suffer(self, kind: str, value: float, begins: bool, now_s: float) -> None:
+        """A fault of this servo begins or ends; kinds as in ``drivers.sim.wire.faults``."""
+        plant = self.plant
+        if kind == "alert":
+            self.forced_alert = begins
+        elif kind == "watchdog-ignored":
+            self.watchdog_ignored = begins
+        elif kind == "eeprom-busy":
+            self.eeprom_busy_s = value if begins else 0.0
+        elif kind == "stall":
+            plant.jam(now_s, begins)
+        elif kind == "hw" and begins:
+            self.latch(int(value), now_s)
+        elif kind == "volts":
+            plant.supply_v = value if begins else self.table.voltage / 10
+            self.check_health(now_s)
+        elif kind == "temp":
+            plant.forced_c = value if begins else None
+            self.check_health(now_s)
+
+    def force_baud(self, baud: int, otherwise: int = 0) -> None:
+        """Set the bit rate it listens at, whatever the wire says.
+
+        This is how a bus comes to have a servo at the wrong rate. A rate the model lacks counts as `otherwise`,
+        or as its lowest.
+        """
+        rates = self.table.baud
+        near = min(rates, key=lambda rate: abs(rate - baud))
+        if not same_rate(near, baud):
+            near = otherwise or min(rates)
+        self.registers.put("Baud Rate", rates.index(near))
+
+    def check_health(self, now_s: float) -> None:
+        """Latch the hardware errors whose causes are there now."""
+        load = self._sense(now_s)
+        self.plant.warm(now_s, load)
+        bits = self.drive.hardware_errors(now_s, load)
+        if bits:
+            self.latch(bits, now_s)
+
+    def _sense(self, now_s: float) -> float:
+        self._sensed_at = now_s
+        return self.drive.sense(now_s)
+
+    # ------------------------------------------------------------ states
+    def _set_power(self, on: bool, now_s: float) -> None:
+        self.plant.powered = on
+        if self.table.lock == "torque":
+            self.registers.locked = on
+        if on:
+            self.drive.plan(now_s)
+        else:
+            self.drive.coast(now_s)
+
+    def _boot(self, now_s: float) -> None:
+        """Power-up. Startup Configuration bit 0 switches the motor on at once."""
+        registers = self.registers
+        registers.reset(self.table.eeprom_end, self.table.size)
+        registers.goals_locked = self.shut_down = False
+        registers.locked = self.table.lock == "Lock" and bool(registers.get("Lock"))
+        self.hardware_error = 0
+        self._pending = []
+        self.drive.born_s = now_s
+        self._set_power(False, now_s)
+        if self.table.protocol == 2 and "Operating Mode" in self.table:
+            registers.extended = registers.get("Operating Mode") in (EXTENDED, CURRENT_POSITION)
+        self._reset_goals(now_s)
+        self._sensed_at = -1.0
+        startup = self.table.get("Startup Configuration")
+        if startup and registers.get(startup.name) & 1:
+            registers.put("Torque Enable", 1)
+            self._set_power(True, now_s)
+
+    def _reset_goals(self, now_s: float) -> None:
+        """Goal Position where the shaft is; current and PWM at their limits but where they are the goal."""
+        registers = self.registers
+        registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))
+        if "Goal PWM" not in self.table:
+            return
+        mode = registers.get("Operating Mode")
+        registers.put("Goal Velocity", 0)
+        registers.put("Goal PWM", 0 if mode == PWM else registers.get("PWM Limit"))
+        if "Goal Current" in self.table:
+            registers.put("Goal Current", 0 if mode == CURRENT else registers.get("Current Limit"))
+
+    def _one_turn(self, now_s: float) -> None:
+        self._sensed_at = -1.0
+        turn = self.table.ticks_per_turn
+        position = self.plant.motion(now_s).position
+        if not 0 <= position < turn:
+            self.plant.place(now_s, position % turn)
+        registers = self.registers
+        registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))

@@ -1,0 +1,85 @@
+"""Time on the wire: ten bits a byte both ways at the port's bit rate, return delays, the USB latency timer.
+
+One wire carries one byte at a time, so an instruction waits until the wire is free, and replies follow each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from drivers.sim.wire.replies import Reply
+
+BITS_PER_BYTE = 10
+USB_PACKET = 62
+"""Data bytes in a full USB packet of a common bridge; a shorter one waits for the latency timer."""
+
+USB_FRAME_S = 0.5e-3
+"""Bytes that arrive within this time reach the host together, when the last of them has arrived."""
+
+Timed = tuple[float, bytes]
+
+
+class WireTiming:
+    """Bookkeeping of when the wire is free.
+
+    Parameters
+    ----------
+    latency_s : latency timer of the USB bridge (16 ms by default on Linux, 1 ms in low-latency mode, 0 = none).
+    """
+
+    def __init__(self, latency_s: float = 0.0) -> None:
+        self.latency_s = latency_s
+        self._free_s = 0.0
+
+    def arrival(self, now_s: float, size: int, baud: int) -> float:
+        """When the last byte of an instruction written now reaches the servos."""
+        self._free_s = max(now_s, self._free_s) + size * BITS_PER_BYTE / baud
+        return self._free_s
+
+    def deliveries(self, replies: Sequence[Reply], baud: int) -> list[Timed]:
+        """(time, bytes) at which the host gets the replies to the instruction that has just arrived."""
+        timed = []
+        for reply in replies:
+            delay = reply.servo.return_delay_s if reply.servo else 0.0
+            self._free_s += delay + reply.late_s + len(reply.data) * BITS_PER_BYTE / baud
+            timed.append((self._free_s, reply.data))
+        return _through_bridge(timed, self.latency_s) if self.latency_s > 0.0 else _by_frames(timed)
+
+
+def without_timing(replies: Sequence[Reply], now_s: float) -> list[Timed]:
+    """(time, bytes) on a wire that takes no time; a late reply still delays those behind it."""
+    timed: list[Timed] = []
+    for reply in replies:
+        now_s += reply.late_s
+        if timed and timed[-1][0] == now_s:
+            timed[-1] = (now_s, timed[-1][1] + reply.data)
+        else:
+            timed.append((now_s, reply.data))
+    return timed
+
+
+def _by_frames(timed: list[Timed]) -> list[Timed]:
+    """Neighbours in time put together; the last byte of all keeps its time."""
+    out: list[Timed] = []
+    begun_s = 0.0
+    for time_s, data in timed:
+        if out and time_s - begun_s < USB_FRAME_S:
+            out[-1] = (time_s, out[-1][1] + data)
+        else:
+            begun_s = time_s
+            out.append((time_s, data))
+    return out
+
+
+def _through_bridge(timed: list[Timed], latency_s: float) -> list[Timed]:
+    """Full USB packets go at once, the rest when the latency timer expires."""
+    out: list[Timed] = []
+    held, last_s = b"", 0.0
+    for last_s, data in timed:
+        held += data
+        while len(held) >= USB_PACKET:
+            out.append((last_s, held[:USB_PACKET]))
+            held = held[USB_PACKET:]
+    if held:
+        out.append((last_s + latency_s, held))
+    return out

@@ -1,0 +1,71 @@
+"""drivers.base.priority: what a thread gets of the processor, where the system gives it."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from drivers.base import priority
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="scheduling as Linux has it")
+
+
+def in_thread(work: Callable[[], object]) -> object:
+    """What a function gives in a thread of its own, so that this one keeps its scheduling."""
+    got: list[object] = []
+    thread = threading.Thread(target=lambda: got.append(work()))
+    thread.start()
+    thread.join()
+    return got[0]
+
+
+def policy_after(*calls: Callable[[], object]) -> object:
+    def work() -> int:
+        for call in calls:
+            call()
+        return os.sched_getscheduler(0)
+
+    return in_thread(work)
+
+
+@linux
+def test_real_time_is_taken_where_it_is_allowed_and_given_back() -> None:
+    allowed = in_thread(priority.take_priority)
+    assert policy_after(priority.take_priority) == (os.SCHED_FIFO if allowed else os.SCHED_OTHER)
+    assert policy_after(priority.take_priority, priority.give_priority_back) == os.SCHED_OTHER
+
+
+@linux
+def test_nobody_asks_for_real_time_who_was_told_not_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(priority.ORDINARY, "1")
+    assert in_thread(priority.take_priority) is False
+    assert policy_after(priority.take_priority) == os.SCHED_OTHER
+
+
+@linux
+def test_short_turns_are_asked_for_instead(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(priority.ORDINARY, "1")
+
+    def turn() -> tuple[bool, str]:
+        nice = os.getpriority(os.PRIO_PROCESS, 0)
+        priority.take_priority()
+        taken = priority.take_short_turns()
+        assert os.getpriority(os.PRIO_PROCESS, 0) == nice
+        told = Path(f"/proc/self/task/{threading.get_native_id()}/sched")
+        return taken, told.read_text() if told.exists() else ""
+
+    taken, told = in_thread(turn)
+    turns = [line.split(":")[1].strip() for line in told.splitlines() if line.startswith("se.slice")]
+    if not taken or not turns:
+        pytest.skip("this kernel has no such wish, or does not show it")
+    assert turns == ["100000"]
+
+
+def test_a_machine_nobody_knows_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(priority.platform, "machine", lambda: "pdp11")
+    assert not priority.take_short_turns()

@@ -1,0 +1,276 @@
+"""drivers.dynamixel.bus over a simulated wire: the contract, and what threatens a running bus as a whole.
+
+Numbers are those of the fault list in docs/drivers.md. See test_telemetry.py and test_startup.py for the others.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers import open_bus
+from drivers.base.bus import Bus
+from drivers.base.errors import NoReply, PortBusy, PortLost, PortMissing, ServoFault
+from drivers.sim import SimulatedBus
+from drivers.sim.serving.virtual import VirtualBus
+from tests.drivers.contract import SERVOS, BusContract, read_until, settle
+from tests.drivers.programs import RAISE, program
+
+CALM = {"margin_s": 0.5, "watchdog_ms": 0}
+IDS = [servo.id for servo in SERVOS]
+
+
+@pytest.fixture
+def wire(tmp_path: Path) -> Iterator[SimulatedBus]:
+    with SimulatedBus(SERVOS, link=tmp_path / "by-id") as simulated:
+        yield simulated
+
+
+@pytest.fixture
+def bus(wire: SimulatedBus) -> Iterator[Bus]:
+    with open_bus("dynamixel", SERVOS, port=wire.path, **CALM) as running:
+        running.start()
+        yield running
+
+
+class TestDynamixelBus(BusContract):
+    @pytest.fixture
+    def bus(self, wire: SimulatedBus) -> Bus:
+        return open_bus("dynamixel", SERVOS, port=wire.path, **CALM)
+
+
+class TestDynamixelBusFastReads(BusContract):
+    @pytest.fixture
+    def bus(self) -> Bus:
+        return VirtualBus(SERVOS).bus(fast=True, **CALM)
+
+
+def torques(wire: SimulatedBus) -> list[bool]:
+    return [wire.servo(i).torque for i in IDS]
+
+
+def wait_until(done: Callable[[], bool], timeout_s: float = 10.0) -> None:
+    end = time.monotonic() + timeout_s
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+# ---------------------------------------------------------------------------- 2: unplugged and back
+
+
+def test_unplugging_is_told_once_and_the_bus_comes_back_where_the_servos_are(wire: SimulatedBus, bus: Bus) -> None:
+    settle(bus, [0.2, 0.2, 0.2])
+    wire.fault("unplug")
+    with pytest.raises(PortLost, match="went away"):
+        for _ in range(3):
+            bus.write(np.zeros(3))
+            bus.read()
+    for use in (bus.read, lambda: bus.write(np.zeros(3)), lambda: bus.discover([1])):
+        with pytest.raises(PortLost, match="is lost") as caught:
+            use()
+        assert "reconnect" in caught.value.hint
+    assert bus.report().errors == {"port_lost": 1}
+    with pytest.raises(PortMissing):
+        bus.reconnect()
+    assert bus.running
+
+    goals = [wire.servo(i).goal for i in IDS]
+    wire.clear("unplug")
+    wait_until(lambda: Path(wire.path).exists())
+    bus.reconnect()
+    assert torques(wire) == [True] * 3
+    here = [wire.servo(i).position_ticks for i in IDS]
+    assert [wire.servo(i).goal for i in IDS] == here
+    assert here == pytest.approx(goals, abs=3)
+    settle(bus, [0.0, 0.0, 0.0])
+
+
+def test_stop_while_unplugged_names_everybody(wire: SimulatedBus, bus: Bus) -> None:
+    wire.fault("unplug")
+    with pytest.raises(PortLost):
+        bus.read()
+    with pytest.raises(PortLost, match="not confirmed off") as caught:
+        bus.stop()
+    assert caught.value.servo_ids == bus.ids
+    assert "power off" in caught.value.hint
+    assert not bus.running
+    wire.clear("unplug")
+
+
+def test_stop_uses_an_adapter_that_is_back(wire: SimulatedBus, bus: Bus) -> None:
+    wire.fault("unplug")
+    with pytest.raises(PortLost):
+        bus.read()
+    wire.clear("unplug")
+    wait_until(lambda: Path(wire.path).exists())
+    bus.stop()
+    assert torques(wire) == [False] * 3
+
+
+def test_unplugging_in_the_middle_of_switching_off_is_told(wire: SimulatedBus) -> None:
+    bus = open_bus("dynamixel", SERVOS, port=wire.path, **CALM)
+    bus.open()
+    bus.start()
+    wire.fault("unplug")
+    with pytest.raises(PortLost, match="not confirmed off") as caught:
+        bus.close()
+    assert caught.value.servo_ids == tuple(IDS)
+    assert not bus.is_open
+
+
+# ---------------------------------------------------------------------------- 3: every way out
+
+
+@pytest.mark.parametrize("how", [RAISE, "SIGINT", "SIGTERM", "SIGHUP"])
+def test_every_way_out_switches_all_servos_off(wire: SimulatedBus, how: str) -> None:
+    with program("dynamixel", SERVOS, wire.path, how, **CALM) as child:
+        if how != RAISE:
+            assert child.pid is not None
+            os.kill(child.pid, getattr(signal, how))
+        child.join(20)
+        assert child.exitcode not in (0, None)
+        assert torques(wire) == [False] * 3
+
+
+def test_the_servos_stop_by_themselves_when_the_program_is_killed(wire: SimulatedBus) -> None:
+    with program("dynamixel", SERVOS, wire.path, margin_s=0.5, watchdog_ms=400) as child:
+        child.kill()
+        child.join(20)
+        wait_until(lambda: all(wire.servo(i).register("Bus Watchdog") == 255 for i in IDS))
+        rest = [wire.servo(i).position_ticks for i in IDS]
+        time.sleep(0.2)
+        assert [wire.servo(i).position_ticks for i in IDS] == rest
+    with open_bus("dynamixel", SERVOS, port=wire.path, **CALM) as bus:
+        bus.start()
+        settle(bus, [0.1, 0.1, 0.1])
+
+
+# ---------------------------------------------------------------------------- 4: errors on the way out
+
+
+def test_the_first_error_is_told_and_the_one_of_closing_is_a_note(wire: SimulatedBus) -> None:
+    bus = open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.05, watchdog_ms=0)
+    with pytest.raises(ZeroDivisionError) as caught, bus:
+        bus.start()
+        wire.fault("mute:2")
+        raise ZeroDivisionError
+    assert any('"brow" (id 2)' in note for note in caught.value.__notes__)
+    assert not bus.is_open
+
+
+# ---------------------------------------------------------------------------- 10: somebody else has the port
+
+
+def test_a_second_program_is_told_that_the_port_is_held(wire: SimulatedBus, bus: Bus) -> None:
+    with pytest.raises(PortBusy):
+        open_bus("dynamixel", SERVOS, port=wire.path).open()
+    settle(bus, [0.1, 0.1, 0.1])
+
+
+def test_an_interrupt_in_a_transaction_leaves_the_bus_usable(
+    wire: SimulatedBus, bus: Bus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(bus._port.link, "read", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            bus.read()
+    settle(bus, [0.1, 0.1, 0.1])
+
+
+# ---------------------------------------------------------------------------- 16, 20: the watchdog, a stalled host
+
+
+class Clock:
+    """A clock the test may move on."""
+
+    def __init__(self) -> None:
+        self.ahead_s = 0.0
+
+    def __call__(self) -> float:
+        return time.monotonic() + self.ahead_s
+
+
+def test_a_tripped_watchdog_is_cleared_without_a_jump(wire: SimulatedBus) -> None:
+    clock = Clock()
+    with open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.5, watchdog_ms=2000, clock=clock) as bus:
+        bus.start()
+        settle(bus, [0.0, 0.0, 0.0])
+        for i in IDS:
+            wire.servo(i).put("Bus Watchdog", 255)
+        clock.ahead_s = 5.0
+        here = bus.read().position_rad
+        sent = bus.write([0.4, 0.5, 0.9])
+        assert np.abs(sent - here).max() < 8.0 * 0.2
+        assert bus.report().errors == {"watchdog": 3}
+        assert [wire.servo(i).register("Bus Watchdog") for i in IDS] == [100] * 3
+        settle(bus, [0.2, 0.2, 0.2])
+
+
+def test_a_watchdog_that_trips_unseen_is_found_in_turn(wire: SimulatedBus) -> None:
+    with open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.5, watchdog_ms=2000) as bus:
+        bus.start()
+        wire.servo(2).put("Bus Watchdog", 255)
+        settle(bus, [0.2, 0.2, 0.2])
+        assert bus.report().errors_by_servo == {2: {"watchdog": 1}}
+
+
+def test_a_stalled_host_sends_no_burst(wire: SimulatedBus) -> None:
+    clock = Clock()
+    with open_bus("dynamixel", SERVOS, port=wire.path, clock=clock, **CALM) as bus:
+        bus.start()
+        settle(bus, [-0.3, -0.3, -0.3])
+        clock.ahead_s += 0.5
+        last = bus.read().position_rad
+        for _ in range(20):
+            start = clock()
+            sent = bus.write([0.4, 0.5, 0.9])
+            reach = 8.0 * (clock() - start + 0.06)
+            assert np.abs(sent - last).max() <= reach
+            last = sent
+            clock.ahead_s += 0.01
+
+
+# ---------------------------------------------------------------------------- servos that let go
+
+
+def test_a_servo_that_let_go_comes_back_only_when_asked(wire: SimulatedBus, bus: Bus) -> None:
+    settle(bus, [0.2, 0.2, 0.2])
+    wire.servo(2).latch(0x20)
+    read_until(bus, lambda state: not state.torque[1])
+    with pytest.raises(ServoFault, match="0x20"):
+        bus.recover([2])
+    wire.servo(2).place(2200)
+    for _ in range(5):
+        bus.write([0.1, 0.1, 0.1])
+        bus.read()
+    assert torques(wire) == [True, False, True]
+    object.__setattr__(bus.policy, "reboot_faulted", True)
+    bus.recover([2])
+    assert torques(wire) == [True] * 3
+    assert wire.servo(2).position_ticks == pytest.approx(2200, abs=3)
+    settle(bus, [0.1, 0.1, 0.1])
+
+
+def test_a_servo_that_is_gone_cannot_be_recovered(wire: SimulatedBus, bus: Bus) -> None:
+    wire.fault("mute:2")
+    bus._port.margin_s = 0.05
+    with pytest.raises(NoReply, match="id 2"):
+        bus.recover()
+    assert torques(wire)[0]
+    wire.clear()
+
+
+def test_everybody_is_found_when_nobody_is_named(bus: Bus) -> None:
+    assert [(info.id, info.model, info.firmware > 40) for info in bus.discover()] == [
+        (i, "xl330-m288", True) for i in IDS
+    ]

@@ -1,0 +1,121 @@
+"""drivers.dynamixel.mixed: servos of both protocols on one wire are one bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers import open_bus
+from drivers.base.bus import Bus, ServoSpec
+from drivers.base.errors import NoReply, ServoFault, WrongModel
+from drivers.dynamixel.bus import DynamixelBus
+from drivers.dynamixel.legacy import LegacyBus
+from drivers.dynamixel.mixed import MixedBus
+from drivers.sim.serving.virtual import VirtualBus
+from tests.drivers.contract import read_until, settle
+
+CALM = {"margin_s": 0.1, "watchdog_ms": 0}
+MODELS = ("xl330-m288", "ax-12a", "xl330-m288", "mx1-28")
+SERVOS = tuple(
+    ServoSpec(number, f"s{number}", model, -0.5, 0.5, 8.0, 200.0)
+    for number, model in zip((5, 3, 1, 4), MODELS, strict=True)
+)
+STEP_RAD = np.deg2rad(300) / 1024
+
+
+@pytest.fixture
+def wire() -> VirtualBus:
+    return VirtualBus(SERVOS)
+
+
+def make(wire: VirtualBus, servos: tuple[ServoSpec, ...] = SERVOS, **options: object) -> Bus:
+    return open_bus("dynamixel", servos, port=wire.link, clock=wire.clock, **(CALM | options))
+
+
+@pytest.fixture
+def bus(wire: VirtualBus) -> Iterator[Bus]:
+    with make(wire) as running:
+        running.start()
+        yield running
+
+
+def torques(wire: VirtualBus) -> list[bool]:
+    return [wire.servo(servo.id).torque for servo in SERVOS]
+
+
+def test_the_models_choose_the_driver(wire: VirtualBus) -> None:
+    new, old = SERVOS[:1], SERVOS[1:2]
+    assert [type(make(wire, servos)) for servos in (new, old, new + old)] == [DynamixelBus, LegacyBus, MixedBus]
+
+
+def test_every_servo_is_driven_in_its_own_place(wire: VirtualBus, bus: Bus) -> None:
+    state = settle(bus, [0.1, 0.2, -0.1, -0.2], 2 * STEP_RAD)
+    ticks = [wire.servo(servo.id).position_ticks for servo in SERVOS]
+    assert ticks == pytest.approx([2048 + 65, 512 + 39, 2048 - 65, 2048 - 130], abs=7)
+    assert np.isfinite(state.current_a).tolist() == [True, False, True, False]
+    assert np.isfinite(state.velocity_rad_s).all()
+
+
+def test_what_one_half_needs_does_not_trouble_the_other(wire: VirtualBus) -> None:
+    with make(wire, fast=True, singles=1, torque_limit=0.5, min_voltage_v=4.0) as bus:
+        bus.start()
+        assert [wire.servo(number).register("Torque Limit") for number in (3, 4)] == [512, 512]
+
+
+@pytest.mark.parametrize(("number", "model"), [(3, "mx1-28"), (1, "xm430-w350")])
+def test_a_wrong_model_in_one_half_leaves_nobody_on(wire: VirtualBus, number: int, model: str) -> None:
+    servos = tuple(replace(s, model=model) if s.id == number else s for s in SERVOS)
+    with make(wire, servos) as bus, pytest.raises(WrongModel) as caught:
+        bus.start()
+    assert caught.value.servo_ids == (number,)
+    assert not any(torques(wire))
+
+
+@pytest.mark.parametrize("number", [3, 1])
+def test_a_dead_servo_of_one_half_leaves_no_other_on(wire: VirtualBus, number: int) -> None:
+    bus = make(wire)
+    with pytest.raises(NoReply) as caught, bus:
+        bus.start()
+        wire.fault(f"mute:{number}")
+    assert caught.value.servo_ids == (number,)
+    assert torques(wire) == [servo.id == number for servo in SERVOS]
+
+
+def test_counters_are_those_of_both_halves(wire: VirtualBus, bus: Bus) -> None:
+    wire.fault("mute:3", "mute:1")
+    read_until(bus, lambda state: int(state.silent.sum()) == 2)
+    bus.write([0.4, 0.4, 9.0, 9.0])
+    report = bus.report()
+    assert report.silent == (1, 3)
+    assert report.errors == {"no_reply": 2}
+    assert report.errors_by_servo == {1: {"no_reply": 1}, 3: {"no_reply": 1}}
+    assert report.limits_hit == 2
+    assert any("Return Delay Time" in line and "id 3" in line for line in report.eeprom_writes)
+    wire.clear()
+    read_until(bus, lambda state: bool(state.fresh.all()))
+
+
+def test_a_servo_of_either_half_is_recovered_where_it_is(wire: VirtualBus, bus: Bus) -> None:
+    settle(bus, [0.1, 0.1, 0.1, 0.1], 2 * STEP_RAD)
+    for number in (3, 1):
+        wire.servo(number).latch(0x20)
+    read_until(bus, lambda state: state.torque.tolist() == [True, False, False, True])
+    with pytest.raises(ServoFault):
+        bus.recover()
+    for half in bus._halves:
+        object.__setattr__(half.policy, "reboot_faulted", True)
+    bus.recover([3, 1])
+    assert all(torques(wire))
+    wire.clock.sleep(0.05)
+    settle(bus, [0.0, 0.0, 0.0, 0.0], 2 * STEP_RAD)
+
+
+def test_everybody_is_found_in_either_protocol(wire: VirtualBus) -> None:
+    with make(wire, margin_s=0.02) as bus:
+        found = bus.discover([5, 3, 1, 4, 9])
+        assert [(info.id, info.model) for info in found] == [
+            (1, "xl330-m288"), (3, "ax-12a"), (4, "mx1-28"), (5, "xl330-m288")
+        ]  # fmt: skip

@@ -1,0 +1,139 @@
+"""drivers.protocol1.bus over simulated wires: the contract for every family that has its framing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from drivers import open_bus
+from drivers.base.bus import Bus
+from drivers.sim import SimulatedBus
+from drivers.sim.serving.virtual import VirtualBus
+from tests.drivers import contract
+from tests.drivers.contract import BusContract, settle
+
+CALM = {"margin_s": 0.5, "watchdog_ms": 0}
+
+
+def servos_of(*models: str) -> tuple[contract.ServoSpec, ...]:
+    return tuple(replace(servo, model=model) for servo, model in zip(contract.SERVOS, models, strict=True))
+
+
+class Family(BusContract):
+    """The contract over a simulated wire of ``SERVOS``."""
+
+    KIND: ClassVar[str] = "feetech"
+
+    @pytest.fixture
+    def bus(self) -> Bus:
+        return VirtualBus(self.SERVOS, self.KIND).bus(**CALM)
+
+
+class TestFeetechSts(Family):
+    MODELS = ("sts3215",) * 3
+    SERVOS = servos_of(*MODELS)
+    VOLTS = 7.4
+
+    @pytest.fixture
+    def bus(self, tmp_path: Path) -> Iterator[Bus]:
+        """Over a real pseudo-terminal, in time that passes by itself."""
+        with SimulatedBus(self.SERVOS, link=tmp_path / "by-id") as wire:
+            yield open_bus(self.KIND, self.SERVOS, port=wire.path, **CALM)
+
+
+class TestFeetechScs(Family):
+    MODELS = ("scs0009",) * 3
+    SERVOS = servos_of(*MODELS)
+    VOLTS = 6.0
+    STEP_RAD = np.deg2rad(300) / 1024
+
+
+class TestDynamixelAx(Family):
+    KIND = "dynamixel"
+    MODELS = ("ax-12a",) * 3
+    SERVOS = servos_of(*MODELS)
+    VOLTS = 12.0
+    STEP_RAD = np.deg2rad(300) / 1024
+
+
+class TestDynamixelOfBothProtocols(Family):
+    KIND = "dynamixel"
+    MODELS = ("ax-12a", "xm430-w350", "mx1-28")
+    SERVOS = servos_of(*MODELS)
+    VOLTS = 12.0
+    STEP_RAD = np.deg2rad(300) / 1024
+
+
+def test_simulated_servos_come_with_the_driver_and_need_no_keeper() -> None:
+    servos = servos_of(*("sts3215",) * 3)
+    with open_bus("simulated", servos, simulates="feetech", margin_s=0.5) as bus:
+        bus.start()
+        settle(bus, [0.2, -0.3, 0.5])
+        assert [info.model for info in bus.discover([1, 7])] == ["sts3215"] * 2
+        assert bus._keeper is None
+
+
+def test_everybody_is_found_when_nobody_is_named() -> None:
+    servos = servos_of(*("scs0009",) * 3)
+    with VirtualBus(servos, "feetech", faults=["baud:7:57600"]).bus(margin_s=0.002) as bus:
+        assert [info.id for info in bus.discover()] == [1, 2]
+        assert [info.id for info in bus.discover([0, 1, 2, 7])] == [1, 2]
+
+
+@pytest.mark.parametrize(("model", "tells"), [("sts3215", True), ("ax-12a", False)])
+def test_load_and_motion_are_told_where_the_model_does(model: str, tells: bool) -> None:
+    servos = servos_of(*(model,) * 3)
+    kind = "feetech" if tells else "dynamixel"
+    wire = VirtualBus(servos, kind)
+    with wire.bus(**CALM) as bus:
+        bus.start()
+        assert np.isnan(bus.load).all()
+        settle(bus, [0.4, -0.3, 0.4], 0.011)
+        contract.read_until(bus, lambda state: not state.velocity_rad_s.any())
+        assert np.sign(bus.load).tolist() == [1, -1, 1], "the skin pulls back"
+        for _ in range(5):
+            bus.write([-0.3, 0.4, -0.3])
+            state = bus.read()
+        assert bus.moving.tolist() == [tells] * 3
+        assert np.sign(state.velocity_rad_s).tolist() == [-1, 1, -1]
+
+
+def test_positions_alone_are_shorter_and_the_rest_comes_in_turn() -> None:
+    servos = servos_of("sts3215", "scs0009", "sts3215")
+    wire = VirtualBus(servos, "feetech")
+    with wire.bus(feedback="position", **CALM) as bus:
+        bus.start()
+        state = contract.read_until(bus, lambda s: bool(np.isfinite(s.voltage_v + s.temperature_c).all()))
+        assert state.fresh.all()
+        np.testing.assert_allclose(state.voltage_v, [7.4, 6.0, 7.4], atol=0.2)
+
+
+def test_servos_read_one_by_one_take_turns() -> None:
+    servos = servos_of(*("ax-12a",) * 3)
+    wire = VirtualBus(servos, "dynamixel")
+    with wire.bus(singles=2, **CALM) as bus:
+        bus.start()
+        fresh = [bus.read().fresh.tolist() for _ in range(3)]
+        assert fresh == [[True, True, False], [True, False, True], [False, True, True]]
+        assert bus.read().age_s.max() < 1.0
+
+
+@pytest.mark.parametrize("how", ["hw:2:0x20", "mute:2"])
+def test_a_servo_in_trouble_is_looked_at_without_waiting_for_its_turn(how: str) -> None:
+    """Without turns, torque is only asked of servos that raise an alert or come back from silence."""
+    servos = servos_of(*("sts3215",) * 3)
+    wire = VirtualBus(servos, "feetech")
+    with wire.bus(slow_group=0, margin_s=0.05, watchdog_ms=0) as bus:
+        bus.start()
+        wire.fault(how)
+        if how == "mute:2":
+            contract.read_until(bus, lambda state: bool(state.silent[1]))
+            wire.servo(2).put("Torque Enable", 0)
+            wire.clear()
+        contract.read_until(bus, lambda state: not state.torque[1])
+        assert bus.report().errors_by_servo[2]["torque_lost"] == 1

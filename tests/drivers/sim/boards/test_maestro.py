@@ -1,0 +1,152 @@
+"""drivers.sim.boards.maestro: the Maestro's three protocols, its limits and its errors."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.base.errors import DriverError
+from drivers.maestro.protocol import MaestroError, crc7
+from drivers.sim.boards.maestro import Maestro, MaestroReader
+
+
+def send(board: Maestro, text: str, now_s: float = 0.0) -> str:
+    return b"".join(reply.data for reply in board.feed(bytes.fromhex(text), now_s)).hex(" ").upper()
+
+
+def pulse(board: Maestro, channel: int, now_s: float = 0.0) -> float:
+    return board.channels[channel].position(now_s) / 4
+
+
+def test_crc_of_the_guide():
+    assert crc7(bytes.fromhex("8301")) == 0x17
+
+
+@pytest.mark.parametrize(
+    ("text", "us"),
+    [
+        ("84 02 70 2E", 1500),  # compact
+        ("AA 0C 04 02 70 2E", 1500),  # Pololu protocol, device 12
+        ("FF 02 7F", 1500),  # Mini SSC: 127 is the middle
+        ("FF 02 FE", 1976.25),
+        ("FF 02 00", 1023.75),
+        ("84 02 00 7F", 2000),  # cut to the channel's limits
+        ("84 02 01 00", 992),
+        ("84 02 00 00", 0),
+    ],
+)
+def test_targets(text: str, us: float):
+    board = Maestro()
+    assert send(board, text) == ""
+    assert pulse(board, 2) == us
+    assert send(board, "A1") == "00 00"
+
+
+def test_another_device_is_not_meant():
+    board = Maestro()
+    send(board, "AA 0B 04 02 70 2E")
+    assert (pulse(board, 2), send(board, "A1")) == (0, "00 00")
+
+
+def test_many_targets_at_once():
+    board = Maestro()
+    send(board, "9F 02 03 70 2E 00 3F")
+    assert (pulse(board, 3), pulse(board, 4)) == (1500, 2000)
+    send(board, "AA 0C 1F 01 05 70 2E")
+    assert pulse(board, 5) == 1500
+
+
+def test_position_is_the_pulse_in_two_full_bytes():
+    board = Maestro()
+    send(board, "84 01 70 2E")
+    assert send(board, "90 01") == "70 17"
+    assert send(board, "90 02") == "00 00"
+
+
+def test_speed_and_acceleration_units():
+    board = Maestro()
+    send(board, "84 00 00 20 87 00 0C 01 84 00 00 30", 1.0)  # 140 x 0.25 us per 10 ms from 1024 to 1536 us
+    assert pulse(board, 0, 1.0 + 0.1) == pytest.approx(1024 + 350)
+    assert send(board, "93", 1.1) == "01"
+    assert send(board, "93", 1.2) == "00"
+    other = Maestro()
+    send(other, "84 00 00 20 89 00 04 00 84 00 00 30", 0.0)  # 4 x 0.25 us per 10 ms per 80 ms
+    assert pulse(other, 0, 0.2) == pytest.approx(1024 + 0.5 * 1250 * 0.04)
+
+
+def test_go_home_stops_the_pulses():
+    board = Maestro()
+    send(board, "84 00 70 2E A2")
+    assert pulse(board, 0) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("01", MaestroError.PROTOCOL),  # data without a command
+        ("84 00 70 90 00", MaestroError.PROTOCOL),  # a command in the middle of another
+        ("84 A1", MaestroError(0)),  # the reading that breaks in clears its own error
+        ("FE", MaestroError.PROTOCOL),
+        ("84 40 70 2E", MaestroError.PROTOCOL),
+        ("87 40 01 00", MaestroError.PROTOCOL),
+        ("90 40", MaestroError.PROTOCOL),
+    ],
+)
+def test_errors_are_kept_until_they_are_read(text: str, error: MaestroError):
+    board = Maestro()
+    send(board, text)
+    assert board.errors == error
+    assert send(board, "A1") == f"{int(error):02X} 00"
+    assert send(board, "A1") == "00 00"
+
+
+def test_broken_bytes_send_every_channel_home():
+    board = Maestro()
+    send(board, "84 00 70 2E")
+    send(board, "84 01")
+    assert send(board, "A1") == "10 00"
+    assert pulse(board, 0) == 0
+
+
+def test_crc_is_checked_where_it_is_asked_for():
+    board = Maestro(crc=True)
+    message = bytes.fromhex("84 02 70 2E")
+    board.feed(message + bytes((crc7(message),)), 0.0)
+    assert pulse(board, 2) == 1500
+    board.feed(message + bytes((crc7(message) ^ 1,)), 0.0)
+    assert board.errors == MaestroError.CRC
+    send(board, "FF 02 7F")
+    assert pulse(board, 2) == 1500
+
+
+def test_scripts_are_accepted_and_never_run():
+    board = Maestro()
+    assert send(board, "A4 A7 00 A8 00 00 00 8A 00 00 00 00 AE") == "01"
+    assert board.errors == MaestroError(0)
+
+
+def test_baud_detection_byte_alone_is_no_error():
+    board = Maestro()
+    send(board, "AA 84 02 70 2E")
+    assert (pulse(board, 2), board.errors) == (1500, MaestroError(0))
+
+
+def test_pieces_and_sizes():
+    reader = MaestroReader()
+    assert reader.feed(b"\x84\x02") == []
+    assert (reader.pending, reader.flush()) == (2, [])
+    (command,) = reader.feed(b"\x70\x2e")
+    assert Maestro().size(command) == 4
+    assert reader.feed(b"\xaa\x0c") == []
+    assert reader.take_pending() == b"\xaa\x0c"
+    assert reader.pending == 0
+
+
+def test_states_for_tools_and_faults():
+    board = Maestro(channels=6)
+    send(board, "84 01 70 2E")
+    assert board.describe(0.0)[1] == {"id": 1, "pulse_us": 1500.0, "target_us": 1500.0}
+    assert len(board.describe(0.0)) == 6
+    with pytest.raises(ValueError, match="by hand"):
+        board.place(1, 5, 0.0)
+    with pytest.raises(DriverError, match="only drop, echo"):
+        Maestro(faults=("crc:1",))

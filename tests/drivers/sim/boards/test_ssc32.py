@@ -1,0 +1,101 @@
+"""drivers.sim.boards.ssc32: moves, groups and queries in text."""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+import pytest
+import serial
+
+from drivers.sim import Ssc32
+from drivers.sim.boards.ssc32 import MAX_LINE, VERSION, LineReader
+from drivers.sim.serving.serve import serve
+
+
+def send(board: Ssc32, text: str, now_s: float = 0.0) -> bytes:
+    return b"".join(reply.data for reply in board.feed(text.encode(), now_s))
+
+
+def pulse(board: Ssc32, channel: int, now_s: float = 0.0) -> float:
+    return board.channels[channel].position(now_s)
+
+
+def test_a_move_in_any_spelling():
+    for text in ("#5P1600\r", "#5 p1600 \r", "#5P\n1600\r", "#5P1600T1000\r"):
+        board = Ssc32()
+        assert send(board, text) == b""
+        assert pulse(board, 5) == 1600
+        assert board.refused == 0
+
+
+def test_a_group_starts_and_ends_together():
+    board = Ssc32()
+    send(board, "#5P1500#10P1500\r")
+    send(board, "#5P1600#10P750T2500\r", 1.0)
+    assert (pulse(board, 5, 2.25), pulse(board, 10, 2.25)) == (1550, 1125)
+    assert send(board, "Q\r", 3.4) == b"+"
+    assert send(board, "Q\r", 3.6) == b"."
+
+
+def test_the_slowest_member_sets_the_time():
+    board = Ssc32()
+    send(board, "#5P1500#10P1500\r")
+    send(board, "#5P1600S100#10P1700S100\r", 0.0)
+    assert (pulse(board, 5, 1.0), pulse(board, 10, 1.0)) == (1550, 1600)
+
+
+def test_queries():
+    board = Ssc32()
+    send(board, "#3P1500\r")
+    assert send(board, "QP3\r") == bytes((150,))
+    assert send(board, "qp4\r") == b"\0"
+    assert send(board, "VER\r") == VERSION
+
+
+@pytest.mark.parametrize(
+    "line", ["#5P400", "#5P2501", "#32P1500", "QP32", "QPx", "P1500", "#5P1500X", "hello", "#5P15#T5"]
+)
+def test_what_it_does_not_understand_it_passes_over(line: str):
+    board = Ssc32()
+    assert send(board, line + "\r") == b""
+    assert (board.refused, pulse(board, 5)) == (1, 0)
+
+
+def test_lines_in_pieces_and_endless_ones():
+    reader = LineReader()
+    assert reader.feed(b"#5P1") == []
+    assert (reader.pending, reader.flush()) == (4, [])
+    assert reader.feed(b"600\r\rQ\rV") == ["#5P1600", "Q"]
+    assert reader.take_pending() == b"V"
+    assert reader.feed(b"x" * (MAX_LINE + 1)) == []
+    assert reader.pending == 0
+
+
+def test_states_and_sizes():
+    board = Ssc32()
+    send(board, "#2P1500\r")
+    assert board.describe(0.0)[2] == {"id": 2, "pulse_us": 1500.0, "target_us": 1500.0}
+    assert board.size("#2P1500") == 8
+
+
+def test_served_to_a_serial_program(tmp_path: Path):
+    ready, paths = threading.Event(), []
+    reading, writing = os.pipe()
+    thread = threading.Thread(
+        target=serve,
+        args=(Ssc32(), tmp_path / "ssc", lambda path: (paths.append(path), ready.set())),
+        kwargs={"stop": reading, "baud": 115_200, "wire": True},
+    )
+    thread.start()
+    try:
+        assert ready.wait(5)
+        with serial.Serial(paths[0], 115_200, timeout=5) as port:
+            port.write(b"#7P1230\rQP7\r")
+            assert port.read(1) == bytes((123,))
+    finally:
+        os.close(writing)
+        thread.join(5)
+        os.close(reading)
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,133 @@
+"""drivers.sim.serving.serve: serving until told to stop."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import threading
+import time
+from pathlib import Path
+
+import pytest
+import serial
+
+from drivers.base.errors import DriverError
+from drivers.packets.packet import Instruction as I
+from drivers.packets.packet import StatusReader, encode_instruction
+from drivers.sim.serving.serve import PAUSE_S, PortServer, make_servos, serve_dynamixel
+from drivers.sim.servos.bus import SimulatedChain
+
+
+def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
+    link, ready = tmp_path / "bus", threading.Event()
+    paths: list[str] = []
+    reading, writing = os.pipe()
+
+    def on_ready(path: str) -> None:
+        paths.append(path)
+        ready.set()
+
+    thread = threading.Thread(
+        target=serve_dynamixel,
+        args=([3, 4], "xm430-w350", 57_600, link, False, ["alert:4"], on_ready),
+        kwargs={"stop": reading},
+    )
+    thread.start()
+    try:
+        assert ready.wait(5)
+        client = os.open(paths[0], os.O_RDWR | os.O_NOCTTY)
+        os.write(client, encode_instruction(0xFE, I.PING))
+        received = b""
+        while len(received) < 28:
+            assert select.select([client], [], [], 5)[0]
+            received += os.read(client, 99)
+        os.close(client)
+    finally:
+        os.close(writing)
+        thread.join(5)
+        os.close(reading)
+    assert [(r.id, r.error, r.params[:2]) for r in StatusReader().feed(received)] == [
+        (3, 0, b"\xfc\x03"),
+        (4, 0x80, b"\xfc\x03"),
+    ]
+    assert paths == [str(link)]
+    assert not link.is_symlink()
+    assert capsys.readouterr() == ("", "")
+
+
+def test_an_interrupt_ends_it_and_takes_the_link_away(tmp_path: Path):
+    def interrupt(path: str) -> None:
+        assert Path(path).is_symlink()
+        raise KeyboardInterrupt
+
+    before = len(os.listdir("/proc/self/fd"))
+    with pytest.raises(KeyboardInterrupt):
+        serve_dynamixel([1], link=tmp_path / "bus", on_ready=interrupt)
+    assert os.listdir(tmp_path) == []
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
+@pytest.mark.parametrize("options", [{"model": "nonsense"}, {"faults": ["nonsense"]}])
+def test_bad_settings_are_refused_before_anybody_is_told(tmp_path: Path, options: dict):
+    with pytest.raises(DriverError, match="nonsense"):
+        serve_dynamixel([1], link=tmp_path / "bus", on_ready=lambda path: pytest.fail("too early"), **options)
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_loop_sleeps_until_something_is_due():
+    chain = SimulatedChain(make_servos([1], "xl330-m288", 1_000_000, 0.0))
+    server = PortServer(chain)
+    try:
+        assert server._timeout() is None  # at rest nothing wakes it but its descriptors
+        chain.faults.add(["mute:1:at=60s"], time.monotonic())
+        assert 59 < server._timeout() <= 60
+        chain.faults.clear(None, 0.0)
+        chain.reader.feed_frames(b"\xff\xff\xfd\x00")
+        server._read_s = time.monotonic()
+        assert 0 < server._timeout() <= PAUSE_S
+    finally:
+        server.port.close()
+
+
+def test_servos_from_ids_and_from_specs():
+    class Spec:
+        id, model = 7, "xl320"
+
+    servos = make_servos([2, Spec()], "xm430-w210", 57_600, 0.0)
+    assert [(s.id, s.table.model, s.baud) for s in servos] == [
+        (2, "xm430-w210", 57_600),
+        (7, "xl320", 57_600),
+    ]
+
+
+def test_another_program_sets_faults_through_the_socket(tmp_path: Path):
+    path, paths, ready = tmp_path / "control", [], threading.Event()
+    reading, writing = os.pipe()
+    thread = threading.Thread(
+        target=serve_dynamixel,
+        args=([1],),
+        kwargs={"commands": path, "stop": reading, "on_ready": lambda p: (paths.append(p), ready.set())},
+    )
+    thread.start()
+    try:
+        assert ready.wait(5)
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+            client.connect(str(path))
+            client.settimeout(5)
+            client.sendall(b"fault alert:1\n")
+            assert client.recv(99) == b"ok\n"
+            with serial.Serial(paths[0], 1_000_000, timeout=5) as port:
+                port.write(encode_instruction(1, I.PING))
+                assert StatusReader().feed(port.read(14))[0].alert
+    finally:
+        os.close(writing)
+        thread.join(5)
+        os.close(reading)
+    assert not path.exists()
+
+
+def test_a_port_that_cannot_be_made_leaves_no_socket(tmp_path: Path):
+    with pytest.raises(DriverError, match="cannot make the link"):
+        serve_dynamixel([1], link=tmp_path / "none" / "port", commands=tmp_path / "control")
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,89 @@
+"""drivers.sim.servos.drive_word: goals and sensors of servos with 16-bit registers."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.sim.servos.drive_word import SENSED, FeetechDrive, WordDrive
+from drivers.sim.servos.motion import Profile, hold
+from drivers.sim.servos.plant import Plant, Skin
+from drivers.sim.servos.registers import Registers
+from drivers.tables.tables import load_table
+
+
+def drive(model: str, **registers: int) -> WordDrive:
+    table = load_table(model)
+    memory = Registers(table)
+    memory.reset(0, table.size)
+    for name, value in registers.items():
+        memory.put(name.replace("_", " "), value)
+    skin = Skin(spring=1e-4, rest=0.0, inertia=0.0, friction=0.0)
+    plant = Plant(0.0, float(table.center), 1000.0, 7.0, skin)
+    return (FeetechDrive if "Goal Velocity" in table else WordDrive)(memory, plant, 0.0)
+
+
+@pytest.mark.parametrize("model", ["ax-12a", "mx1-28", "xl320", "sts3215", "scs0009"])
+def test_sensing_touches_nothing_but_sensed_registers(model: str):
+    one = drive(model)
+    memory, table = one.registers.memory, one.registers.table
+    memory[:] = b"\xa5" * len(memory)
+    one.sense(1.0)
+    sensed = {at for item in table.values() if item.name in SENSED for at in range(item.address, item.end)}
+    assert {at for at in range(len(memory)) if memory[at] != 0xA5} <= sensed
+    assert (one.first_sensed, one.last_sensed) == (min(sensed), max(sensed) + 1)
+
+
+def test_sense_motion_is_sense():
+    one = drive("ax-12a")
+    one.plant.trajectory = hold(0.0, 300.0)
+    one.sense_motion(1.0)
+    assert one.registers.get("Present Position") == 300
+
+
+@pytest.mark.parametrize(("model", "load"), [("ax-12a", 51), ("sts3215", 205)])
+def test_load_is_a_share_of_the_stall_torque(model: str, load: int):
+    one = drive(model)
+    one.plant.powered = True
+    one.sense(1.0)
+    assert one.registers.get("Present Load") == load
+
+
+def test_the_direction_of_an_xl320_is_left_in_its_register():
+    one = drive("xl320")
+    one.plant.powered = True
+    one.plant.rest = 1512.0
+    one.sense(1.0)
+    assert one.registers.get("Present Load") == round(1023 * 0.1) | 1024
+
+
+def test_positions_outside_the_turn_are_cut():
+    one = drive("ax-12a")
+    for shaft, shown in ((-50.0, 0), (2000.0, 1023)):
+        one.plant.trajectory = hold(0.0, shaft)
+        one.sense(1.0)
+        assert one.registers.get("Present Position") == shown
+
+
+@pytest.mark.parametrize(("speed", "fastest"), [(0, 1000.0), (100, 100 * 0.0116228475 / 0.005113269293928698)])
+def test_moving_speed_zero_is_the_top_speed(speed: int, fastest: float):
+    one = drive("ax-12a", Goal_Position=900, Moving_Speed=speed)
+    one.plan(0.0)
+    assert one.plant.motion(0.2).velocity == pytest.approx(fastest)
+    assert one.plant.trajectory.profile == Profile.RECTANGULAR
+
+
+def test_an_acceleration_beyond_the_motors_is_the_motors():
+    one = drive("sts3215", Goal_Position=3000, Acceleration=254)
+    one.plan(0.0)
+    assert one.plant.motion(0.01).acceleration == pytest.approx(254 * 100.0)
+    one.plant.top_acceleration = 5000.0
+    one.plan(0.0)
+    assert one.plant.motion(0.01).acceleration == 5000.0
+
+
+def test_goal_time_is_for_the_scs_series_only():
+    for model, seconds in (("scs0009", 2.0), ("sts3215", None)):
+        one = drive(model, Goal_Time=2000)
+        one.registers.put("Goal Position", one.registers.table.center + 100)
+        one.plan(0.0)
+        assert (one.plant.trajectory.duration == pytest.approx(2.0)) is (seconds is not None)

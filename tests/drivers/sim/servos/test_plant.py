@@ -1,0 +1,85 @@
+"""drivers.sim.servos.plant: load, heat, supply and a stuck shaft."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from drivers.sim.servos.motion import Motion, plan_speed
+from drivers.sim.servos.plant import Heat, Plant, Skin
+
+AT_REST = Motion(2048.0, 0.0, 0.0)
+
+
+def plant(**skin: float) -> Plant:
+    made = Plant(0.0, 2048.0, 1000.0, 5.0, Skin(**{"spring": 0.0, "inertia": 0.0, "friction": 0.0, **skin}))
+    made.powered = True
+    return made
+
+
+@pytest.mark.parametrize(
+    ("skin", "motion", "load"),
+    [
+        ({"spring": 1e-4}, Motion(3048.0, 0.0, 0.0), 0.1),
+        ({"spring": 1e-4}, Motion(1048.0, 0.0, 0.0), -0.1),
+        ({"spring": 1e-4, "rest": 3048.0}, AT_REST, -0.1),
+        ({"friction": 0.05}, Motion(2048.0, -3.0, 0.0), -0.05),
+        ({"friction": 0.05}, AT_REST, 0.0),
+        ({"inertia": 1e-5}, Motion(2048.0, 0.0, 2e4), 0.2),
+        ({"spring": 1.0}, Motion(3048.0, 0.0, 0.0), 1.0),
+    ],
+)
+def test_load(skin: dict[str, float], motion: Motion, load: float):
+    assert plant(**skin).load(motion, motion) == pytest.approx(load)
+
+
+def test_a_limp_motor_gives_no_torque():
+    limp = plant(spring=1.0)
+    limp.powered = False
+    assert limp.load(Motion(0.0, 5.0, 0.0), AT_REST) == 0.0
+
+
+def test_the_supply_sags_under_load():
+    assert plant().voltage(0.0) == 5.0
+    assert plant().voltage(-1.0) == 4.6
+
+
+def test_heat_follows_the_square_of_the_load_with_a_lag():
+    heat = Heat(lag_s=100.0)
+    heat.advance(100.0, 0.5)
+    assert heat.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
+    heat.advance(50.0, 1.0)  # time does not run back
+    assert heat.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
+    heat.advance(1e6, 0.0)
+    assert heat.temperature_c == pytest.approx(30.0)
+
+
+def test_a_temperature_from_outside_wins():
+    hot = plant()
+    hot.forced_c = 80.0
+    hot.warm(10.0, 1.0)
+    assert hot.temperature_c == 80.0
+
+
+def test_a_jammed_shaft_stays_pushes_and_goes_on_from_where_it_is():
+    stuck = plant()
+    stuck.trajectory = plan_speed(0.0, 2048.0, 0.0, 100.0, 1e6)
+    stuck.jam(1.0, True)
+    held = stuck.motion(1.0)
+    assert held.position == pytest.approx(2148.0, abs=0.1)
+    assert stuck.motion(5.0) == held
+    assert stuck.load(stuck.motion(1.1), stuck.wanted(1.1)) == pytest.approx(0.2, abs=0.01)
+    stuck.jam(6.0, True)
+    assert stuck.jammed_since == 1.0
+    stuck.jam(7.0, False)
+    assert stuck.motion(9.0) == held
+    stuck.jam(9.0, False)
+    assert stuck.jammed_since is None
+
+
+def test_placing_moves_even_a_jammed_shaft():
+    limp = plant()
+    limp.jam(0.0, True)
+    limp.place(1.0, 100.0)
+    assert limp.motion(2.0).position == 100.0

@@ -1,0 +1,186 @@
+"""drivers.sim.wire.faults: the words of a fault, when it strikes, and what it does to bytes."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from drivers.base.errors import DriverError
+from drivers.packets.packet import StatusPacket, StatusReader, encode_status
+from drivers.sim.wire.faults import KINDS, Fault, FaultSet, Spoiler, parse_fault
+
+
+@pytest.mark.parametrize(
+    ("spec", "expected"),
+    [
+        ("mute:7", {"kind": "mute", "ids": {7}}),
+        ("mute:*", {"ids": None}),
+        ("drop:1-3,9:every=5", {"ids": {1, 2, 3, 9}, "every": 5}),
+        ("late:7:45ms", {"value": 0.045}),
+        ("late:7:0.5s", {"value": 0.5}),
+        ("late:7", {"value": 0.045}),
+        ("late:7:2", {"value": 2.0}),
+        ("hw:4:0x05", {"value": 5}),
+        ("volts:2:3.5:at=2s:for=500ms", {"value": 3.5, "at_s": 2.0, "for_s": 0.5}),
+        ("crc:3:p=0.25:count=2", {"chance": 0.25, "count": 2}),
+        ("echo", {"ids": None}),
+        ("unplug:at=1s:as=/tmp/b", {"alias": "/tmp/b", "at_s": 1.0}),
+        (" noise:1:9 ", {"kind": "noise", "value": 9}),
+    ],
+)
+def test_specs(spec: str, expected: dict):
+    fault = parse_fault(spec)
+    for key, value in expected.items():
+        assert getattr(fault, key) == (frozenset(value) if isinstance(value, set) else value)
+
+
+@pytest.mark.parametrize(
+    ("spec", "why"),
+    [
+        ("mut:7", "there is no fault 'mut'"),
+        ("", "there is no fault ''"),
+        ("mute", "ids are missing"),
+        ("mute:x", "'x' is not an id"),
+        ("mute:1-x", "'1-x' is not an id"),
+        ("mute:300", "must be 0 to 252"),
+        ("mute:5-3", "must be 0 to 252"),
+        ("mute:7:8", "'8' is one word too many"),
+        ("late:7:soon", "'soon' is not a value for late"),
+        ("volts:7", "volts needs a value"),
+        ("crc:7:evry=3", "there is no option 'evry'"),
+        ("crc:7:every=x", "'x' is not a value for every"),
+        ("crc:7:every=0", "out of range"),
+        ("crc:7:p=1.5", "out of range"),
+        ("crc:7:at=-1", "out of range"),
+    ],
+)
+def test_unreadable_specs_are_named_with_the_reason(spec: str, why: str):
+    with pytest.raises(DriverError) as error:
+        parse_fault(spec)
+    assert repr(spec) in str(error.value)
+    assert why in str(error.value)
+    assert "mute" in error.value.hint
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_has_a_help_line_and_can_be_written(kind: str):
+    entry = KINDS[kind]
+    assert entry.help
+    value = ":7" if entry.value and entry.default is None else ""
+    assert parse_fault(f"{kind}{'' if entry.scope == 'bus' else ':1'}{value}").kind == kind
+
+
+def strikes(spec: str, ids: list[int]) -> list[bool]:
+    spoiler = Spoiler(parse_fault(spec), random.Random(1))
+    return [spoiler.strikes(device) for device in ids]
+
+
+def test_every_counts_each_servo_for_itself():
+    assert strikes("drop:1-2:every=2", [1, 2, 3, 1, 2, 1, 2]) == [False, False, False, True, True, False, False]
+
+
+def test_count_ends_it():
+    assert strikes("drop:*:count=2", [1, 2, 3, 1]) == [True, True, False, False]
+
+
+def test_chance_is_about_right_and_repeatable():
+    hits = strikes("drop:*:p=0.1", [1] * 5000)
+    assert 400 < sum(hits) < 600
+    assert hits == strikes("drop:*:p=0.1", [1] * 5000)
+
+
+def spoil(spec: str, data: bytes = b"\1\2\3\4") -> bytes | None:
+    frame = encode_status(5, 0x80, data)
+    return Spoiler(parse_fault(spec), random.Random(1)).status(frame, 5, 0x80, data)
+
+
+def test_what_happens_to_a_status_packet():
+    frame = encode_status(5, 0x80, b"\1\2\3\4")
+    assert spoil("drop:*") is None
+    assert spoil("silent:*") is None
+    assert StatusReader().feed(spoil("short:*:2")) == [StatusPacket(5, 0x80, b"\1\2")]
+    assert StatusReader().feed(spoil("wrongid:*:9")) == [StatusPacket(9, 0x80, b"\1\2\3\4")]
+    assert spoil("crc:*")[:-1] == frame[:-1]
+    assert spoil("crc:*")[-1] != frame[-1]
+    assert spoil("noise:*:6")[6:] == frame
+    assert len(spoil("noise:*:6")) == len(frame) + 6
+    assert spoil("late:*") == frame
+
+
+def test_flip_changes_exactly_one_bit_behind_the_header():
+    frame = encode_status(5, 0x80, b"\1\2\3\4")
+    places = set()
+    spoiler = Spoiler(parse_fault("flip:*"), random.Random(1))
+    for _ in range(300):
+        spoilt = spoiler.status(frame, 5, 0x80, b"\1\2\3\4")
+        difference = int.from_bytes(spoilt, "big") ^ int.from_bytes(frame, "big")
+        assert difference.bit_count() == 1
+        assert spoilt[:4] == frame[:4]
+        places.add(difference)
+    assert len(places) > 60
+
+
+def test_what_happens_to_a_part_of_a_joint_reply():
+    part = bytes((0, 5, 1, 2, 3, 4, 0xAA, 0xBB))
+
+    def spoilt(spec: str) -> bytes | None:
+        return Spoiler(parse_fault(spec), random.Random(1)).part(part)
+
+    assert spoilt("drop:*") is None
+    assert spoilt("short:*:1") == bytes((0, 5, 1, 0xAA, 0xBB))
+    assert spoilt("wrongid:*:9") == bytes((0, 9, 1, 2, 3, 4, 0xAA, 0xBB))
+    assert spoilt("crc:*")[:-1] == part[:-1]
+    assert spoilt("late:*") == part
+
+
+def recorded(*specs: str | Fault, now_s: float = 0.0) -> tuple[FaultSet, list[tuple[str, bool, float]]]:
+    seen: list[tuple[str, bool, float]] = []
+    faults = FaultSet(lambda fault, begins, at: seen.append((fault.kind, begins, at)))
+    faults.add(specs, now_s)
+    return faults, seen
+
+
+def test_faults_begin_and_end_at_their_times_even_when_looked_at_late():
+    faults, seen = recorded("stall:1:at=1s:for=2s", "mute:2", now_s=10.0)
+    assert seen == [("mute", True, 10.0)]
+    assert faults.next_change_s == 11.0
+    faults.advance(99.0)
+    assert seen[1:] == [("stall", True, 11.0), ("stall", False, 13.0)]
+    assert faults.next_change_s == float("inf")
+    assert [fault.kind for fault in faults.active] == ["mute"]
+
+
+def test_clearing_ends_what_runs_and_forgets_what_was_to_come():
+    faults, seen = recorded("crc:1", "crc:2:at=5s", "mute:2")
+    faults.clear("crc", 1.0)
+    assert seen[-1] == ("crc", False, 1.0)
+    assert faults.spoilers == []
+    assert faults.next_change_s == float("inf")
+    faults.clear(None, 2.0)
+    assert faults.active == []
+
+
+def test_a_fault_that_was_cleared_does_not_end_twice():
+    faults, seen = recorded("mute:1:for=2s")
+    faults.clear("other", 0.5)
+    assert faults.next_change_s == 2.0
+    faults.clear("mute", 1.0)
+    faults.advance(5.0)
+    assert seen == [("mute", True, 0.0), ("mute", False, 1.0)]
+
+
+def test_one_bad_spec_sets_none():
+    seen: list[object] = []
+    faults = FaultSet(lambda *change: seen.append(change))
+    with pytest.raises(DriverError):
+        faults.add(["mute:1", "mute:x"], 0.0)
+    assert (seen, faults.active) == ([], [])
+
+
+def test_a_bus_may_have_few_kinds_of_fault():
+    faults = FaultSet(lambda *change: None, kinds=("echo", "unplug"))
+    faults.add(["echo"], 0.0)
+    with pytest.raises(DriverError, match=r"'mute:1': a bus of this kind has only echo, unplug"):
+        faults.add(["unplug", "mute:1"], 0.0)
+    assert [fault.kind for fault in faults.active] == ["echo"]

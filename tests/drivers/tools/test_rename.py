@@ -1,0 +1,84 @@
+"""drivers.tools.rename over simulated servos: the id changes, or nothing does."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.base.errors import CorruptReply, NoReply, ServoRefused
+from drivers.sim import SimulatedBus
+from drivers.tools.rename import set_id
+
+FAMILIES = [("xl330-m288", 2), ("xl320", 2), ("ax-12a", 1), ("sts3215", 1), ("scs0009", 1)]
+
+
+@pytest.mark.parametrize(("model", "protocol"), FAMILIES)
+def test_a_servo_answers_under_its_new_id(model: str, protocol: int) -> None:
+    with SimulatedBus([1, 5], model=model) as bus:
+        info = set_id(bus.path, 1_000_000, protocol, 1, 7)
+        assert (info.id, info.model) == (7, model)
+        assert bus.servo(7).register("ID") == 7
+        assert bus.servo(5).eeprom_writes == {}
+
+
+def test_feetech_memory_is_closed_again() -> None:
+    with SimulatedBus([1], model="sts3215") as bus:
+        servo = bus.servo(1)
+        servo.put("Lock", 1)
+        set_id(bus.path, 1_000_000, 1, 1, 2)
+        assert (servo.register("ID"), servo.register("Lock")) == (2, 1)
+
+
+@pytest.mark.parametrize(("model", "protocol"), FAMILIES)
+def test_a_taken_id_changes_nothing(model: str, protocol: int) -> None:
+    with SimulatedBus([1, 5], model=model) as bus:
+        with pytest.raises(ServoRefused, match=r"5 .* is taken"):
+            set_id(bus.path, 1_000_000, protocol, 1, 5)
+        assert bus.servo(1).eeprom_writes == {}
+
+
+@pytest.mark.parametrize(("model", "protocol"), [("xl330-m288", 2), ("sts3215", 1)])
+def test_a_servo_that_holds_is_left_alone_unless_it_may_be_released(model: str, protocol: int) -> None:
+    with SimulatedBus([1], model=model) as bus:
+        servo = bus.servo(1)
+        _switch_on(bus, model)
+        with pytest.raises(ServoRefused, match="holds with torque"):
+            set_id(bus.path, 1_000_000, protocol, 1, 2)
+        assert servo.torque
+        assert set_id(bus.path, 1_000_000, protocol, 1, 2, release=True).torque is False
+        assert servo.register("ID") == 2
+
+
+def _switch_on(bus: SimulatedBus, model: str) -> None:
+    """By a program that went away without switching off."""
+    import serial
+
+    from drivers.packets import packet, packet1
+
+    v2 = packet.encode_instruction(1, 3, bytes((64, 0, 1)))
+    v1 = packet1.encode(1, 3, bytes((40, 1)))
+    with serial.Serial(bus.path, 1_000_000, timeout=1) as port:
+        port.write(v1 if model.startswith("sts") else v2)
+        assert port.read(6)
+
+
+@pytest.mark.parametrize("protocol", [1, 2])
+def test_nobody_there_is_told_with_the_next_step(protocol: int) -> None:
+    with SimulatedBus([1]) as bus, pytest.raises(NoReply, match="nobody has the id 9") as caught:
+        set_id(bus.path, 1_000_000, protocol, 9, 2)
+    assert "omote scan" in caught.value.hint
+
+
+@pytest.mark.parametrize(("model", "protocol"), [("xl330-m288", 2), ("sts3215", 1)])
+def test_two_servos_with_the_old_id_are_left_alone(model: str, protocol: int) -> None:
+    with SimulatedBus([3, 3], model=model) as bus:
+        bus.servo(3).place(1200)
+        with pytest.raises(CorruptReply) as caught:
+            set_id(bus.path, 1_000_000, protocol, 3, 9)
+        assert "two servos may have this id" in caught.value.hint
+        assert bus.servo(3).eeprom_writes == {}
+
+
+@pytest.mark.parametrize(("old", "new", "name"), [(-1, 2, "old"), (1, 253, "new"), (1, 254, "new")])
+def test_ids_that_no_servo_may_have_are_refused(old: int, new: int, name: str) -> None:
+    with pytest.raises(ValueError, match=name):
+        set_id("/dev/null", 1_000_000, 2, old, new)
