@@ -67,7 +67,7 @@ $(VENV)/.opengl: $(VENV)/.installed
 $(VENV)/.compiled: $(VENV)/.installed
 	@echo "Compiling the surface engine (half a minute, once) ..."
 	@$(BIN)/omote check ict
-	@$(PY) -c 'import drivers.core.kernels, controller.braking'
+	@$(PY) -c 'import drivers.core.kernels, controller.motion.braking'
 	@$(BIN)/omote run everything --headless --seconds 1 >$(VENV)/first-run.log 2>&1 || true # pictures, links and mirror
 	@touch $@
 

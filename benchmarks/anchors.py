@@ -20,11 +20,11 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import lsq_linear
 
-from controller.anchors import AnchorMap, Rows, anchored, first, load_anchors, sample_skin, servo_field, travel
-from controller.expression import Vocabulary
-from controller.parameters import PARAMETERS, Floats
-from controller.paths import find_config
-from controller.robot import ChannelSettings, load_robot
+from controller.base.parameters import PARAMETERS, Floats
+from controller.base.paths import find_config
+from controller.robot.anchors import AnchorMap, Rows, anchored, first, load_anchors, sample_skin, servo_field, travel
+from controller.robot.robot import ChannelSettings, load_robot
+from controller.vocabulary.expression import Vocabulary
 from surface.head import Head
 
 NAIVE = {

@@ -18,14 +18,14 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from controller.commands import CommandState
-from controller.layers import default_layers
-from controller.mixer import LayerSettings
-from controller.parameters import PARAMETERS as P
-from controller.parameters import Floats
-from controller.paths import find_config
-from controller.rehearsal import Line
-from controller.robot import load_robot
+from controller.base.parameters import PARAMETERS as P
+from controller.base.parameters import Floats
+from controller.base.paths import find_config
+from controller.layers.commands import CommandState
+from controller.layers.layers import default_layers
+from controller.layers.mixer import LayerSettings
+from controller.robot.robot import load_robot
+from controller.stage.rehearsal import Line
 
 LAYERS = (*default_layers(), LayerSettings("show", 45, "max"), LayerSettings("twitch", 55, "add", weight=0.2))
 DT = 0.01

@@ -11,10 +11,10 @@ import time
 import numpy as np
 from rich.console import Console
 
-from controller.anchors import skin_points
-from controller.dragging import Dragger, Reshaper
-from controller.parameters import PARAMETERS as P
-from controller.paths import find_config
+from controller.base.parameters import PARAMETERS as P
+from controller.base.paths import find_config
+from controller.robot.anchors import skin_points
+from controller.stage.dragging import Dragger, Reshaper
 from surface.head import Head
 
 FRAMES = 400

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from controller.paths import find_config
+from controller.base.paths import find_config
 from surface.head import Head
 from surface.head.model.parameters import SHAPES
 

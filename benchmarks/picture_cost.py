@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from controller.paths import find_config
+from controller.base.paths import find_config
 from surface.head import Head
 from surface.view.pictures.offscreen import Offscreen
 from surface.view.scene.bounds import Bands

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import typer
 
-from controller.cli_bench import Subject, bench
+from controller.cli.bench import Subject, bench
 
 
 def main(large: bool = False, growth: str | None = None, seconds: float = 0.3) -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from controller.expression import Vocabulary
-from controller.parameters import PARAMETERS
-from controller.paths import find_config
-from controller.still import for_head, sheet_poses
+from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
+from controller.face.still import for_head, sheet_poses
+from controller.vocabulary.expression import Vocabulary
 from surface.head import Head
 from surface.view import PRESETS, Camera, Offscreen, compose, contact_sheet, write_png
 from surface.view.pictures.imagefile import as_image, replacing

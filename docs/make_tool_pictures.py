@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from controller.capturing import Capturing
-from controller.parameters import PARAMETERS
-from controller.paths import find_config
-from controller.robot import load_robot
+from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
+from controller.robot.robot import load_robot
+from controller.tools.capturing import Capturing
 
 CHANNELS = 8
 

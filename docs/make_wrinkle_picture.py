@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from controller.paths import find_config
+from controller.base.paths import find_config
 from surface.head import Head
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data

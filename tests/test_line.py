@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.body import Body
-from controller.face import HeadValues
-from controller.mailbox import Mailbox
-from controller.parameters import PARAMETERS
-from controller.stage import Stage, load_stage
+from controller.base.mailbox import Mailbox
+from controller.base.parameters import PARAMETERS
+from controller.body.body import Body
+from controller.face.face import HeadValues
+from controller.stage.stage import Stage, load_stage
 from drivers.sim import SimulatedBus
 from surface.head import Head
 from surface.view.pictures.offscreen import Offscreen

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from controller.commands import CommandState
-from controller.linesession import LineSession
-from controller.parameters import PARAMETERS
+from controller.base.parameters import PARAMETERS
+from controller.layers.commands import CommandState
+from controller.links.linesession import LineSession
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import NoReply, WrongModel

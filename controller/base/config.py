@@ -1,0 +1,116 @@
+"""Reading a TOML file into a checked model: every fault at once, each with its path in the file."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from controller.base.errors import ConfigError
+from controller.base.salvage import Rest
+
+Model = TypeVar("Model", bound="Settings")
+
+
+class Settings(BaseModel):
+    """Base of every configuration table: unknown keys are faults, values are fixed once read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
+    """Read ``path`` as ``model``.
+
+    Parameters
+    ----------
+    cross_check : gives the faults that only the whole file can have, such as names that nothing has; of a file that
+        does not fit the model it is asked about the rest.
+
+    Raises
+    ------
+    ConfigError
+        when the file cannot be read, is not TOML, or does not fit; lists every fault with its key.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}", hint="mend the line named above") from error
+    return check(table, model, path, cross_check)
+
+
+def check(table: dict[str, Any], model: type[Model], path: Path,
+          cross_check: Callable[[Model], list[str]] | None = None) -> Model:  # fmt: skip
+    """Turn a table into ``model``; ``path`` only names the source in messages. See :func:`load`."""
+    try:
+        read = model.model_validate(table)
+    except ValidationError as error:
+        faults = [describe(fault, model) for fault in error.errors()]
+        rest = Rest(table, model, error)
+        if cross_check is not None and rest.read is not None:
+            faults += rest.tell(cross_check(rest.read))
+        raise config_error(path, faults) from error
+    if cross_check is not None and (faults := cross_check(read)):
+        raise config_error(path, faults)
+    return read
+
+
+def config_error(path: Path, faults: list[str]) -> ConfigError:
+    """One error that lists all ``faults`` of ``path``."""
+    listing = "\n".join(f"  {fault}" for fault in faults)
+    count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
+    return ConfigError(f"{path}: {count}\n{listing}", hint=f"mend the file, then: omote check {path}")
+
+
+def describe(fault: Any, model: type[BaseModel]) -> str:
+    """One pydantic fault as ``key.path: reason``; misspelt keys get the closest known one."""
+    where = key_path(fault["loc"])
+    if fault["type"] == "extra_forbidden":
+        known = _keys_at(model, fault["loc"][:-1])
+        close = difflib.get_close_matches(str(fault["loc"][-1]), known, n=1)
+        return f"{where}: unknown key" + (f", did you mean {close[0]!r}?" if close else "")
+    if fault["type"] == "missing":
+        return f"{where}: missing"
+    reason = fault["msg"].removeprefix("Value error, ")
+    given = fault.get("input")
+    shown = f" (is {given!r})" if isinstance(given, str | int | float | bool) else ""
+    return f"{where}: {reason[:1].lower()}{reason[1:]}{shown}"
+
+
+def key_path(parts: tuple[str | int, ...]) -> str:
+    """``("links", 0, "port")`` as ``links[0].port``."""
+    text = ""
+    for part in parts:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text or "file"
+
+
+def _keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
+    """The keys the table at ``location`` may have."""
+    current: Any = model
+    for part in location:
+        if isinstance(part, int):
+            continue
+        field = current.model_fields.get(part)
+        if field is None:  # the name of an entry of a table of tables
+            continue
+        current = _inner_model(field.annotation)
+        if current is None:
+            return []
+    return list(current.model_fields)
+
+
+def _inner_model(annotation: Any) -> Any:
+    """The model inside ``X``, ``list[X]``, ``X | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        inner = _inner_model(argument)
+        if inner is not None:
+            return inner
+    return None

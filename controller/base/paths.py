@@ -1,0 +1,75 @@
+"""Where the configuration files are: beside the code in a checkout, under share/ when installed."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+from pathlib import Path
+
+from controller.base.errors import ConfigError
+
+VARIABLE = "OMOTE_CONFIGS"
+"""Environment variable that names another configuration folder."""
+
+
+def config_dir() -> Path:
+    """Folder that holds heads, vocabularies, robots and stages.
+
+    Raises
+    ------
+    ConfigError : no such folder is found.
+    """
+    folders = _candidates()
+    for folder in folders:
+        if (folder / "vocabularies").is_dir():
+            return folder
+    raise ConfigError(
+        f"the configuration folder is missing; looked in {', '.join(map(str, folders))}",
+        hint=f"set {VARIABLE} to a folder that holds vocabularies/ and heads/",
+    )
+
+
+def find_config(kind: str, name: str, *, beside: Path | None = None) -> Path:
+    """The file or folder that ``name`` means.
+
+    Parameters
+    ----------
+    kind : ``"heads"``, ``"robots"``, ``"stages"``, ``"vocabularies"`` or ``"scripts"``.
+    name : a path (also relative to the folder of ``beside``), or a name from ``configs/<kind>``.
+    beside : the file that says ``name``.
+
+    Raises
+    ------
+    ConfigError : nothing of that name; the message lists what there is.
+    """
+    folder = config_dir() / kind
+    places = [Path(name), folder / name, folder / f"{name}.toml"]
+    if beside is not None:
+        places.insert(0, beside.parent / name)
+    for place in places:
+        if _fits(kind, place):
+            return place
+    raise _unknown(kind, name, folder)
+
+
+def _fits(kind: str, place: Path) -> bool:
+    return (place / "head.toml").is_file() if kind == "heads" else place.is_file()
+
+
+def _unknown(kind: str, name: str, folder: Path) -> ConfigError:
+    known = sorted(p.stem for p in folder.glob("*") if not p.name.startswith("."))
+    close = difflib.get_close_matches(name, known, n=1)
+    guess = f", did you mean {close[0]!r}?" if close else ""
+    listing = ", ".join(known) if known else "nothing"
+    return ConfigError(
+        f"no {kind.replace('ies', 'ys').removesuffix('s')} {name!r}{guess}",
+        hint=f"give a path, or a name from {folder}: {listing}",
+    )
+
+
+def _candidates() -> list[Path]:
+    override = os.environ.get(VARIABLE)
+    if override:
+        return [Path(override)]
+    return [Path(__file__).resolve().parents[2] / "configs", Path(sys.prefix) / "share/omote/configs"]

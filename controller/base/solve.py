@@ -1,0 +1,190 @@
+"""Bounded least squares with sparsity: the way back from what is shown to the values that show it.
+
+Minimises over ``low <= x <= high``
+
+    1/2 |W (A x - b)|^2 + ridge/2 |x|^2 + sparsity |x|_1
+
+by coordinate descent on the normal equations, which is exact for this problem (Tseng 2001), with Newton steps of
+the values inside their bounds in between, which settle what is nearly alike. Started from the last solution it takes
+a few rounds: it can follow a tracker.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+import surface.base.jit  # noqa: F401  first of all: it keeps numba from importing scipy
+from controller.base.parameters import Floats
+
+_ROUNDS = 200
+_ZERO = 1e-13
+
+
+@njit(cache=True, nogil=True)
+def _sweep(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> float:
+    """One round over all coordinates, in place on ``x`` and ``gradient``; returns the largest change."""
+    largest = 0.0
+    for i in range(len(x)):
+        if gram[i, i] <= 0.0:
+            continue
+        goal = x[i] - gradient[i] / gram[i, i]
+        shrink = sparsity / gram[i, i]
+        goal = max(goal - shrink, 0.0) if goal > 0.0 else min(goal + shrink, 0.0)
+        step = min(max(goal, low[i]), high[i]) - x[i]
+        if step != 0.0:
+            x[i] += step
+            largest = max(largest, abs(step))
+            for j in range(len(x)):
+                gradient[j] += step * gram[j, i]
+    return largest
+
+
+@njit(cache=True, nogil=True)
+def _reach(x: float, step: float, low: float, high: float) -> float:
+    """How much of ``step`` can be taken from ``x`` without leaving the bounds or passing zero, 0..1."""
+    end = x + step
+    stop = high if step > 0.0 else low
+    if x > 0.0 and step < 0.0:
+        stop = max(low, 0.0)
+    elif x < 0.0 and step > 0.0:
+        stop = min(high, 0.0)
+    return 1.0 if (end <= stop) == (step > 0.0) or end == stop else (stop - x) / step
+
+
+@njit(cache=True, nogil=True)
+def _solve(matrix: Floats, right: Floats) -> None:
+    """Gauss elimination with pivots: leaves in ``right (n,)`` the solution, in ``matrix (n, n)`` nothing of use.
+
+    numba's own products and solutions would import scipy, which takes longer than all else of this module.
+    """
+    n = len(right)
+    for i in range(n):
+        best = i + int(np.argmax(np.abs(matrix[i:, i])))
+        if best != i:
+            for k in range(i, n):
+                matrix[i, k], matrix[best, k] = matrix[best, k], matrix[i, k]
+            right[i], right[best] = right[best], right[i]
+        if matrix[i, i] == 0.0:
+            raise ValueError("the values inside their bounds do not determine each other")
+        for j in range(i + 1, n):
+            share = matrix[j, i] / matrix[i, i]
+            if share != 0.0:
+                for k in range(i + 1, n):
+                    matrix[j, k] -= share * matrix[i, k]
+                right[j] -= share * right[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+
+
+@njit(cache=True, nogil=True)
+def _leap(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> None:
+    """Newton step of all values inside their bounds at once, as far as the first bound; in place."""
+    free = np.flatnonzero((x > low) & (x < high) & (x != 0.0))
+    if len(free) == 0:
+        return
+    block = np.empty((len(free), len(free)))
+    slope = np.empty(len(free))
+    for i in range(len(free)):
+        slope[i] = gradient[free[i]] + sparsity * np.sign(x[free[i]])
+        for j in range(len(free)):
+            block[i, j] = gram[free[i], free[j]]
+    _solve(block, slope)
+    step = -slope
+    reach = 1.0
+    for i in range(len(free)):
+        k = free[i]
+        reach = min(reach, _reach(x[k], step[i], low[k], high[k]))
+    for i in range(len(free)):
+        k = free[i]
+        x[k] = min(max(x[k] + reach * step[i], low[k]), high[k])
+        if abs(x[k]) < _ZERO:
+            x[k] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def _descend(
+    gram: Floats, wanted: Floats, low: Floats, high: Floats, sparsity: float, tolerance: float, x: Floats
+) -> int:
+    """Minimise for ``gram`` : (n, n) and ``wanted`` : (n,), in place on ``x``; returns the rounds it took."""
+    gradient = np.empty(len(x))
+    for round_ in range(_ROUNDS):
+        for i in range(len(x)):
+            gradient[i] = -wanted[i]
+            for j in range(len(x)):
+                gradient[i] += gram[i, j] * x[j]
+        if _sweep(gram, gradient, low, high, sparsity, x) < tolerance:
+            return round_ + 1
+        _sweep(gram, gradient, low, high, sparsity, x)
+        _leap(gram, gradient, low, high, sparsity, x)
+    return _ROUNDS
+
+
+class BoundedSolver:
+    """Solves for one matrix and many right-hand sides.
+
+    Parameters
+    ----------
+    matrix : (m, n) float64. low, high : (n,) bounds.
+    weights : (m,) how much each row counts; all alike without.
+    ridge : pulls towards 0 and settles what the rows leave open. sparsity : prefers few values that are not 0.
+    tolerance : largest change of a value at which it stops.
+
+    Raises
+    ------
+    ValueError : shapes do not fit, a number is not finite, or bounds are inside out.
+    """
+
+    def __init__(
+        self,
+        matrix: Floats,
+        low: Floats,
+        high: Floats,
+        *,
+        weights: Floats | None = None,
+        ridge: float = 1e-9,
+        sparsity: float = 0.0,
+        tolerance: float = 1e-7,
+    ) -> None:
+        self._matrix = np.ascontiguousarray(matrix, dtype=np.float64)
+        m, n = self._matrix.shape
+        self._low, self._high = (np.array(np.broadcast_to(b, n), dtype=np.float64) for b in (low, high))
+        scale = np.ones(m) if weights is None else np.asarray(weights, dtype=np.float64)
+        if scale.shape != (m,):
+            raise ValueError(f"weights must be ({m},), not {scale.shape}")
+        if not (np.isfinite(self._matrix).all() and np.isfinite(scale).all()):
+            raise ValueError("matrix and weights must be finite")
+        if not np.all(self._low <= self._high):
+            raise ValueError("low must not be above high")
+        self._weighted = self._matrix * (scale**2)[:, None]
+        self._gram = self._matrix.T @ self._weighted
+        least = 1e-12 * max(float(np.trace(self._gram)) / n, 1.0)  # keeps Newton's system solvable
+        self._gram += max(ridge, least) * np.eye(n)
+        self._sparsity, self._tolerance = float(sparsity), float(tolerance)
+        self.rounds = 0
+        self.solve(np.zeros(m))  # compiles, which may take seconds, before a bus waits for an answer
+
+    def solve(self, wanted: Floats, start: Floats | None = None) -> Floats:
+        """The best (n,) values for ``wanted`` : (m,).
+
+        Parameters
+        ----------
+        start : (n,) where to begin; the last solution of something that moves. Zero without.
+
+        Raises
+        ------
+        ValueError : ``wanted`` is not finite.
+        """
+        if not np.isfinite(wanted).all():
+            raise ValueError("wanted must be finite")
+        x = np.zeros(len(self._low)) if start is None else np.array(start, dtype=np.float64)
+        np.clip(x, self._low, self._high, out=x)
+        right = wanted @ self._weighted
+        self.rounds = int(_descend(self._gram, right, self._low, self._high, self._sparsity, self._tolerance, x))
+        return x
+
+    def residual(self, x: Floats, wanted: Floats) -> Floats:
+        """(m,) what ``x`` does not reach of ``wanted``."""
+        return wanted - self._matrix @ x

@@ -1,0 +1,178 @@
+"""What plays into the layers besides the links: a take, a voice, a head that is moved by hand."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import IO
+
+from controller.base.errors import TakeError
+from controller.robot.following import Puppet
+from controller.takes.listening import HOP_S, Listener
+from controller.takes.livelink import TakePlayer
+from controller.takes.recording import Face
+
+_CHUNK = 4096
+
+
+@dataclass(frozen=True)
+class Voice:
+    """Where a voice comes from.
+
+    Attributes
+    ----------
+    path : file, named pipe or device with WAV of PCM; ``-`` for standard input.
+    raw_hz : samples per second of signed 16 bit mono PCM without a header; None for WAV.
+    alone : nothing else plays: its end is the end of the run.
+    pipe : brings standard input to the body's process.
+    """
+
+    path: str
+    raw_hz: int | None = None
+    alone: bool = False
+    pipe: Connection | None = None
+
+    def open(self) -> IO[bytes]:
+        """The stream.
+
+        Raises
+        ------
+        TakeError : it cannot be opened.
+        """
+        if self.pipe is not None:
+            return io.BufferedReader(PipeStream(self.pipe), _CHUNK)
+        try:
+            return open(self.path, "rb")
+        except OSError as error:
+            hint = f"look at: ls -l {self.path}"
+            raise TakeError(f"{self.path}: cannot be read: {error.strerror}", hint=hint) from error
+
+
+class PipeStream(io.RawIOBase):
+    """Bytes that another process sends over a pipe, as a stream that ends when the pipe does."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe, self._left = pipe, b""
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def readinto(self, buffer) -> int:  # type: ignore[no-untyped-def]
+        """Wait for some bytes; 0 at the end."""
+        if not self._left:
+            try:
+                self._left = self._pipe.recv_bytes()
+            except (EOFError, OSError):
+                return 0
+        count = min(len(buffer), len(self._left))
+        buffer[:count], self._left = self._left[:count], self._left[count:]
+        return count
+
+
+def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
+    """Send a stream, standard input without one, down a pipe from a thread of its own, and close it at the end.
+
+    Raises
+    ------
+    TakeError : standard input is closed.
+    """
+    found = stream or sys.stdin
+    if found is None:
+        hint = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le - | omote play -"
+        raise TakeError("standard input is closed: no voice can come from it", hint=hint)
+    source = found.fileno()
+
+    def run() -> None:
+        with suppress(OSError):  # the body is gone, or the stream was closed
+            while data := os.read(source, _CHUNK):
+                pipe.send_bytes(data)
+        pipe.close()
+
+    thread = threading.Thread(target=run, name="standard input", daemon=True)
+    thread.start()
+    return thread
+
+
+class Sources:
+    """Everything that is ticked before the layers are mixed.
+
+    Parameters
+    ----------
+    state : the layers. player : plays a take. puppet : reads a limp head. voice : a voice to listen to.
+    beside : the take plays beside the links, and its end is not the end of the run.
+
+    Attributes
+    ----------
+    error : what ended the voice, if anything did. heard : the voice has ended.
+    """
+
+    def __init__(
+        self,
+        state: Face,
+        player: TakePlayer | None = None,
+        puppet: Puppet | None = None,
+        voice: Voice | None = None,
+        *,
+        beside: bool = False,
+    ) -> None:
+        self._beside = beside
+        self._state, self._player, self._puppet, self._voice = state, player, puppet, voice
+        self._listener: Listener | None = None
+        self._stopped = False
+        self.error: Exception | None = None
+        self.heard = False
+
+    @property
+    def finished(self) -> bool:
+        """A take has been played to its end, or a voice that was all there is to play has ended."""
+        if self._player is not None:
+            return self._player.finished and not self._beside
+        return self.heard and self._voice is not None and self._voice.alone
+
+    def begin(self) -> None:
+        """Let a voice in; it may take a while until it says anything."""
+        if self._voice is not None:
+            threading.Thread(target=self._listen, args=(self._voice,), name="voice", daemon=True).start()
+
+    def stop(self) -> None:
+        """Listen no more; a stream that is silent is left to end by itself."""
+        self._stopped = True
+        if self._listener is not None:
+            self._listener.stop()
+
+    def tick(self, now_ns: int, begun: bool) -> None:
+        """Give the layers what is due; takes wait until ``begun``."""
+        if self._player is not None and begun:
+            self._player.tick(now_ns)
+        if self._puppet is not None:
+            self._puppet.tick(self._state, now_ns)
+        if self._state.shows is not None and begun:
+            self._state.shows.tick(now_ns)
+
+    def report(self) -> dict[str, object]:
+        """How far a take was played and a voice was heard (s); None without."""
+        heard = None if self._voice is None else {"heard_s": self._listener.hops * HOP_S if self._listener else 0.0}
+        return {"take": self._take(), "voice": heard}
+
+    def _listen(self, voice: Voice) -> None:
+        try:
+            with voice.open() as stream:
+                self._listener = Listener(stream, self._state, raw_hz=voice.raw_hz)
+                if not self._stopped:
+                    self._listener.run()
+        except Exception as error:  # noqa: BLE001  the body has to hear of it
+            self.error = error
+        self.heard = True
+
+    def _take(self) -> dict[str, object] | None:
+        if self._player is None:
+            return None
+        take = self._player.take
+        played = min(self._player.position_s, take.duration_s)
+        return {"rows": take.frames, "rate_hz": take.rate_hz, "played_s": played, "duration_s": take.duration_s}

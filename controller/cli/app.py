@@ -1,0 +1,82 @@
+"""The ``omote`` command: one message and exit code 1 for everything that goes wrong, never a traceback.
+
+Each command lives in a ``cli_*`` module and imports what it needs when it runs, so that ``omote --help`` and
+the simulated parts start at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typer import Typer
+
+
+def make_app() -> Typer:
+    """All commands."""
+    from typer import Typer
+
+    from controller.cli import bench as cli_bench
+    from controller.cli import bus as cli_bus
+    from controller.cli import calibrate as cli_calibrate
+    from controller.cli import check as cli_check
+    from controller.cli import fit as cli_fit
+    from controller.cli import picture as cli_picture
+    from controller.cli import run as cli_run
+
+    app = Typer(
+        name="omote",
+        help="Drives a robot's face: a CG face and a servo head that make the same expression.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        add_completion=False,
+        rich_markup_mode="rich",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    for module in (cli_run, cli_picture, cli_fit, cli_bus, cli_calibrate, cli_check, cli_bench):
+        module.register(app)
+    return app
+
+
+def report_error(error: BaseException, remark: str = "") -> None:
+    """Print what failed and what to do next on standard error."""
+    from rich.console import Console
+
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console.print(f"[bold red]error:[/] {_plain(error)}")
+    hint = getattr(error, "hint", "")
+    if hint:
+        console.print(f"[bold]try:[/] {_escape(hint)}")
+    if remark:
+        console.print(remark, style="dim")
+
+
+def _plain(error: BaseException) -> str:
+    return _escape(str(error) or type(error).__name__)
+
+
+def _escape(text: str) -> str:
+    return text.replace("[", r"\[")
+
+
+def main() -> None:
+    """Entry point of the ``omote`` command; nothing is imported before Ctrl-C would end it quietly."""
+    try:
+        from controller.base.errors import OMOTE_ERRORS
+
+        make_app()()
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except OMOTE_ERRORS as error:
+        report_error(error)
+        sys.exit(1)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except Exception as error:
+        if os.environ.get("OMOTE_DEBUG"):
+            raise
+        report_error(error, "This is a fault in omote. OMOTE_DEBUG=1 shows where.")
+        sys.exit(70)

@@ -1,0 +1,136 @@
+"""``omote ports``, ``scan``, ``set-id`` and ``monitor``; ``simulate`` is in cli_simulate."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from controller.cli import simulate as cli_simulate
+
+console = Console(highlight=False)
+
+
+def register(app: typer.Typer) -> None:
+    """Add this module's commands to ``app``."""
+    app.command()(ports)
+    app.command()(scan)
+    app.command("set-id")(set_id)
+    app.command()(monitor)
+    cli_simulate.register(app)
+
+
+def ports() -> None:
+    """List the serial ports of this machine, and what to type where one cannot be used.
+
+    Example: omote ports
+    """
+    from drivers.port.ports import list_ports
+
+    found = list_ports()
+    if not found:
+        console.print("No serial port found. Plug the adapter in, or try: omote simulate dynamixel --link /tmp/head")
+        return
+    table = Table("port", "usb", "serial number", "description", "usable", "latency timer")
+    for record in found:
+        latency = "" if record.latency_s is None else f"{record.latency_s * 1000:g} ms"
+        usable = "yes" if record.usable else "[red]no[/]"
+        table.add_row(record.path, record.vid_pid, record.serial_number, record.description, usable, latency)
+    console.print(table)
+    for record in found:
+        if record.hint:
+            console.print(f"{record.device}: {record.hint}", soft_wrap=True)
+
+
+def scan(
+    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    baud: Annotated[
+        list[int] | None, typer.Option("--baud", help="Baud rate to try; may be repeated. All without it.")
+    ] = None,
+    protocol: Annotated[
+        list[int] | None,
+        typer.Option("--protocol", min=1, max=2, help="2 (Dynamixel X, XL-320) or 1 (AX, MX, Feetech). Both without."),
+    ] = None,
+) -> None:
+    """Look for Dynamixel and Feetech servos on a port, at all rates and in both protocols; nothing moves.
+
+    Example: omote scan /dev/ttyUSB0 --baud 1000000
+    """
+    from rich.progress import Progress
+
+    from controller.tools.scanning import STEPS, plan_scan, scan_port
+
+    plan = plan_scan(baud, protocol or (2, 1))
+    table = Table("baud", "prot.", "id", "model", "fw", "supply", "temp.", "error", "torque")
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task(f"scanning {port}", total=len(plan) * STEPS)
+
+        def tell(text: str, step: int) -> None:
+            progress.update(task, description=text, completed=step)
+
+        for found in scan_port(port, plan, tell):
+            table.add_row(*found.row)
+    if table.row_count:
+        console.print(table)
+    else:
+        console.print(f"No servo answered on {port}. Check its power, the wiring and the adapter's direction switch.")
+
+
+def set_id(
+    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    old: Annotated[int, typer.Argument(min=0, max=252, help="Id that the servo has.")],
+    new: Annotated[int, typer.Argument(min=0, max=252, help="Id that it shall have.")],
+    baud: Annotated[int, typer.Option(help="Baud rate it listens at; omote scan finds it.")] = 1_000_000,
+    protocol: Annotated[
+        int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")
+    ] = 2,
+    release: Annotated[
+        bool, typer.Option("--release", help="Switch its motor off first; support what it holds.")
+    ] = False,
+) -> None:
+    """Give a servo another id. It is checked that nobody else has it, and that the change was kept.
+
+    Example: omote set-id /dev/ttyUSB0 1 12
+    """
+    from drivers.tools.rename import set_id as change
+
+    info = change(port, baud, protocol, old, new, release=release)
+    console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}")
+
+
+def monitor(
+    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    baud: Annotated[int, typer.Option(help="Baud rate of the bus; omote scan finds it.")] = 1_000_000,
+    protocol: Annotated[
+        int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")
+    ] = 2,
+    listen: Annotated[
+        bool, typer.Option("--listen", help="Only listen: for a second adapter on a wire that another program drives.")
+    ] = False,
+    model: Annotated[str, typer.Option(help="With --listen: the servos' model, so that registers have names.")] = "",
+    rate: Annotated[float, typer.Option(min=0.1, max=200, help="How often the servos are asked, per second.")] = 10.0,
+    seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
+) -> None:
+    """Show the servos of a bus and the decoded packets that pass, live; nothing is switched on or moved.
+
+    Where the output is no terminal, the packets are printed line by line.
+
+    Example: omote monitor /dev/ttyUSB0 --baud 57600
+    """
+    from controller.base.signals import stop_flag
+    from controller.body.run import Deadline
+    from controller.tools.monitoring import ask
+    from controller.tools.monitoring import listen as only_listen
+
+    deadline = Deadline(seconds)
+    with stop_flag() as flag:
+
+        def going() -> bool:
+            return not flag.is_set() and deadline()
+
+        if listen:
+            only_listen(port, baud, protocol, console, going, model)
+        else:
+            ask(port, baud, protocol, console, going, rate)

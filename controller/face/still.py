@@ -1,0 +1,179 @@
+"""One picture, or one sheet of pictures, of a head."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.base.errors import ParameterError
+from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
+from controller.stage.identity import check_identity, parse_identity
+from controller.stage.picture import PictureSettings, checked
+from controller.stage.stage import FaceSettings, load_head, load_stage
+from controller.vocabulary.expression import Vocabulary
+
+if TYPE_CHECKING:
+    from surface.head import Head
+
+
+@dataclass(frozen=True)
+class Still:
+    """What to draw.
+
+    Attributes
+    ----------
+    values : (p,) float64, the full parameter vector.
+    size : width and height (pixels).
+    look : theme, camera and the rest.
+    head : folder of the head. identity : variations of it to mix in, by name. groups : group files it wears.
+    vocabulary : the named expressions.
+    """
+
+    values: NDArray[np.float64]
+    size: tuple[int, int]
+    look: PictureSettings
+    head: Path
+    identity: dict[str, float]
+    groups: tuple[tuple[Path, float], ...]
+    vocabulary: Vocabulary
+
+    @classmethod
+    def parse(
+        cls, settings: list[str], expressions: list[str], size: str | None = None,
+        look: Mapping[str, object] | None = None, head: str | None = None, identity: str | None = None, *,
+        stage: str | None = None, vocabularies: Sequence[str] = (), groups: Sequence[str] = (),
+    ) -> Still:  # fmt: skip
+        """Read the words of a command line; what they leave open is as the stage has it, if there is one.
+
+        Raises
+        ------
+        ParameterError, ConfigError
+            naming the word that is wrong and what would be right.
+        """
+        base = load_stage(stage, PARAMETERS) if stage else None
+        files = [*(base.vocabularies if base else ()), *(find_config("vocabularies", name) for name in vocabularies)]
+        vocabulary = Vocabulary.load(PARAMETERS, more=files)
+        values = PARAMETERS.neutral()
+        for word in expressions:
+            _add_expression(vocabulary, values, word)
+        for word in settings:
+            index, value = parse_setting(word)
+            values[index] = value
+        folder = base.head if base and head is None else find_config("heads", head or "ict")
+        wanted = dict(base.settings.identity) if base and identity is None else parse_identity(identity)
+        check_identity(folder, wanted)
+        worn = (*(base.groups if base else ()), *(parse_group(word) for word in groups))
+        face = base.settings.face if base else FaceSettings()
+        width_height = parse_size(size or "800x800") if size or base is None else face.size
+        return cls(values, width_height, checked(face, look or {}), folder, wanted, worn, vocabulary)
+
+    def load_head(self) -> Head:
+        """The head with its identity and groups; see :func:`controller.stage.stage.load_head`."""
+        return load_head(self.head, self.identity, self.groups)
+
+
+def parse_group(word: str) -> tuple[Path, float]:
+    """``FILE=AMOUNT`` as path and amount, -1 to 1; a file alone counts 1."""
+    name, equals, text = word.rpartition("=")
+    amount = parse_number(f"--group {word}", text) if equals else 1.0
+    if not -1.0 <= amount <= 1.0:
+        raise ParameterError(f"--group {word}: the amount goes from -1 to 1")
+    return find_config("groups", name if equals else word), amount
+
+
+def parse_setting(word: str) -> tuple[int, float]:
+    """``NAME=VALUE`` as parameter index and value; the value must lie in the parameter's range."""
+    name, equals, text = word.partition("=")
+    if not equals:
+        raise ParameterError(f"--set {word}: expected NAME=VALUE", hint="for example --set jawOpen=0.8")
+    index = PARAMETERS.index(name)
+    value = parse_number(f"--set {word}", text)
+    low, high = PARAMETERS.low[index], PARAMETERS.high[index]
+    if not low <= value <= high:
+        raise ParameterError(f"--set {word}: {PARAMETERS.names[index]} goes from {low:g} to {high:g}")
+    return index, value
+
+
+def parse_number(where: str, text: str) -> float:
+    """A finite number, or an error that says where it stood."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ParameterError(f"{where}: {text!r} is not a number")
+    return value
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """``800x600`` as (800, 600)."""
+    match = re.fullmatch(r"(\d{1,5})[xX](\d{1,5})", text.strip())
+    size = (int(match[1]), int(match[2])) if match else (0, 0)
+    if min(size) < 16 or max(size) > 16384:
+        raise ParameterError(f"--size {text}: expected WIDTHxHEIGHT, each 16 to 16384", hint="--size 800x800")
+    return size
+
+
+def _add_expression(vocabulary: Vocabulary, values: NDArray[np.float64], word: str) -> None:
+    name, equals, text = word.partition("=")
+    intensity = parse_number(f"--expression {word}", text) if equals else 1.0
+    if not 0.0 <= intensity <= 1.0:
+        raise ParameterError(f"--expression {word}: the intensity goes from 0 to 1")
+    values += _vector(vocabulary.expand(name, intensity))
+    np.clip(values, PARAMETERS.low, PARAMETERS.high, out=values)
+
+
+def draw_still(still: Still, out: Path) -> None:
+    """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
+    from surface.view.pictures.offscreen import Offscreen
+    from surface.view.pictures.sheet import write_png
+
+    head, look = still.load_head(), still.look
+    with Offscreen(head, still.size, quality=look.quality, theme=look.make_theme(), evaluator=look.evaluator) as screen:
+        picture = screen.render(for_head(still.values, head.parameters), look.make_camera())
+    write_png(picture, out)
+
+
+def for_head(values: NDArray[np.float64], wanted: tuple[str, ...]) -> NDArray[np.float64]:
+    """The full vector (p,) in a head's own order (h,); names omote does not know stay 0."""
+    place = {name: i for i, name in enumerate(PARAMETERS.names)}
+    return np.array([values[place[name]] if name in place else 0.0 for name in wanted])
+
+
+def sheet_poses(vocabulary: Vocabulary | None = None) -> list[tuple[str, NDArray[np.float64]]]:
+    """Label and full parameter vector of every picture of the sheet: expressions first, then every parameter."""
+    vocabulary = vocabulary or Vocabulary.load(PARAMETERS)
+    poses = [(name, _vector(vocabulary.expand(name, 1.0))) for name in vocabulary.names]
+    for index, name in enumerate(PARAMETERS.names):
+        two_sided = PARAMETERS.low[index] < 0
+        if two_sided:
+            poses.append((f"{name} \N{MINUS SIGN}", _vector({index: PARAMETERS.low[index]})))
+        poses.append((f"{name} +" if two_sided else name, _vector({index: PARAMETERS.high[index]})))
+    return poses
+
+
+def _vector(values: dict[int, float]) -> NDArray[np.float64]:
+    vector = PARAMETERS.neutral()
+    for index, value in values.items():
+        vector[index] = value
+    return vector
+
+
+def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Draw every parameter and every named expression on one sheet (PNG); ``progress(done, total)`` is told."""
+    from surface.view.pictures.sheet import contact_sheet, write_png
+
+    head, look = still.load_head(), still.look
+    entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]
+    page = contact_sheet(
+        head, entries, views=[look.make_camera()], quality=look.quality, theme=look.make_theme(), progress=progress
+    )
+    write_png(page, out)

@@ -1,0 +1,323 @@
+"""What commands do to the face: the layers, the expressions and the gaze behind one small interface.
+
+Links call the methods of :class:`CommandSink` from their own threads; the control loop calls
+:meth:`CommandState.tick`. Each holds one short lock.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.base.errors import ParameterError
+from controller.base.parameters import Floats, Parameters
+from controller.layers.acting import Actor
+from controller.layers.gaze import Gaze
+from controller.layers.layers import default_layers
+from controller.layers.life import Life, LifeSettings
+from controller.layers.mixer import LayerSettings, Mixer
+from controller.motion.motion import MotionLimiter
+from controller.vocabulary.expression import Vocabulary
+
+if TYPE_CHECKING:
+    from controller.links.show import Shows
+
+StatusValue = str | int | float
+
+
+class CommandSink(Protocol):
+    """What a link may ask of the face. ``stamp_ns`` is when the command arrived (monotonic clock, ns).
+
+    Attributes
+    ----------
+    parameters : the registry. vocabulary : the named expressions. shows : plays scripts; None where none can be.
+    """
+
+    parameters: Parameters
+    vocabulary: Vocabulary
+    shows: Shows | None
+
+    def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
+        """Hold parameters at values, until released."""
+
+    def release(self, indices: Sequence[int], stamp_ns: int) -> None:
+        """Give held parameters back to the layers below."""
+
+    def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
+        """Show a named expression; without a duration until the next one."""
+
+    def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
+        """Look in a direction."""
+
+    def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        """Look at a point."""
+
+    def gaze_off(self, stamp_ns: int) -> None:
+        """Stop looking at anything."""
+
+    def neutral(self, seconds: float, stamp_ns: int) -> None:
+        """Release everything that was commanded and return to neutral."""
+
+    def live(self, amount: float, stamp_ns: int) -> None:
+        """Set how lively the face is when nobody tells it anything, 0..1."""
+
+    def snapshot(self, out: Floats) -> None:
+        """Copy the present parameters to ``out`` : (P,)."""
+
+    def measured(self, out: Floats) -> bool:
+        """Copy the parameters that the servos show to ``out`` : (P,); False when no servo says where it stands."""
+
+    def holder(self, index: int) -> str | None:
+        """The layer that holds a parameter."""
+
+    def layer_names(self) -> tuple[str, ...]:
+        """Layers, lowest priority first."""
+
+    def status(self) -> dict[str, StatusValue]:
+        """How the face is, as short words and numbers."""
+
+
+class Watch(Protocol):
+    """What looks at the servos; see :class:`controller.robot.following.Reflection`."""
+
+    def measured(self, out: Floats) -> bool:
+        """Copy the parameters that the servos show to ``out`` : (P,); False when none is known."""
+
+    def status(self) -> Mapping[str, StatusValue]:
+        """How the servos are, as short words and numbers."""
+
+
+class CommandState:
+    """The face's intentions: layers mixed, eased and clipped, once per tick.
+
+    Parameters
+    ----------
+    parameters : the registry.
+    vocabulary : the named expressions; the shipped ones without.
+    layers : the layers; the shipped ones without. Must have those of :data:`controller.layers.layers.NEEDED`.
+    life : the figures of idle life; the natural ones without. seed : the same seed lives the same life.
+    period_s : length of a tick.
+
+    Attributes
+    ----------
+    watch : looks at the servos; None without any. shows : plays scripts; None where none can be.
+
+    Raises
+    ------
+    ConfigError : the shipped expressions or figures cannot be read.
+    """
+
+    def __init__(
+        self,
+        parameters: Parameters,
+        vocabulary: Vocabulary | None = None,
+        layers: Sequence[LayerSettings] | None = None,
+        *,
+        life: LifeSettings | None = None,
+        seed: int = 0,
+        period_s: float = 0.01,
+    ) -> None:
+        self.parameters = parameters
+        self.vocabulary = vocabulary or Vocabulary.load(parameters)
+        self.mixer = Mixer(parameters, default_layers() if layers is None else layers)
+        self.limiter = MotionLimiter.of(parameters, period_s)
+        self._actor = Actor(self.vocabulary["neutral"])
+        self._gaze = Gaze(parameters)
+        self._life = Life(parameters, life or LifeSettings.named("natural", parameters), seed)
+        self._mixed, self._present = parameters.neutral(), parameters.neutral()
+        self._expression, self._looking = self.mixer["expression"], self.mixer["gaze"]
+        self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
+        self._speech = self.mixer["speech"]
+        self._everything = np.ones(len(parameters), dtype=bool)
+        self.watch: Watch | None = None
+        self.shows: Shows | None = None
+        self._lock = threading.Lock()
+        self._stamp_ns = 0
+        self._now_s = 0.0
+        self._ticks = 0
+
+    def tick(self, now_ns: int, dt: float, out: Floats) -> int:
+        """Advance to ``now_ns`` (monotonic clock), ``dt`` seconds after the last tick.
+
+        Writes the parameters to ``out`` : (P,) and returns the arrival time (ns) of the newest command in them,
+        0 before the first.
+        """
+        with self._lock:
+            now_s = self._now_s = now_ns * 1e-9
+            self._write_layers(now_s)
+            self.mixer.mix(now_s, dt, self._mixed)
+            self.limiter.step(dt, self._mixed, self._present)
+            self._ticks += 1
+            out[:] = self._present
+            return self._stamp_ns
+
+    def _write_layers(self, now_s: float) -> None:
+        self._expression.write_masked(self._actor.update(now_s), self._everything, now_s)
+        self._live(now_s)
+        self._looking.hold_back(self._actor.gaze_block)
+        self._speech.hold_back(self._actor.mouth_block)
+        if self._gaze.active:
+            self._looking.write(self._gaze.indices, self._gaze.update(self._present, self._life), now_s)
+
+    def _live(self, now_s: float) -> None:
+        life, actor = self._life, self._actor
+        if life.liveliness > 0.0:
+            life.update(now_s, looking=self._gaze.active, blink_block=actor.blink_block, gaze_block=actor.gaze_block)
+            self._idle.write_masked(life.values, self._everything, now_s)
+        elif self._idle.holding:
+            life.update(now_s, looking=False)
+            self._idle.release()
+
+    # What links call
+
+    def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._manual.write(list(indices), values, stamp_ns * 1e-9)
+            self._note(stamp_ns)
+
+    def release(self, indices: Sequence[int], stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._manual.release(list(indices))
+            self._note(stamp_ns)
+
+    def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
+        """See :class:`CommandSink`. Raises ParameterError for an unknown name."""
+        expression = self.vocabulary[name]
+        with self._lock:
+            self._actor.play(expression, intensity, duration_s, self._time(stamp_ns))
+            self._note(stamp_ns)
+
+    def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._gaze.look(yaw_rad, pitch_rad)
+            self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
+            self._note(stamp_ns)
+
+    def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._gaze.look_at(x_mm, y_mm, z_mm)
+            self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
+            self._note(stamp_ns)
+
+    def gaze_off(self, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._stop_looking()
+            self._note(stamp_ns)
+
+    def neutral(self, seconds: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._manual.release(fade_s=seconds)
+            self._stop_looking(seconds)
+            self._actor.rest(seconds, self._time(stamp_ns))
+            self._note(stamp_ns)
+
+    def live(self, amount: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            self._life.liveliness = min(max(amount, 0.0), 1.0)
+            self._note(stamp_ns)
+
+    def capture(self, values: Floats, mask: NDArray[np.bool_], now_ns: int, stamp_ns: int = 0) -> None:
+        """Give the live-capture layer ``values`` : (P,) where ``mask`` : (P,) bool; released after 1 s of silence."""
+        self.write_layer("capture", values, mask, now_ns, stamp_ns)
+
+    def write_layer(
+        self,
+        name: str,
+        values: Floats,
+        mask: NDArray[np.bool_],
+        now_ns: int,
+        stamp_ns: int = 0,
+        *,
+        through: Floats | None = None,
+    ) -> None:
+        """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest.
+
+        Parameters
+        ----------
+        through : (P,) how much of the layers below shows through, 0..1; nothing without.
+
+        Raises
+        ------
+        KeyError : no layer of that name.
+        """
+        with self._lock:
+            layer = self.mixer[name]
+            layer.write_masked(values, mask, now_ns * 1e-9)
+            if through is None:
+                layer.share.fill(1.0)
+            else:
+                np.subtract(1.0, through, out=layer.share)
+            self._note(stamp_ns)
+
+    def set_gains(self, name: str, gains: Mapping[str, float]) -> None:
+        """Scale what a layer gives, by region: ``{"brows": 0.6}``; regions not named stay at 1.
+
+        Raises
+        ------
+        KeyError : no layer of that name. ParameterError : no such region, or a gain that is not 0 to 4.
+        """
+        layer = self.mixer[name]
+        gain = np.ones(len(self.parameters))
+        for region, factor in gains.items():
+            if not 0.0 <= factor <= 4.0:
+                raise ParameterError(f"gain of {region} must be 0 to 4, not {factor}", hint="1 leaves it as it is")
+            gain[self.parameters.region(region)] = factor
+        with self._lock:
+            layer.gain[:] = gain
+
+    def snapshot(self, out: Floats) -> None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            out[:] = self._present
+
+    def measured(self, out: Floats) -> bool:
+        """See :class:`CommandSink`."""
+        return self.watch is not None and self.watch.measured(out)
+
+    def holder(self, index: int) -> str | None:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            return self.mixer.holder(index)
+
+    def layer_names(self) -> tuple[str, ...]:
+        """See :class:`CommandSink`."""
+        return self.mixer.names
+
+    def status(self) -> dict[str, StatusValue]:
+        """See :class:`CommandSink`."""
+        with self._lock:
+            yaw, pitch = self._gaze.direction_deg
+            return {
+                "expression": self._actor.name,
+                "intensity": round(self._actor.intensity, 3),
+                "gaze": f"{yaw:.1f},{pitch:.1f}" if self._gaze.active else "off",
+                "life": self._life.liveliness,
+                "manual": self._manual.holding,
+                "capture": self.mixer["capture"].holding,
+                "limited": int(np.count_nonzero(self.limiter.limited)),
+                "ticks": self._ticks,
+                "layers": ",".join(self.mixer.active) or "none",
+                **(self.watch.status() if self.watch is not None else {}),
+            }
+
+    def _stop_looking(self, fade_s: float | None = None) -> None:
+        self._gaze.off()
+        self._looking.release(fade_s=fade_s)
+
+    def _note(self, stamp_ns: int) -> None:
+        self._stamp_ns = max(self._stamp_ns, stamp_ns)
+
+    def _time(self, stamp_ns: int) -> float:
+        """When a command takes effect: when it came, but not before the last tick."""
+        return max(stamp_ns * 1e-9, self._now_s)

@@ -1,0 +1,111 @@
+"""Gaze: one direction or point, shared between eyes and head.
+
+The head takes what lies beyond a comfortable eye angle; the eyes make up the difference to where the head is
+*now*. So on a large shift the eyes arrive first and turn back while the head follows, as people's do.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from controller.base.parameters import Floats, Parameters
+
+EYE_OFFSET_MM = 32.0
+"""Distance of an eye's centre from the middle between the eyes."""
+
+_NAMES = ("headYaw", "headPitch", "leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
+_HEAD_SHARE = 0.75
+_COMFORT_YAW_RAD = math.radians(8.0)
+_COMFORT_PITCH_RAD = math.radians(6.0)
+
+
+class Stir(Protocol):
+    """Small movements around a direction; idle life has them."""
+
+    eye_yaw_rad: float
+    eye_pitch_rad: float
+    head_rad: Floats
+
+
+class _Still:
+    eye_yaw_rad = eye_pitch_rad = 0.0
+    head_rad = np.zeros(3)
+
+
+STILL: Stir = _Still()
+"""No movement at all."""
+
+
+class Gaze:
+    """Splits a direction or a point into head and eye parameters.
+
+    Directions are relative to the head's zero pose: yaw + to the subject's left, pitch + down.
+
+    Parameters
+    ----------
+    parameters : the registry; must have the head's and the eyes' angles.
+
+    Attributes
+    ----------
+    indices : (6,) positions of the parameters it drives. active : whether there is anything to look at.
+    shift_rad : how far the last command moved the gaze.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.indices = parameters.indices(_NAMES)
+        self.active = False
+        self.shift_rad = 0.0
+        self._scale = parameters.full_scale_rad[self.indices]
+        self._yaw = np.zeros(2)
+        self._pitch = 0.0
+        self._values = np.zeros(6)
+
+    def look(self, yaw_rad: float, pitch_rad: float) -> None:
+        """Look in a direction, with parallel eyes."""
+        self._turn(yaw_rad, yaw_rad, pitch_rad)
+
+    def look_at(self, x_mm: float, y_mm: float, z_mm: float) -> None:
+        """Look at a point; x to the subject's left, y up, z forward from the middle between the eyes."""
+        left, right = math.atan2(x_mm - EYE_OFFSET_MM, z_mm), math.atan2(x_mm + EYE_OFFSET_MM, z_mm)
+        self._turn(left, right, math.atan2(-y_mm, math.hypot(x_mm, z_mm)))
+
+    def off(self) -> None:
+        """Look at nothing in particular."""
+        self.active = False
+
+    @property
+    def direction_deg(self) -> tuple[float, float]:
+        """Yaw and pitch, degrees, of the middle between both eyes' directions."""
+        return math.degrees(float(self._yaw.mean())) + 0.0, math.degrees(self._pitch) + 0.0
+
+    def _turn(self, left_rad: float, right_rad: float, pitch_rad: float) -> None:
+        before = float(self._yaw.mean()), self._pitch
+        self._yaw[:] = left_rad, right_rad
+        self._pitch = pitch_rad
+        self.shift_rad = math.hypot(float(self._yaw.mean()) - before[0], pitch_rad - before[1])
+        self.active = True
+
+    def update(self, present: Floats, stir: Stir = STILL) -> Floats:
+        """Values (6,) for :attr:`indices`; a view.
+
+        Parameters
+        ----------
+        present : (P,) parameters the face shows now. stir : small movements of eyes and head around the direction.
+        """
+        values, scale = self._values, self._scale
+        values[0] = (_head_part(float(self._yaw.mean()), _COMFORT_YAW_RAD) + stir.head_rad[0]) / scale[0]
+        values[1] = (_head_part(self._pitch, _COMFORT_PITCH_RAD) + stir.head_rad[1]) / scale[1]
+        head_yaw = present[self.indices[0]] * scale[0]
+        head_pitch = present[self.indices[1]] * scale[1]
+        values[2] = (self._yaw[0] + stir.eye_yaw_rad - head_yaw) / scale[2]
+        values[4] = (self._yaw[1] + stir.eye_yaw_rad - head_yaw) / scale[4]
+        values[3] = values[5] = (self._pitch + stir.eye_pitch_rad - head_pitch) / scale[3]
+        return np.clip(values, -1.0, 1.0, out=values)
+
+
+def _head_part(angle: float, comfort: float) -> float:
+    """What the head does of a gaze angle (rad)."""
+    return math.copysign(max(0.0, abs(angle) - comfort) * _HEAD_SHARE, angle)

@@ -1,0 +1,231 @@
+"""Layers: many sources, one parameter vector, and for every parameter the name of the layer that holds it.
+
+A layer keeps the latest value of each parameter it was given; nothing queues. From the lowest priority to the
+highest, with s the layer's share of a parameter (weight x fade) and v its value:
+
+    set  out <- out + s (v - out)      add  out <- out + s v      max  out <- max(out, s v)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.base.parameters import Floats, Parameters, did_you_mean
+
+Mode = Literal["set", "add", "max"]
+Indices = NDArray[np.intp] | Sequence[int] | slice
+
+_SHORTEST_S = 1e-9
+
+
+@dataclass(frozen=True)
+class LayerSettings:
+    """What a layer is.
+
+    Attributes
+    ----------
+    name : unique name. priority : higher goes over lower. mode : how it joins what lies below.
+    weight : 0..1. fade_in_s, fade_out_s : times to take and to give back a parameter.
+    timeout_s : a parameter not written for so long is released; infinity keeps it.
+    gains : factors on its values by region, 1 where none is given.
+    """
+
+    name: str
+    priority: int
+    mode: Mode = "set"
+    weight: float = 1.0
+    fade_in_s: float = 0.0
+    fade_out_s: float = 0.4
+    timeout_s: float = math.inf
+    gains: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.mode not in ("set", "add", "max"):
+            raise ValueError(f"mode must be 'set', 'add' or 'max', not {self.mode!r}")
+        if not 0.0 <= self.weight <= 1.0:
+            raise ValueError(f"weight must be 0 to 1, not {self.weight}")
+        if not (self.fade_in_s >= 0 and self.fade_out_s >= 0 and self.timeout_s > 0):
+            raise ValueError("fade_in_s and fade_out_s must not be negative, timeout_s must be positive")
+
+
+class Layer:
+    """One source's place in a :class:`Mixer`; all arrays are rows of the mixer's, (P,) each.
+
+    Attributes
+    ----------
+    values : latest values. held : which parameters the source has given and not released.
+    gain : factor on the values, for instance per region.
+    share : factor on the weight, for what blocks or fades the layer.
+    applied : share it had in the last mix. settings : what it was made from.
+    """
+
+    def __init__(self, settings: LayerSettings, table: _Table, row: int) -> None:
+        self.settings = settings
+        self.name = settings.name
+        self.values, self.gain, self.share = table.values[row], table.gain[row], table.share[row]
+        self.applied, self.held, self._stamp = table.applied[row], table.held[row], table.stamp[row]
+        self._fade_out, self._block = table.fade_out_s[row], table.block[row]
+        self._fresh = np.zeros(len(self.values), dtype=bool)
+
+    def write(self, indices: Indices, values: Floats | Sequence[float] | float, now_s: float) -> None:
+        """Hold some parameters at ``values`` from ``now_s`` on; what is not finite changes nothing."""
+        given = np.asarray(values, dtype=np.float64)
+        if not np.isfinite(given).all():
+            indices, given = _only_finite(indices, given, len(self.values))
+        self.values[indices] = given
+        self._stamp[indices] = now_s
+        self.held[indices] = True
+
+    def write_masked(self, values: Floats, mask: NDArray[np.bool_], now_s: float) -> None:
+        """Hold the parameters of ``mask`` : (P,) bool at ``values`` : (P,); all others are released."""
+        np.isfinite(values, out=self._fresh)
+        self._fresh &= mask
+        np.copyto(self.values, values, where=self._fresh)
+        np.copyto(self._stamp, now_s, where=self._fresh)
+        np.copyto(self.held, mask)
+
+    def release(self, indices: Indices = slice(None), *, fade_s: float | None = None) -> None:
+        """Give parameters back to the layers below, over ``fade_s`` or the layer's own fade."""
+        self.held[indices] = False
+        self._fade_out[:] = self.settings.fade_out_s if fade_s is None else fade_s
+
+    def hold_back(self, amount: float) -> None:
+        """Take away ``amount`` 0..1 of its say, as an expression does that blocks it."""
+        self._block[:] = 1.0 - amount
+
+    @property
+    def holding(self) -> int:
+        """How many parameters the layer holds."""
+        return int(np.count_nonzero(self.held))
+
+
+class _Table:
+    """What ``n`` layers hold of ``p`` parameters, and how they come and go; (n, p) or (n, 1) each."""
+
+    def __init__(self, settings: Sequence[LayerSettings], p: int) -> None:
+        shape = (len(settings), p)
+        self.values, self.stamp, self.level, self.applied, self.given = (np.zeros(shape) for _ in range(5))
+        self.gain, self.share = np.ones(shape), np.ones(shape)
+        self.held, self._fresh = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        columns = ("weight", "fade_in_s", "fade_out_s", "timeout_s")
+        self._weight, self._fade_in_s, self.fade_out_s, self._timeout_s = (
+            np.array([[getattr(each, name)] for each in settings]) for name in columns
+        )
+        self._rate, self.block = np.zeros(shape), np.ones((len(settings), 1))
+
+    def advance(self, now_s: float, dt: float) -> NDArray[np.bool_]:
+        """Let fades and time-outs pass; (n,) which layers have any say."""
+        np.greater(self.stamp, now_s - self._timeout_s, out=self._fresh)
+        self.held &= self._fresh
+        rise, fall = (dt / np.maximum(fade, max(dt, _SHORTEST_S)) for fade in (self._fade_in_s, self.fade_out_s))
+        np.copyto(self._rate, -fall)
+        np.copyto(self._rate, rise, where=self.held)
+        self.level += self._rate
+        np.maximum(self.level, 0.0, out=self.level)
+        np.minimum(self.level, 1.0, out=self.level)
+        np.multiply(self.level, self._weight * self.block, out=self.applied)
+        self.applied *= self.share
+        np.multiply(self.values, self.gain, out=self.given)
+        return np.logical_or.reduce(self.level != 0.0, axis=1)
+
+
+class Mixer:
+    """Mixes layers into one (P,) vector.
+
+    Parameters
+    ----------
+    parameters : the registry. layers : what layers there are; order in priority, not in the list.
+
+    Raises
+    ------
+    ValueError : two layers of one name. ParameterError : gains of a region that is none.
+    """
+
+    def __init__(self, parameters: Parameters, layers: Sequence[LayerSettings]) -> None:
+        ordered = by_priority(layers)
+        if len({layer.name for layer in ordered}) < len(ordered):
+            raise ValueError("layers must have different names")
+        self._table = _Table(ordered, len(parameters))
+        self.layers = tuple(Layer(settings, self._table, i) for i, settings in enumerate(ordered))
+        self._by_name = {layer.name: layer for layer in self.layers}
+        self._work = np.zeros(len(parameters))
+        self._better = np.zeros(len(parameters), dtype=bool)
+        for layer in self.layers:
+            for region, factor in layer.settings.gains.items():
+                layer.gain[parameters.region(region)] = factor
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Layer names, lowest priority first."""
+        return tuple(self._by_name)
+
+    def __getitem__(self, name: str) -> Layer:
+        """The layer called ``name``. Raises KeyError with the nearest names."""
+        try:
+            return self._by_name[name]
+        except KeyError:
+            raise KeyError(f"unknown layer {name!r}{did_you_mean(name, self._by_name)}") from None
+
+    def mix(self, now_s: float, dt: float, out: Floats) -> Floats:
+        """Advance every layer by ``dt`` to ``now_s``; write their mix, not clipped, to ``out`` : (P,)."""
+        out.fill(0.0)
+        table = self._table
+        for row in np.flatnonzero(table.advance(now_s, dt)).tolist():
+            self._apply(self.layers[row].settings.mode, table.given[row], table.applied[row], out)
+        return out
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Layers that had any say in the last mix, lowest priority first."""
+        return tuple(layer.name for layer in self.layers if layer.applied.any())
+
+    def holder(self, index: int) -> str | None:
+        """Name of the layer that decides a parameter since the last mix; None when none does.
+
+        The highest ``set`` or winning ``max`` layer; where only ``add`` layers act, the highest of those.
+        """
+        adding = None
+        for layer in reversed(self.layers):
+            if layer.applied[index] > 0.0:
+                if layer.settings.mode != "add":
+                    return layer.name
+                adding = adding or layer.name
+        return adding
+
+    def holders(self) -> list[str | None]:
+        """:meth:`holder` of every parameter."""
+        return [self.holder(i) for i in range(len(self._work))]
+
+    def _apply(self, mode: Mode, given: Floats, share: Floats, out: Floats) -> None:
+        work = self._work
+        if mode == "set":
+            np.subtract(given, out, out=work)
+            work *= share
+            out += work
+            return
+        np.multiply(given, share, out=work)
+        if mode == "add":
+            out += work
+            return
+        np.greater(work, out, out=self._better)
+        np.copyto(out, work, where=self._better)
+        share *= self._better
+
+
+def by_priority(layers: Sequence[LayerSettings]) -> list[LayerSettings]:
+    """Layers in the order in which they are mixed, lowest priority first."""
+    return sorted(layers, key=lambda layer: layer.priority)
+
+
+def _only_finite(indices: Indices, values: Floats, count: int) -> tuple[NDArray[np.intp], Floats]:
+    """The finite part of ``values`` and the positions it belongs to."""
+    positions = np.arange(count)[indices]
+    spread = np.broadcast_to(values, positions.shape)
+    good = np.isfinite(spread)
+    return positions[good], spread[good]

@@ -1,0 +1,226 @@
+"""A simulated robot host: it sends a script over a pseudo-terminal and checks every answer.
+
+``python -m controller.links.host --script tour`` makes the port, prints ``ready PATH``, serves until its standard input
+ends, and prints what it counted as one line of JSON. It so ends with whoever started it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from controller.base.clock import Samples
+from controller.base.errors import OMOTE_ERRORS
+from controller.base.parameters import Parameters, standard
+from controller.base.paths import find_config
+from controller.base.signals import ENDINGS
+from controller.links.hostport import HostPort
+from controller.links.lineprotocol import MAX_REPLY, LineDecoder, LineError, Reply, format_words, number, parse_reply
+from controller.links.script import Script, Wave
+from controller.vocabulary.expression import Vocabulary
+
+_ANSWER_LIMIT_S = 1.0
+_HELLO_EVERY_S = 0.1
+_POLL_S = 0.02
+_KEPT_REFUSALS = 20
+
+
+class RobotHost:
+    """Plays a script to whoever opens the port.
+
+    Parameters
+    ----------
+    port : the host's end. script : what to send. parameters : for lines that name every parameter.
+    now_s : the time source.
+
+    Attributes
+    ----------
+    sent, accepted, refused, unanswered, damaged, streamed : lines counted.
+    refusals : the first refused lines with their answers. round_trip_ms : from a line to its answer.
+    newest : the newest streamed line.
+    """
+
+    def __init__(
+        self,
+        port: HostPort,
+        script: Script,
+        parameters: Parameters,
+        *,
+        now_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.port = port
+        self.script = script
+        self.refusals: list[str] = []
+        self.round_trip_ms = Samples(8192)
+        self.newest: Reply | None = None
+        self.counts: Counter[str] = Counter()
+        self._wave = Wave(parameters)
+        self._decoder = LineDecoder(MAX_REPLY)
+        self._waiting: dict[int, tuple[float, str]] = {}
+        self._tag = 0
+        self._now_s = now_s
+        self._greeted = False
+
+    def run(self, keep_going: Callable[[], bool]) -> None:
+        """Greet until somebody answers, then play the script, until ``keep_going()`` is false."""
+        while keep_going() and not self._greeted:
+            self._waiting.clear()
+            self.send("HELLO")
+            self._listen(self._now_s() + _HELLO_EVERY_S)
+        start_s, rounds, step, frame = self._now_s(), 0, 0, 0
+        while keep_going():
+            at_s = self._now_s() - start_s
+            if self.script.loop_s and at_s >= (rounds + 1) * self.script.loop_s:
+                rounds, step = rounds + 1, 0
+            step = self._send_steps(step, at_s - rounds * self.script.loop_s)
+            frame = self._send_frame(frame, at_s)
+            self._listen(start_s + self._next_s(step, rounds, frame, at_s))
+
+    def send(self, line: str) -> int:
+        """Send a line with a tag and a checksum; returns the tag."""
+        self._tag = self._tag % 999_999_999 + 1
+        self._waiting[self._tag] = (self._now_s(), line)
+        self.counts["sent"] += 1
+        self.port.write(format_words([line], tag=self._tag, checked=True))
+        return self._tag
+
+    def report(self) -> dict[str, object]:
+        """What was sent, how it was answered and how fast."""
+        kinds = ("sent", "accepted", "refused", "unanswered", "damaged", "unasked", "streamed")
+        return {
+            "script": self.script.name,
+            **{kind: self.counts[kind] for kind in kinds},
+            "dropped_bytes": self.port.dropped,
+            "refusals": self.refusals,
+            "round_trip_ms": self.round_trip_ms.summary(),
+        }
+
+    def _send_steps(self, step: int, at_s: float) -> int:
+        steps = self.script.steps
+        while step < len(steps) and steps[step][0] <= at_s:
+            self.send(steps[step][1])
+            step += 1
+        return step
+
+    def _send_frame(self, frame: int, at_s: float) -> int:
+        """Send every parameter when it is time; frames that were missed are left out."""
+        due = int(at_s * self.script.frames_hz) + 1
+        if self.script.frames_hz and frame < due:
+            self.send("FRAME " + " ".join(map(number, self._wave.at(at_s).tolist())))
+            return due
+        return frame
+
+    def _next_s(self, step: int, rounds: int, frame: int, at_s: float) -> float:
+        """When there is something to send next, since the start; soon when there is nothing."""
+        times = [at_s + _POLL_S]
+        if step < len(self.script.steps):
+            times.append(rounds * self.script.loop_s + self.script.steps[step][0])
+        if self.script.frames_hz:
+            times.append(frame / self.script.frames_hz)
+        return min(times)
+
+    def _listen(self, until_s: float) -> None:
+        while True:
+            data = self.port.read(until_s - self._now_s())
+            for line in self._decoder.feed(data):
+                self._take(line)
+            if self._now_s() >= until_s:
+                break
+        self._forget(self._now_s() - _ANSWER_LIMIT_S)
+
+    def _take(self, line: bytes) -> None:
+        try:
+            reply = parse_reply(line)
+        except LineError:
+            self.counts["damaged"] += 1
+            return
+        if reply is None:
+            return
+        if reply.kind in ("P", "F"):
+            self.counts["streamed"] += 1
+            self.newest = reply
+            return
+        self._answered(reply)
+
+    def _answered(self, reply: Reply) -> None:
+        asked = self._waiting.pop(reply.tag or 0, None)
+        if asked is None:
+            self.counts["unasked"] += 1
+            return
+        self._greeted = True
+        self.round_trip_ms.add((self._now_s() - asked[0]) * 1e3)
+        self.counts["accepted" if reply.ok else "refused"] += 1
+        if not reply.ok and len(self.refusals) < _KEPT_REFUSALS:
+            self.refusals.append(f"{asked[1]} -> ERR {reply.code} {reply.text}")
+
+    def _forget(self, before_s: float) -> None:
+        for tag in [tag for tag, (sent_s, _) in self._waiting.items() if sent_s < before_s]:
+            del self._waiting[tag]
+            self.counts["unanswered"] += self._greeted
+
+
+def load_script(
+    name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
+) -> Script:
+    """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
+
+    Parameters
+    ----------
+    beside : the file that names it; its folder is looked through first.
+
+    Raises
+    ------
+    ConfigError : it is not there, or wrong; every fault with its key.
+    """
+    return Script.load(
+        find_config("scripts", name, beside=beside), parameters, vocabulary or Vocabulary.load(parameters)
+    )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Serve a script in a process of its own; see the module's text."""
+    parser = argparse.ArgumentParser(prog="controller.links.host", description="simulated robot host")
+    parser.add_argument("--script", default="tour", help="a path, or a name in configs/scripts")
+    parser.add_argument("--vocabulary", type=Path, action="append", default=[], help="file of further expressions")
+    parser.add_argument("--link", type=Path, default=None, help="make this path a link to the port")
+    options = parser.parse_args(arguments)
+    for ending in (signal.SIGINT, *ENDINGS):  # they reach the whole group; the end of stdin ends this
+        signal.signal(ending, signal.SIG_IGN)
+    try:
+        parameters = standard()
+        script = load_script(options.script, parameters, Vocabulary.load(parameters, more=options.vocabulary))
+        with HostPort(options.link) as port:
+            _say(f"ready {port.path}")
+            host = RobotHost(port, script, parameters)
+            host.run(_stdin_open)
+            _say(json.dumps(host.report()))
+    except OMOTE_ERRORS as error:
+        _say("failed " + json.dumps([str(error), error.hint]))
+        return 1
+    return 0
+
+
+def _say(line: str) -> None:
+    try:
+        sys.stdout.write(line + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        pass  # whoever started it is gone
+
+
+def _stdin_open() -> bool:
+    """False once standard input has ended, which happens when the starter closes it or dies."""
+    ready, _, _ = select.select([sys.stdin], [], [], 0.0)
+    return not ready or bool(os.read(sys.stdin.fileno(), 1024))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

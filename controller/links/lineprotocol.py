@@ -1,0 +1,257 @@
+"""The omote line protocol, bytes to words and back: framing, checksums, tags, replies. No I/O here.
+
+The rules are written down for other programmers in docs/line-protocol.md; what the words of a command mean
+is in :mod:`controller.links.linecommands`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from controller.base.errors import LinkError
+
+VERSION = 1
+"""Version of the protocol, as HELLO tells it."""
+
+MAX_LINE = 1024
+"""Longest line to omote, in bytes, with tag and checksum but without the line end."""
+
+MAX_REPLY = 2048
+"""Longest line from omote, in bytes, without the line end."""
+
+_TAG = re.compile(r"#(\d{1,9})")
+_CHECKSUM = re.compile(rb"\*([0-9A-Fa-f]{2})[ \t]*\Z")
+_PRINTABLE = re.compile(rb"[\x20-\x7e\t]*\Z")
+
+
+class Code(IntEnum):
+    """Why a line was refused; 1x the line itself, 2x its words, 3x the state of omote."""
+
+    TOO_LONG = 10
+    NOT_ASCII = 11
+    BINARY = 12
+    CHECKSUM = 13
+    TAG = 14
+    COMMAND = 20
+    ARGUMENTS = 21
+    NUMBER = 22
+    NAME = 23
+    RANGE = 24
+    BUSY = 30
+
+
+class LineError(LinkError):
+    """A line that is refused.
+
+    Attributes
+    ----------
+    code : why, for programs. tag : tag of the line, None without one. checked : the line had a checksum.
+    """
+
+    def __init__(self, code: Code, reason: str, *, tag: int | None = None, checked: bool = False) -> None:
+        super().__init__(reason, hint="docs/line-protocol.md lists the commands and the error codes")
+        self.code = code
+        self.tag = tag
+        self.checked = checked
+
+
+@dataclass(frozen=True)
+class Words:
+    """A line taken apart: its tag, its words, and whether it came with a (right) checksum."""
+
+    words: tuple[str, ...]
+    tag: int | None = None
+    checked: bool = False
+
+
+@dataclass(frozen=True)
+class Reply:
+    """A line from omote, taken apart.
+
+    Attributes
+    ----------
+    kind : ``"OK"``, ``"ERR"``, or ``"P"``/``"F"`` for streamed parameters.
+    text : what follows. tag : tag of the line it answers. code : of an ERR. checked : it had a checksum.
+    """
+
+    kind: str
+    text: str = ""
+    tag: int | None = None
+    code: int | None = None
+    checked: bool = False
+
+    @property
+    def ok(self) -> bool:
+        """Whether the command was taken."""
+        return self.kind == "OK"
+
+
+def _crc_table() -> tuple[int, ...]:
+    table = []
+    for byte in range(256):
+        for _ in range(8):
+            byte = (byte << 1) ^ (0x07 if byte & 0x80 else 0)
+        table.append(byte & 0xFF)
+    return tuple(table)
+
+
+_CRC = _crc_table()
+
+
+def checksum(data: bytes) -> int:
+    """CRC-8/SMBUS of ``data``: polynomial 0x07, start 0, not reflected. Check value of b"123456789": 0xF4.
+
+    Unlike the XOR of NMEA it sees every swap of neighbouring ASCII characters and any burst of up to 8 bits.
+    """
+    crc = 0
+    for byte in data:
+        crc = _CRC[crc ^ byte]
+    return crc
+
+
+def parse_words(line: bytes) -> Words | None:
+    """Take a line (without its line end) apart; None for one with nothing in it.
+
+    Raises
+    ------
+    LineError : not printable ASCII, too long, reserved for binary frames, wrong checksum or tag.
+    """
+    if not line.strip(b" \t"):
+        return None
+    _check_bytes(line)
+    body, checked = _strip_checksum(line)
+    words = body.decode("ascii").split()
+    tag = None
+    if words and words[0].startswith("#"):
+        match = _TAG.fullmatch(words[0])
+        if match is None:
+            raise LineError(Code.TAG, "a tag is # and 1 to 9 digits", checked=checked)
+        tag = int(match[1])
+        words = words[1:]
+    if not words:
+        raise LineError(Code.COMMAND, "no command in this line", tag=tag, checked=checked)
+    return Words(tuple(words), tag, checked)
+
+
+def _check_bytes(line: bytes) -> None:
+    if line[0] >= 0x80:
+        raise LineError(Code.BINARY, "binary frames are reserved for a later version; send ASCII lines")
+    if len(line) > MAX_LINE:
+        raise LineError(Code.TOO_LONG, f"a line has at most {MAX_LINE} bytes")
+    if not _PRINTABLE.match(line):
+        raise LineError(Code.NOT_ASCII, "only printable ASCII is allowed")
+
+
+def _strip_checksum(line: bytes) -> tuple[bytes, bool]:
+    if b"*" not in line:
+        return line, False
+    match = _CHECKSUM.search(line)
+    if match is None or line.count(b"*") > 1:
+        raise LineError(Code.CHECKSUM, "* must be followed by two hexadecimal digits at the end of the line")
+    body = line[: match.start()]
+    want = checksum(body)
+    if int(match[1], 16) != want:
+        reason = f"checksum is {match[1].decode().upper()} but the line sums up to {want:02X}"
+        raise LineError(Code.CHECKSUM, reason, checked=True)
+    return body, True
+
+
+def format_words(words: Iterable[str], *, tag: int | None = None, checked: bool = False) -> bytes:
+    """A line with its line end (LF) from words."""
+    text = " ".join(words)
+    return _finish(text if tag is None else f"#{tag} {text}", checked)
+
+
+def format_ok(text: str, *, tag: int | None = None, checked: bool = False) -> bytes:
+    """The reply to a command that was taken."""
+    return format_words(["OK", text] if text else ["OK"], tag=tag, checked=checked)
+
+
+def format_error(error: LineError) -> bytes:
+    """The reply to a line that was refused."""
+    return format_words(["ERR", str(int(error.code)), str(error)], tag=error.tag, checked=error.checked)
+
+
+def _finish(text: str, checked: bool) -> bytes:
+    data = re.sub(rb"[^\x20-\x29\x2b-\x7e]", b"?", text.encode("ascii", "replace"))[: MAX_REPLY - 3]
+    return data + (b"*%02X\n" % checksum(data) if checked else b"\n")
+
+
+def parse_reply(line: bytes) -> Reply | None:
+    """Take a line from omote apart; None for an empty one. Raises LineError when it is damaged."""
+    if not line.strip(b" \t"):
+        return None
+    body, checked = _strip_checksum(line)
+    words = body.decode("ascii", "replace").split(" ", 1)
+    tag = None
+    match = _TAG.fullmatch(words[0])
+    if match is not None:
+        tag = int(match[1])
+        words = words[1].split(" ", 1) if len(words) > 1 else [""]
+    kind, text = words[0], words[1] if len(words) > 1 else ""
+    if kind == "ERR":
+        number, _, text = text.partition(" ")
+        if not number.isascii() or not number.isdigit():
+            raise LineError(Code.NUMBER, "ERR without a code")
+        return Reply(kind, text, tag, int(number), checked)
+    if kind not in ("OK", "P", "F"):
+        raise LineError(Code.COMMAND, f"not a reply: {kind!r}")
+    return Reply(kind, text, tag, None, checked)
+
+
+class LineDecoder:
+    """Cuts a byte stream into lines, whatever the stream brings.
+
+    CR and LF both end a line. A line that grows past ``limit`` is dropped up to its end and reported once,
+    as the bytes kept so far, which are one longer than ``limit``.
+    """
+
+    def __init__(self, limit: int = MAX_LINE) -> None:
+        self._limit = limit
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Lines completed by ``data``, without line ends; empty lines are left out."""
+        pieces = data.replace(b"\r", b"\n").split(b"\n")
+        lines = []
+        for piece in pieces[:-1]:
+            self._take(piece)
+            if self._buffer:
+                lines.append(bytes(self._buffer))
+            self._buffer.clear()
+        self._take(pieces[-1])
+        return lines
+
+    def clear(self) -> None:
+        """Forget a line that has begun, as after the port was lost."""
+        self._buffer.clear()
+
+    def _take(self, piece: bytes) -> None:
+        room = self._limit + 1 - len(self._buffer)
+        self._buffer += piece[:room]
+
+
+def format_frame(time_ms: int, values: np.ndarray, *, checked: bool = False) -> bytes:
+    """Every parameter, by position: ``F t v0 v1 ...``. ``values`` : (P,) float64."""
+    return _finish(f"F {time_ms} " + " ".join(map(number, values.tolist())), checked)
+
+
+def format_parameters(time_ms: int, names: Iterable[str], values: Iterable[float], *, checked: bool = False) -> bytes:
+    """Some parameters, by name: ``P t name=value ...``."""
+    return _finish(f"P {time_ms} {pairs(names, values)}", checked)
+
+
+def pairs(names: Iterable[str], values: Iterable[float]) -> str:
+    """``name=value name=value ...``."""
+    return " ".join(f"{name}={number(value)}" for name, value in zip(names, values, strict=True))
+
+
+def number(value: float) -> str:
+    """A value with at most 4 decimals and no needless zeros."""
+    text = f"{value:.4f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text

@@ -1,0 +1,156 @@
+"""Shows: a script played straight into the face, with marks, pause, seek and loop."""
+
+from __future__ import annotations
+
+import bisect
+import math
+import threading
+from collections.abc import Callable
+
+from controller.base.errors import ParameterError
+from controller.base.parameters import did_you_mean
+from controller.layers.commands import CommandSink
+from controller.links.linesession import LineSession
+from controller.links.script import Script
+
+
+class Show:
+    """Plays a script on the clock of the control loop.
+
+    Parameters
+    ----------
+    script : what to play; ``loop_s`` begins it again. sink : the face.
+
+    Attributes
+    ----------
+    playing : whether time passes. position_s : where it is. loops : how often it began again.
+    """
+
+    def __init__(self, script: Script, sink: CommandSink) -> None:
+        self.script = script
+        self.playing = False
+        self.position_s = 0.0
+        self.loops = 0
+        self._session = LineSession(sink, 0)
+        self._times = [at_s for at_s, _ in script.steps]
+        self._next = 0
+        self._last_ns: int | None = None
+
+    @property
+    def finished(self) -> bool:
+        """The last step has been played and nothing begins again."""
+        return not self.script.loop_s and self._next >= len(self._times)
+
+    @property
+    def mark(self) -> str | None:
+        """The last mark that was passed."""
+        passed = [(at_s, name) for name, at_s in self.script.marks.items() if at_s <= self.position_s]
+        return max(passed)[1] if passed else None
+
+    def play(self) -> None:
+        """Let time pass."""
+        self.playing = True
+        self._last_ns = None
+
+    def pause(self) -> None:
+        """Stop time; the face stays as it is."""
+        self.playing = False
+
+    def seek(self, to: str | float) -> None:
+        """Go to a mark or a time (s). What was said before is not said again: begin such a place with NEUTRAL.
+
+        Raises
+        ------
+        ParameterError : no such mark, or not a time from 0 on.
+        """
+        if isinstance(to, str):
+            if to not in self.script.marks:
+                raise ParameterError(f"unknown mark {to!r}{did_you_mean(to, self.script.marks)}",
+                                     hint=f"marks: {', '.join(self.script.marks) or 'none'}")  # fmt: skip
+            to = self.script.marks[to]
+        if not 0.0 <= to < math.inf:
+            raise ParameterError(f"a time must be 0 s or later, not {to}", hint="seek to 0 for the beginning")
+        self.position_s = to
+        self._next = bisect.bisect_left(self._times, to)
+        self._last_ns = None
+
+    def tick(self, now_ns: int) -> list[str]:
+        """Say what is due at ``now_ns`` (monotonic clock); returns the lines that were said."""
+        if not self.playing:
+            return []
+        if self._last_ns is not None:
+            self.position_s += (now_ns - self._last_ns) * 1e-9
+        self._last_ns = now_ns
+        said = self._say_due(now_ns)
+        if self.script.loop_s and self.position_s >= self.script.loop_s:
+            self.position_s %= self.script.loop_s
+            self._next = 0
+            self.loops += 1
+            said += self._say_due(now_ns)
+        return said
+
+    def _say_due(self, now_ns: int) -> list[str]:
+        said = []
+        while self._next < len(self._times) and self._times[self._next] <= self.position_s:
+            line = self.script.steps[self._next][1]
+            self._session.feed(line.encode("ascii") + b"\n", now_ns)
+            said.append(line)
+            self._next += 1
+        return said
+
+
+Find = Callable[[str], Script]
+
+
+class Shows:
+    """The show that plays now; links change it from their threads, the control loop ticks it.
+
+    Parameters
+    ----------
+    find : the script of a name; raises ConfigError. sink : the face.
+    """
+
+    def __init__(self, find: Find, sink: CommandSink) -> None:
+        self._find, self._sink = find, sink
+        self._show: Show | None = None
+        self._lock = threading.RLock()  # a show may start another
+
+    def start(self, name: str) -> None:
+        """Play a script from its beginning. Raises ConfigError."""
+        show = Show(self._find(name), self._sink)
+        show.play()
+        with self._lock:
+            self._show = show
+
+    def act(self, what: str, to: str | float = 0.0) -> None:
+        """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s).
+
+        Raises
+        ------
+        ParameterError : there is no show, or no such mark or time.
+        """
+        with self._lock:
+            show = self._show
+            if show is None:
+                raise ParameterError("no show plays", hint="begin one: SHOW name")
+            if what == "SEEK":
+                show.seek(to)
+            elif what == "STOP":
+                self._show = None
+            else:
+                show.play() if what == "PLAY" else show.pause()
+
+    def tick(self, now_ns: int) -> None:
+        """Say what is due."""
+        with self._lock:
+            if self._show is not None:
+                self._show.tick(now_ns)
+
+    def status(self) -> str:
+        """``off``, or the script's name, where it is (s), and whether it waits: ``tour@12.3``, ``tour@12.3,paused``."""
+        with self._lock:
+            show = self._show
+            if show is None or show.finished:
+                return "off"
+            name = show.script.name.replace(" ", "_") or "show"
+            return f"{name}@{show.position_s:.1f}" + ("" if show.playing else ",paused")

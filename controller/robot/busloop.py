@@ -1,0 +1,247 @@
+"""One bus at its own clock: the newest parameters out, measured positions back.
+
+The loop owns its bus: nobody else touches it. It reads the parameters from whoever makes them as a latest
+value, and leaves its own measurements as a latest value. It never waits for the face.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.base.clock import Clock, Samples
+from controller.base.parameters import Parameters
+from controller.robot.channels import build_table, limiter_of, play, servo_specs
+from controller.robot.following import Following, regions_of
+from controller.robot.robot import BusSettings, ChannelSettings
+from controller.robot.rules import RuleSettings
+from controller.robot.safety import Guard
+from drivers import open_bus
+from drivers.base.bus import Bus, BusState
+from drivers.base.errors import DriverError, NoReply, PortLost
+from drivers.base.priority import take_priority
+
+if TYPE_CHECKING:
+    from controller.robot.anchors import AnchorMap
+
+log = logging.getLogger(__name__)
+
+Floats = NDArray[np.float64]
+Newest = Callable[[], tuple[Floats, int]]
+
+_RETRY_NS = 1_000_000_000
+_READS = 10
+_REST_LIMIT_NS = 2_000_000_000
+_AT_REST_RAD = 0.02
+
+
+class BusLoop:
+    """Drives the channels of one bus until it is stopped.
+
+    Parameters
+    ----------
+    settings : the bus.
+    channels : its channels, one a servo.
+    parameters : the vocabulary the channels' mixes refer to.
+    newest : gives the newest parameter vector ``(p,) float64`` and the time (monotonic ns) at which the command
+        behind it arrived, 0 for none.
+    rules : what no servo does, whoever asks.
+    anchors : solves the channels that pull at the skin; those of other buses may be among them.
+    limp : switch the motors off and only read where the servos are.
+    """
+
+    def __init__(
+        self,
+        settings: BusSettings,
+        channels: Sequence[ChannelSettings],
+        parameters: Parameters,
+        newest: Newest,
+        rules: RuleSettings = RuleSettings(),
+        anchors: AnchorMap | None = None,
+        *,
+        limp: bool = False,
+    ) -> None:
+        self.settings = settings
+        own = [channel.name for channel in channels]
+        self.table = build_table(channels, parameters, anchors.on(own) if anchors is not None else None)
+        rest, _ = self.table.angles(np.zeros(len(parameters)))
+        self.bus: Bus = open_bus(settings.kind, servo_specs(channels, rest), **settings.options())
+        self.clock = Clock(settings.rate_hz)
+        self.latency_ms = Samples()
+        self.following = Following(own, regions_of(self.table, parameters))
+        self.held = 0
+        self.limp = limp
+        self.realtime = False
+        self.error: Exception | None = None
+        self._newest = newest
+        self._guard = Guard(rules, self.table, *play(channels))
+        self._limiter = limiter_of(self.table, 1.0 / settings.rate_hz)
+        self._sent = np.zeros(len(channels))
+        self._last_stamp = 0
+        self._retry_ns: int | None = None
+        self._state: BusState | None = None
+        self._stopping = threading.Event()
+        self._begun = threading.Event()
+        self._last_reason = ""
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Open the bus, bring the servos up safely and begin to drive them.
+
+        Raises
+        ------
+        DriverError
+            when the port or a servo does not come up; the bus is closed again.
+        """
+        try:
+            self.bus.open()
+            self.bus.start()
+            if self.limp:
+                self.bus.stop()
+                if not self.bus.measures:
+                    log.warning("bus %s does not measure its servos: the face cannot follow", self.settings.name)
+            self._resume()
+        except BaseException:
+            self.bus.close()
+            raise
+        self._thread = threading.Thread(target=self._run, name=f"bus {self.settings.name}", daemon=True)
+        self._thread.start()
+
+    def begin(self) -> None:
+        """Follow the parameters from now on; until then the servos are held where they stood."""
+        self._begun.set()
+
+    def stop(self) -> None:
+        """Stop driving, switch torque off on every reachable servo and close the port."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+        try:
+            self.bus.stop()
+        finally:
+            self.bus.close()
+
+    def measured(self) -> BusState | None:
+        """The newest measurement, or None before the first."""
+        return self._state
+
+    def _resume(self) -> None:
+        """Begin from where the servos are, so that the first goals are a ramp from there."""
+        state = self._all_fresh()
+        self._sent[:] = np.clip(state.position_rad, self.table.low_rad, self.table.high_rad)
+        self._limiter.reset(self._sent)
+
+    def _all_fresh(self) -> BusState:
+        """A measurement in which every servo answered.
+
+        Raises
+        ------
+        NoReply
+            when some keep silent: a pose that was missed or is old is none to begin from.
+        """
+        for _ in range(_READS):
+            state = self._state = self.bus.read()
+            if state.fresh.all() or not self.bus.measures:
+                return state
+        names = [name for name, fresh in zip(self.table.names, state.fresh, strict=True) if not fresh]
+        raise NoReply(
+            f"bus {self.settings.name}: where {', '.join(names)} stands is not known, for no answer came",
+            hint="look at its cable, then start again",
+        )
+
+    def _run(self) -> None:
+        self.realtime = take_priority()
+        try:
+            for now in self.clock.run(lambda: not self._stopping.is_set()):
+                if self._retry_ns is None:
+                    self._cycle()
+                elif now >= self._retry_ns:
+                    self._reconnect(now)
+            if not self.limp:
+                self._come_to_rest()
+        except Exception as error:  # noqa: BLE001  the body has to hear of it and stop the servos
+            self.error = error
+
+    def _cycle(self) -> None:
+        try:
+            if self.limp:
+                self._state = self.bus.read()
+            else:
+                self._drive()
+        except PortLost as error:
+            log.warning("%s; trying again every %g s", error, _RETRY_NS / 1e9)
+            self._retry_ns = 0
+
+    def _drive(self) -> None:
+        if not self._begun.is_set():
+            self.bus.write(self._sent)
+            self._state = self.bus.read()
+            return
+        values, stamp = self._newest()
+        angles, held = self.table.angles(values)
+        self.held += held
+        self._send(angles)
+        self._note_latency(stamp)
+        self._state = self.bus.read()
+        self.following.note(angles, self._state)
+
+    def _send(self, angles: Floats) -> None:
+        """One step towards ``angles`` (n,) rad, as far as the rules and the limits of motion allow."""
+        dt = self.clock.period_ns / 1e9
+        allowed = self._guard.apply(angles, self._sent, self._limiter.rest(dt), self._state, dt)
+        self._limiter.step(dt, allowed, self._sent)
+        self.bus.write(self._sent)
+
+    def _come_to_rest(self) -> None:
+        """Lead the servos to the neutral face before they go limp, so that no part of the head drops."""
+        rest, _ = self.table.angles(np.zeros(self.table.mix.shape[1]))
+        end_ns = time.monotonic_ns() + _REST_LIMIT_NS
+        with suppress(DriverError):  # a bus that does not work is stopped as it is
+            for now in Clock(self.settings.rate_hz).run(lambda: self._retry_ns is None):
+                self._send(rest)
+                state = self._state = self.bus.read()
+                known = state.fresh | (not self.bus.measures)
+                away = np.where(known, np.abs(state.position_rad - rest), np.inf)
+                if now > end_ns or away.max() < _AT_REST_RAD:
+                    return
+
+    def _reconnect(self, now: int) -> None:
+        """One attempt to get a lost port back; motion goes on from where the servos are found."""
+        try:
+            self.bus.reconnect()
+            self._resume()
+        except DriverError as error:
+            if str(error) != self._last_reason:
+                self._last_reason = str(error)
+                log.warning("bus %s is not back: %s", self.settings.name, error)
+            self._retry_ns = now + _RETRY_NS
+        else:
+            log.warning("bus %s is back", self.settings.name)
+            self._retry_ns = None
+
+    def _note_latency(self, stamp: int) -> None:
+        if stamp > self._last_stamp:
+            self._last_stamp = stamp
+            self.latency_ms.add((time.monotonic_ns() - stamp) / 1e6)
+
+    def report(self) -> dict[str, object]:
+        """What was measured: rate and jitter, command-to-wire latency, errors by kind, limits hit."""
+        return {
+            "name": self.settings.name,
+            "servos": len(self.table.names),
+            "realtime": self.realtime,
+            **self.clock.report(),
+            "command_to_wire_ms": self.latency_ms.summary(),
+            "channels_held_at_limit": self.held,
+            "rules": self._guard.report(),
+            "face_difference": self.following.report(),
+            "bus": self.bus.report().as_dict(),
+            "fault": str(self.error) if self.error else None,
+        }

@@ -1,0 +1,211 @@
+"""A stage: one head, the links that command it and the robots that make the same face."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from controller.base.config import Settings, load
+from controller.base.errors import ConfigError, TakeError
+from controller.base.parameters import Parameters
+from controller.base.paths import find_config
+from controller.layers.commands import CommandState
+from controller.layers.layers import load_layers
+from controller.layers.life import LifeSettings
+from controller.layers.mixer import LayerSettings
+from controller.links.host import load_script
+from controller.robot.robot import RobotSettings, load_robot
+from controller.stage.identity import check_identity
+from controller.stage.picture import PictureSettings
+from controller.takes.speech import load_take
+from controller.vocabulary.expression import Vocabulary
+
+if TYPE_CHECKING:
+    from surface.head import Head
+
+Pixels = Annotated[int, Field(ge=16, le=16384)]
+
+
+class FaceSettings(PictureSettings):
+    """How the picture is drawn."""
+
+    size: tuple[Pixels, Pixels] = (1280, 720)
+    fps: Annotated[float, Field(ge=1, le=1000)] = 60.0
+
+
+class LinkSettings(Settings):
+    """One way commands come in. ``simulated`` starts the simulated robot host with ``script``."""
+
+    kind: Literal["line"] = "line"
+    port: str
+    baud: Annotated[int, Field(ge=300, le=12_000_000)] = 115_200
+    script: str | None = None
+
+    @model_validator(mode="after")
+    def _script_is_simulated(self) -> LinkSettings:
+        if self.script is not None and self.port != "simulated":
+            raise ValueError('script needs port = "simulated"')
+        return self
+
+
+class StageSettings(Settings):
+    """What a stage file holds."""
+
+    name: str
+    description: str = ""
+    head: str = "ict"
+    identity: dict[str, Annotated[float, Field(ge=0, le=1)]] = {}
+    robots: list[str] = []
+    control_hz: Annotated[float, Field(ge=10, le=1000)] = 100.0
+    liveliness: Annotated[float, Field(ge=0, le=1)] = 0.0
+    life: str = "natural"
+    seed: Annotated[int, Field(ge=0)] = 0
+    vocabularies: list[str] = []
+    show: str | None = None
+    take: str | None = None
+    voice: str | None = None
+    voice_hz: Annotated[int, Field(ge=1000)] | None = None
+    groups: dict[str, Annotated[float, Field(ge=-1, le=1)]] = {}
+    layers: dict[str, dict[str, Any]] = {}
+    face: FaceSettings = FaceSettings()
+    links: list[LinkSettings] = []
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage with everything it refers to found and checked.
+
+    Attributes
+    ----------
+    path : the stage's file.
+    settings : its content.
+    head : folder of the head.
+    robots : the robots, in file order.
+    vocabulary : the named expressions, the user's own from files ``vocabularies`` among them.
+    layers : the layers. life : figures of idle life. groups : group files the head wears, and how much.
+    """
+
+    path: Path
+    settings: StageSettings
+    head: Path
+    robots: tuple[RobotSettings, ...]
+    vocabularies: tuple[Path, ...]
+    vocabulary: Vocabulary
+    layers: tuple[LayerSettings, ...]
+    life: LifeSettings
+    groups: tuple[tuple[Path, float], ...] = ()
+
+    def file(self, name: str) -> Path:
+        """A file the stage names: beside it, or a path."""
+        beside = self.path.parent / name
+        return beside if beside.exists() else Path(name)
+
+    @property
+    def period_s(self) -> float:
+        """Length of a tick."""
+        return 1.0 / self.settings.control_hz
+
+    def load_head(self) -> Head:
+        """The head as the stage wants it; see :func:`load_head`."""
+        return load_head(self.head, self.settings.identity, self.groups)
+
+    def state(self, parameters: Parameters, seed: int | None = None, period_s: float | None = None) -> CommandState:
+        """A face of its own, as the stage wants it; nothing is commanded yet."""
+        return CommandState(
+            parameters,
+            self.vocabulary,
+            self.layers,
+            life=self.life,
+            seed=self.settings.seed if seed is None else seed,
+            period_s=period_s or self.period_s,
+        )
+
+
+def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]]) -> Head:
+    """A head with identities mixed in and groups worn, each by its amount.
+
+    Raises
+    ------
+    SurfaceError : the head cannot be read. ConfigError : a group does not fit it.
+    """
+    from controller.stage.dragging import load_group, wear
+    from surface.head import Head
+
+    head = Head.load(folder, identity)
+    for path, amount in groups:
+        wear(head, load_group(path, head)[1], amount)
+    return head
+
+
+def load_stage(name: str, parameters: Parameters) -> Stage:
+    """Find, read and cross-check a stage and all it refers to.
+
+    Parameters
+    ----------
+    name : a path, or the name of a file in ``configs/stages``.
+
+    Raises
+    ------
+    ConfigError
+        listing every fault of the stage and of the files it names.
+    """
+    path = find_config("stages", name)
+    found: list[Stage] = []
+
+    def check(settings: StageSettings) -> list[str]:
+        faults: list[str] = []
+        found[:] = [_gather(path, settings, parameters, faults)]
+        return faults
+
+    load(path, StageSettings, check)
+    return found[0]
+
+
+def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
+    """All that a stage refers to; what is wrong with it goes to ``faults``, and leaves the stage unfit for use."""
+    head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
+    if head is not None and settings.identity:
+        _collect(faults, "identity", lambda: check_identity(head, settings.identity))
+    robots = [
+        _collect(
+            faults, f"robots[{i}]", lambda name=name: load_robot(find_config("robots", name, beside=path), parameters)
+        )
+        for i, name in enumerate(settings.robots)
+    ]
+    more = _files(faults, "vocabularies", settings.vocabularies, path)
+    groups = _files(faults, "groups", list(settings.groups), path)
+    vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
+    layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
+    life = _collect(faults, "life", lambda: LifeSettings.named(settings.life, parameters))
+    scripts = [("show", settings.show)] + [(f"links[{i}].script", link.script) for i, link in enumerate(settings.links)]
+    for key, script in scripts:
+        if script is not None:
+            _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
+    worn = tuple(zip(groups, settings.groups.values(), strict=False))
+    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, worn)
+    if settings.take is not None:
+        _collect(faults, "take", lambda: load_take(stage.file(str(settings.take)), parameters))
+    return stage
+
+
+def _files(faults: list[str], kind: str, names: list[str], path: Path) -> tuple[Path, ...]:
+    """The files of one kind that a stage names, those that are there."""
+    found = [
+        _collect(faults, f"{kind}[{i}]", lambda name=name: find_config(kind, name, beside=path))
+        for i, name in enumerate(names)
+    ]
+    return tuple(file for file in found if file is not None)
+
+
+def _collect(faults: list[str], key: str, read):  # type: ignore[no-untyped-def]
+    """Run ``read``; a configuration error becomes a fault of ``key``, so that all are seen at once."""
+    try:
+        return read()
+    except (ConfigError, TakeError) as error:
+        hint = f" ({error.hint})" if error.hint and "\n" not in str(error) else ""
+        faults.append(f"{key}: {error}{hint}".replace("\n", "\n  "))
+        return None

@@ -1,0 +1,277 @@
+"""Takes of Live Link Face: the CSV file, its traps, and playing it at its own rate.
+
+What the format hides (measured on public takes): the timecode counts frames of 1/60 s even in takes of 30 Hz; rows
+are missing; values may exceed 1; head angles that are zero throughout mean "not recorded"; eye angles repeat what the
+eyeLook columns say; and the labels JawLeft/JawRight and MouthLeft/MouthRight are swapped against the smile's.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.base.errors import ParameterError, TakeError
+from controller.base.parameters import Floats, Parameters, fold
+
+_FRAMES_PER_S = 60.0
+_DAY_S = 86_400.0
+_TIMECODE = re.compile(r"\s*(\d{1,2}):(\d{1,2}):(\d{1,2}):(\d{1,2}(?:\.\d*)?)\s*")
+_SWAPPED = {"jawLeft": "jawRight", "jawRight": "jawLeft", "mouthLeft": "mouthRight", "mouthRight": "mouthLeft"}
+_HEAD = ("headYaw", "headPitch", "headRoll")
+_EYES = ("leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
+_NEGATED = ("headYaw", "leftEyeYaw", "rightEyeYaw")
+"""Live Link counts yaw positive to the subject's right (seen in the eyes; taken to hold for the head)."""
+_HINT = "a Live Link Face take begins with the line Timecode,BlendShapeCount,EyeBlinkLeft,..."
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A recorded take.
+
+    Attributes
+    ----------
+    name : file name. times_s : (n,) float64, from 0, rising. values : (n, P) float64, normalised but not clipped.
+    mask : (P,) bool, which parameters the take drives. low, high : (P,) range that :meth:`sample` keeps to.
+    through : (P,) how much of the layers below shows through, 0..1; None for nothing.
+    """
+
+    name: str
+    times_s: Floats
+    values: Floats
+    mask: NDArray[np.bool_]
+    low: Floats
+    high: Floats
+    through: Floats | None = None
+
+    @classmethod
+    def load(
+        cls, path: Path, parameters: Parameters, *, swap_jaw_mouth_lr: bool = True, use_eye_angles: bool = False
+    ) -> Take:
+        """Read a CSV take.
+
+        Parameters
+        ----------
+        path : the file. parameters : the registry.
+        swap_jaw_mouth_lr : take the labels jaw and mouth left and right for each other, as the evidence has it.
+        use_eye_angles : drive the eyes by the eye angle columns even when eyeLook columns carry data; these are
+            left out then, for the eyes must not turn twice.
+
+        Raises
+        ------
+        TakeError : the file cannot be read or a cell is wrong; names file, line and column.
+        """
+        columns, times, table = _read(Path(path))
+        values, present = _by_parameter(columns, table, parameters, swap_jaw_mouth_lr)
+        _leave_out(values, present, parameters, use_eye_angles)
+        for array in (times, values, present):
+            array.flags.writeable = False
+        return cls(Path(path).name, times, values, present, parameters.low, parameters.high)
+
+    @property
+    def frames(self) -> int:
+        """How many rows there are."""
+        return len(self.times_s)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first row to the last."""
+        return float(self.times_s[-1])
+
+    @property
+    def rate_hz(self) -> float:
+        """Rows per second where none is missing, from the median step of the timecode; 0 for a single row."""
+        return float(1.0 / np.median(np.diff(self.times_s))) if self.frames > 1 else 0.0
+
+    @property
+    def gaps(self) -> int:
+        """How many steps are longer than one and a half rows."""
+        steps = np.diff(self.times_s)
+        return int(np.count_nonzero(steps > 1.5 * np.median(steps))) if len(steps) else 0
+
+    def sample(self, t: float, out: Floats) -> Floats:
+        """Write the parameters at ``t`` s into ``out`` : (P,), straight between rows, kept in range."""
+        t = min(max(t, 0.0), self.duration_s)
+        after = min(int(np.searchsorted(self.times_s, t, side="right")), self.frames - 1)
+        before = max(after - 1, 0)
+        span = self.times_s[after] - self.times_s[before]
+        share = (t - self.times_s[before]) / span if span > 0.0 else 1.0
+        np.subtract(self.values[after], self.values[before], out=out)
+        out *= share
+        out += self.values[before]
+        return np.clip(out, self.low, self.high, out=out)
+
+
+class LayerSink(Protocol):
+    """Whatever a take can be played into: a command state, or a recorder of one."""
+
+    def write_layer(
+        self,
+        name: str,
+        values: Floats,
+        mask: NDArray[np.bool_],
+        now_ns: int,
+        stamp_ns: int = 0,
+        *,
+        through: Floats | None = None,
+    ) -> None:
+        """Give a layer the values of the mask and release the rest."""
+
+
+class TakePlayer:
+    """Plays a take into a layer at its own rate.
+
+    Parameters
+    ----------
+    take : what to play. state : where. layer : ``"capture"``, or ``"speech"`` for a mouth that leaves the rest alone.
+
+    Attributes
+    ----------
+    finished : the last row has been given.
+    """
+
+    def __init__(self, take: Take, state: LayerSink, layer: str = "capture") -> None:
+        self.take = take
+        self._layer = layer
+        self.finished = False
+        self._state = state
+        self._values = np.zeros(take.values.shape[1])
+        self._start_ns: int | None = None
+
+    @property
+    def position_s(self) -> float:
+        """How far it has played."""
+        return self._position_s
+
+    _position_s = 0.0
+
+    def tick(self, now_ns: int) -> None:
+        """Give the layer the values of ``now_ns`` (monotonic clock); the first call is the take's beginning."""
+        if self._start_ns is None:
+            self._start_ns = now_ns
+        self._position_s = (now_ns - self._start_ns) * 1e-9
+        if self.finished:
+            return
+        self.finished = self._position_s >= self.take.duration_s
+        values = self.take.sample(self._position_s, self._values)
+        self._state.write_layer(self._layer, values, self.take.mask, now_ns, now_ns, through=self.take.through)
+
+
+def _read(path: Path) -> tuple[list[str], Floats, Floats]:
+    """Column names (folded, without timecode and count), times from the first row (s) and cells (n, columns)."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.reader(file))
+    except OSError as error:
+        raise TakeError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise TakeError(f"{path}: not a CSV file: {error}", hint=_HINT) from error
+    if not rows:
+        raise TakeError(f"{path}: the file is empty", hint=_HINT)
+    header = [cell.strip() for cell in rows[0]]
+    folded = [fold(cell) for cell in header]
+    if "timecode" not in folded:
+        raise TakeError(f"{path}, line 1: no column Timecode", hint=_HINT)
+    lines = [(number, row) for number, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
+    if not lines:
+        raise TakeError(f"{path}: a header but no rows", hint="record the take again, or export it again")
+    return _cells(path, header, folded, lines)
+
+
+def _cells(
+    path: Path, header: list[str], folded: list[str], lines: list[tuple[int, list[str]]]
+) -> tuple[list[str], Floats, Floats]:
+    for number, row in lines:
+        if len(row) != len(header):
+            raise TakeError(
+                f"{path}, line {number}: {len(row)} cells where the header has {len(header)}",
+                hint="the file may be cut off; export the take again",
+            )
+    clock = folded.index("timecode")
+    keep = [i for i, name in enumerate(folded) if name not in ("timecode", "blendshapecount", "framerate")]
+    times = _unwrap(np.array([_timecode(path, number, row[clock]) for number, row in lines]))
+    back = np.flatnonzero(np.diff(times) < 0)
+    if len(back):
+        raise TakeError(
+            f"{path}, line {lines[back[0] + 1][0]}, column Timecode: goes back in time",
+            hint="two takes in one file? split it there",
+        )
+    try:
+        table = np.array([[row[i] for i in keep] for _, row in lines], dtype=np.float64)
+    except ValueError:
+        table = np.full((1, 1), math.nan)
+    if not np.isfinite(table).all():
+        raise _bad_cell(path, header, keep, lines)
+    return [folded[i] for i in keep], times, table
+
+
+def _bad_cell(path: Path, header: list[str], keep: Sequence[int], lines: list[tuple[int, list[str]]]) -> TakeError:
+    """Look for the cell that is not a finite number, now that there is one."""
+    for number, row in lines:
+        for i in keep:
+            try:
+                good = math.isfinite(float(row[i]))
+            except ValueError:
+                good = False
+            if not good:
+                return TakeError(
+                    f"{path}, line {number}, column {header[i]}: {row[i]!r} is not a finite number",
+                    hint="mend or remove that line",
+                )
+    return TakeError(f"{path}: a cell is not a finite number", hint="export the take again")
+
+
+def _timecode(path: Path, number: int, text: str) -> float:
+    """Seconds since midnight; the frame counts 1/60 s."""
+    match = _TIMECODE.fullmatch(text)
+    if match is None:
+        raise TakeError(
+            f"{path}, line {number}, column Timecode: {text!r} is not HH:MM:SS:FF.fff", hint="mend or remove that line"
+        )
+    hours, minutes, seconds = (int(group) for group in match.groups()[:3])
+    return 3600 * hours + 60 * minutes + seconds + float(match[4]) / _FRAMES_PER_S
+
+
+def _unwrap(times: Floats) -> Floats:
+    """Seconds from the first row; a fall by more than half a day is midnight."""
+    days = np.cumsum(np.diff(times, prepend=times[0]) < -_DAY_S / 2)
+    return times + _DAY_S * days - times[0]
+
+
+def _by_parameter(
+    columns: list[str], table: Floats, parameters: Parameters, swap: bool
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Cells (n, P) under their parameters, angles normalised, and which parameters there are columns for."""
+    values = np.zeros((len(table), len(parameters)))
+    present = np.zeros(len(parameters), dtype=bool)
+    for column, cells in zip(columns, table.T, strict=True):
+        try:
+            i = parameters.index(column)
+        except ParameterError:
+            continue  # emotion columns of other programs, eye rolls: nothing here moves by them
+        if swap:
+            i = parameters.index(_SWAPPED.get(parameters.names[i], parameters.names[i]))
+        full = parameters.full_scale_rad[i]
+        sign = -1.0 if parameters.names[i] in _NEGATED else 1.0
+        values[:, i] = cells if math.isnan(full) else sign * cells / full
+        present[i] = True
+    return values, present
+
+
+def _leave_out(values: Floats, present: NDArray[np.bool_], parameters: Parameters, use_eye_angles: bool) -> None:
+    """Drop columns that carry nothing or say the same as others; changes both arrays."""
+    head, eyes = parameters.indices(_HEAD), parameters.indices(_EYES)
+    looks = np.array([i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")])
+    if not values[:, head].any():
+        present[head] = False
+    dropped = looks if use_eye_angles and values[:, eyes].any() else eyes
+    if dropped is looks or values[:, looks].any():
+        values[:, dropped] = 0.0
+        present[dropped] = True  # held at zero, so that no lower layer adds its own gaze

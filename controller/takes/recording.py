@@ -1,0 +1,302 @@
+"""Recordings: every command and every tick as it came, so that a run can be played again bit by bit.
+
+A recording is a text file, one JSON list a line: a header, then ``["name", ...arguments]`` of each call in the order it
+took effect. A tick also carries the CRC-32 of the parameters that came out of it.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.base.errors import ControllerError
+from controller.base.parameters import Floats, Parameters
+from controller.layers.commands import CommandState, StatusValue, Watch
+from controller.vocabulary.expression import Vocabulary
+
+if TYPE_CHECKING:
+    from controller.links.show import Shows
+
+SUFFIX = ".rec"
+"""What names of recordings end in."""
+
+_VERSION = 1
+_COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live", "set_gains")
+
+
+Maker = Callable[[Parameters, int, float], CommandState]
+
+
+def _plain(parameters: Parameters, seed: int, period_s: float) -> CommandState:
+    """A command state with everything as shipped."""
+    return CommandState(parameters, seed=seed, period_s=period_s)
+
+
+class Recorder:
+    """A command state that writes down what is asked of it; stands wherever a command state does.
+
+    Parameters
+    ----------
+    state : what does the work. path : the file to write.
+    seed, period_s : those of ``state``, for the replay.
+
+    Raises
+    ------
+    ControllerError : the file cannot be written.
+    """
+
+    def __init__(self, state: CommandState, path: Path, *, seed: int = 0, period_s: float = 0.01) -> None:
+        self.state = state
+        self.parameters: Parameters = state.parameters
+        self.vocabulary: Vocabulary = state.vocabulary
+        self.mixer, self.limiter = state.mixer, state.limiter
+        self.shows: Shows | None = None
+        self._lock = threading.Lock()
+        try:
+            self._file: TextIO = path.open("w", encoding="ascii")
+        except OSError as error:
+            raise ControllerError(f"{path}: cannot be written: {error.strerror}", hint="choose another path") from error
+        self._write("omote recording", _VERSION, seed, period_s, list(state.parameters.names))
+
+    def tick(self, now_ns: int, dt: float, out: Floats) -> int:
+        """See :meth:`CommandState.tick`."""
+        with self._lock:
+            stamp_ns = self.state.tick(now_ns, dt, out)
+            self._write("tick", now_ns, dt, zlib.crc32(out.tobytes()))
+            return stamp_ns
+
+    def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        self._do("set_parameters", [int(i) for i in indices], [float(v) for v in values], stamp_ns)
+
+    def release(self, indices: Sequence[int], stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        self._do("release", [int(i) for i in indices], stamp_ns)
+
+    def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        self._do("expression", name, intensity, duration_s, stamp_ns)
+
+    def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        self._do("gaze", yaw_rad, pitch_rad, stamp_ns)
+
+    def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        self._do("gaze_at", x_mm, y_mm, z_mm, stamp_ns)
+
+    def gaze_off(self, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        self._do("gaze_off", stamp_ns)
+
+    def neutral(self, seconds: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        self._do("neutral", seconds, stamp_ns)
+
+    def live(self, amount: float, stamp_ns: int) -> None:
+        """See :class:`CommandSink`."""
+        self._do("live", amount, stamp_ns)
+
+    def write_layer(
+        self,
+        name: str,
+        values: Floats,
+        mask: NDArray[np.bool_],
+        now_ns: int,
+        stamp_ns: int = 0,
+        *,
+        through: Floats | None = None,
+    ) -> None:
+        """See :meth:`CommandState.write_layer`."""
+        with self._lock:
+            self.state.write_layer(name, values, mask, now_ns, stamp_ns, through=through)
+            held = np.flatnonzero(mask)
+            shown = None if through is None else through.tolist()
+            self._write("write_layer", name, held.tolist(), values[held].tolist(), now_ns, stamp_ns, shown)
+
+    def capture(self, values: Floats, mask: NDArray[np.bool_], now_ns: int, stamp_ns: int = 0) -> None:
+        """See :meth:`CommandState.capture`."""
+        self.write_layer("capture", values, mask, now_ns, stamp_ns)
+
+    def set_gains(self, name: str, gains: Mapping[str, float]) -> None:
+        """See :meth:`CommandState.set_gains`."""
+        self._do("set_gains", name, dict(gains))
+
+    def snapshot(self, out: Floats) -> None:
+        """See :class:`CommandSink`."""
+        self.state.snapshot(out)
+
+    @property
+    def watch(self) -> Watch | None:
+        """See :class:`CommandState`."""
+        return self.state.watch
+
+    @watch.setter
+    def watch(self, watch: Watch | None) -> None:
+        self.state.watch = watch
+
+    def measured(self, out: Floats) -> bool:
+        """See :class:`CommandSink`."""
+        return self.state.measured(out)
+
+    def holder(self, index: int) -> str | None:
+        """See :class:`CommandSink`."""
+        return self.state.holder(index)
+
+    def layer_names(self) -> tuple[str, ...]:
+        """See :class:`CommandSink`."""
+        return self.state.layer_names()
+
+    def status(self) -> dict[str, StatusValue]:
+        """See :class:`CommandSink`."""
+        return self.state.status()
+
+    def close(self) -> None:
+        """Finish the file; may be called again."""
+        with self._lock:
+            self._file.close()
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _do(self, name: str, *arguments: Any) -> None:
+        """Hand a command on and write it down, as one step: the order in the file is the order of effect."""
+        with self._lock:
+            getattr(self.state, name)(*arguments)
+            self._write(name, *arguments)
+
+    def _write(self, *items: Any) -> None:
+        if not self._file.closed:
+            self._file.write(json.dumps(items, separators=(",", ":")) + "\n")
+
+
+Face = CommandState | Recorder
+"""What sources write to and the control loop ticks."""
+
+
+def replay(
+    path: Path, parameters: Parameters, *, check: bool = True, make: Maker = _plain
+) -> Iterator[tuple[int, Floats]]:
+    """Play a recording again: time (ns) and parameters (P,) of each tick; the array is used again for the next.
+
+    Parameters
+    ----------
+    check : compare each tick with the recorded one.
+    make : makes the state to play into, of the parameters, a seed and the length of a tick (s).
+
+    Raises
+    ------
+    ControllerError : the file cannot be read, is damaged, or ``check`` finds a tick that came out differently.
+    """
+    lines = _lines(path)
+    seed, period_s = _header(path, lines, parameters)
+    state, out = make(parameters, seed, period_s), parameters.neutral()
+    for number, items in lines:
+        try:
+            if items[0] == "tick":
+                now_ns, dt, crc = items[1:]
+                state.tick(now_ns, dt, out)
+                if check and zlib.crc32(out.tobytes()) != crc:
+                    raise ControllerError(
+                        f"{path}, line {number}: this tick came out differently from the recorded one",
+                        hint="it was recorded with another stage, other vocabularies or another version of omote",
+                    )
+                yield now_ns, out
+            else:
+                _again(state, items)
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise _damaged(path, number) from error
+
+
+class Replay:
+    """Plays a recording at its own pace; ticks where a command state would, and takes no commands.
+
+    Parameters
+    ----------
+    path, parameters, make : see :func:`replay`.
+
+    Attributes
+    ----------
+    finished : the last tick has been given. ticks : how many were. played_s : how far it is.
+    """
+
+    def __init__(self, path: Path, parameters: Parameters, make: Maker = _plain) -> None:
+        self._ticks = replay(path, parameters, make=make)
+        self._next = self._pull()
+        self._start_ns = (0, 0)
+        self.finished = False
+        self.ticks, self.played_s = 0, 0.0
+
+    def tick(self, now_ns: int, dt: float, out: Floats) -> int:
+        """Write the recorded parameters of this time to ``out`` : (P,); returns 0, for no command came."""
+        if not self.ticks and self._next is not None:
+            self._start_ns = now_ns, self._next[0]
+        begun, first = self._start_ns
+        while self._next is not None and self._next[0] - first <= now_ns - begun:
+            out[:] = self._next[1]
+            self.played_s = (self._next[0] - first) * 1e-9
+            self.ticks += 1
+            self._next = self._pull()
+        self.finished = self._next is None
+        return 0
+
+    def _pull(self) -> tuple[int, Floats] | None:
+        found = next(self._ticks, None)
+        return None if found is None else (found[0], found[1].copy())
+
+
+def _again(state: CommandState, items: list[Any]) -> None:
+    name, *arguments = items
+    if name in _COMMANDS:
+        getattr(state, name)(*arguments)
+        return
+    if name != "write_layer":
+        raise ValueError(name)
+    layer, held, given, now_ns, stamp_ns, through = arguments
+    values, mask = state.parameters.neutral(), np.zeros(len(state.parameters), dtype=bool)
+    values[held], mask[held] = given, True
+    state.write_layer(layer, values, mask, now_ns, stamp_ns, through=None if through is None else np.array(through))
+
+
+def _lines(path: Path) -> Iterator[tuple[int, list[Any]]]:
+    try:
+        with path.open(encoding="ascii") as file:
+            for number, line in enumerate(file, 1):
+                try:
+                    items = json.loads(line)
+                except ValueError as error:
+                    raise _damaged(path, number) from error
+                if not isinstance(items, list) or not items:
+                    raise _damaged(path, number)
+                yield number, items
+    except OSError as error:
+        raise ControllerError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+    except UnicodeDecodeError as error:
+        raise ControllerError(f"{path}: not a recording", hint="omote writes recordings as ASCII text") from error
+
+
+def _header(path: Path, lines: Iterator[tuple[int, list[Any]]], parameters: Parameters) -> tuple[int, float]:
+    """Seed and length of a tick (s), once the header says that this is a recording of these parameters."""
+    _, items = next(lines, (1, []))
+    if len(items) != 5 or items[:2] != ["omote recording", _VERSION] or not isinstance(items[2], int):
+        raise ControllerError(f"{path}: not a recording of version {_VERSION}", hint="record it again")
+    if items[4] != list(parameters.names):
+        raise ControllerError(f"{path}: recorded with other parameters", hint="use the vocabulary it was recorded with")
+    return items[2], float(items[3])
+
+
+def _damaged(path: Path, number: int) -> ControllerError:
+    return ControllerError(f"{path}, line {number}: damaged", hint="the recording may be cut off; record it again")

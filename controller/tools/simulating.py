@@ -1,0 +1,210 @@
+"""Serving simulated hardware until interrupted, for ``omote simulate``."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+
+from controller.base.errors import ConfigError
+from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
+from controller.base.signals import stop_flag
+from controller.robot.buses import BOARDS, SIMULATION, BusSettings
+from controller.robot.channels import servo_specs
+from controller.robot.robot import ChannelSettings, load_robot
+from controller.tools.watching import Watch
+from drivers.tools.traffic import Decoder
+
+if TYPE_CHECKING:
+    from drivers.sim.serving.serve import PortServer
+    from drivers.sim.wire.line import Line
+
+Where = Path | str | None
+"""A path that becomes a link to a pseudo-terminal, or a URL to listen at instead."""
+
+
+@dataclass(frozen=True)
+class SimulatedId:
+    """A servo to simulate: ``id`` on the bus and vendor ``model`` name."""
+
+    id: int
+    model: str
+
+
+@dataclass(frozen=True)
+class Serving:
+    """Where and how something is served.
+
+    Attributes
+    ----------
+    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT``.
+    wire : bytes take the time they take at the baud rate. latency_s : a USB adapter's latency timer besides.
+    faults : faults to inject, see docs/simulated-buses.md.
+    control : path of a socket that takes faults while it runs.
+    watch : show the servos and the traffic while it runs.
+    """
+
+    link: Where = None
+    wire: bool = False
+    latency_s: float = 0.0
+    faults: tuple[str, ...] = ()
+    control: Path | None = None
+    watch: bool = False
+
+
+def serve_servos(servos: list[SimulatedId], baud: int, how: Serving, console: Console) -> None:
+    """Serve simulated servos; prints ``ready PATH`` and returns when interrupted.
+
+    Parameters
+    ----------
+    servos : ids and models; the model decides the protocol.
+    baud : rate the servos listen at.
+    """
+    from drivers.sim.serving.serve import make_chain, make_servos
+    from drivers.tables.tables import load_table
+    from drivers.tools.traffic import Decoder1, Decoder2
+
+    tables = {servo.id: load_table(servo.model) for servo in servos}
+    decoder = (Decoder1 if any(table.protocol == 1 for table in tables.values()) else Decoder2)(tables)
+    now_s = time.monotonic()
+    _serve(make_chain(make_servos(servos, 0, baud, now_s), now_s, 0), baud, how, console, decoder)
+
+
+def _serve(line: Line, baud: int, how: Serving, console: Console, decoder: Decoder) -> None:
+    from drivers.sim.serving.serve import serve
+
+    line.faults.add(how.faults, time.monotonic())
+    with _watching(decoder if how.watch else None, console) as look:
+        _until_stopped(
+            lambda stop: serve(
+                line,
+                how.link,
+                lambda path: _say_ready(path, console),
+                baud=baud,
+                wire=how.wire,
+                latency_s=how.latency_s,
+                commands=how.control,
+                stop=stop,
+                on_server=look,
+            )
+        )
+
+
+@contextmanager
+def _watching(decoder: Decoder | None, console: Console) -> Iterator[Callable[[PortServer], None]]:
+    """Gives what begins to watch a server; the view ends with the block. Without a decoder nobody watches."""
+    over = threading.Event()
+    threads: list[threading.Thread] = []
+
+    def look(server: PortServer) -> None:
+        if decoder is None:
+            return
+
+        def rows() -> list[dict[str, Any]]:
+            with server.chain.lock:
+                return server.chain.describe(time.monotonic())
+
+        watch = Watch(f"simulated bus on {server.port.path}", rows, decoder, console)
+        server.tap = watch.tap
+        threads.append(threading.Thread(target=watch.run, args=(lambda: not over.is_set(),)))
+        threads[-1].start()
+
+    try:
+        yield look
+    finally:
+        over.set()
+        for thread in threads:
+            thread.join()
+
+
+def _say_ready(path: str, console: Console) -> None:
+    console.print(f"ready {path}", soft_wrap=True)
+
+
+def serve_board(line: Line, baud: int, how: Serving, console: Console) -> None:
+    """Serve a simulated board; prints ``ready PATH`` and returns when interrupted."""
+    from drivers.sim import Maestro
+    from drivers.tools.traffic import HexDecoder, TextDecoder
+
+    _serve(line, baud, how, console, HexDecoder() if isinstance(line, Maestro) else TextDecoder())
+
+
+def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSettings]]:
+    """One bus of a robot file and the channels on it; the first bus without a name.
+
+    Raises
+    ------
+    ConfigError
+        when the file is wrong or has no such bus.
+    """
+    robot = load_robot(find_config("robots", name), PARAMETERS)
+    names = [entry.name for entry in robot.buses]
+    if bus is not None and bus not in names:
+        raise ConfigError(f"robot {robot.name} has no bus called {bus!r}", hint=f"its buses: {', '.join(names)}")
+    chosen = robot.buses[names.index(bus) if bus else 0]
+    return chosen, robot.on_bus(chosen.name)
+
+
+def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> None:
+    """Serve what is on a bus of a robot file (:func:`robot_bus`)."""
+    chosen, channels = robot_bus(name, bus)
+    if chosen.family in BOARDS:
+        serve_board(_board(chosen, channels), chosen.baud, how, console)
+        return
+    serve_servos([SimulatedId(channel.id, channel.model) for channel in channels], chosen.baud, how, console)
+
+
+def _board(bus: BusSettings, channels: list[ChannelSettings]) -> Line:
+    """The simulated board of a bus, set to what its driver will expect."""
+    from drivers import open_bus
+    from drivers.sim.serving.families import make_line
+
+    options = {key: value for key, value in bus.options().items() if key not in SIMULATION}
+    driver = open_bus(bus.family, servo_specs(channels), **{"port": "", **options})
+    servos = [(channel.id, channel.model) for channel in channels]
+    return make_line(bus.family, servos, time.monotonic(), options=driver.far_end())
+
+
+def serve_host(script: str, link: Path | None, console: Console) -> None:
+    """Serve a simulated robot host; prints ``ready PATH``, returns when interrupted and says what it counted.
+
+    Raises
+    ------
+    ConfigError
+        when the script is unknown or wrong.
+    """
+    from controller.links.host import HostPort, RobotHost, load_script
+
+    loaded = load_script(script, PARAMETERS)
+    with HostPort(link) as port, stop_flag() as flag:
+        console.print(f"ready {link or port.path}", soft_wrap=True)
+        host = RobotHost(port, loaded, PARAMETERS)
+        host.run(lambda: not flag.is_set())
+        counts = host.report()
+    console.print(f"{counts['sent']} lines sent, {counts['accepted']} accepted, {counts['refused']} refused")
+
+
+def _until_stopped(serve: Callable[[socket.socket], None]) -> None:
+    """Run ``serve(stop)`` until SIGINT or SIGTERM; the socket ``stop`` becomes readable then."""
+    reading, writing = socket.socketpair()
+
+    def note(_number: int, _frame: object) -> None:
+        writing.send(b"x")
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        serve(reading)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        reading.close()
+        writing.close()

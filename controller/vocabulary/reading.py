@@ -1,0 +1,96 @@
+"""Reading a face back in other vocabularies, so that a receiver that speaks one of them can be driven."""
+
+from __future__ import annotations
+
+import threading
+from functools import cached_property
+
+import numpy as np
+
+from controller.base.parameters import Floats, Parameters
+from controller.base.solve import BoundedSolver
+from controller.vocabulary.affect import Affect
+from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.facs import Facs
+from controller.vocabulary.visemes import Visemes
+
+_SHOWN = 0.05
+_RIDGE, _SPARSITY = 1e-4, 2e-3
+
+
+class Readings:
+    """Says what a face shows; may be asked from any thread.
+
+    Parameters
+    ----------
+    parameters : the registry. vocabulary : the named expressions, which moods are blended from.
+    """
+
+    def __init__(self, parameters: Parameters, vocabulary: Vocabulary) -> None:
+        self._parameters, self._vocabulary = parameters, vocabulary
+        self._lock = threading.Lock()
+
+    def read(self, what: str, values: Floats) -> list[tuple[str, float]]:
+        """Names and values 0..1 (moods -1..1) of what the face ``values`` : (P,) shows.
+
+        Parameters
+        ----------
+        what : one of :data:`controller.links.linewords.READINGS`.
+
+        Raises
+        ------
+        KeyError : another word. ConfigError : a vocabulary's file is wrong.
+        """
+        with self._lock:
+            return {"UNITS": self._units, "EMOTION": self._emotion, "VISEMES": self._shapes, "MOOD": self._mood}[what](
+                values
+            )
+
+    def _units(self, values: Floats) -> list[tuple[str, float]]:
+        levels = self._facs.read(values)
+        return [(name, float(levels[i])) for i, name in enumerate(self._facs.names) if levels[i] >= _SHOWN]
+
+    def _emotion(self, values: Floats) -> list[tuple[str, float]]:
+        return [self._facs.read_emotion(values)]
+
+    def _shapes(self, values: Floats) -> list[tuple[str, float]]:
+        visemes, solver = self._visemes
+        levels = solver.solve(values * visemes.mask)
+        return [(name, float(levels[i])) for i, name in enumerate(visemes.names) if levels[i] >= _SHOWN]
+
+    def _mood(self, values: Floats) -> list[tuple[str, float]]:
+        affect, solver = self._affect
+        levels = dict(zip(affect.names[1:], solver.solve(values).tolist(), strict=True))
+        return list(zip(("valence", "arousal", "dominance"), affect.read(levels).tolist(), strict=True))
+
+    @cached_property
+    def _facs(self) -> Facs:
+        return Facs.load(self._parameters)
+
+    @cached_property
+    def _visemes(self) -> tuple[Visemes, _Levels]:
+        visemes = Visemes.load(self._parameters)
+        return visemes, _Levels(visemes.matrix)
+
+    @cached_property
+    def _affect(self) -> tuple[Affect, _Levels]:
+        affect = Affect.load(self._vocabulary)
+        faces = np.stack([self._vocabulary[name].weights for name in affect.names[1:]], axis=1)
+        return affect, _Levels(faces)
+
+
+class _Levels:
+    """Levels 0..1 of the columns of a matrix (P, n), few of them not zero.
+
+    Columns are brought to one length first: otherwise two long ones would be preferred to the short one that fits.
+    """
+
+    def __init__(self, matrix: Floats) -> None:
+        self._size = np.maximum(np.linalg.norm(matrix, axis=0), 1e-9)
+        self._solver = BoundedSolver(
+            matrix / self._size, 0.0 * self._size, self._size, ridge=_RIDGE, sparsity=_SPARSITY, tolerance=1e-5
+        )
+
+    def solve(self, values: Floats) -> Floats:
+        """(n,) levels that give ``values`` : (P,) best."""
+        return self._solver.solve(values) / self._size

@@ -1,0 +1,81 @@
+"""The clock keeps absolute deadlines and skips what it missed."""
+
+from __future__ import annotations
+
+import pytest
+
+from controller.base.clock import Clock, Samples
+
+
+class Time:
+    """A time source that only moves when told to."""
+
+    def __init__(self) -> None:
+        self.ns = 1_000
+
+    def now(self) -> int:
+        return self.ns
+
+    def sleep(self, seconds: float) -> None:
+        self.ns += round(seconds * 1e9)
+
+
+def run(clock: Clock, time: Time, work_ns: list[int]) -> list[int]:
+    """Tick once per entry of ``work_ns``, each tick taking that long; returns when ticks began."""
+    began = []
+    for now in clock.run(lambda: len(began) < len(work_ns)):
+        began.append(now)
+        time.ns += work_ns[len(began) - 1]
+    return began
+
+
+def test_ticks_stay_on_the_grid_of_deadlines() -> None:
+    time = Time()
+    clock = Clock(100.0, now_ns=time.now, sleep_s=time.sleep)
+    began = run(clock, time, [3_000_000, 9_999_999, 0, 5_000_000])
+    assert began == [1_000 + k * 10_000_000 for k in range(4)]
+    assert clock.skipped == 0
+
+
+def test_a_late_tick_skips_deadlines_and_does_not_hurry() -> None:
+    time = Time()
+    clock = Clock(100.0, now_ns=time.now, sleep_s=time.sleep)
+    began = run(clock, time, [0, 35_000_000, 0, 0])
+    assert [(b - 1_000) // 10_000_000 for b in began] == [0, 1, 5, 6]
+    assert clock.skipped == 3
+
+
+def test_a_prompt_clock_ticks_at_once_after_a_late_tick_and_never_faster_than_its_rate() -> None:
+    time = Time()
+    clock = Clock(100.0, now_ns=time.now, sleep_s=time.sleep, prompt=True)
+    began = run(clock, time, [0, 35_000_000, 12_000_000, 4_000_000, 0, 0])
+    assert [b - 1_000 for b in began] == [0, 10_000_000, 45_000_000, 57_000_000, 67_000_000, 77_000_000]
+    assert clock.skipped == 0
+
+
+def test_report_counts_rate_and_jitter() -> None:
+    time = Time()
+    clock = Clock(50.0, now_ns=time.now, sleep_s=lambda s: time.sleep(s + 0.002))
+    run(clock, time, [0] * 11)
+    report = clock.report()
+    assert report["ticks"] == 11
+    assert report["jitter_ms"]["max"] == pytest.approx(2.0)  # type: ignore[index]
+    assert report["rate_hz"] == pytest.approx(11 / 0.202)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])
+def test_a_rate_must_be_positive(rate: float) -> None:
+    with pytest.raises(ValueError, match="rate_hz"):
+        Clock(rate)
+
+
+def test_samples_keep_the_newest_and_do_not_grow() -> None:
+    samples = Samples(capacity=4)
+    for value in range(10):
+        samples.add(float(value))
+    summary = samples.summary()
+    assert samples.count == 10
+    assert summary["p50"] == pytest.approx(7.5)
+    assert summary["max"] == 9.0
+    assert summary["mean"] == pytest.approx(4.5)
+    assert Samples().summary() == {}

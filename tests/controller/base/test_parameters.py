@@ -1,0 +1,148 @@
+"""The registry of parameters."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import ConfigError, ParameterError
+from controller.base.parameters import PARAMETERS, REGIONS, Parameters, did_you_mean, fold
+
+UDP_ORDER = """
+eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft eyeWideLeft
+eyeBlinkRight eyeLookDownRight eyeLookInRight eyeLookOutRight eyeLookUpRight eyeSquintRight eyeWideRight
+jawForward jawLeft jawRight jawOpen mouthClose mouthFunnel mouthPucker mouthLeft mouthRight
+mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight mouthDimpleLeft mouthDimpleRight
+mouthStretchLeft mouthStretchRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper
+mouthPressLeft mouthPressRight mouthLowerDownLeft mouthLowerDownRight mouthUpperUpLeft mouthUpperUpRight
+browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight
+cheekPuff cheekSquintLeft cheekSquintRight noseSneerLeft noseSneerRight tongueOut
+headYaw headPitch headRoll leftEyeYaw leftEyePitch rightEyeYaw rightEyePitch
+"""
+
+
+def test_names_are_arkit_in_live_link_order_then_angles() -> None:
+    assert list(PARAMETERS.names) == UDP_ORDER.split()
+
+
+def test_ranges_and_full_scales() -> None:
+    angles = slice(52, 59)
+    assert np.all(PARAMETERS.low[:52] == 0) and np.all(PARAMETERS.low[angles] == -1)
+    assert np.all(PARAMETERS.high == 1)
+    np.testing.assert_allclose(np.degrees(PARAMETERS.full_scale_rad[angles]), [60, 40, 30, 35, 30, 35, 30])
+    assert np.all(np.isnan(PARAMETERS.full_scale_rad[:52]))
+
+
+def test_every_region_has_parameters_and_none_is_left_out() -> None:
+    found = np.concatenate([PARAMETERS.region(region) for region in REGIONS])
+    assert sorted(found) == list(range(59))
+
+
+def test_lids_are_faster_than_brows() -> None:
+    lid, brow = PARAMETERS.index("eyeBlinkLeft"), PARAMETERS.index("browDownLeft")
+    assert PARAMETERS.max_speed[lid] > PARAMETERS.max_speed[brow]
+    assert PARAMETERS.max_acceleration[lid] > PARAMETERS.max_acceleration[brow]
+
+
+@pytest.mark.parametrize(
+    ("spelling", "name"),
+    [
+        ("EyeBlinkLeft", "eyeBlinkLeft"),
+        ("eyeBlink_L", "eyeBlinkLeft"),
+        ("eyeblink_r", "eyeBlinkRight"),
+        ("MOUTHSMILELEFT", "mouthSmileLeft"),
+        ("HeadYaw", "headYaw"),
+        ("head_yaw", "headYaw"),
+        ("eyeYawRight", "rightEyeYaw"),
+        ("EyePitch_L", "leftEyePitch"),
+    ],
+)
+def test_other_spellings(spelling: str, name: str) -> None:
+    assert PARAMETERS.index(spelling) == PARAMETERS.names.index(name)
+
+
+def test_every_name_is_found_in_pascal_case_and_with_suffix() -> None:
+    for i, name in enumerate(PARAMETERS.names):
+        assert PARAMETERS.index(name[0].upper() + name[1:]) == i
+        short = name.removesuffix("Left") + "_L" if name.endswith("Left") else name
+        assert PARAMETERS.index(short) == i
+
+
+def test_unknown_name_suggests_the_nearest() -> None:
+    with pytest.raises(ParameterError, match=r"unknown parameter 'jawOpn', did you mean 'jawOpen'\?") as caught:
+        PARAMETERS.index("jawOpn")
+    assert "LIST PARAMETERS" in caught.value.hint
+    with pytest.raises(ParameterError, match=r"^unknown parameter 'qqqq'$"):
+        PARAMETERS.index("qqqq")
+    with pytest.raises(ParameterError, match="did you mean 'mouth'"):
+        PARAMETERS.region("mouht")
+
+
+def test_clip_keeps_the_last_good_value() -> None:
+    out = np.full(59, 0.25)
+    values = np.linspace(-2, 2, 59)
+    values[[0, 1, 2]] = [math.nan, math.inf, -math.inf]
+    assert PARAMETERS.clip(values, out) is out
+    assert list(out[:3]) == [0.25] * 3
+    np.testing.assert_array_equal(out[3:], np.clip(values, PARAMETERS.low, PARAMETERS.high)[3:])
+
+
+def test_mirror_swaps_sides_and_undoes_itself() -> None:
+    mirror = PARAMETERS.mirror()
+    pairs = [("eyeBlinkLeft", "eyeBlinkRight"), ("jawLeft", "jawRight"), ("leftEyeYaw", "rightEyeYaw")]
+    for left, right in [*pairs, ("jawOpen", "jawOpen")]:
+        assert mirror[PARAMETERS.index(left)] == PARAMETERS.index(right)
+    np.testing.assert_array_equal(mirror[mirror], np.arange(59))
+
+
+def test_arrays_cannot_be_changed() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        PARAMETERS.low[0] = 5
+    assert not PARAMETERS.neutral().any()
+
+
+def test_fold_and_guess() -> None:
+    assert fold(" Eye_Blink-L ") == "eyeblinkleft"
+    assert did_you_mean("mouthSmileLft", PARAMETERS.names).startswith(", did you mean 'mouthSmileLeft'")
+
+
+def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(
+        """
+        colour = 1
+        [profile.a]
+        range = [0.0, 1.0]
+        max_speed = 1.0
+        max_acceleration = 1.0
+        response_s = 0.1
+        [parameters]
+        good = { region = "mouth", profile = "a" }
+        wide = { region = "moth", profile = "a", range = [1.0, 0.0] }
+        slow = { region = "mouth", profile = "a", max_speed = 0.0, sped = 3 }
+        lost = { region = "mouth", profile = "b" }
+        bare = 3
+        [aliases]
+        other = "god"
+        """
+    )
+    with pytest.raises(ConfigError) as caught:
+        Parameters.load(path)
+    text = str(caught.value)
+    for part in (
+        str(path), "8 faults", "colour: unknown key", "parameters.wide.region", "parameters.wide.range",
+        "parameters.slow.max_speed", "parameters.slow.sped: unknown key", "parameters.lost.profile",
+        "parameters.bare", "aliases.other: unknown parameter 'god', did you mean 'good'",
+    ):  # fmt: skip
+        assert part in text
+
+
+def test_a_missing_or_broken_file(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read"):
+        Parameters.load(tmp_path / "none.toml")
+    (tmp_path / "bad.toml").write_text("[parameters\n")
+    with pytest.raises(ConfigError, match="not valid TOML"):
+        Parameters.load(tmp_path / "bad.toml")

@@ -1,0 +1,25 @@
+"""SIGINT and SIGTERM become a flag and handlers come back."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+
+from controller.base.signals import stop_flag
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_sets_the_flag(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with stop_flag() as flag:
+        assert not flag.is_set()
+        signal.raise_signal(number)
+        assert flag.is_set()
+    assert signal.getsignal(number) is before
+
+
+def test_a_second_interrupt_is_not_held_back() -> None:
+    with pytest.raises(KeyboardInterrupt), stop_flag():
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)

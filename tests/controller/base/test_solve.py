@@ -1,0 +1,78 @@
+"""Bounded least squares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from controller.base.solve import BoundedSolver
+
+
+def problem(seed: int, m: int = 150, n: int = 52) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    random = np.random.default_rng(seed)
+    matrix = random.normal(size=(m, n))
+    low = np.where(random.random(n) < 0.2, -1.0, 0.0)
+    truth = random.uniform(low, 1.0) * (random.random(n) < 0.6)
+    return matrix, low, np.ones(n), matrix @ truth + 0.3 * random.normal(size=m)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_agrees_with_scipy(seed: int) -> None:
+    matrix, low, high, wanted = problem(seed)
+    solver = BoundedSolver(matrix, low, high, ridge=0.0, tolerance=1e-12)
+    np.testing.assert_allclose(solver.solve(wanted), lsq_linear(matrix, wanted, (low, high), tol=1e-13).x, atol=1e-7)
+
+
+def test_the_optimality_conditions_hold_with_ridge_weights_and_sparsity() -> None:
+    matrix, low, high, wanted = problem(9)
+    weights = np.random.default_rng(1).uniform(0.1, 2.0, len(wanted))
+    solver = BoundedSolver(matrix, low, high, weights=weights, ridge=0.5, sparsity=8.0, tolerance=1e-12)
+    x = solver.solve(wanted)
+    slope = matrix.T @ (weights**2 * (matrix @ x - wanted)) + 0.5 * x
+    inside = (x > low + 1e-9) & (x < high - 1e-9) & (np.abs(x) > 1e-9)
+    np.testing.assert_allclose(slope[inside] + 8.0 * np.sign(x[inside]), 0.0, atol=1e-6)
+    assert np.all(slope[x >= high - 1e-12] + 8.0 <= 1e-6)
+    zero = np.abs(x) <= 1e-9
+    assert np.all(slope[zero] >= -8.0 - 1e-6) and zero.sum() > 5
+
+
+def test_starting_from_the_last_solution_takes_no_more_rounds() -> None:
+    matrix, low, high, wanted = problem(2)
+    solver = BoundedSolver(matrix, low, high)
+    first = solver.solve(wanted)
+    cold = solver.rounds
+    again = solver.solve(wanted + 1e-3, start=first)
+    assert solver.rounds <= cold
+    np.testing.assert_allclose(again, solver.solve(wanted + 1e-3), atol=1e-5)
+
+
+def test_rows_that_say_nothing_leave_zero_and_bounds_hold() -> None:
+    matrix = np.array([[1.0, 0.0], [0.0, 0.0]])
+    solver = BoundedSolver(matrix, np.zeros(2), np.ones(2), ridge=0.0)
+    np.testing.assert_array_equal(solver.solve(np.array([5.0, 1.0])), [1.0, 0.0])
+    np.testing.assert_array_equal(solver.residual(np.array([1.0, 0.0]), np.array([5.0, 1.0])), [4.0, 1.0])
+
+
+def test_columns_that_are_alike_are_settled() -> None:
+    random = np.random.default_rng(4)
+    matrix = random.normal(size=(60, 20))
+    matrix[:, 10:] = matrix[:, :10] + 1e-4 * random.normal(size=(60, 10))
+    wanted = matrix @ random.uniform(0, 1, 20)
+    solver = BoundedSolver(matrix, np.zeros(20), np.ones(20))
+    assert np.abs(solver.residual(solver.solve(wanted), wanted)).max() < 5e-4
+    matrix[:, 10:] = matrix[:, :10]
+    same = BoundedSolver(matrix, np.zeros(20), np.ones(20), ridge=0.0)
+    assert np.abs(same.residual(same.solve(matrix @ np.full(20, 0.5)), matrix @ np.full(20, 0.5))).max() < 1e-6
+
+
+def test_wrong_arguments_are_named() -> None:
+    one = np.eye(2)
+    with pytest.raises(ValueError, match="weights must be"):
+        BoundedSolver(one, np.zeros(2), np.ones(2), weights=np.ones(3))
+    with pytest.raises(ValueError, match="low must not be above high"):
+        BoundedSolver(one, np.ones(2), np.zeros(2))
+    with pytest.raises(ValueError, match="finite"):
+        BoundedSolver(one * np.nan, np.zeros(2), np.ones(2))
+    with pytest.raises(ValueError, match="wanted must be finite"):
+        BoundedSolver(one, np.zeros(2), np.ones(2)).solve(np.array([np.nan, 0.0]))

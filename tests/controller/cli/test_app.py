@@ -1,0 +1,186 @@
+"""The command line as a user meets it: help with examples, one message for what goes wrong, never a traceback."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from controller.cli.app import main, make_app
+
+COMMANDS = [
+    ("demo",),
+    ("run",),
+    ("play",),
+    ("render",),
+    ("fit",),
+    ("ports",),
+    ("scan",),
+    ("set-id",),
+    ("calibrate",),
+    ("monitor",),
+    ("check",),
+    ("bench",),
+    ("simulate", "dynamixel"),
+    ("simulate", "feetech"),
+    ("simulate", "maestro"),
+    ("simulate", "ssc32"),
+    ("simulate", "robot"),
+    ("simulate", "host"),
+]
+
+
+Omote = Callable[..., "Said"]
+
+
+class Said(NamedTuple):
+    """What a command left: its exit code and what it wrote."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def omote(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Omote:
+    """Runs ``omote WORDS`` in a folder, by the entry point of the command but in this process."""
+
+    def run(*words: str, cwd: Path | None = None) -> Said:
+        monkeypatch.setattr(sys, "argv", ["omote", *words])
+        if cwd is not None:
+            monkeypatch.chdir(cwd)
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        return Said(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_every_command_has_help_with_an_example(command: tuple[str, ...]) -> None:
+    result = CliRunner().invoke(make_app(), [*command, "--help"])
+    assert result.exit_code == 0
+    assert f"Example: omote {' '.join(command)}" in " ".join(result.output.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "message", "hint"),
+    [
+        (("run", "nope"), "no stage 'nope'", "demo"),
+        (("check", "nope"), "nope: no such file", "omote check demo"),
+        (("play", "nope.csv"), "nope.csv: cannot be read", "ls -l"),
+        (("render", "-o", "x.png", "--set", "jawOpn=1"), "did you mean 'jawOpen'", "arkit.toml"),
+        (("render", "-o", "x.png", "--set", "jawOpen=nan"), "'nan' is not a number", ""),
+        (("render", "-o", "x.png", "-e", "hapiness"), "did you mean 'happiness'", ""),
+        (("render", "-o", "x.png", "--size", "big"), "expected WIDTHxHEIGHT", "800x800"),
+        (("render", "-o", "x.png", "--head", "nobody"), "no head 'nobody'", "ict"),
+        (("render", "-o", "no/such/x.png", "--size", "32x32"), "x.png", ""),
+        (("fit", "nope.npz", "-o", "out"), "nope.npz", ""),
+        (("scan", "/dev/not-there"), "/dev/not-there", "omote ports"),
+        (("simulate", "dynamixel", "--ids", "1-300"), "ids go from 0 to 252", "--ids 1-24"),
+        (("simulate", "dynamixel", "--model", "x"), "no control table for model 'x'", ""),
+        (("simulate", "dynamixel", "--fault", "x:1"), "fault 'x:1'", "mute"),
+        (("simulate", "robot", "nope"), "no robot 'nope'", "head24"),
+        (("simulate", "host", "nope"), "no script 'nope'", "tour"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_wrong_input_is_one_message_with_the_next_step(
+    omote: Omote, tmp_path: Path, words: tuple[str, ...], message: str, hint: str
+) -> None:
+    result = omote(*words, cwd=tmp_path)
+    said = " ".join(result.stderr.split())
+    assert result.returncode == 1
+    assert said.startswith("error: ")
+    assert message in said
+    assert hint in said
+    assert "Traceback" not in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_process_of_its_own_ends_with_that_code_and_says_it_on_stderr() -> None:
+    command = [sys.executable, "-c", "from controller.cli.app import main; main()", "run", "nope"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert result.returncode == 1
+    assert result.stdout == ""
+    assert result.stderr.startswith("error: ")
+
+
+@pytest.mark.parametrize("module", ["controller.base.errors", "rich.console", "controller.cli.run"])
+def test_an_interrupt_while_the_command_line_loads_says_nothing(module: str) -> None:
+    program = """
+import signal, sys
+from controller.cli.app import main
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1]:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Finder())
+main()
+"""
+    command = [sys.executable, "-c", program, module]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
+
+
+def test_a_missing_or_busy_port_ends_a_run_with_one_message(omote: Omote, tmp_path: Path) -> None:
+    stage = tmp_path / "stage.toml"
+    stage.write_text('name = "mine"\n[[links]]\nport = "/dev/not-there"\n')
+    result = omote("run", str(stage), "--headless", "--seconds", "2")
+    said = " ".join(result.stderr.split())
+    assert result.returncode == 1
+    assert said.startswith("error: ")
+    assert "/dev/not-there" in said
+    assert "omote ports" in said
+    assert "Traceback" not in said
+
+
+def test_a_damaged_head_is_one_message(omote: Omote, tmp_path: Path, root: Path) -> None:
+    head = tmp_path / "head"
+    head.mkdir()
+    shipped = root / "configs/heads/ict"
+    (head / "head.toml").write_bytes((shipped / "head.toml").read_bytes())
+    (head / "head.npz").write_bytes((shipped / "head.npz").read_bytes()[:50_000])
+    result = omote("check", str(head))
+    assert result.returncode == 1
+    assert "head.npz" in " ".join(result.stderr.split())
+    assert "Traceback" not in result.stderr
+
+
+def test_render_draws_what_it_is_told(omote: Omote, tmp_path: Path) -> None:
+    pictures = []
+    for name, words in (("rest", ()), ("open", ("--set", "jawOpen=0.8"))):
+        out = tmp_path / f"{name}.png"
+        result = omote("render", "-o", str(out), "--size", "160x200", *words)
+        assert result.returncode == 0, result.stderr
+        assert result.stderr == ""
+        pictures.append(np.asarray(Image.open(out).convert("RGB")).astype(int))
+    assert pictures[0].shape == (200, 160, 3)
+    assert (np.abs(pictures[1] - pictures[0]).max(axis=2) > 24).mean() > 0.01
+
+
+def test_check_names_what_is_good(omote: Omote) -> None:
+    for name, said in (("demo", "stage demo"), ("head24", "24 channels"), ("ict", "59 parameters")):
+        result = omote("check", name)
+        assert result.returncode == 0, result.stderr
+        assert said in result.stdout
+        assert "good" in result.stdout
+
+
+def test_dry_run_opens_nothing_and_lists_every_channel(omote: Omote) -> None:
+    result = omote("run", "demo", "--dry-run")
+    assert result.returncode == 0, result.stderr
+    assert "no port was opened" in result.stdout
+    assert result.stdout.count("xl330") == 24

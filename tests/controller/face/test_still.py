@@ -1,0 +1,105 @@
+"""What the words of ``omote render`` mean, and what is wrong with wrong ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import ConfigError, ParameterError
+from controller.base.parameters import PARAMETERS
+from controller.face.still import Still, for_head, parse_group, parse_setting, parse_size, sheet_poses
+
+
+def test_a_setting_names_a_parameter_in_any_spelling() -> None:
+    jaw = PARAMETERS.index("jawOpen")
+    assert parse_setting("jawOpen=0.8") == (jaw, 0.8)
+    assert parse_setting("JawOpen=1") == (jaw, 1.0)
+    assert parse_setting("headYaw=-1")[1] == -1.0
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("jawOpen", "expected NAME=VALUE"),
+        ("jawOpn=1", "did you mean 'jawOpen'"),
+        ("jawOpen=1.2", "jawOpen goes from 0 to 1"),
+        ("headYaw=-1.1", "headYaw goes from -1 to 1"),
+        ("jawOpen=wide", "'wide' is not a number"),
+        ("jawOpen=nan", "'nan' is not a number"),
+        ("jawOpen=", "'' is not a number"),
+    ],
+)
+def test_a_wrong_setting_is_told(word: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        parse_setting(word)
+
+
+def test_sizes() -> None:
+    assert parse_size("1280x720") == (1280, 720)
+    for wrong in ("800", "0x800", "800x", "axb", "8x8", "99999x100", "-1x5"):
+        with pytest.raises(ParameterError, match="WIDTHxHEIGHT"):
+            parse_size(wrong)
+
+
+def test_the_sheet_shows_every_end_of_every_parameter() -> None:
+    poses = sheet_poses()
+    labels = [label for label, _ in poses]
+    assert len(set(labels)) == len(labels)
+    reached = np.array([values for _, values in poses])
+    assert (reached.min(axis=0) == PARAMETERS.low).all()
+    assert (reached.max(axis=0) == PARAMETERS.high).all()
+
+
+def test_values_reach_a_head_in_its_own_order() -> None:
+    values = np.arange(len(PARAMETERS.names), dtype=float)
+    wanted = ("jawOpen", "somethingElse", "eyeBlinkLeft")
+    assert for_head(values, wanted).tolist() == [PARAMETERS.index("jawOpen"), 0.0, PARAMETERS.index("eyeBlinkLeft")]
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """A stage with an expression and a group of the user's own."""
+    (tmp_path / "mine.toml").write_text("[grin]\nweights = { mouthSmile = 0.9 }\n")
+    (tmp_path / "dimple.json").write_text(
+        '{"format": 1, "name": "dimple", "part": "face", "ids": [7], "moves_mm": [[0, 0, 4]]}'
+    )
+    (tmp_path / "stage.toml").write_text(
+        'name = "own"\nvocabularies = ["mine.toml"]\nidentity = { broad = 0.5 }\n'
+        '[groups]\n"dimple.json" = 0.5\n[face]\nsize = [320, 200]\ntheme = "mask"\n'
+    )
+    return tmp_path
+
+
+def test_a_stage_lends_a_picture_its_head_expressions_and_look(own: Path) -> None:
+    still = Still.parse([], ["grin=0.5"], stage=str(own / "stage.toml"))
+    assert still.values[PARAMETERS.index("mouthSmileLeft")] == pytest.approx(0.45)
+    assert (still.size, still.look.theme, still.identity) == ((320, 200), "mask", {"broad": 0.5})
+    assert still.groups == ((own / "dimple.json", 0.5),)
+    assert "grin" in dict(sheet_poses(still.vocabulary))
+    said = Still.parse([], [], "64x64", {"theme": "skin", "camera": None}, identity="", stage=str(own / "stage.toml"))
+    assert (said.size, said.look.theme, said.identity) == ((64, 64), "skin", {})
+
+
+def test_a_picture_wears_groups_and_expressions_named_on_the_command_line(own: Path) -> None:
+    still = Still.parse(
+        [], ["grin"], vocabularies=[str(own / "mine.toml")], groups=[f"{own / 'dimple.json'}=-0.5"]
+    )  # fmt: skip
+    worn, plain = still.load_head(), Still.parse([], []).load_head()
+    rest = np.zeros(len(worn.parameters))
+    for head in (worn, plain):
+        head.pose(rest)
+    moved = worn.part("face").control_points - plain.part("face").control_points
+    assert moved[7] == pytest.approx([0, 0, -2.0])
+    assert np.count_nonzero(moved.any(axis=1)) == 1
+    assert still.values[PARAMETERS.index("mouthSmileRight")] == pytest.approx(0.9)
+
+
+def test_wrong_groups_are_told(own: Path) -> None:
+    with pytest.raises(ParameterError, match="from -1 to 1"):
+        parse_group(f"{own / 'dimple.json'}=2")
+    with pytest.raises(ParameterError, match="'x' is not a number"):
+        parse_group(f"{own / 'dimple.json'}=x")
+    with pytest.raises(ConfigError, match=r"none\.json"):
+        parse_group("none.json")

@@ -1,0 +1,184 @@
+"""The line protocol over real pseudo-terminals and a real serial port object."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from controller.base.parameters import PARAMETERS as P
+from controller.layers.commands import CommandState
+from controller.links.hostport import HostPort
+from controller.links.linelink import LineLink
+from controller.links.lineprotocol import MAX_REPLY, LineDecoder, Reply, format_words, parse_reply
+from drivers.base.errors import PortMissing
+
+LIMIT_S = 5.0
+
+
+class Peer:
+    """The other end of a link."""
+
+    def __init__(self, port: HostPort) -> None:
+        self.port = port
+        self._decoder = LineDecoder(MAX_REPLY)
+        self._lines: list[Reply] = []
+
+    def send(self, data: bytes) -> None:
+        self.port.write(data)
+
+    def next(self, *kinds: str) -> Reply:
+        """The next line of one of ``kinds``; others before it are dropped."""
+        end = time.monotonic() + LIMIT_S
+        while time.monotonic() < end:
+            while self._lines:
+                reply = self._lines.pop(0)
+                if not kinds or reply.kind in kinds:
+                    return reply
+            found = (parse_reply(line) for line in self._decoder.feed(self.port.read(0.1)))
+            self._lines += [reply for reply in found if reply is not None]
+        raise AssertionError("no answer")
+
+    def ask(self, line: str) -> Reply:
+        self.send(format_words([line], tag=7, checked=True))
+        return self.next("OK", "ERR")
+
+
+def eventually(question: Callable[[], object]) -> None:
+    end = time.monotonic() + LIMIT_S
+    while not question():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def state() -> CommandState:
+    return CommandState(P)
+
+
+@pytest.fixture
+def port() -> Iterator[HostPort]:
+    with HostPort() as port:
+        yield port
+
+
+@pytest.fixture
+def link(port: HostPort, state: CommandState) -> Iterator[LineLink]:
+    with LineLink(port.path, 115200, state, retry_s=0.02) as link:
+        yield link
+
+
+def test_a_line_in_is_answered_and_moves_the_face(port: HostPort, state: CommandState, link: LineLink) -> None:
+    before = time.monotonic_ns()
+    reply = Peer(port).ask("SET jawOpen 0.8")
+    after = time.monotonic_ns()
+    assert (reply.kind, reply.tag, reply.checked, reply.text) == ("OK", 7, True, "SET 1")
+    out = P.neutral()
+    stamp = state.tick(after, 0.01, out)
+    assert before <= stamp <= after
+    assert out[P.index("jawOpen")] > 0
+    assert link.report()["accepted"] == 1
+
+
+def test_noise_partial_and_overlong_lines(port: HostPort, link: LineLink) -> None:
+    peer = Peer(port)
+    peer.send(b"\xff\x00garbage\xfe\r\n")
+    assert peer.next().code == 12
+    for piece in (b"PI", b"NG ", b"hel", b"lo\r"):
+        peer.send(piece)
+        time.sleep(0.005)
+    assert peer.next().text == "PONG hello"
+    peer.send(b"x" * 5000 + b"\nPING\n")
+    assert peer.next().code == 10 and peer.next().ok
+    peer.send(b"PING\x85\n")
+    assert peer.next().code == 11
+    assert link.report()["refused"] == {"10": 1, "11": 1, "12": 1}
+
+
+def test_many_lines_at_once_are_each_answered_in_order(port: HostPort, link: LineLink) -> None:
+    peer = Peer(port)
+    peer.send(b"".join(b"#%d SET jawOpen 0.5\n" % i for i in range(100)))
+    assert [peer.next().tag for _ in range(100)] == list(range(100))
+
+
+def test_a_subscription_streams_the_newest_values(port: HostPort, state: CommandState, link: LineLink) -> None:
+    peer = Peer(port)
+    assert peer.ask("SUB 100 jawOpen").ok
+    assert peer.next("P").text.endswith(" jawOpen=0")
+    peer.ask("SET jawOpen 1")
+    now = time.monotonic_ns()
+    for i in range(100):
+        state.tick(now + i * 10_000_000, 0.01, P.neutral())
+    eventually(lambda: peer.next("P").text.endswith(" jawOpen=1"))
+    assert peer.ask("UNSUB").ok
+    assert link.report()["streamed"]
+
+
+def test_a_peer_that_does_not_read_never_holds_up_the_link(port: HostPort, state: CommandState, link: LineLink) -> None:
+    port.write(b"SUB 200 ALL\n")
+    eventually(lambda: link.report()["dropped"])
+    port.write(b"SET jawOpen 1\n")
+    eventually(lambda: state.status()["manual"] == 1)
+    time.sleep(0.05)
+    peer = Peer(port)
+    reply = peer.next("OK")
+    assert reply.text == "SUB 200 59"  # whole lines come out once it reads again
+    assert peer.next("OK").text == "SET 1"
+
+
+def test_a_port_that_vanishes_is_found_again(tmp_path: Path, state: CommandState) -> None:
+    path = tmp_path / "robot"
+    first = HostPort(path)
+    with LineLink(str(path), 115200, state, retry_s=0.02) as link:
+        peer = Peer(first)
+        assert peer.ask("SET jawOpen 0.5").ok and peer.ask("SUB 50 jawOpen").ok
+        first.close()
+        eventually(lambda: not link.connected)
+        assert state.status()["manual"] == 1  # the face keeps what it was told
+        with HostPort(path) as second:
+            eventually(lambda: link.connected)
+            peer = Peer(second)
+            assert peer.next("P").text.endswith("jawOpen=0")  # the stream goes on
+            assert peer.ask("PING").ok
+            assert link.report()["reconnects"] == 1
+            link.stop()
+    assert not link.connected
+
+
+def test_a_missing_port_is_one_clear_error(tmp_path: Path, state: CommandState) -> None:
+    with pytest.raises(PortMissing, match="no port"):
+        LineLink(str(tmp_path / "none"), 115200, state).start()
+
+
+def test_stop_may_be_called_again_and_before_start(port: HostPort, state: CommandState) -> None:
+    link = LineLink(port.path, 115200, state)
+    link.stop()
+    descriptors = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
+    with LineLink(port.path, 115200, state) as link:
+        link.stop()
+    if descriptors:
+        assert len(os.listdir("/proc/self/fd")) == descriptors
+
+
+def test_a_fault_of_its_own_is_told_once_and_the_link_goes_on(
+    port: HostPort,
+    state: CommandState,
+    link: LineLink,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def broken(amount: float, stamp_ns: int) -> None:
+        raise ZeroDivisionError("life is short")
+
+    monkeypatch.setattr(state, "live", broken)
+    peer = Peer(port)
+    for _ in range(2):
+        faults = link.faults
+        peer.send(b"LIFE 1\n")
+        eventually(lambda faults=faults: link.faults == faults + 1)
+    assert peer.ask("PING").ok
+    assert link.report()["last_fault"] == "ZeroDivisionError: life is short"
+    assert caplog.text.count("goes on with the next line") == 1

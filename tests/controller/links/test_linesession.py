@@ -1,0 +1,208 @@
+"""One conversation in the line protocol, without a port."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from controller.base.errors import ControllerError
+from controller.base.parameters import PARAMETERS as P
+from controller.layers.commands import CommandState
+from controller.links.lineprotocol import MAX_LINE, MAX_REPLY, Reply, checksum, format_words, parse_reply
+from controller.links.linesession import LineSession
+
+SECOND = 10**9
+JAW = P.index("jawOpen")
+
+
+class Talk:
+    """A session over a real command state."""
+
+    def __init__(self) -> None:
+        self.state = CommandState(P)
+        self.session = LineSession(self.state, SECOND)
+        self.now = SECOND
+        self.values = P.neutral()
+
+    def say(self, line: str) -> Reply:
+        replies = self.session.feed(line.encode() + b"\n", self.now).splitlines()
+        assert len(replies) == 1
+        reply = parse_reply(replies[0])
+        assert reply is not None
+        return reply
+
+    def run(self, seconds: float) -> np.ndarray:
+        for _ in range(round(seconds * 100)):
+            self.now += SECOND // 100
+            self.state.tick(self.now, 0.01, self.values)
+        return self.values
+
+
+@pytest.fixture
+def talk() -> Talk:
+    return Talk()
+
+
+def test_set_moves_the_face_and_is_stamped_with_its_arrival(talk: Talk) -> None:
+    assert talk.say("#3 SET jawOpen 0.8") == Reply("OK", "SET 1", 3)
+    assert talk.state.tick(talk.now + 10, 0.01, talk.values) == talk.now
+    assert talk.run(1.0)[JAW] == pytest.approx(0.8, abs=1e-3)
+    assert talk.say("GET jawOpen").text == "GET jawOpen=0.8"
+    assert talk.say("INFO JawOpen").text == "INFO jawOpen value=0.8 low=0 high=1 region=jaw layer=manual"
+    assert talk.say("INFO headYaw").text.endswith("region=head layer=expression full_scale_deg=60")
+
+
+def test_every_command_is_acknowledged(talk: Talk) -> None:
+    talk.run(0.05)
+    answers = {
+        "HELLO": "HELLO omote", "PING a b": "PONG a b", "PING": "PONG", "FRAME " + "0.5 " * 59: "SET 59",
+        "RELEASE jawOpen": "RELEASE 1", "RELEASE ALL": "RELEASE 59", "EXPR Happy .5 2": "EXPR happiness 0.5",
+        "GAZE 10 -5": "GAZE", "GAZE AT 0 0 500": "GAZE", "GAZE OFF": "GAZE", "NEUTRAL 1": "NEUTRAL",
+        "LIFE .5": "LIFE 0.5", "LIFE 0": "LIFE 0",
+        "GET ALL": "GET ALL 0", "STATUS": "STATUS expression=neutral", "SUB 20": "SUB 20 59", "UNSUB": "UNSUB",
+        "LIST PARAMETERS": "LIST PARAMETERS eyeBlinkLeft", "LIST EXPRESSIONS": "LIST EXPRESSIONS neutral",
+        "LIST LAYERS": "LIST LAYERS expression", "LIST HOLDERS": "LIST HOLDERS expression",
+        "LIST COMMANDS": "LIST COMMANDS HELLO",
+    }  # fmt: skip
+    for line, text in answers.items():
+        reply = talk.say(line)
+        assert reply.ok and reply.text.startswith(text), line
+    assert talk.session.accepted == len(answers)
+
+
+def test_gaze_and_expression_arrive(talk: Talk) -> None:
+    talk.say("GAZE 20 0")
+    talk.say("EXPR happiness 1")
+    values = talk.run(2.0)
+    assert values[P.index("headYaw")] * 60 + values[P.index("leftEyeYaw")] * 35 == pytest.approx(20, abs=0.1)
+    assert values[P.index("mouthSmileLeft")] == pytest.approx(0.85, abs=1e-3)
+    talk.say("NEUTRAL 0")
+    assert np.abs(talk.run(2.0)).max() < 1e-3
+
+
+def test_a_refused_line_changes_nothing(talk: Talk) -> None:
+    talk.say("SET jawOpen 0.5")
+    talk.run(1.0)
+    for line in ("SET jawOpen 0.9 mouthFunnel 1.1", "SET jawOpen 0.9 nothing 1", "SET jawOpen 0.9 mouthFunnel nan",
+                 "SET jawOpen 0.9*00", "EXPR anger 2", "GAZE 0 100", "NEUTRAL -1", "FRAME 1"):  # fmt: skip
+        reply = talk.say(line)
+        assert reply.kind == "ERR" and reply.text
+    values = talk.run(1.0)
+    assert values[JAW] == pytest.approx(0.5, abs=1e-3)
+    assert np.abs(np.delete(values, JAW)).max() < 1e-9
+    assert talk.session.refused.total() == 8
+
+
+def test_checksums_are_answered_with_checksums(talk: Talk) -> None:
+    assert talk.session.feed(format_words(["PING"], tag=9, checked=True), 0) == b"#9 OK PONG*%02X\n" % checksum(
+        b"#9 OK PONG"
+    )
+    talk.say("SUB 10 jawOpen")
+    assert b"*" not in talk.session.stream(talk.now)
+    talk.session.feed(format_words(["SUB", "10", "jawOpen"], checked=True), talk.now)
+    reply = parse_reply(talk.session.stream(talk.now).strip())
+    assert reply is not None and reply.checked and reply.text == "0 jawOpen=0"
+
+
+def test_stream_keeps_its_rate_and_leaves_missed_lines_out(talk: Talk) -> None:
+    assert talk.session.due_ns() is None and talk.session.stream(talk.now) == b""
+    talk.say("SUB 10 jawOpen headYaw")
+    lines = []
+    for step in range(101):  # one second in steps of 10 ms
+        lines += talk.session.stream(talk.now + step * SECOND // 100).splitlines()
+    assert len(lines) == 11 and lines[3] == b"P 300 jawOpen=0 headYaw=0"
+    assert len(talk.session.stream(talk.now + 60 * SECOND).splitlines()) == 1
+    assert talk.session.due_ns() == talk.now + 60 * SECOND + SECOND // 10
+    talk.say("SUB 10 ALL")
+    assert talk.session.stream(talk.now).startswith(b"F 0 0 0 ")
+    talk.say("UNSUB")
+    assert talk.session.stream(talk.now + 99 * SECOND) == b""
+
+
+def test_a_dropped_line_forgets_its_half_and_keeps_its_stream(talk: Talk) -> None:
+    talk.say("SUB 10")
+    talk.session.feed(b"SET jaw", 0)
+    talk.session.drop()
+    assert talk.session.due_ns() == talk.now
+    assert talk.session.feed(b"PING\n", 0) == b"OK PONG\n"
+
+
+def test_what_the_sink_refuses_is_a_busy_reply(talk: Talk, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise ControllerError("a take is playing")
+
+    monkeypatch.setattr(talk.state, "neutral", refuse)
+    assert talk.say("#2 NEUTRAL") == Reply("ERR", "a take is playing", 2, 30)
+
+
+NOISE = st.binary(max_size=120) | st.sampled_from(
+    [b"SET jawOpen 2", b"SET jawOpen", b"EXPR nothing 1", b"#1 GAZE 1", b"x" * (MAX_LINE + 50), b"PING", b"STATUS",
+     b"*", b"#", b"SUB 1e9", b"FRAME", b"GET ALL", b"\xff\xfe\x00", b" \t ", b"LIST ALL"]
+)  # fmt: skip
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.tuples(NOISE, st.sampled_from([b"\n", b"\r", b"\r\n"])), max_size=12), st.integers(1, 200))
+def test_any_bytes_get_one_answer_a_line_and_never_move_the_face(pieces: list[tuple[bytes, bytes]], cut: int) -> None:
+    data = b"".join(body + end for body, end in pieces) + b"\n"
+    session = LineSession(STATE, 0)
+    replies = b"".join(session.feed(data[i : i + cut], 0) for i in range(0, len(data), cut))
+    lines = [line for line in data.replace(b"\r", b"\n").split(b"\n") if line.strip(b" \t")]
+    answers = replies.splitlines()
+    assert len(answers) == len(lines)
+    for answer in answers:
+        reply = parse_reply(answer)
+        assert reply is not None and reply.kind in ("OK", "ERR") and len(answer) <= MAX_REPLY
+    STATE.tick(SECOND, 0.01, FACE)
+    assert not FACE.any()
+
+
+STATE, FACE = CommandState(P), P.neutral()
+
+
+class Servos:
+    """Servos that show an open jaw."""
+
+    def __init__(self) -> None:
+        self.known = True
+
+    def measured(self, out: np.ndarray) -> bool:
+        out[:] = 0.0
+        out[JAW] = 0.5
+        return self.known
+
+    def status(self) -> dict[str, float]:
+        return {"away_deg": 1.5}
+
+
+def test_a_face_is_told_and_streamed_in_other_vocabularies(talk: Talk) -> None:
+    talk.say("EXPR happiness")
+    talk.run(1.5)
+    assert talk.say("READ EMOTION").text.startswith("READ EMOTION happiness=")
+    assert "L12=" in talk.say("read units").text
+    assert talk.say("READ MOOD").text.startswith("READ MOOD valence=")
+    assert talk.say("READ VISEMES").text.startswith("READ VISEMES")
+    assert talk.say("SUB 20 READ EMOTION").text == "SUB 20 READ EMOTION"
+    reply = parse_reply(talk.session.stream(talk.now).strip())
+    assert reply is not None and reply.kind == "P" and "happiness=" in reply.text
+    assert (
+        talk.say("READ").code == 21 and talk.say("READ TEA").code == 21 and talk.say("SUB 5 READ UNITS NOW").code == 21
+    )
+
+
+def test_what_the_servos_show_is_told_and_streamed(talk: Talk) -> None:
+    for line in ("MEASURED jawOpen", "READ UNITS MEASURED"):
+        assert (talk.say(line).code, talk.say(line).text) == (30, "no servo says where it stands")
+    servos = talk.state.watch = Servos()
+    assert talk.say("MEASURED jawOpen tongueOut").text == "MEASURED jawOpen=0.5 tongueOut=0"
+    assert "26=" in talk.say("READ UNITS MEASURED").text
+    assert "away_deg=1.5" in talk.say("STATUS").text
+    assert talk.say("SUB 20 MEASURED jawOpen").text == "SUB 20 MEASURED 1"
+    assert talk.session.stream(talk.now).strip().endswith(b"jawOpen=0.5")
+    assert talk.say("SUB 20 MEASURED").text == "SUB 20 MEASURED 59"
+    assert talk.session.stream(talk.now).startswith(b"F ")
+    servos.known = False
+    talk.now += SECOND
+    assert talk.session.stream(talk.now) == b""

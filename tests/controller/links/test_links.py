@@ -1,0 +1,59 @@
+"""Opening the links of a stage."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from controller.base.errors import LinkError
+from controller.base.parameters import PARAMETERS as P
+from controller.layers.commands import CommandState
+from controller.links.hostport import HostPort
+from controller.links.links import HostProcess, open_links
+from controller.stage.stage import LinkSettings
+from drivers.base.errors import PortMissing
+
+
+def test_a_simulated_host_drives_the_face_from_its_own_process(tmp_path: Path) -> None:
+    script = tmp_path / "own.toml"
+    script.write_text('steps = ["0 SET jawOpen 0.8"]')
+    state = CommandState(P)
+    with ExitStack() as closers:
+        links = open_links([LinkSettings(port="simulated", script=str(script))], state, closers)
+        end = time.monotonic() + 10
+        while state.status()["manual"] != 1:
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        assert links[0].report()["accepted"] == 2  # HELLO and SET
+    assert not links[0].connected
+
+
+def test_a_host_process_tells_its_counts_and_stops_once() -> None:
+    host = HostProcess("tour")
+    assert os.path.exists(host.path)
+    host.stop()
+    host.stop()
+    assert host.counts["script"] == "tour"
+
+
+def test_a_host_process_that_is_killed_does_not_hang_stop() -> None:
+    host = HostProcess("tour")
+    host._process.send_signal(signal.SIGKILL)
+    host.stop()
+    assert host.counts == {}
+
+
+def test_a_host_that_cannot_start_says_why() -> None:
+    with pytest.raises(LinkError, match="did you mean 'tour'") as caught:
+        HostProcess("toor")
+    assert "tour" in caught.value.hint
+
+
+def test_a_missing_port_closes_what_was_open() -> None:
+    with HostPort() as port, ExitStack() as closers, pytest.raises(PortMissing):
+        open_links([LinkSettings(port=port.path), LinkSettings(port="/dev/none")], CommandState(P), closers)

@@ -1,0 +1,50 @@
+"""One step along the braking curve, against the formulas it is made of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller.motion import braking
+from controller.motion.braking import move
+
+DT, SPEED, ACCEL, RESPONSE = 0.01, 3.0, 40.0, 0.02
+
+
+def step(target: float, position: float, velocity: float) -> tuple[float, float, bool]:
+    """Position, velocity and whether a limit held it back, after one step."""
+    place, speed, limited = np.array([position]), np.array([velocity]), np.zeros(1, dtype=bool)
+    limits = (np.array([x]) for x in (SPEED, ACCEL, RESPONSE, -10.0, 10.0))
+    move(DT, np.array([target]), place, speed, limited, *limits)
+    return float(place[0]), float(speed[0]), bool(limited[0])
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_it_takes_the_speed_that_the_way_left_allows(way: float) -> None:
+    for error in (0.03, 0.1):  # beyond the knee at a r^2: where an even step ends, just enough is left to brake
+        now = np.sqrt(2 * ACCEL * (error - 0.5 * ACCEL * RESPONSE**2)) * 0.95
+        place, speed, _ = step(way * error, 0.0, way * now)
+        left = error - way * place
+        assert abs(speed) == pytest.approx(np.sqrt(2 * ACCEL * (left - 0.5 * ACCEL * RESPONSE**2)), abs=ACCEL * DT)
+        assert (abs(speed) - now) / DT <= ACCEL * (1 + 1e-9)
+        assert np.sign(speed) == way
+    assert step(way * 0.004, 0.0, way * 0.2)[1] == pytest.approx(way * (0.004 - 0.001) / 0.025)  # the linear end
+
+
+def test_limits_of_speed_and_acceleration_hold_it_back_and_are_told() -> None:
+    assert step(5.0, 0.0, 0.0) == (pytest.approx(0.5 * ACCEL * DT**2), pytest.approx(ACCEL * DT), True)
+    assert step(5.0, 0.0, SPEED)[1:] == (SPEED, True)
+    assert step(-5.0, 0.0, SPEED)[1] == pytest.approx(SPEED - ACCEL * DT)
+    assert step(0.001, 0.0, 0.0)[2] is False
+
+
+def test_it_stops_where_the_target_lies_on_the_way() -> None:
+    assert step(0.001, 0.0, 0.25) == (0.001, 0.0, False)
+    place, speed, _ = step(0.001, 0.0, 2.0)  # too fast to stop there
+    assert (place > 0.001, speed) == (True, pytest.approx(2.0 - ACCEL * DT))
+
+
+def test_nothing_is_compiled_at_its_first_call() -> None:
+    kernels = [value for value in vars(braking).values() if hasattr(value, "signatures")]
+    assert len(kernels) == 2
+    assert all(len(kernel.signatures) == 1 and not kernel._can_compile for kernel in kernels)

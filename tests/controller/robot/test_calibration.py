@@ -1,0 +1,87 @@
+"""controller.robot.calibration: a robot is carried onto what was captured, or the file is refused whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import ConfigError
+from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
+from controller.robot.calibration import Captured, calibrated, calibration_path, carried, save_calibration
+from controller.robot.channels import build_table
+from controller.robot.robot import load_robot
+
+HEAD = find_config("robots", "head24")
+
+
+def jaw_deg(robot, value: float) -> float:
+    values = PARAMETERS.neutral()
+    values[PARAMETERS.index("jawOpen")] = value
+    table = build_table(robot.channels, PARAMETERS)
+    return float(np.degrees(table.angles(values)[0][table.names.index("jawOpen")]))
+
+
+def test_neutral_and_ends_become_those_captured(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    save_calibration(path, "desk", "head24", {"jawOpen": Captured(min_deg=-4, neutral_deg=3, max_deg=19)})
+    robot = calibrated(load_robot(HEAD, PARAMETERS), path)
+    assert jaw_deg(robot, 0.0) == pytest.approx(3.0)
+    assert jaw_deg(robot, 1.0) == pytest.approx(19.0)
+    jaw = next(channel for channel in robot.channels if channel.name == "jawOpen")
+    assert jaw.limit_deg == (-4, 19)
+    others = [(a, b) for a, b in zip(robot.channels, load_robot(HEAD, PARAMETERS).channels, strict=True)]
+    assert all(a == b for a, b in others if a.name != "jawOpen")
+
+
+@pytest.mark.parametrize(
+    ("at", "deg", "gives"),
+    [
+        ([0, 1], [0, 20], [2, 9]),
+        ([0, 1], [0, -20], [2, -5]),
+        ([-1, 0, 1], [-30, 0, 30], [-5, 2, 9]),
+        ([-1, 1], [30, -30], [9, -5]),
+        ([-1, 0, 0.5, 1], [-30, 0, 3, 30], [-5, 2, 2.7, 9]),
+        ([0.5, 1], [10, 20], [2, 9]),
+    ],
+)
+def test_points_are_stretched_on_either_side_of_rest(at: list[float], deg: list[float], gives: list[float]) -> None:
+    robot = load_robot(HEAD, PARAMETERS)
+    points = robot.channels[0].map.model_copy(update={"at": at, "deg": deg})
+    channel = robot.channels[0].model_copy(update={"map": points, "trim_deg": 4.0})
+    out = carried(channel, Captured(min_deg=-5, neutral_deg=2, max_deg=9))
+    assert out.map.deg == pytest.approx(gives)
+    assert out.trim_deg == 0.0
+
+
+def test_a_robot_file_names_its_calibration(tmp_path: Path) -> None:
+    robot = tmp_path / "mine.toml"
+    text = HEAD.read_text().replace('name = "head24"', 'name = "head24"\ncalibration = "desk"', 1)
+    robot.write_text(text)
+    with pytest.raises(ConfigError, match=r"mine\.desk\.calibration\.toml"):
+        load_robot(robot, PARAMETERS)
+    path = calibration_path("desk", robot)
+    save_calibration(path, "desk", "head24", {"jawOpen": Captured(min_deg=-4, neutral_deg=3, max_deg=19)})
+    assert jaw_deg(load_robot(robot, PARAMETERS), 0.0) == pytest.approx(3.0)
+
+
+def test_faults_are_told_together_with_the_nearest_name(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    save_calibration(path, "desk", "other", {"jawOpne": Captured(min_deg=-4, neutral_deg=3, max_deg=19)})
+    with pytest.raises(ConfigError, match="2 faults") as caught:
+        calibrated(load_robot(HEAD, PARAMETERS), path)
+    assert "'jawOpen'" in str(caught.value)
+    assert "'other'" in str(caught.value)
+
+
+@pytest.mark.parametrize("angles", [(3, 2, 9), (2, 9, 3), (1, 1, 1)])
+def test_angles_out_of_order_are_refused(angles: tuple[float, float, float], tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    low, rest, high = angles
+    path.write_text(
+        f'name = "a"\nrobot = "head24"\n[channels.jawOpen]\nmin_deg = {low}\nneutral_deg = {rest}\nmax_deg = {high}\n'
+    )
+    with pytest.raises(ConfigError, match=r"channels\.jawOpen"):
+        calibrated(load_robot(HEAD, PARAMETERS), path)

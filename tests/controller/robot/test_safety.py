@@ -1,0 +1,188 @@
+"""Safety rules before the bus, alone and against hostile targets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller.base.parameters import PARAMETERS as P
+from controller.base.paths import find_config
+from controller.robot.channels import ChannelTable, build_table, limiter_of, play
+from controller.robot.robot import ChannelSettings, load_robot
+from controller.robot.rules import LoadRule, PreventRule, RuleSettings, TimingRule
+from controller.robot.safety import Guard
+from drivers.base.bus import BusState
+
+DT = 0.02
+JAW = TimingRule(channels=["a"], toward="high", extreme=0.6, hold_s=1.0, fall_s=1.0, rest_s=3.0, recover_s=1.0)
+LOAD = LoadRule(channels=["a"], current_a=0.5, after_s=0.2, most_deg=12.0, fall_deg_s=30.0, rest_s=0.5, rise_deg_s=20.0)
+PAIR = PreventRule(channel="a", toward="high", extreme=0.5, other="b", other_toward="low", other_extreme=0.4)
+
+
+def table_of(*names: str, limits: tuple[float, float] = (-40.0, 50.0)) -> ChannelTable:
+    return build_table(
+        [
+            ChannelSettings.model_validate(
+                {
+                    "name": name,
+                    "bus": "b",
+                    "id": i,
+                    "model": "xl330-m288",
+                    "mix": {"jawOpen": 1.0},
+                    "map": {"at": [0, 1], "deg": [0, 50]},
+                    "limit_deg": limits,
+                    "max_speed_deg_s": 400,
+                    "max_accel_deg_s2": 4000,
+                }
+            )
+            for i, name in enumerate(names)
+        ],
+        P,
+    )
+
+
+def measured(position_rad: np.ndarray, current_a: np.ndarray, fresh: bool = True) -> BusState:
+    n = len(position_rad)
+    flags, bytes_, floats = np.full(n, fresh), np.zeros(n, np.uint8), np.zeros(n)
+    return BusState(0.0, position_rad, floats, current_a, flags, floats, bytes_, ~flags, floats, floats, bytes_, flags)
+
+
+class Line:
+    """Guard and limiter as a bus has them; degrees in and out."""
+
+    def __init__(self, rules: RuleSettings, table: ChannelTable, **takeup: np.ndarray) -> None:
+        self.guard, self.limiter = Guard(rules, table, **takeup), limiter_of(table, DT)
+        self.sent = np.zeros(len(table.names))
+
+    def step(self, *target_deg: float, state: BusState | None = None) -> np.ndarray:
+        allowed = self.guard.apply(np.radians(target_deg), self.sent, self.limiter.rest(DT), state, DT)
+        return np.degrees(self.limiter.step(DT, allowed, self.sent))
+
+    def run(self, seconds: float, *target_deg: float) -> np.ndarray:
+        return np.array([self.step(*target_deg).copy() for _ in range(round(seconds / DT))])
+
+
+def test_a_jaw_held_open_falls_to_its_extreme_rests_and_may_open_again() -> None:
+    way = Line(RuleSettings(timing=[JAW]), table_of("a")).run(12.0, 50.0)[:, 0]
+    at = lambda seconds: way[round(seconds / DT)]  # noqa: E731
+    assert at(0.9) == pytest.approx(50.0)
+    assert at(3.0) == pytest.approx(30.0, abs=0.1)
+    assert at(5.0) == pytest.approx(30.0, abs=0.1)
+    assert at(6.6) == pytest.approx(50.0, abs=0.5)
+    assert at(9.5) == pytest.approx(30.0, abs=0.1)  # and so on, for as long as it is asked for
+
+
+def test_leaving_before_the_time_keeps_the_whole_travel_and_flicker_does_not() -> None:
+    line = Line(RuleSettings(timing=[JAW]), table_of("a"))
+    for _ in range(10):
+        line.run(0.5, 50.0)
+        line.run(0.6, 0.0)
+    assert line.guard.report() == []
+    for _ in range(20):
+        line.run(0.5, 50.0)
+        line.step(0.0)
+    assert line.guard.report()[0]["rule"] == "timing a toward high"
+
+
+def test_the_other_side_of_a_timed_servo_is_free() -> None:
+    line = Line(RuleSettings(timing=[JAW]), table_of("a"))
+    assert line.run(4.0, -40.0)[-1, 0] == pytest.approx(-40.0)
+    assert line.guard.report() == []
+
+
+def test_antagonists_are_never_past_their_extremes_together() -> None:
+    line = Line(RuleSettings(prevent=[PAIR]), table_of("a", "b"))
+    rng = np.random.default_rng(3)
+    way = []
+    for _ in range(600):
+        target = rng.uniform(-60, 60, 2) if rng.random() < 0.5 else np.array([50.0, -40.0])
+        way += [line.step(*target) for _ in range(int(rng.integers(1, 12)))]
+    a, b = np.array(way).T
+    assert np.minimum(a - 25.0, -16.0 - b).max() <= 0.06  # degrees: what counts as past
+    assert a.max() > 40.0 and b.min() < -35.0  # either of them has its whole travel when the other is away
+
+
+def test_the_favoured_antagonist_gets_its_way() -> None:
+    line = Line(RuleSettings(prevent=[PAIR]), table_of("a", "b"))
+    line.run(1.0, 50.0, 0.0)
+    a, b = line.run(1.0, 50.0, -40.0)[-1]
+    assert (a, b) == (pytest.approx(25.0, abs=1e-3), pytest.approx(-40.0))
+    assert line.guard.report() == [{"rule": "prevent a against b", "times": 1, "seconds": 1.0}]
+
+
+def test_an_overloaded_servo_gives_way_from_where_it_stands_and_comes_back() -> None:
+    line = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    line.run(1.0, 40.0)
+    stuck = measured(np.radians([20.0]), np.array([0.9]))
+    held = [float(line.step(40.0, state=stuck)[0]) for _ in range(100)]
+    assert held[5] == pytest.approx(40.0)
+    assert held[-1] == pytest.approx(8.0, abs=0.1)  # 12 degrees back from where it is stuck, not from the target
+    free = measured(np.radians([8.0]), np.array([0.1]))
+    after = [float(line.step(40.0, state=free)[0]) for _ in range(200)]
+    assert after[20] == pytest.approx(8.0, abs=0.1)  # rests first
+    assert after[-1] == pytest.approx(40.0, abs=0.1)
+    assert line.guard.report()[0]["times"] == 1
+
+
+def test_a_servo_pushed_down_gives_way_upwards() -> None:
+    line = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    line.run(1.0, -30.0)
+    stuck = measured(np.radians([-10.0]), np.array([-0.9]))
+    for _ in range(100):
+        line.step(-30.0, state=stuck)
+    assert np.degrees(line.sent[0]) == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize("state", [measured(np.zeros(1), np.array([np.nan])), measured(np.zeros(1), np.ones(1), False)])
+def test_a_current_that_was_not_measured_says_nothing(state: BusState) -> None:
+    line = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    for _ in range(200):
+        line.step(40.0, state=state)
+    assert np.degrees(line.sent[0]) == pytest.approx(40.0)
+
+
+def test_slack_is_taken_up_on_both_ways() -> None:
+    play_deg = 4.0
+    far = {True: 0.0, False: 0.0}
+    worst = {True: 0.0, False: 0.0}
+    for compensated in (True, False):
+        slack = np.radians([play_deg if compensated else 0.0])
+        line = Line(RuleSettings(), table_of("a"), dead_rad=np.zeros(1), slack_rad=slack)
+        for i in range(2000):
+            wanted = 20.0 * np.sin(i * DT)
+            (near,) = line.step(wanted)
+            far[compensated] = min(max(far[compensated], near - play_deg / 2), near + play_deg / 2)
+            if i > 200 and abs(np.cos(i * DT)) > 0.5:  # away from the turning points
+                worst[compensated] = max(worst[compensated], abs(far[compensated] - wanted))
+    assert worst[True] < 0.5 * worst[False]
+
+
+def test_a_dead_band_keeps_small_changes_away() -> None:
+    line = Line(RuleSettings(), table_of("a"), dead_rad=np.radians([1.0]), slack_rad=np.zeros(1))
+    line.run(1.0, 10.0)
+    assert line.run(1.0, 10.9)[-1, 0] == pytest.approx(10.0)
+    assert line.run(1.0, 11.1)[-1, 0] == pytest.approx(11.1)
+
+
+def test_no_hostile_target_gets_past_a_limit_of_the_shipped_head() -> None:
+    robot = load_robot(find_config("robots", "head24"), P)
+    table = build_table(robot.channels, P)
+    guard, limiter = Guard(robot.rules, table, *play(robot.channels)), limiter_of(table, DT)
+    rng = np.random.default_rng(0)
+    values = P.neutral()
+    way = np.zeros((3002, 24))  # two rows at rest first
+    for step in range(2, len(way)):
+        if rng.random() < 0.3:  # seldom enough that rules come to act
+            values = rng.uniform(-3, 3, len(P)) if rng.random() < 0.5 else np.ones(len(P))
+        way[step] = way[step - 1]
+        sent = way[step]
+        target = table.angles(values)[0]
+        target[rng.random(24) < 0.05] = rng.choice([np.nan, np.inf, -np.inf, 1e300])
+        current = np.where(np.sin(step / 40) > 0, 1.4, rng.choice([0.0, np.nan], 24))
+        state = measured(sent + rng.normal(0, 0.2, 24), current, bool(rng.random() < 0.9))
+        limiter.step(DT, guard.apply(target, sent, limiter.rest(DT), state, DT), sent)
+    speed = np.diff(way, axis=0) / DT
+    assert np.all((table.low_rad <= way) & (way <= table.high_rad))
+    assert np.all(np.abs(speed) <= table.max_speed_rad_s * (1 + 1e-9))
+    assert np.all(np.abs(np.diff(speed, axis=0)) / DT <= table.max_accel_rad_s2 * (1 + 1e-6))
+    assert len(guard.report()) >= 8

@@ -1,0 +1,73 @@
+"""What ``[face]`` and command lines say of the picture's look."""
+
+from __future__ import annotations
+
+import pytest
+
+from controller.base.errors import ParameterError
+from controller.base.parameters import PARAMETERS
+from controller.stage.picture import LightSettings, PictureSettings, checked, parse_background, with_picture
+from controller.stage.stage import load_stage
+from surface.view.scene.camera import PRESETS
+from surface.view.scene.theme import THEMES
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_without_words_a_theme_is_as_it_is(theme: str) -> None:
+    assert checked(PictureSettings(), {"theme": theme}).make_theme() == THEMES[theme]
+
+
+def test_background_and_lights() -> None:
+    settings = PictureSettings(
+        background="#ff0080",
+        light=LightSettings(yaw_deg=50, key=2.0, fill=0.0, warmth=1.0, ambient=0.5, follows_camera=1.0),
+    )
+    theme, own = settings.make_theme(), THEMES["skin"]
+    assert theme.background_top == theme.background_bottom == pytest.approx((1.0, 0.0, 128 / 255))
+    assert (theme.key.yaw_deg, theme.key.pitch_deg, theme.lights_follow) == (50, own.key.pitch_deg, 1.0)
+    assert theme.key.colour[0] > 2 * own.key.colour[0]
+    assert theme.key.colour[1] == pytest.approx(2 * own.key.colour[1])
+    assert theme.key.colour[2] < 2 * own.key.colour[2]
+    assert theme.fill.colour == (0, 0, 0)
+    assert theme.rim == own.rim
+    assert theme.sky == pytest.approx([0.5 * x for x in own.sky])
+    gradient = PictureSettings(background=("#000000", "#ffffff")).make_theme()
+    assert (gradient.background_top, gradient.background_bottom) == ((0, 0, 0), (1, 1, 1))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_camera_can_be_named(name: str) -> None:
+    for word in (name, name.replace("-", "_")):
+        assert checked(PictureSettings(), {"camera": word}).make_camera() == PRESETS[name]()
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [
+        ({"theme": "clown"}, "--theme clown: must be 'skin' or 'mask'"),
+        ({"camera": "above"}, "--camera above: must be 'front'"),
+        ({"background": "red"}, "--background red: must be #rrggbb"),
+        ({"background": ("#000000", "x")}, "--background #000000,x: must be"),
+        ({"monitor": -1}, "--monitor -1: must be greater than or equal to 0"),
+        ({"evaluator": "abacus"}, "--evaluator abacus: must be 'auto', 'cpu' or 'gpu'"),
+    ],
+)
+def test_a_wrong_word_is_told(wanted: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        checked(PictureSettings(), wanted)
+    assert message in str(caught.value)
+
+
+def test_options_lie_over_the_stage() -> None:
+    stage = load_stage("everything", PARAMETERS)
+    other = with_picture(stage, {"kiosk": True, "quality": "fast", "theme": None})
+    face = other.settings.face
+    assert (face.kiosk, face.quality, face.theme) == (True, "fast", "skin")
+    assert (face.size, face.fps) == (stage.settings.face.size, stage.settings.face.fps)
+    assert stage.settings.face.quality == "full"
+
+
+def test_backgrounds_on_the_command_line() -> None:
+    assert parse_background(None) is None
+    assert parse_background("#102030") == "#102030"
+    assert parse_background("#102030, #405060") == ("#102030", "#405060")

@@ -1,0 +1,91 @@
+"""Stages: what is shipped is whole; every fault of a stage and of what it names is told at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from controller.base.errors import ConfigError
+from controller.base.parameters import PARAMETERS
+from controller.stage.stage import load_stage
+
+
+def stage_file(tmp_path: Path, text: str) -> str:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    return str(path)
+
+
+@pytest.mark.parametrize("name", ["demo", "everything", "play", "serial"])
+def test_shipped_stages_are_whole(name: str) -> None:
+    stage = load_stage(name, PARAMETERS)
+    assert stage.settings.name == name
+    assert (stage.head / "head.toml").is_file()
+    assert len(stage.robots) == len(stage.settings.robots)
+
+
+def test_an_unknown_stage_names_the_closest() -> None:
+    with pytest.raises(ConfigError, match="did you mean 'demo'"):
+        load_stage("dmeo", PARAMETERS)
+
+
+def test_faults_of_stage_and_references_come_together(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text('name = "r"\nbuses = []\nchannels = []\nspeed = 1')
+    text = 'name = "mine"\nhead = "nobody"\nrobots = ["robot.toml", "head42"]'
+    with pytest.raises(ConfigError) as caught:
+        load_stage(stage_file(tmp_path, text), PARAMETERS)
+    message = str(caught.value)
+    assert "3 faults" in message
+    assert "head: no head 'nobody'" in message
+    assert "robots[0]:" in message
+    assert "speed: unknown key" in message
+    assert "robots[1]: no robot 'head42', did you mean 'head24'?" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("[face]\nsize = [0, 720]", "face.size[0]: "),
+        ("[face]\nqualty = 'full'", "face.qualty: unknown key, did you mean 'quality'?"),
+        ("[[links]]\nbaud = 9600", "links[0].port: missing"),
+        ("[[links]]\nport = '/dev/x'\nscript = 'tour'", 'links[0]: script needs port = "simulated"'),
+        ("control_hz = 0", "control_hz: "),
+    ],
+)
+def test_a_fault_is_named_with_its_key(tmp_path: Path, text: str, fault: str) -> None:
+    top, _, tables = text.partition("[") if text.startswith("[") else (text, "", "")
+    body = f'name = "mine"\n{top}\n' + (f"[{tables}" if tables else "")
+    with pytest.raises(ConfigError) as caught:
+        load_stage(stage_file(tmp_path, body), PARAMETERS)
+    assert fault in str(caught.value)
+
+
+def test_a_stage_has_layers_expressions_and_shows_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text("[smirk]\nweights = { mouthSmileLeft = 0.7 }")
+    text = 'name = "mine"\nvocabularies = ["own.toml"]\nshow = "tour"\nseed = 3\ncontrol_hz = 200\n'
+    text += "[layers.capture]\ngains = { brows = 0.5 }\n[layers.late]\npriority = 70\n"
+    stage = load_stage(stage_file(tmp_path, text), PARAMETERS)
+    state = stage.state(PARAMETERS)
+    assert state.vocabulary["smirk"].weights[PARAMETERS.index("mouthSmileLeft")] == 0.7
+    assert state.layer_names()[-1] == "late"
+    assert state.mixer["capture"].gain[PARAMETERS.index("browInnerUp")] == 0.5
+    assert stage.period_s == 0.005
+
+
+def test_faults_of_its_own_files_are_told_with_the_rest(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text("[a]\nof = { b = 1 }\n[b]\nof = { a = 1 }")
+    text = 'name = "mine"\nvocabularies = ["own.toml", "none.toml"]\nshow = "tuor"\nlife = "natral"\nhead = "nobody"\n'
+    with pytest.raises(ConfigError) as caught:
+        load_stage(stage_file(tmp_path, text + "[layers.capture]\ngain = 1\n"), PARAMETERS)
+    message = str(caught.value)
+    for part in (
+        "6 faults",
+        "vocabularies[1]: no vocabulary 'none.toml'",
+        "goes in a circle: a -> b -> a",
+        "show: no script 'tuor', did you mean 'tour'?",
+        "life: no life 'natral', did you mean 'natural'?",
+        "layers.capture.gain: unknown key, did you mean 'gains'?",
+        "head: no head 'nobody'",
+    ):
+        assert part in message

@@ -1,0 +1,132 @@
+"""Recordings and their replay."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import ControllerError
+from controller.base.parameters import PARAMETERS as P
+from controller.layers.commands import CommandState
+from controller.links.linesession import LineSession
+from controller.takes.recording import Recorder, Replay, replay
+
+STEP_NS = 10_000_000
+
+
+def perform(path: Path, seconds: float = 6.0) -> np.ndarray:
+    """A lively run with everything in it; returns (n, 59) what came out."""
+    random = np.random.default_rng(5)
+    out, rows, now = P.neutral(), [], 10**9
+    lines = [
+        b"LIFE 1", b"EXPR happiness 0.8", b"SET jawOpen 0.5", b"GAZE 30 -5", b"GAZE AT 100 0 300", b"RELEASE jawOpen",
+        b"EXPR wink 1 0.4", b"GAZE OFF", b"EXPR AU1+2 0.5", b"NEUTRAL 0.3", b"SET nothing 1", b"FRAME " + b"0.1 " * 59,
+    ]  # fmt: skip
+    with Recorder(CommandState(P, seed=7), path, seed=7) as state:
+        session = LineSession(state, now)
+        for i in range(round(seconds * 100)):
+            now += int(STEP_NS * random.uniform(0.9, 1.1))
+            if i % 40 == 7:
+                session.feed(lines[(i // 40) % len(lines)] + b"\n", now - 12345)
+            if 200 < i < 300:
+                state.write_layer("capture", random.random(59), random.random(59) < 0.5, now, through=random.random(59))
+            state.tick(now, 0.01, out)
+            rows.append(out.copy())
+    return np.array(rows)
+
+
+def test_a_replay_is_the_same_bit_by_bit(tmp_path: Path) -> None:
+    path = tmp_path / "run.omote"
+    recorded = perform(path)
+    played = np.array([values.copy() for _, values in replay(path, P)])
+    np.testing.assert_array_equal(played, recorded)
+    assert np.ptp(recorded, axis=0).max() > 0.5
+
+
+def test_a_recorder_answers_like_its_state(tmp_path: Path) -> None:
+    state = CommandState(P)
+    with Recorder(state, tmp_path / "a") as recorder:
+        recorder.set_parameters([17], [0.5], 0)
+        recorder.tick(STEP_NS, 0.01, P.neutral())
+        out = P.neutral()
+        recorder.snapshot(out)
+        assert out[17] > 0 and recorder.holder(17) == "manual"
+        assert recorder.status() == state.status() and recorder.layer_names() == state.layer_names()
+    recorder.close()
+    recorder.set_parameters([17], [0.1], 0)  # after the end it still works, unrecorded
+
+
+def test_a_tick_that_comes_out_differently_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "run.omote"
+    perform(path, 1.0)
+    lines = path.read_text().splitlines()
+    i = next(i for i, line in enumerate(lines) if "expression" in line)
+    lines[i] = lines[i].replace("0.8", "0.7")
+    path.write_text("\n".join(lines))
+    with pytest.raises(ControllerError, match="came out differently"):
+        list(replay(path, P))
+    assert len(list(replay(path, P, check=False))) == 100
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "not a recording"),
+        ("{}\n", "line 1: damaged"),
+        ("[]\n", "line 1: damaged"),
+        ('["omote recording",99,0,[]]\n', "not a recording of version 1"),
+        ('["omote recording",1,0,0.01,["jawOpen"]]\n', "other parameters"),
+        ("\xff", "not a recording"),
+    ],
+)
+def test_broken_files_say_why(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(ControllerError, match=message):
+        list(replay(path, P))
+
+
+@pytest.mark.parametrize("line", ['["system","ls"]', '["tick",1]', '["gaze","a","b",0]', "[1", '["write_layer","x"]'])
+def test_a_damaged_line_is_named_and_nothing_else_is_called(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "a"
+    perform(path, 0.05)
+    path.write_text(path.read_text() + line + "\n")
+    with pytest.raises(ControllerError, match="line 7: damaged"):
+        list(replay(path, P))
+
+
+def test_files_that_cannot_be_opened(tmp_path: Path) -> None:
+    with pytest.raises(ControllerError, match="cannot be read"):
+        list(replay(tmp_path / "none", P))
+    with pytest.raises(ControllerError, match="cannot be written"):
+        Recorder(CommandState(P), tmp_path / "none" / "a")
+
+
+def test_a_replay_ticks_at_its_own_pace_whatever_the_clock(tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    recorded, out = perform(path, 2.0), P.neutral()
+    player = Replay(path, P)
+    rows = []
+    for i in range(400):  # a clock twice as fast
+        player.tick(7 * 10**9 + i * STEP_NS // 2, 0.005, out)
+        rows.append(out.copy())
+        if player.finished:
+            break
+    assert player.finished and player.ticks == 200 and player.played_s == pytest.approx(2.0, abs=0.05)
+    shown = {row.tobytes() for row in rows}
+    assert all(row.tobytes() in shown for row in recorded[::7])  # each recorded face was shown, bit by bit
+    np.testing.assert_array_equal(rows[-1], recorded[-1])
+
+
+def test_gains_and_captures_are_recorded(tmp_path: Path) -> None:
+    path, out = tmp_path / "a.rec", P.neutral()
+    with Recorder(CommandState(P), path) as state:
+        state.set_gains("capture", {"jaw": 0.5})
+        state.capture(np.full(len(P), 0.6), np.ones(len(P), dtype=bool), 10**9)
+        for i in range(60):
+            state.tick(10**9 + i * STEP_NS, 0.01, out)
+    *_, (_, values) = replay(path, P)
+    np.testing.assert_array_equal(values, out)
+    assert values[P.index("jawOpen")] == pytest.approx(0.3, abs=0.01)

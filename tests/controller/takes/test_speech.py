@@ -1,0 +1,145 @@
+"""Speech as takes."""
+
+from __future__ import annotations
+
+import json
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import TakeError
+from controller.base.parameters import PARAMETERS as P
+from controller.layers.commands import CommandState
+from controller.takes.livelink import TakePlayer
+from controller.takes.speech import Cue, load_take, speech_take
+from controller.vocabulary.visemes import Visemes
+
+VISEMES = Visemes.load(P)
+JAW, PRESS, SMILE = P.index("jawOpen"), P.index("mouthPressLeft"), P.index("mouthSmileLeft")
+
+
+def say(*sounds: tuple[float, str], end_s: float) -> np.ndarray:
+    cues = [Cue(start, VISEMES.weights(name)) for start, name in sounds]
+    return speech_take("test", cues, end_s, P, VISEMES).values
+
+
+def test_a_held_sound_shows_its_shape_and_the_mouth_closes_after() -> None:
+    values = say((0.0, "sil"), (0.5, "aa"), (1.5, "sil"), end_s=2.0)
+    assert values[100, JAW] == pytest.approx(0.55)
+    assert values[0, JAW] == 0.0 and values[-1, JAW] == 0.0
+
+
+def test_lips_meet_for_a_short_p_between_open_vowels() -> None:
+    values = say((0.0, "aa"), (0.30, "PP"), (0.37, "aa"), end_s=0.7)
+    full = VISEMES.matrix[PRESS, 1]
+    assert values[30:38, PRESS].max() > 0.85 * full
+    assert values[30:38, JAW].min() < 0.1
+    assert values[20, JAW] > 0.5
+
+
+def test_sounds_reach_into_their_neighbours_without_jumps() -> None:
+    values = say((0.0, "sil"), (0.3, "O"), (0.45, "nn"), (0.55, "I"), (0.75, "SS"), (0.9, "sil"), end_s=1.1)
+    pucker = values[:, P.index("mouthPucker")]
+    assert pucker[28] > 0.05  # before the O begins
+    assert np.abs(np.diff(values, axis=0)).max() < 0.2
+    assert np.all((values >= 0) & (values <= 1))
+
+
+def test_rhubarb_tsv_and_json_agree(tmp_path: Path) -> None:
+    shapes = [(0.00, "X"), (0.05, "D"), (0.27, "C"), (0.31, "B"), (0.43, "X")]
+    ends = [t for t, _ in shapes[1:]] + [0.47]
+    tsv, js = tmp_path / "hi.tsv", tmp_path / "hi.json"
+    tsv.write_text("".join(f"{t:.2f}\t{shape}\n" for t, shape in [*shapes, (0.47, "X")]))
+    cues = [{"start": t, "end": e, "value": s} for (t, s), e in zip(shapes, ends, strict=True)]
+    js.write_text(json.dumps({"metadata": {"duration": 0.47}, "mouthCues": cues}))
+    one, other = load_take(tsv, P), load_take(js, P)
+    assert one.sample(0.16, P.neutral())[JAW] > 0.45
+    n = min(one.frames, other.frames) - 20
+    np.testing.assert_allclose(one.values[:n], other.values[:n], atol=1e-9)
+
+
+def test_phonemes_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "word.tsv"
+    path.write_text("# mama\n0.0 SIL\n0.2 M\n0.3 AA1\n0.5 M\n0.6 AA0\n0.8 SIL\n")
+    take = load_take(path, P)
+    jaw = take.values[:, JAW]
+    assert jaw[40] > 0.4 and jaw[25] < 0.1 and jaw[55] < 0.15 and jaw[70] > 0.4
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.tsv", "0.0 X\nzero D\n", "line 2: 'zero D' is not a time"),
+        ("a.tsv", "0.0 AA\n0.2 QQ\n", "line 2: unknown viseme or phoneme 'QQ'"),
+        ("a.tsv", "0.5 X\n0.2 D\n", "times that rise"),
+        ("a.tsv", "", "at least one sound"),
+        ("a.json", "{}", "not the output of rhubarb"),
+        ("a.json", "[", "not the output of rhubarb"),
+        ("a.wav", "RIFF", "not a WAV file"),
+        ("a.mp3", "", "its name ends in .mp3"),
+    ],
+)
+def test_broken_files_say_why(tmp_path: Path, name: str, text: str, message: str) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(TakeError) as caught:
+        load_take(path, P)
+    assert message in str(caught.value) and caught.value.hint
+
+
+def test_missing_files(tmp_path: Path) -> None:
+    for name in ("a.tsv", "a.wav", "a.csv"):
+        with pytest.raises(TakeError):
+            load_take(tmp_path / name, P)
+
+
+def write_wav(path: Path, sound: np.ndarray, rate: int, width: int = 2, channels: int = 1) -> Path:
+    kinds = {1: ("u1", 127, 128), 2: ("<i2", 32767, 0), 4: ("<i4", 2**31 - 1, 0)}
+    kind, scale, offset = kinds[width]
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(channels)
+        file.setsampwidth(width)
+        file.setframerate(rate)
+        file.writeframes(np.repeat(sound * scale + offset, channels).astype(kind).tobytes())
+    return path
+
+
+@pytest.mark.parametrize(("width", "channels", "rate"), [(2, 1, 16000), (1, 1, 8000), (4, 2, 44100)])
+def test_a_voice_opens_the_jaw_and_silence_closes_it(tmp_path: Path, width: int, channels: int, rate: int) -> None:
+    t = np.arange(2 * rate) / rate
+    voice = 0.6 * np.sin(2 * np.pi * 220 * t) * ((t > 0.5) & (t < 1.2))
+    take = load_take(write_wav(tmp_path / "a.wav", voice, rate, width, channels), P)
+    jaw = take.values[:, JAW]
+    assert take.frames == 200 and take.duration_s == pytest.approx(1.99)
+    assert jaw[80:110].min() > 0.3 and jaw[:45].max() < 0.02 and jaw[170:].max() < 0.05
+
+
+def test_hissing_stretches_the_lips_more_than_it_opens_the_jaw(tmp_path: Path) -> None:
+    rate, random = 16000, np.random.default_rng(1)
+    t = np.arange(2 * rate) / rate
+    voice = 0.5 * np.sin(2 * np.pi * 200 * t) * (t < 0.8)
+    hiss = np.diff(random.normal(size=2 * rate + 1)) * 0.1 * ((t > 1.2) & (t < 1.6))
+    values = load_take(write_wav(tmp_path / "a.wav", np.clip(voice + hiss, -1, 1), rate), P).values
+    stretch = P.index("mouthStretchLeft")
+    assert values[135:155, stretch].min() > 0.1 > values[135:155, JAW].max()
+    assert values[20:70, JAW].min() > 0.3
+
+
+def test_talking_keeps_the_smile_and_the_brows(tmp_path: Path) -> None:
+    state, out, now = CommandState(P), P.neutral(), 10**9
+    state.expression("happiness", 1.0, None, now)
+    path = tmp_path / "a.tsv"
+    path.write_text("0 SIL\n1 AA\n3 SIL\n")
+    player = TakePlayer(load_take(path, P), state, "speech")
+    shown = []
+    for _ in range(250):
+        now += 10_000_000
+        player.tick(now)
+        state.tick(now, 0.01, out)
+        shown.append(out.copy())
+    talking = shown[220]
+    assert talking[JAW] == pytest.approx(0.55, abs=0.02)
+    assert talking[SMILE] > 0.4 and talking[P.index("cheekSquintLeft")] == pytest.approx(0.75, abs=0.01)
+    assert state.holder(JAW) == "speech" and state.holder(P.index("browInnerUp")) == "expression"

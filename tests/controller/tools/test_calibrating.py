@@ -1,0 +1,177 @@
+"""omote calibrate in a real terminal, with a simulated head that is moved by hand."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Self
+
+import pytest
+
+from drivers.sim import ServoView, SimulatedBus
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+
+ROBOT = """
+name = "pair"
+[[buses]]
+name = "head"
+kind = "dynamixel"
+port = "{port}"
+[[channels]]
+name = "jaw"
+bus = "head"
+id = 1
+model = "xl330-m288"
+mix = {{ jawOpen = 1.0 }}
+map = {{ at = [0, 1], deg = [0, 20] }}
+limit_deg = [-30, 30]
+max_speed_deg_s = 300
+max_accel_deg_s2 = 3000
+"""
+
+
+class Terminal:
+    """omote calibrate on a pseudo-terminal of its own; a context manager that leaves no process behind."""
+
+    def __init__(self, *words: str) -> None:
+        self.master, slave = os.openpty()
+        command = [sys.executable, "-c", "from controller.cli.app import main; main()", "calibrate", *words]
+        environment = {**os.environ, "COLUMNS": "140", "LINES": "40", "TERM": "xterm"}
+        self.process = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env=environment)
+        os.close(slave)
+        os.set_blocking(self.master, False)
+        self.shown = ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+        os.close(self.master)
+
+    def until(self, pattern: str) -> None:
+        """Wait until a pattern was drawn after the last one that was waited for."""
+
+        def drawn() -> re.Match[str] | None:
+            self.drain()
+            return re.search(pattern, re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", self.shown))
+
+        wait(drawn)
+        found = drawn()
+        assert found is not None
+        self.shown = found.string[found.end() :]
+
+    def press(self, keys: str) -> None:
+        os.write(self.master, keys.encode())
+
+    def end(self) -> int:
+        """Its exit code, once it has ended by itself."""
+
+        def ended() -> bool:
+            self.drain()  # a terminal that nobody reads would hold it up
+            return self.process.poll() is not None
+
+        wait(ended)
+        return self.process.returncode
+
+    def drain(self) -> None:
+        """Take what was drawn."""
+        with suppress(BlockingIOError, OSError):
+            self.shown += os.read(self.master, 65536).decode("utf-8", "ignore")
+
+    def capture(self, servo: ServoView) -> None:
+        """Neutral, lowest and highest of the only channel, each seen before the hand moves on."""
+        for angle, key in ((5, "n"), (-10, "["), (18, "]")):
+            servo.place(degrees(angle))
+            self.until(rf" {angle}\.0 ")
+            self.press(key)
+            self.until(rf" {angle}\.0 [^\n]* {angle}\.0 ")
+
+
+def degrees(value: float) -> float:
+    return 2048 + value * 4096 / 360
+
+
+def wait(done: Callable[[], object]) -> None:
+    """Wait by counting, not by the clock: a machine that stood still for a while is no fault of the program."""
+    for _ in range(3000):
+        if done():
+            return
+        time.sleep(0.01)
+    raise AssertionError("waited 30 s in vain")
+
+
+Opened = Callable[[Terminal], Terminal]
+
+
+@pytest.fixture
+def opened() -> Iterator[Opened]:
+    """Keeps terminals until the test ends, whatever its end is."""
+    with ExitStack() as stack:
+        yield stack.enter_context
+
+
+def test_a_head_is_calibrated_by_hand_and_by_keys_and_saved(tmp_path: Path, opened: Opened) -> None:
+    with SimulatedBus([1], link=tmp_path / "port") as head:
+        robot = tmp_path / "pair.toml"
+        robot.write_text(ROBOT.format(port=head.path))
+        servo, terminal = head.servo(1), opened(Terminal(str(robot), "--name", "desk", "--margin", "0"))
+        terminal.capture(servo)
+        assert not servo.torque
+        terminal.press("h")
+        wait(lambda: servo.torque)
+        terminal.press("\x1b[D\x1b[D")
+        wait(lambda: servo.goal < degrees(17.3))
+        terminal.press("h")
+        wait(lambda: not servo.torque)
+        terminal.press("s")
+        terminal.until("saved 1 channels")
+        terminal.press("q")
+        assert terminal.end() == 0
+        assert not servo.torque
+    captured = tomllib.loads((tmp_path / "pair.desk.calibration.toml").read_text())
+    assert captured["channels"]["jaw"] == pytest.approx({"min_deg": -10, "neutral_deg": 5, "max_deg": 18}, abs=0.1)
+
+
+def test_a_calibration_that_exists_is_not_replaced_without_a_yes(tmp_path: Path, opened: Opened) -> None:
+    with SimulatedBus([1], link=tmp_path / "port") as head:
+        robot, old = tmp_path / "pair.toml", tmp_path / "pair.desk.calibration.toml"
+        robot.write_text(ROBOT.format(port=head.path))
+        old.write_text("precious")
+        servo, terminal = head.servo(1), opened(Terminal(str(robot), "--name", "desk"))
+        terminal.capture(servo)
+        terminal.press("s")
+        terminal.until("replace")
+        terminal.press("n")
+        terminal.until("not saved")
+        assert old.read_text() == "precious"
+        terminal.press("s")
+        terminal.until("replace")
+        terminal.press("y")
+        terminal.until("saved 1 channels")
+        terminal.press("q")
+        assert terminal.end() == 0
+    assert "precious" not in old.read_text()
+
+
+def test_a_calibration_that_is_told_to_end_leaves_the_motors_off(tmp_path: Path, opened: Opened) -> None:
+    with SimulatedBus([1], link=tmp_path / "port") as head:
+        robot = tmp_path / "pair.toml"
+        robot.write_text(ROBOT.format(port=head.path))
+        terminal = opened(Terminal(str(robot)))
+        terminal.until("jaw")
+        terminal.press("h")
+        wait(lambda: head.servo(1).torque)
+        terminal.process.terminate()
+        assert terminal.end() == 0
+        assert not list(tmp_path.glob("*.calibration.toml"))
+        assert not head.servo(1).torque

@@ -1,0 +1,59 @@
+"""Faces read back in other vocabularies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller.base.parameters import PARAMETERS as P
+from controller.vocabulary.affect import Affect
+from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.facs import Facs
+from controller.vocabulary.reading import Readings
+from controller.vocabulary.visemes import Visemes
+
+VOCABULARY = Vocabulary.load(P)
+EMOTIONS = ("happiness", "sadness", "surprise", "fear", "anger", "disgust", "contempt")
+
+
+@pytest.fixture(scope="module")
+def readings() -> Readings:
+    return Readings(P, VOCABULARY)
+
+
+@pytest.mark.parametrize("intensity", np.linspace(0.3, 1.0, 8))
+@pytest.mark.parametrize("emotion", EMOTIONS)
+def test_emotions_to_units_to_parameters_and_back(readings: Readings, emotion: str, intensity: float) -> None:
+    facs = Facs.load(P)
+    face = facs.expand(facs.emotions[emotion], intensity)
+    ((name, level),) = readings.read("EMOTION", face)
+    assert name == emotion and level == pytest.approx(intensity, abs=0.2)
+    shown = VOCABULARY[emotion].weights * intensity
+    assert readings.read("EMOTION", shown)[0][0] == emotion
+
+
+def test_units(readings: Readings) -> None:
+    face = Facs.load(P).expand("12+26B+L2")
+    found = dict(readings.read("UNITS", face))
+    assert set(found) == {"L12", "R12", "26", "L2"}
+    assert found["26"] == pytest.approx(0.4, abs=0.1)
+    assert readings.read("UNITS", P.neutral()) == []
+
+
+def test_visemes(readings: Readings) -> None:
+    visemes = Visemes.load(P)
+    for name in visemes.names[1:]:
+        face = visemes.matrix @ visemes.weights(name)
+        shown = readings.read("VISEMES", face)
+        best = max(shown, key=lambda each: each[1])[0]
+        alike = np.abs(visemes.matrix - face[:, None]).max(axis=0) < 1e-9  # some visemes have one mouth
+        assert best in {visemes.names[i] for i in np.flatnonzero(alike)}, name
+
+
+def test_moods(readings: Readings) -> None:
+    affect = Affect.load(VOCABULARY)
+    at = dict(zip(affect.names, affect.points, strict=True))
+    for name in ("happiness", "sadness", "anger"):
+        mood = np.array([value for _, value in readings.read("MOOD", VOCABULARY[name].weights)])
+        assert mood == pytest.approx(at[name], abs=0.2)
+    assert [name for name, _ in readings.read("MOOD", P.neutral())] == ["valence", "arousal", "dominance"]
