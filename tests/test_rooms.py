@@ -1,41 +1,161 @@
-"""The house has one direction: surface and drivers know nothing of each other or of controller."""
+"""The house has one direction: every import goes from a room to one before it, wherever in a file it stands.
+
+The order is the table ``[tool.omote.rooms]`` of pyproject.toml. Imports inside functions and those that only a type
+checker follows count as any other.
+"""
 
 from __future__ import annotations
 
 import ast
+import os
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-FORBIDDEN = {
-    "surface": {"drivers", "controller", "serial", "dynamixel_sdk", "pydantic", "typer"},
-    "drivers": {"surface", "controller", "moderngl", "numba", "scipy", "pydantic", "typer"},
+ORDER: dict[str, list[str]] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["omote"][
+    "rooms"
+]
+BELOW = {"surface": set(), "drivers": set(), "controller": {"surface", "drivers"}}
+"""Which of the three a module of each may import besides its own."""
+FOREIGN = {
+    "surface": {"serial", "dynamixel_sdk", "pydantic", "typer"},
+    "drivers": {"moderngl", "numba", "scipy", "pydantic", "typer"},
+    "controller": set(),
 }
-COMPILED = {"drivers/core/kernels.py": {"numba"}}
+"""Packages that a room does without."""
+COMPILED = {"drivers.core.kernels": {"numba"}}
 """Loaded by whoever drives a bus and by nobody else, so that looking for ports stays quick."""
+MOST_MODULES = 20
 
 
-def imported(path: Path) -> set[str]:
-    """Top-level names of every module ``path`` imports, at any depth of the file."""
-    names: set[str] = set()
+def modules() -> dict[str, Path]:
+    """Every module of the three rooms by its dotted name."""
+    found = {}
+    for room in ORDER:
+        for path in sorted((ROOT / room).rglob("*.py")):
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            found[name.removesuffix(".__init__")] = path
+    return found
+
+
+MODULES = modules()
+
+
+def imports(name: str) -> Iterator[str]:
+    """What a module imports, at any depth of its file: modules, or names of packages that are not its own."""
+    path = MODULES[name]
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            names |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            names.add(node.module.split(".")[0])
-    return names
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            for alias in node.names:
+                full = f"{module}.{alias.name}"
+                yield full if full in MODULES else module
 
 
-@pytest.mark.parametrize("room", FORBIDDEN)
-def test_room_imports_nothing_from_above(room: str) -> None:
-    files = sorted((ROOT / room).rglob("*.py"))
-    assert files
-    wrong = {name: imported(ROOT / name) & FORBIDDEN[room] for name in (str(f.relative_to(ROOT)) for f in files)}
-    wrong = {name: found - COMPILED.get(name, set()) for name, found in wrong.items()}
-    assert {name: found for name, found in wrong.items() if found} == {}
+def place(name: str) -> tuple[str, int]:
+    """Room of a module and where its sub-room stands in the order; the room's own ``__init__`` stands last."""
+    room, _, inside = name.partition(".")
+    fitting = [k for k, sub in enumerate(ORDER[room]) if inside == sub or inside.startswith(f"{sub}.")]
+    if not inside:
+        return room, len(ORDER[room])
+    assert fitting, f"{name} is in no room of pyproject.toml's [tool.omote.rooms]"
+    return room, max(fitting, key=lambda k: len(ORDER[room][k]))
+
+
+def is_against(name: str, other: str) -> bool:
+    """Whether the import of ``other`` by ``name`` goes against the order."""
+    room, at = place(name)
+    there, position = place(other)
+    return there not in BELOW[room] if there != room else position > at
+
+
+@pytest.mark.parametrize("room", ORDER)
+def test_every_import_goes_with_the_order(room: str) -> None:
+    names = [name for name in MODULES if name.split(".")[0] == room]
+    assert names
+    wrong = [(a, b) for a in names for b in imports(a) if b.split(".")[0] in ORDER and is_against(a, b)]
+    assert wrong == []
+
+
+def test_no_import_goes_in_a_circle() -> None:
+    edges = {a: {b for b in imports(a) if b in MODULES and b != a} for a in MODULES}
+    try:
+        TopologicalSorter(edges).prepare()
+    except CycleError as error:
+        pytest.fail(" imports ".join(reversed(error.args[1])))
+
+
+@pytest.mark.parametrize("room", ORDER)
+def test_a_room_does_without_packages_that_are_not_for_it(room: str) -> None:
+    used = {
+        name: {other.split(".")[0] for other in imports(name)} & FOREIGN[room] - COMPILED.get(name, set())
+        for name in MODULES
+        if name.split(".")[0] == room
+    }
+    assert {name: found for name, found in used.items() if found} == {}
 
 
 def test_only_the_view_draws() -> None:
-    files = [f for f in (ROOT / "surface").rglob("*.py") if "view" not in f.relative_to(ROOT).parts]
-    assert [f.name for f in files if imported(f) & {"moderngl", "imgui_bundle", "glfw"}] == []
+    drawing = {"moderngl", "imgui_bundle", "glfw"}
+    names = [name for name in MODULES if name.startswith("surface.") and not name.startswith("surface.view.")]
+    assert [name for name in names if {other.split(".")[0] for other in imports(name)} & drawing] == []
+
+
+def test_no_folder_is_crowded() -> None:
+    folders: dict[Path, int] = {}
+    for path in MODULES.values():
+        folders[path.parent] = folders.get(path.parent, 0) + (path.name != "__init__.py")
+    assert {str(folder.relative_to(ROOT)): n for folder, n in folders.items() if n > MOST_MODULES} == {}
+
+
+def test_every_folder_says_what_comes_in_what_goes_out_and_what_it_may_import() -> None:
+    silent = []
+    for name, path in MODULES.items():
+        if path.name == "__init__.py":
+            text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+            if not all(word in text for word in ("In: ", "Out: ", "Imports ")):
+                silent.append(name)
+    assert silent == []
+
+
+def test_no_module_takes_a_name_of_the_standard_library() -> None:
+    taken = {*sys.stdlib_module_names, "serial"}
+    assert [name for name in MODULES if name.split(".")[-1] in taken] == []
+
+
+ALONE = """
+import importlib, os, sys
+for package in sys.argv[1].split():
+    try:
+        importlib.import_module(package)  # once for all: here only the rooms' own imports are looked at
+    except ImportError:
+        pass
+for name in sys.argv[2:]:
+    child = os.fork()
+    if not child:
+        try:
+            importlib.import_module(name)
+        except BaseException as error:
+            print(f"{name}: {error!r}", flush=True)
+        os._exit(0)
+    os.waitpid(child, 0)
+"""
+HEAVY = "numba numba.core.registry scipy.sparse scipy.optimize pydantic rich.table typer moderngl serial dynamixel_sdk"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks, to import every module before all others")
+@pytest.mark.parametrize("room", ORDER)
+def test_every_module_can_be_imported_first(room: str) -> None:
+    names = [name for name in MODULES if name.split(".")[0] == room]
+    done = subprocess.run([sys.executable, "-c", ALONE, HEAVY, *names], capture_output=True, text=True, cwd=ROOT)
+    assert (done.stdout, done.stderr, done.returncode) == ("", "", 0)

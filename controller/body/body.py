@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from controller.base.clock import Clock
 from controller.base.errors import OMOTE_ERRORS
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.signals import ENDINGS, let_interrupts_through
 from controller.body.insight import InsightWriter, insight_size

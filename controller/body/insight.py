@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 from controller.base.parameters import REGIONS, Parameters
 from controller.robot.following import Reflection
 from controller.takes.recording import Face

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 
 from controller.base.errors import ControllerError
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 from controller.base.parameters import Parameters
 from controller.body.insight import Insight, insight_size
 from controller.body.sources import Voice, pump

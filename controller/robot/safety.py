@@ -2,8 +2,8 @@
 
 The chain is dead band -> slack -> rules. Rules only narrow the window [low, high] in which each servo may be told to
 be; several rules join by intersection, so their order does not matter. All of it acts on targets: the
-:class:`controller.motion.motion.MotionLimiter` behind keeps speed and acceleration, whatever a rule does. After the rules
-of the Hanson motor stack, without its defects; see docs/robots.md for what differs.
+:class:`controller.motion.motion.MotionLimiter` behind keeps speed and acceleration, whatever a rule does. After the
+rules of the Hanson motor stack, without its defects; see docs/robots.md for what differs.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.body.insight import Insight, InsightWriter, insight_size

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from controller.base.errors import TakeError
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.body.body import Body
 from controller.body.sources import PipeStream, Sources, Voice, pump

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.base.errors import ControllerError
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS
 from controller.face.face import FrameLog, HeadValues, Recorder
 from controller.face.pictures import write_pictures

@@ -51,7 +51,7 @@ import json
 import numpy as np
 from controller.face.face import HeadValues
 from controller.face.handling import Screen
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.stage.stage import FaceSettings, load_stage
 from controller.face.window import WindowFace

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from controller.base.errors import ConfigError
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.body.body import Body

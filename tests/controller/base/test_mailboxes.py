@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.base.mailbox import Mailbox
+from controller.base.mailboxes import Mailbox
 
 COUNT = 257
 
