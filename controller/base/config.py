@@ -21,6 +21,11 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    @classmethod
+    def known_keys(cls) -> list[str]:
+        """Keys that such a table may have, for who misspelt one."""
+        return list(cls.model_fields)
+
 
 def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
     """Read ``path`` as ``model``.
@@ -102,7 +107,7 @@ def _keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[st
         current = _inner_model(field.annotation)
         if current is None:
             return []
-    return list(current.model_fields)
+    return current.known_keys() if issubclass(current, Settings) else list(current.model_fields)
 
 
 def _inner_model(annotation: Any) -> Any:

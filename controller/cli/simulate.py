@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import inspect
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 from rich.console import Console
+from typer.core import TyperGroup
 
 from controller.base.errors import ConfigError
+from drivers.base.options import Entry, entries
 
 if TYPE_CHECKING:
     from controller.tools.simulating import Serving
@@ -19,41 +20,36 @@ if TYPE_CHECKING:
 console = Console(highlight=False)
 
 
+class _Simulators(TyperGroup):
+    """A command for each family that has a simulator, besides those of this module; listed when asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names of all commands."""
+        from drivers.core.registry import FAMILIES  # start-up: most commands need no families
+
+        return [*(family.kind for family in FAMILIES.all() if family.simulator), *super().list_commands(ctx)]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of a name; None where there is none."""
+        if cmd_name in self.commands:
+            return self.commands[cmd_name]
+        return _family_command(cmd_name) if cmd_name in self.list_commands(ctx) else None
+
+
+def _family_command(kind: str) -> Any:
+    app = typer.Typer(add_completion=False)
+    app.command(kind)(_simulate_family(kind))
+    return typer.main.get_command(app)
+
+
 def register(app: typer.Typer) -> None:
     """Add this module's commands to ``app``."""
-    simulators = typer.Typer(no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
-    simulators.command("dynamixel")(simulate_dynamixel)
-    simulators.command("feetech")(simulate_feetech)
-    simulators.command("maestro")(simulate_maestro)
-    simulators.command("ssc32")(simulate_ssc32)
-    simulators.command("text")(simulate_text)
-    simulators.command("omote")(simulate_omote)
+    simulators = typer.Typer(cls=_Simulators, no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
     simulators.command("robot")(simulate_robot)
     simulators.command("host")(simulate_host)
     app.add_typer(simulators, name="simulate")
 
 
-def parse_ids(text: str) -> list[int]:
-    """``1-3,7`` as [1, 2, 3, 7].
-
-    Raises
-    ------
-    ConfigError
-        naming the part that is no id or range of ids.
-    """
-    ids: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not first.isdigit() or (dash and not last.isdigit()):
-            raise ConfigError(f"--ids {text}: {part.strip()!r} is no id", hint="for example --ids 1,3,7-9")
-        ids += range(int(first), int(last or first) + 1)
-    wrong = [i for i in ids if i > 252]
-    if wrong or not ids or len(set(ids)) != len(ids):
-        raise ConfigError(f"--ids {text}: ids go from 0 to 252, each once", hint="for example --ids 1-24")
-    return ids
-
-
-Ids = Annotated[str, typer.Option("--ids", help="Ids of the servos: 1-24 or 1,3,7-9.")]
 Link = Annotated[Path | None, typer.Option("--link", help="Make this path a link to the pseudo-terminal.")]
 Tcp = Annotated[
     str | None, typer.Option("--tcp", metavar="HOST:PORT", help="Listen here; clients open socket://HOST:PORT.")
@@ -70,7 +66,6 @@ Look = Annotated[bool, typer.Option("--watch", help="Show the servos and the dec
 Control = Annotated[
     Path | None, typer.Option("--control", help="Socket that takes faults, and says how the servos are, while it runs.")
 ]
-BoardBaud = Annotated[int, typer.Option("--baud", min=300, help="Baud rate of the board.")]
 
 
 def _serving(
@@ -93,9 +88,9 @@ def _serving(
     return Serving(where, wire, latency / 1000.0, tuple(fault or ()), control, watch)
 
 
-def _served(command: Callable[..., None]) -> Callable[..., None]:
+def _served(command: Callable[..., None], own: list[inspect.Parameter] | None = None) -> Callable[..., None]:
     """The command with the options of :func:`_serving` for its first parameter, ``how``."""
-    own, shared = _options(command)[1:], _options(_serving)
+    own, shared = _options(command)[1:] if own is None else own, _options(_serving)
 
     def run(**given: Any) -> None:
         how = _serving(**{option.name: given.pop(option.name) for option in shared})
@@ -113,123 +108,26 @@ def _options(command: Callable[..., Any]) -> list[inspect.Parameter]:
     return [p.replace(annotation=hints[p.name]) for p in inspect.signature(command).parameters.values()]
 
 
-@_served
-def simulate_dynamixel(
-    how: Serving,
-    ids: Ids = "1-24",
-    model: Annotated[str, typer.Option(help="Model of the servos.")] = "xl330-m288",
-    baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
-) -> None:
-    """Serve simulated Dynamixel servos until interrupted; prints `ready PATH`. AX and MX models speak Protocol 1.0.
+def _simulate_family(kind: str) -> Callable[..., None]:
+    """The command that serves what stands in for a family."""
+    from controller.tools.simulating import serve_alone  # start-up: the command line shows its help without it
+    from drivers.core.registry import simulator_of
 
-    Example: omote simulate dynamixel --ids 1-24 --model xl330-m288 --link /tmp/head
-    """
-    from controller.tools.simulating import SimulatedId, serve_servos
+    simulator = simulator_of(kind)
 
-    servos = [SimulatedId(i, model) for i in parse_ids(ids)]
-    serve_servos(servos, baud, how, console)
+    def command(how: Serving, **given: Any) -> None:
+        serve_alone(kind, simulator.options(**given), how, console)
+
+    command.__doc__ = simulator.help
+    return _served(command, [_parameter(entry) for entry in entries(simulator.options)])
 
 
-@_served
-def simulate_feetech(
-    how: Serving,
-    ids: Ids = "1-6",
-    model: Annotated[str, typer.Option(help="Model of the servos.")] = "sts3215",
-    baud: Annotated[int, typer.Option(help="Baud rate the servos listen at.")] = 1_000_000,
-) -> None:
-    """Serve simulated Feetech STS or SCS servos until interrupted; prints `ready PATH`.
-
-    Example: omote simulate feetech --ids 1-6 --model sts3215 --link /tmp/arm
-    """
-    from controller.tools.simulating import SimulatedId, serve_servos
-
-    servos = [SimulatedId(i, model) for i in parse_ids(ids)]
-    serve_servos(servos, baud, how, console)
-
-
-@_served
-def simulate_maestro(
-    how: Serving,
-    channels: Annotated[int, typer.Option(help="6 (Micro Maestro), 12, 18 or 24.")] = 24,
-    device: Annotated[int, typer.Option(min=0, max=127, help="Device number, for the Pololu protocol.")] = 12,
-    crc: Annotated[bool, typer.Option("--crc", help="Commands end with a CRC-7.")] = False,
-    baud: BoardBaud = 115_200,
-) -> None:
-    """Serve a simulated Pololu Maestro until interrupted; prints `ready PATH`.
-
-    Example: omote simulate maestro --link /tmp/maestro
-    """
-    from controller.tools.simulating import serve_board
-    from drivers.sim import Maestro
-    from drivers.sim.serving.families import MAESTRO_SIZES
-
-    if channels not in MAESTRO_SIZES:
-        raise ConfigError(f"--channels {channels}: no Maestro has so many", hint="6, 12, 18 or 24")
-    board = Maestro(channels, time.monotonic(), device=device, crc=crc)
-    serve_board(board, baud, how, console)
-
-
-@_served
-def simulate_ssc32(
-    how: Serving,
-    baud: BoardBaud = 115_200,
-) -> None:
-    """Serve a simulated Lynxmotion SSC-32 until interrupted; prints `ready PATH`.
-
-    Example: omote simulate ssc32 --link /tmp/ssc32
-    """
-    from controller.tools.simulating import serve_board
-    from drivers.sim import Ssc32
-
-    serve_board(Ssc32(now_s=time.monotonic()), baud, how, console)
-
-
-@_served
-def simulate_text(
-    how: Serving,
-    template: Annotated[
-        str, typer.Option("--template", help=r"One servo's move, as in a robot file; \n and \r end a line.")
-    ] = r"#{ch}P{us}\r",
-    off: Annotated[str, typer.Option(help="What switches one servo off.")] = r"#{ch}P0\r",
-    query: Annotated[str, typer.Option(help="What asks for one servo.")] = "",
-    answer: Annotated[str, typer.Option(help="What comes back; it goes with --query.")] = "",
-    begin: Annotated[str, typer.Option(help="What stands before the moves of one line.")] = "",
-    separator: Annotated[str, typer.Option(help="What stands between them.")] = "",
-    end: Annotated[str, typer.Option(help="What stands behind them.")] = "",
-    ids: Ids = "1-16",
-    baud: BoardBaud = 115_200,
-) -> None:
-    """Serve a simulated board that reads lines of a template, until interrupted; prints `ready PATH`.
-
-    Example: omote simulate text --template 'S{ch},{us}\\n' --off 'D{ch}\\n' --link /tmp/board
-    """
-    from controller.tools.simulating import serve_board
-    from drivers.sim.boards.textboard import TextBoard
-
-    texts = {"template": template, "off": off, "query": query, "answer": answer}
-    texts |= {"begin": begin, "separator": separator, "end": end}
-    texts = {name: text.replace(r"\r", "\r").replace(r"\n", "\n") for name, text in texts.items()}
-    numbers = parse_ids(ids)
-    board = TextBoard(texts=texts, names=[f"servo{i}" for i in numbers], ids=numbers, now_s=time.monotonic())
-    serve_board(board, baud, how, console)
-
-
-@_served
-def simulate_omote(
-    how: Serving,
-    names: Annotated[str, typer.Option(help="What the head takes, with commas; all parameters without it.")] = "",
-    baud: BoardBaud = 115_200,
-) -> None:
-    """Serve a simulated head that takes the omote line protocol, until interrupted; prints `ready PATH`.
-
-    Example: omote simulate omote --names jawOpen,headYaw --link /tmp/head
-    """
-    from controller.base.parameters import PARAMETERS
-    from controller.tools.simulating import serve_board
-    from drivers.sim.boards.linehead import LineHead
-
-    known = [name.strip() for name in names.split(",") if name.strip()] or [*PARAMETERS.names]
-    serve_board(LineHead(known, time.monotonic()), baud, how, console)
+def _parameter(entry: Entry) -> inspect.Parameter:
+    """An option of a simulator as an option of the command."""
+    limits, flag = entry.option, f"--{entry.name.replace('_', '-')}"
+    shown = typer.Option(limits.flag or flag, min=limits.at_least, max=limits.at_most, help=limits.help)
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, shown])
 
 
 @_served

@@ -14,9 +14,12 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from controller.base.config import Settings, load
 from controller.base.parameters import Parameters, did_you_mean
-from controller.robot.buses import PULSES, BusSettings
+from controller.robot.buses import Bus
 from controller.robot.rules import RuleSettings
 from controller.robot.terms import Curve, Finite, Term, check_points
+from drivers import check_model
+from drivers.base.errors import DriverError
+from drivers.core.registry import FAMILIES
 
 Degrees = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -127,7 +130,7 @@ class RobotSettings(Settings):
     name: str
     description: str = ""
     calibration: str | None = None
-    buses: list[BusSettings] = Field(min_length=1)
+    buses: list[Bus] = Field(min_length=1)
     channels: list[ChannelSettings] = Field(min_length=1)
     landmarks: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=3)]] = {}
     profiles: dict[str, dict[str, Any]] = {}
@@ -188,9 +191,6 @@ def _doubled(robot: RobotSettings) -> list[str]:
 
 def _models(robot: RobotSettings) -> list[str]:
     """Servo models that their bus does not drive, and settings that mean nothing there."""
-    from drivers import check_model
-    from drivers.base.errors import DriverError
-
     faults = []
     buses = {bus.name: bus for bus in robot.buses}
     for i, channel in enumerate(robot.channels):
@@ -201,7 +201,7 @@ def _models(robot: RobotSettings) -> list[str]:
             check_model(bus.family, channel.model)
         except DriverError as error:
             faults.append(f"channels[{i}].model: {error}" + (f" ({error.hint})" if error.hint else ""))
-        if channel.pulse is not None and bus.family not in (*PULSES, "omote"):
+        if channel.pulse is not None and not FAMILIES.get(bus.family).hobby:
             faults.append(f"channels[{i}].pulse: is for hobby servos; {bus.name!r} is a {bus.family} bus")
     return faults
 

@@ -15,9 +15,9 @@ from controller.tools.watching import Watch
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
+from drivers.core.traffic import Decoder, Decoder1, Decoder2, Heard
 from drivers.port.serialport import SerialPort, tapped
 from drivers.tables.tables import ControlTable, load_table
-from drivers.tools.traffic import Decoder, Decoder1, Decoder2, Heard
 
 FEETECH = ("sts", "scs")
 SHOWN = ("Present Position", "Goal Position")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 
@@ -18,26 +18,20 @@ from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.base.signals import stop_flag
-from controller.robot.buses import BOARDS, SIMULATION, BusSettings
+from controller.robot.buses import SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.robot import ChannelSettings, load_robot
 from controller.tools.watching import Watch
-from drivers.tools.traffic import Decoder
-
-if TYPE_CHECKING:
-    from drivers.sim.serving.serve import PortServer
-    from drivers.sim.wire.line import Line
+from drivers import open_bus
+from drivers.core.registry import simulator_of
+from drivers.core.traffic import Decoder
+from drivers.sim.serving.farend import make_line
+from drivers.sim.serving.serve import PortServer, serve
+from drivers.sim.wire.line import Line
+from drivers.sim.wire.simulator import Setting, Simulator
 
 Where = Path | str | None
 """A path that becomes a link to a pseudo-terminal, or a URL to listen at instead."""
-
-
-@dataclass(frozen=True)
-class SimulatedId:
-    """A servo to simulate: ``id`` on the bus and vendor ``model`` name."""
-
-    id: int
-    model: str
 
 
 @dataclass(frozen=True)
@@ -61,29 +55,25 @@ class Serving:
     watch: bool = False
 
 
-def serve_servos(servos: list[SimulatedId], baud: int, how: Serving, console: Console) -> None:
-    """Serve simulated servos; prints ``ready PATH`` and returns when interrupted.
+def serve_alone(kind: str, options: Any, how: Serving, console: Console) -> None:
+    """Serve what stands in for a family; prints ``ready PATH`` and returns when interrupted.
 
     Parameters
     ----------
-    servos : ids and models; the model decides the protocol.
-    baud : rate the servos listen at.
+    options : an instance of the options of the family's simulator.
+
+    Raises
+    ------
+    DriverError : options that do not fit, or a port that cannot be made.
     """
-    from drivers.sim.serving.serve import make_chain, make_servos
-    from drivers.tables.tables import load_table
-    from drivers.tools.traffic import Decoder1, Decoder2
-
-    tables = {servo.id: load_table(servo.model) for servo in servos}
-    decoder = (Decoder1 if any(table.protocol == 1 for table in tables.values()) else Decoder2)(tables)
-    now_s = time.monotonic()
-    _serve(make_chain(make_servos(servos, 0, baud, now_s), now_s, 0), baud, how, console, decoder)
+    simulator = simulator_of(kind)
+    setting = Setting(now_s=time.monotonic(), baud=options.baud, names=PARAMETERS.names)
+    _serve(simulator.alone(options, setting), options.baud, how, console, simulator)
 
 
-def _serve(line: Line, baud: int, how: Serving, console: Console, decoder: Decoder) -> None:
-    from drivers.sim.serving.serve import serve
-
+def _serve(line: Line, baud: int, how: Serving, console: Console, simulator: Simulator) -> None:
     line.faults.add(how.faults, time.monotonic())
-    with _watching(decoder if how.watch else None, console) as look:
+    with _watching(simulator.decoder(line) if how.watch else None, console) as look:
         _until_stopped(
             lambda stop: serve(
                 line,
@@ -130,14 +120,6 @@ def _say_ready(path: str, console: Console) -> None:
     console.print(f"ready {path}", soft_wrap=True)
 
 
-def serve_board(line: Line, baud: int, how: Serving, console: Console) -> None:
-    """Serve a simulated board; prints ``ready PATH`` and returns when interrupted."""
-    from drivers.sim import Maestro
-    from drivers.tools.traffic import HexDecoder, TextDecoder
-
-    _serve(line, baud, how, console, HexDecoder() if isinstance(line, Maestro) else TextDecoder())
-
-
 def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSettings]]:
     """One bus of a robot file and the channels on it; the first bus without a name.
 
@@ -155,23 +137,13 @@ def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSett
 
 
 def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> None:
-    """Serve what is on a bus of a robot file (:func:`robot_bus`)."""
+    """Serve what is on a bus of a robot file (:func:`robot_bus`), set to what its driver will expect."""
     chosen, channels = robot_bus(name, bus)
-    if chosen.family in BOARDS:
-        serve_board(_board(chosen, channels), chosen.baud, how, console)
-        return
-    serve_servos([SimulatedId(channel.id, channel.model) for channel in channels], chosen.baud, how, console)
-
-
-def _board(bus: BusSettings, channels: list[ChannelSettings]) -> Line:
-    """The simulated board of a bus, set to what its driver will expect."""
-    from drivers import open_bus
-    from drivers.sim.serving.families import make_line
-
-    options = {key: value for key, value in bus.options().items() if key not in SIMULATION}
-    driver = open_bus(bus.family, servo_specs(channels), **{"port": "", **options})
+    options = {key: value for key, value in chosen.options().items() if key not in SIMULATION}
+    driver = open_bus(chosen.family, servo_specs(channels), **{"port": "", **options})
     servos = [(channel.id, channel.model) for channel in channels]
-    return make_line(bus.family, servos, time.monotonic(), options=driver.far_end())
+    line = make_line(chosen.family, servos, time.monotonic(), baud=chosen.baud, options=driver.far_end())
+    _serve(line, chosen.baud, how, console, simulator_of(chosen.family))
 
 
 def serve_host(script: str, link: Path | None, console: Console) -> None:

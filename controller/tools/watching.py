@@ -13,7 +13,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from drivers.tools.traffic import Decoder
+from drivers.core.traffic import Decoder
 
 Rows = Callable[[], Iterable[Mapping[str, Any]]]
 

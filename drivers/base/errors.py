@@ -8,6 +8,7 @@ The tree::
     │   ├── PortBusy         another program holds it
     │   ├── PortPermission   the user may not open it
     │   └── PortLost         it went away while in use (unplugged)
+    ├── PluginError          a kind that is not installed, or a plug-in that cannot be loaded
     └── BusError             the wire behind an open port
         ├── NoReply          a servo did not answer in time
         ├── CorruptReply     an answer failed its checks (CRC, id, length)
@@ -39,6 +40,10 @@ class DriverError(Exception):
         self.hint = hint
         self.port = port
         self.servo_ids = servo_ids
+
+
+class PluginError(DriverError):
+    """A kind of bus, link or the like that is not installed, or that cannot be loaded."""
 
 
 class PortError(DriverError):

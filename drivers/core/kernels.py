@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numba import int64, njit, types
 
-from drivers.dynamixel.layout import MAGNITUDE_BIT, TRIPPED
 from drivers.packets.packet import crc16
+from drivers.tables.tables import MAGNITUDE_BIT, TRIPPED
 
 CRC_TABLE = np.array([crc16(bytes((byte,))) for byte in range(256)], np.uint16)
 """CRC-16 of each single byte, (256,)."""

@@ -9,7 +9,7 @@ import copy
 import logging
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -38,11 +38,6 @@ class WireBus(Bus):
         self._limits = TargetLimits(self.servos, self._report)
         self._running = False
         self._lost = False
-
-    @classmethod
-    def fitting(cls, servos: Sequence[ServoSpec]) -> type[WireBus]:
-        """The driver for these servos, where a family needs more than one; this one by default."""
-        return cls
 
     # ------------------------------------------------------------------ hooks
 

@@ -17,10 +17,11 @@ import numpy as np
 
 from drivers.base.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError, DriverError, PortLost
+from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
 from drivers.dynamixel import startup
 from drivers.dynamixel.indirect import set_up
-from drivers.dynamixel.layout import Block, Scale
+from drivers.dynamixel.layout import Block
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
@@ -82,17 +83,6 @@ class DynamixelBus(WireBus):
         self._mended: Counter[int] = Counter()
         self._goals = np.zeros(len(self.ids), np.int32)
         self._heard_s = 0.0
-
-    @classmethod
-    def fitting(cls, servos: Sequence[ServoSpec]) -> type[WireBus]:
-        """The driver for the servos' protocols; that of Protocol 1.0 is only loaded where there are any."""
-        protocols = {load_table(model_number(servo.model)).protocol for servo in servos}
-        if 1 not in protocols:
-            return cls
-        from drivers.dynamixel.legacy import LegacyBus
-        from drivers.dynamixel.mixed import MixedBus
-
-        return LegacyBus if protocols == {1} else MixedBus
 
     # ------------------------------------------------------------------ the port
 

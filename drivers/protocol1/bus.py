@@ -19,8 +19,8 @@ import numpy as np
 from drivers.base.bus import BusReport, BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
 from drivers.base.errors import DriverError, PortLost
 from drivers.core.keeper import Keeper
+from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
-from drivers.dynamixel.layout import Scale
 from drivers.packets.packet1 import Packet1
 from drivers.protocol1 import startup
 from drivers.protocol1.exchange import Exchanges

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base.bus import Floats
-from drivers.dynamixel.layout import Ticks
+from drivers.core.scale import Ticks
 from drivers.protocol1.registers import item_of
 from drivers.tables.tables import ControlTable, Item
 

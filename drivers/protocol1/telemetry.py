@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.base.bus import BusReport, BusState, frozen
 from drivers.base.telling import Teller
-from drivers.dynamixel.layout import Scale, Ticks
+from drivers.core.scale import Scale, Ticks
 from drivers.packets.packet import ALERT
 from drivers.packets.packet1 import Packet1
 from drivers.protocol1.exchange import Exchange

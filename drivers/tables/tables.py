@@ -17,6 +17,11 @@ from typing import Any, Literal
 
 from drivers.base.errors import DriverError
 
+MAGNITUDE_BIT = 1024
+"""XL-320: bit 10 of speed and load is the direction, the rest the magnitude."""
+TRIPPED = 0xFF
+"""What the watchdog's register says when it has stopped the servo."""
+
 
 @dataclass(frozen=True, slots=True)
 class Item:

@@ -17,7 +17,7 @@ from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import DriverError
 from drivers.boards.pulses import GROUP, PulseBus
 from drivers.boards.scales import ValueScale
-from drivers.text.template import NAMES, VALUES, AnswerPattern, Template, decimals
+from drivers.text.template import NAMES, VALUES, AnswerPattern, check_texts, decimals
 
 log = logging.getLogger(__name__)
 
@@ -224,31 +224,3 @@ class TextBus(PulseBus):
 def _read_scale(pattern: AnswerPattern, servos: tuple[ServoSpec, ...], pulses: Any) -> ValueScale:
     field = next(name for name in VALUES if name in pattern.fields)
     return ValueScale(field, VALUES[field][1], servos, pulses)
-
-
-def check_texts(
-    template: str, begin: str = "", separator: str = "", end: str = "", off: str = "", query: str = "", answer: str = ""
-) -> tuple[Template, tuple[Template, Template], Template | None, Template | None, AnswerPattern | None]:
-    """The templates of a text board, read and checked: move, (begin, end), off, query and answer.
-
-    Raises
-    ------
-    DriverError : one does not fit; the message names it and what is wrong.
-    """
-    move = Template("template", template, (*VALUES, *NAMES, "time_ms"))
-    if not move.fields & set(VALUES):
-        raise DriverError("template: holds no value", hint="put one of {us}, {deg}, {deg10}, {angle}, {unit} into it")
-    frame = Template("begin", begin, ("time_ms",)), Template("end", end, ("time_ms",))
-    Template("separator", separator, ())
-    switch = Template("off", off, NAMES) if off else None
-    if bool(query) != bool(answer):
-        raise DriverError("query and answer go together", hint=r'as query = "?{ch}\n", answer = "{ch}={us}\n"')
-    if not query:
-        return move, frame, switch, None, None
-    pattern = AnswerPattern("answer", answer, (*VALUES, *NAMES))
-    if not pattern.fields & set(NAMES) or len(pattern.fields & set(VALUES)) != 1:
-        raise DriverError(
-            "answer: must name its servo and hold one value, for answers are told apart by nothing else",
-            hint=r'for example "{ch}={us}\n"',
-        )
-    return move, frame, switch, Template("query", query, NAMES), pattern

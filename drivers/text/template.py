@@ -169,3 +169,31 @@ class AnswerPattern:
             name: text if name == "name" else float(text)
             for name, text in zip(self._names, match.groups(), strict=True)
         }
+
+
+def check_texts(
+    template: str, begin: str = "", separator: str = "", end: str = "", off: str = "", query: str = "", answer: str = ""
+) -> tuple[Template, tuple[Template, Template], Template | None, Template | None, AnswerPattern | None]:
+    """The templates of a text board, read and checked: move, (begin, end), off, query and answer.
+
+    Raises
+    ------
+    DriverError : one does not fit; the message names it and what is wrong.
+    """
+    move = Template("template", template, (*VALUES, *NAMES, "time_ms"))
+    if not move.fields & set(VALUES):
+        raise DriverError("template: holds no value", hint="put one of {us}, {deg}, {deg10}, {angle}, {unit} into it")
+    frame = Template("begin", begin, ("time_ms",)), Template("end", end, ("time_ms",))
+    Template("separator", separator, ())
+    switch = Template("off", off, NAMES) if off else None
+    if bool(query) != bool(answer):
+        raise DriverError("query and answer go together", hint=r'as query = "?{ch}\n", answer = "{ch}={us}\n"')
+    if not query:
+        return move, frame, switch, None, None
+    pattern = AnswerPattern("answer", answer, (*VALUES, *NAMES))
+    if not pattern.fields & set(NAMES) or len(pattern.fields & set(VALUES)) != 1:
+        raise DriverError(
+            "answer: must name its servo and hold one value, for answers are told apart by nothing else",
+            hint=r'for example "{ch}={us}\n"',
+        )
+    return move, frame, switch, Template("query", query, NAMES), pattern

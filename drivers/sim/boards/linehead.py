@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from drivers.base.options import option
+from drivers.core.families import BOARD_BAUD
 from drivers.omote.protocol import checksum
 from drivers.sim.boards.board import Board
 from drivers.sim.wire.faults import Fault
+from drivers.sim.wire.simulator import Servos, Setting, Simulator
 
 MAX_LINE = 200
 SILENCE_S = 1.0
@@ -167,3 +171,31 @@ def _number(text: str) -> float:
     if not math.isfinite(value):
         raise _Refusal(f"22 {text!r} is not a number")
     return value
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeadOptions:
+    """What ``omote simulate omote`` can be told."""
+
+    names: str = option("What the head takes, with commas; all parameters without it.", "")
+    baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
+
+
+def _alone(options: HeadOptions, setting: Setting) -> LineHead:
+    names = [name.strip() for name in options.names.split(",") if name.strip()] or setting.names
+    return LineHead(names, setting.now_s, seed=setting.seed)
+
+
+def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> LineHead:
+    return LineHead(now_s=setting.now_s, seed=setting.seed, **options)
+
+
+SIMULATOR = Simulator(
+    far_end=_far_end,
+    alone=_alone,
+    options=HeadOptions,
+    help="""Serve a simulated head that takes the omote line protocol, until interrupted; prints `ready PATH`.
+
+    Example: omote simulate omote --names jawOpen,headYaw --link /tmp/head
+    """,
+)

@@ -5,9 +5,14 @@ Source: Pololu Maestro User's Guide, sections 3, 4.e and 5. Scripts are not run;
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from drivers.base.errors import DriverError
+from drivers.base.options import option
+from drivers.core.families import BOARD_BAUD
+from drivers.core.traffic import HexDecoder
 from drivers.maestro.protocol import (
     GET_ERRORS,
     GET_MOVING,
@@ -30,6 +35,7 @@ from drivers.maestro.protocol import (
 from drivers.sim.boards.board import Board
 from drivers.sim.boards.rc import RcChannel
 from drivers.sim.wire.faults import Fault
+from drivers.sim.wire.simulator import Servos, Setting, Simulator
 
 LIMITS_US = (992.0, 2000.0)
 """Pulse limits of a new board."""
@@ -281,3 +287,42 @@ class Maestro(Board):
 def _word(data: bytes) -> int:
     """14 bits, low seven first."""
     return data[0] | data[1] << 7
+
+
+SIZES = (6, 12, 18, 24)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaestroOptions:
+    """What ``omote simulate maestro`` can be told."""
+
+    channels: int = option("6 (Micro Maestro), 12, 18 or 24.", 24)
+    device: int = option("Device number, for the Pololu protocol.", 12, at_least=0, at_most=127)
+    crc: bool = option("Commands end with a CRC-7.", False)
+    baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
+
+
+def _alone(options: MaestroOptions, setting: Setting) -> Maestro:
+    if options.channels not in SIZES:
+        raise DriverError(f"--channels {options.channels}: no Maestro has so many", hint="6, 12, 18 or 24")
+    return Maestro(options.channels, setting.now_s, seed=setting.seed, device=options.device, crc=options.crc)
+
+
+def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Maestro:
+    others = dict(options)
+    sizes = SIZES if others.pop("board", "mini") == "micro" else SIZES[1:]
+    highest = max(channel for channel, _ in servos)
+    channels = next((size for size in sizes if highest < size), sizes[-1])
+    return Maestro(channels, setting.now_s, seed=setting.seed, **others)
+
+
+SIMULATOR = Simulator(
+    far_end=_far_end,
+    alone=_alone,
+    options=MaestroOptions,
+    decoder=lambda line: HexDecoder(),
+    help="""Serve a simulated Pololu Maestro until interrupted; prints `ready PATH`.
+
+    Example: omote simulate maestro --link /tmp/maestro
+    """,
+)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from drivers.base.options import option, parse_ids
+from drivers.core.families import BOARD_BAUD
 from drivers.sim.boards.board import Board
 from drivers.sim.wire.faults import Fault
-from drivers.text.bus import check_texts
-from drivers.text.template import VALUES, Piece, Template, pattern_of, pieces_of
+from drivers.sim.wire.simulator import Servos, Setting, Simulator
+from drivers.text.template import VALUES, Piece, Template, check_texts, pattern_of, pieces_of
 
 MAX_LINE = 4096
 
@@ -154,3 +157,42 @@ class TextBoard(Board):
         number = values.get("ch", values.get("id"))
         servo = int(number) if number is not None else next(iter(self.told))
         return servo if servo in self.told else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextOptions:
+    """What ``omote simulate text`` can be told."""
+
+    template: str = option(r"One servo's move, as in a robot file; \n and \r end a line.", r"#{ch}P{us}\r")
+    off: str = option("What switches one servo off.", r"#{ch}P0\r")
+    query: str = option("What asks for one servo.", "")
+    answer: str = option("What comes back; it goes with --query.", "")
+    begin: str = option("What stands before the moves of one line.", "")
+    separator: str = option("What stands between them.", "")
+    end: str = option("What stands behind them.", "")
+    ids: str = option("Ids of the servos: 1-24 or 1,3,7-9.", "1-16")
+    baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
+
+
+TEXTS = ("template", "off", "query", "answer", "begin", "separator", "end")
+
+
+def _alone(options: TextOptions, setting: Setting) -> TextBoard:
+    texts = {name: getattr(options, name).replace(r"\r", "\r").replace(r"\n", "\n") for name in TEXTS}
+    ids = parse_ids(options.ids)
+    return TextBoard(texts, ids, [f"servo{i}" for i in ids], setting.now_s, seed=setting.seed)
+
+
+def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> TextBoard:
+    return TextBoard(ids=[servo for servo, _ in servos], now_s=setting.now_s, seed=setting.seed, **options)
+
+
+SIMULATOR = Simulator(
+    far_end=_far_end,
+    alone=_alone,
+    options=TextOptions,
+    help="""Serve a simulated board that reads lines of a template, until interrupted; prints `ready PATH`.
+
+    Example: omote simulate text --template 'S{ch},{us}\\n' --off 'D{ch}\\n' --link /tmp/board
+    """,
+)

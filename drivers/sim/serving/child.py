@@ -18,7 +18,7 @@ from typing import Any
 from drivers.base.errors import DriverError
 from drivers.base.priority import take_priority
 from drivers.sim.serving.control import Commands
-from drivers.sim.serving.families import make_line
+from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import Control, PortServer
 
 

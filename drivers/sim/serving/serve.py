@@ -11,11 +11,7 @@ from collections.abc import Callable, Iterable
 
 from drivers.sim.serving.control import Commands, ControlSocket, Lines
 from drivers.sim.serving.farports import make_port
-from drivers.sim.servos.bus import SimulatedChain
-from drivers.sim.servos.chain import Chain
-from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.legacy import LegacyChain
-from drivers.sim.servos.mixed import MixedChain
+from drivers.sim.servos.simulators import make_chain, make_servos
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.timing import Timed, WireTiming, without_timing
@@ -188,28 +184,6 @@ class PortServer:
             self.chain.reader.take_pending()
         elif not self.port.is_open:
             self.port.open(fault.alias or self._link)
-
-
-def make_servos(servos: Iterable[object], model: str | int, baud: int, now_s: float) -> list[SimulatedServo]:
-    """Simulated servos for ids, or for anything that has an ``id`` and a ``model`` (a ``ServoSpec``)."""
-    return [
-        SimulatedServo(
-            int(getattr(servo, "id", servo)),  # type: ignore[call-overload]
-            getattr(servo, "model", model),
-            now_s=now_s,
-            baud=baud,
-        )
-        for servo in servos
-    ]
-
-
-def make_chain(servos: list[SimulatedServo], now_s: float, seed: int = 0) -> Chain:
-    """A wire with these servos, of the protocol they speak, or of both."""
-    protocols = {servo.table.protocol for servo in servos}
-    if len(protocols) > 1:
-        return MixedChain(servos, now_s, seed=seed)
-    kind = LegacyChain if protocols == {1} else SimulatedChain
-    return kind(servos, now_s, seed=seed)
 
 
 def serve_dynamixel(

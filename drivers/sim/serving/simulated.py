@@ -16,7 +16,7 @@ from typing import Any, Self
 
 from drivers.base.errors import PortError
 from drivers.sim.serving.control import Commands
-from drivers.sim.serving.families import make_line
+from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import PortServer
 from drivers.sim.servos.chain import Chain
 from drivers.sim.wire.faults import parse_fault
@@ -92,7 +92,7 @@ class SimulatedBus:
     wire, latency_s : bytes take their time.
     process : serve from a child process (which ends with this one, however this one ends) instead of a thread.
     seed : of random faults.
-    family, options : see :func:`drivers.sim.serving.families.make_line`.
+    family, options : see :func:`drivers.sim.serving.farend.make_line`.
 
     Attributes
     ----------

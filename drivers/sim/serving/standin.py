@@ -7,15 +7,12 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from drivers.base.bus import ServoSpec
 from drivers.base.errors import DriverError
 from drivers.core.wirebus import WireBus
-
-if TYPE_CHECKING:
-    from drivers.sim import SimulatedBus
-
+from drivers.sim.serving.simulated import SimulatedBus
 
 TRANSPORTS = ("pty", "tcp", "memory")
 
@@ -31,7 +28,7 @@ class SimulatedWire(WireBus):
     port : path that shall point at the simulated port, so that other programs can find it; empty for a private one.
     transport : ``"pty"`` (a pseudo-terminal), ``"tcp"`` (this machine's loopback) or ``"memory"`` (a thread of this
         process serves); empty takes a pseudo-terminal where the system has them, else TCP.
-    faults, wire, latency_s, seed, process : see :class:`drivers.sim.SimulatedBus`.
+    faults, wire, latency_s, seed, process : see :class:`drivers.sim.serving.simulated.SimulatedBus`.
     options : see the driver.
 
     Raises
@@ -85,8 +82,6 @@ class SimulatedWire(WireBus):
             raise
 
     def _simulate(self) -> None:
-        from drivers.sim import SimulatedBus  # only who simulates pays for it
-
         simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
         simulation.__enter__()
         self.simulation = simulation

@@ -12,10 +12,10 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import PortLost, PortMissing
-from drivers.sim.serving.families import make_line
+from drivers.core.registry import open_bus
+from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import PAUSE_S
 from drivers.sim.serving.simulated import ServoView
 from drivers.sim.servos.chain import Chain
@@ -170,7 +170,7 @@ class VirtualBus:
     Parameters
     ----------
     servos : the servos.
-    family : a kind of bus, as ``drivers.KINDS`` names it.
+    family : a kind of bus, as ``drivers.kinds()`` lists them.
     driver : options of the drivers over it, such as ``{"margin_s": 0.05}``.
     faults, baud, latency_s, seed : see :class:`drivers.sim.SimulatedBus`.
     options : what the far end is set to; None: as the driver wants it.

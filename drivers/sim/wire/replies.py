@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from drivers.sim.servos.device import SimulatedServo
+
+class Speaker(Protocol):
+    """Who puts bytes on the wire, as far as their time goes."""
+
+    @property
+    def return_delay_s(self) -> float:
+        """Pause between a packet and its answer."""
 
 
 class Reply(NamedTuple):
@@ -18,7 +24,7 @@ class Reply(NamedTuple):
     """
 
     data: bytes
-    servo: SimulatedServo | None
+    servo: Speaker | None
     late_s: float = 0.0
 
 

@@ -10,12 +10,13 @@ from pydantic import ValidationError
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
-from controller.robot.buses import BOARDS, OPTIONS, BusSettings
+from controller.robot.buses import read_bus, takers
 from controller.robot.robot import load_robot
-from drivers import KINDS, open_bus
+from drivers import kinds, open_bus
 from drivers.base.bus import ServoSpec
 
-FAMILIES = sorted(KINDS)
+FAMILIES = kinds()
+OPTIONS = takers()
 MODEL = {"dynamixel": "xl330-m288", "feetech": "sts3215", "omote": "parameter"}
 VALUES: dict[str, Any] = {
     "watchdog_ms": 100, "takeover": "release", "reboot_faulted": True, "min_voltage_v": 4.5, "voltage_wait_s": 1.0,
@@ -28,7 +29,7 @@ VALUES: dict[str, Any] = {
 
 def fault(**table: Any) -> str:
     with pytest.raises(ValidationError) as caught:
-        BusSettings.model_validate({"name": "head", **table})
+        read_bus({"name": "head", **table})
     return caught.value.errors()[0]["msg"].removeprefix("Value error, ")
 
 
@@ -40,8 +41,12 @@ def test_every_option_has_a_value_here_and_every_family_its_options() -> None:
 @pytest.mark.parametrize("family", FAMILIES)
 def test_all_options_of_a_family_reach_its_driver(family: str) -> None:
     given = {key: VALUES[key] for key, families in OPTIONS.items() if family in families}
-    bus = BusSettings.model_validate({"name": "head", "kind": family, "port": "/dev/null", **given})
-    assert bus.options() == {"baud": 115_200 if family in BOARDS else 1_000_000, "port": "/dev/null", **given}
+    bus = read_bus({"name": "head", "kind": family, "port": "/dev/null", **given})
+    assert bus.options() == {
+        "baud": 1_000_000 if family in ("dynamixel", "feetech") else 115_200,
+        "port": "/dev/null",
+        **given,
+    }
     spec = ServoSpec(1, "jaw", MODEL.get(family, "rc-180"), -0.5, 0.5, 5.0, 50.0)
     driver = open_bus(bus.kind, [spec], **bus.options())
     for key in ("takeover", "reboot_faulted", "min_voltage_v"):
@@ -53,7 +58,7 @@ def test_all_options_of_a_family_reach_its_driver(family: str) -> None:
 def test_a_simulated_bus_takes_the_options_of_its_family(family: str) -> None:
     given = {"template": "{us}\n"} if family == "text" else {}
     table = {"name": "head", "kind": "simulated", "simulates": family, "transport": "tcp", "seed": 3, **given}
-    bus = BusSettings.model_validate(table)
+    bus = read_bus(table)
     assert bus.family == family
     assert bus.options()["simulates"] == family
     spec = ServoSpec(1, "jaw", MODEL.get(family, "rc-180"), -0.5, 0.5, 5.0, 50.0)
@@ -62,7 +67,7 @@ def test_a_simulated_bus_takes_the_options_of_its_family(family: str) -> None:
 
 
 def test_what_is_not_given_is_left_to_the_driver() -> None:
-    bus = BusSettings.model_validate({"name": "head", "kind": "maestro", "port": "x"})
+    bus = read_bus({"name": "head", "kind": "maestro", "port": "x"})
     assert bus.options() == {"baud": 115_200, "port": "x"}
 
 

@@ -8,9 +8,9 @@ import struct
 from rich.console import Console
 
 from controller.tools.watching import KEPT, Watch, table_of
+from drivers.core.traffic import Decoder2
 from drivers.packets.packet import encode_instruction
 from drivers.tables.tables import load_table
-from drivers.tools.traffic import Decoder2
 
 WRITE = encode_instruction(3, 3, struct.pack("<HI", 116, 2048))
 

@@ -46,7 +46,7 @@ def test_two_servos_with_one_id_are_refused() -> None:
 def test_an_unknown_kind_names_the_known_ones() -> None:
     with pytest.raises(DriverError, match="bottango") as caught:
         drivers.open_bus("bottango", [])
-    assert caught.value.hint == f"use one of: {', '.join(sorted([*drivers.KINDS, 'simulated']))}"
+    assert caught.value.hint == f"use one of: {', '.join(sorted([*drivers.kinds(), 'simulated']))}"
 
 
 def test_an_unknown_model_is_a_driver_error() -> None:

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import drivers.core.kernels  # noqa: F401  compiled code is loaded here and not within an example's deadline
 from drivers.base.bus import ServoSpec
-from drivers.dynamixel.layout import NAMES, Block, Scale, item_of, layout_of
+from drivers.core.scale import Scale
+from drivers.dynamixel.layout import NAMES, Block, item_of, layout_of
 from drivers.tables.tables import load_table
 
 MODELS = ("xl330-m288", "xm430-w350", "xl430-w250", "xl320", "mx-28")

@@ -1,4 +1,4 @@
-"""drivers.tools.traffic: bytes become lines that name servos, registers and values."""
+"""drivers.core.traffic: bytes become lines that name servos, registers and values."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.core.traffic import Decoder, Decoder1, Decoder2, HexDecoder, TextDecoder
 from drivers.packets import packet as v2
 from drivers.packets import packet1 as v1
 from drivers.tables.tables import load_table
-from drivers.tools.traffic import Decoder, Decoder1, Decoder2, HexDecoder, TextDecoder
 
 X = load_table("xl330-m288")
 GOAL, POSITION = 116, 132

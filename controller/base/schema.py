@@ -1,0 +1,42 @@
+"""Dataclasses of options (:mod:`drivers.base.options`) as fields of a checked table."""
+
+from __future__ import annotations
+
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import Field
+
+from drivers.base.options import Entry, Option, entries
+
+
+def fields_of(options: type) -> dict[str, tuple[Any, Any]]:
+    """For :func:`pydantic.create_model`: the annotated type and the default of each option of a dataclass."""
+    return {entry.name: (_annotated(entry), entry.default) for entry in entries(options)}
+
+
+def bare_type(annotation: Any) -> Any:
+    """``X`` of ``X | None``, and anything else as it is."""
+    if get_origin(annotation) in (Union, UnionType):
+        kinds = [kind for kind in get_args(annotation) if kind is not type(None)]
+        return kinds[0] if len(kinds) == 1 else annotation
+    return annotation
+
+
+def _annotated(entry: Entry) -> Any:
+    kind = bare_type(entry.type)
+    checked = _checked(kind, entry.option)
+    return checked if kind is entry.type else checked | None
+
+
+def _checked(kind: Any, limits: Option) -> Any:
+    if limits.choices:
+        return Literal[limits.choices]
+    if kind is str:
+        return Annotated[str, Field(max_length=limits.longest)]
+    if kind in (int, float):
+        ends: dict[str, Any] = {"ge": limits.at_least, "le": limits.at_most, "gt": limits.above}
+        if kind is float:
+            ends["allow_inf_nan"] = False
+        return Annotated[kind, Field(**ends)]
+    return kind

@@ -1,0 +1,85 @@
+"""Options of plug-ins: a plain dataclass whose fields carry what a reader of files or a command line must know.
+
+Nothing here knows how they are read. The controller turns such a dataclass into keys of a robot file and into options
+of a command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, get_type_hints
+
+from drivers.base.errors import DriverError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """What a value of an option may be, and what people are told of it.
+
+    Attributes
+    ----------
+    help : one sentence for people.
+    at_least, at_most : ends of a number, themselves allowed; above : a number below all that are allowed.
+    choices : the only texts allowed. longest : characters of a text at most.
+    flag : what the command line calls it, where that is not its name.
+    """
+
+    help: str = ""
+    at_least: float | None = None
+    at_most: float | None = None
+    above: float | None = None
+    choices: tuple[str, ...] = ()
+    longest: int = 200
+    flag: str = ""
+
+
+def option(help: str, default: Any = None, **limits: Any) -> Any:
+    """A field of a dataclass of options.
+
+    Parameters
+    ----------
+    help : one sentence for people.
+    default : None says that the driver's own default holds.
+    limits : further fields of :class:`Option`.
+    """
+    return field(default=default, metadata={"option": Option(help=help, **limits)})
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One option of a dataclass: its name, its type as annotated, its default and its limits."""
+
+    name: str
+    type: Any
+    default: Any
+    option: Option
+
+
+def entries(options: type) -> Iterator[Entry]:
+    """The options of a dataclass in order."""
+    types = get_type_hints(options)
+    for each in fields(options):
+        default = None if each.default is MISSING else each.default
+        yield Entry(each.name, types[each.name], default, each.metadata.get("option", Option()))
+
+
+def parse_ids(text: str, most: int = 252) -> list[int]:
+    """``1-3,7`` as [1, 2, 3, 7].
+
+    Raises
+    ------
+    DriverError : a part is no id or range of ids, an id stands twice or is beyond ``most``.
+    """
+    hint = "for example --ids 1-24, or --ids 1,3,7-9"
+    ids: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdigit() or (dash and not last.isdigit()):
+            raise DriverError(f"--ids {text}: {part.strip()!r} is no id", hint=hint)
+        if int(last or first) > most:
+            raise DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
+        ids += range(int(first), int(last or first) + 1)
+    if not ids or len(set(ids)) != len(ids):
+        raise DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
+    return ids

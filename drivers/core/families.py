@@ -1,0 +1,89 @@
+"""What a family of servos or boards says of itself, and the options that many families share.
+
+A family is a folder of ``drivers`` with a module ``family`` that holds ``FAMILY``, or a package of somebody else with
+an entry point in the group ``omote.drivers`` that names a :class:`Family`; see docs/extending.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drivers.base.options import option
+
+API = 1
+"""Version of what a family must keep: this module, ``drivers.core.wirebus`` and ``drivers.sim.wire.simulator``."""
+
+SERVO_BAUD, BOARD_BAUD = 1_000_000, 115_200
+"""Rates that servos and boards leave the factory with."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """What drives one sort of servos or boards, and what stands in for it.
+
+    Attributes
+    ----------
+    api : version of the registry it is made for; see :data:`API`.
+    kind : what robot files call it. title : what people call it, as "Pololu Maestro boards".
+    driver : ``"module:name"`` of a :class:`drivers.core.wirebus.WireBus`, or of a function that gives one for a
+        sequence of servos where the family needs more than one.
+    settings : dataclass of what the driver can be told besides ``port`` and ``baud``, see :mod:`drivers.base.options`;
+        a method ``check(self, rate_hz)``, where it has one, raises ValueError where values do not go together.
+    check_model : ``"module:name"`` of a function that raises DriverError for a model that it does not drive.
+    simulator : ``"module:name"`` of a :class:`drivers.sim.wire.simulator.Simulator`; empty: none.
+    baud : rate of the port where a file gives none.
+    hobby : its servos are hobby servos, whose pulses can be calibrated.
+    install : what ``pip install`` takes where a package is missing.
+    """
+
+    api: int
+    kind: str
+    title: str
+    driver: str
+    settings: type
+    check_model: str
+    simulator: str = ""
+    baud: int = BOARD_BAUD
+    hobby: bool = False
+    install: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnySettings:
+    """What every driver can be told."""
+
+    margin_s: float | None = option(
+        "Longest wait for an answer beyond its time on the wire (s).", at_least=0, at_most=600
+    )
+
+
+WATCHDOG_MS = 200
+"""What drivers of servos set where a file says nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServoSettings(AnySettings):
+    """What drivers of servos with control tables can be told."""
+
+    watchdog_ms: int | None = option(
+        "Servos stop when nothing was heard for this time; 0 is never (ms).", at_least=0, at_most=2540
+    )
+    takeover: str | None = option("What becomes of servos that are on already.", choices=("adopt", "release", "refuse"))
+    reboot_faulted: bool | None = option("Reboot servos that latched a hardware error.")
+    min_voltage_v: float | None = option("Supply below which servos are not switched on (V).", above=0, at_most=60)
+    voltage_wait_s: float | None = option("How long to wait for that supply (s).", at_least=0, at_most=600)
+    feedback: str | None = option("What is read every cycle.", choices=("full", "position"))
+    slow_group: int | None = option("Servos asked for slow values in one cycle.", at_least=0, at_most=252)
+
+    def check(self, rate_hz: float) -> None:
+        """Raises ValueError for a watchdog that would bite between two cycles."""
+        watchdog_ms = WATCHDOG_MS if self.watchdog_ms is None else self.watchdog_ms
+        if 0 < watchdog_ms < 2000 / rate_hz:
+            raise ValueError(f"watchdog_ms must be 0 or span two cycles, {2000 / rate_hz:g} at this rate_hz")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PulseSettings(AnySettings):
+    """What drivers of boards of hobby servos can be told."""
+
+    stagger_s: float | None = option("Pause between switching servos on (s).", at_least=0, at_most=1)

@@ -1,0 +1,104 @@
+"""Every kind of bus there is: the families in the folders of ``drivers``, and those that other packages add.
+
+Nothing else in the house names a family. A driver is imported when it is asked for, so a missing vendor package never
+breaks anything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from drivers.base.errors import DriverError, PluginError
+from drivers.base.plugins import Registry, folders_with
+from drivers.core.families import API, Family
+
+if TYPE_CHECKING:  # start-up: they bring numpy, which listing the kinds does without
+    from drivers.base.bus import Bus, ServoSpec
+    from drivers.core.wirebus import WireBus
+
+SIMULATED = "simulated"
+
+FAMILIES: Registry[Family] = Registry(
+    Family,
+    "bus kind",
+    "omote.drivers",
+    API,
+    lambda: folders_with("drivers", "family"),
+    "FAMILY",
+    also=(SIMULATED,),
+)
+
+
+def kinds() -> list[str]:
+    """Every kind of real bus, in order."""
+    return FAMILIES.kinds()
+
+
+def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynamixel", **options: Any) -> Bus:
+    """Make the bus of a kind; it opens its port when it is entered or when ``open`` is called.
+
+    Parameters
+    ----------
+    kind : one of :func:`kinds` (a real port, or one that something serves), or ``"simulated"`` (the same driver over a
+        bus simulated in a child process).
+    servos : the servos in the order of all arrays.
+    simulates : the family that ``"simulated"`` stands in for.
+    options : what the driver takes, for example ``port`` and ``baud``; see docs/drivers.md.
+
+    Raises
+    ------
+    DriverError : unknown kind, or a package is not installed.
+    """
+    servos = tuple(servos)
+    if kind == SIMULATED:
+        driver = _simulated(simulates, servos)
+    else:
+        driver = driver_of(kind, servos)
+        if options.pop("faults", ()):
+            raise DriverError("faults can only be given to a simulated bus", hint='set kind = "simulated"')
+    bus: Bus = driver(servos, **options)
+    return bus
+
+
+def driver_of(kind: str, servos: Sequence[ServoSpec]) -> type[WireBus]:
+    """The driver of a family for some servos.
+
+    Raises
+    ------
+    DriverError : unknown kind, a package is not installed, or an unknown model.
+    """
+    family = FAMILIES.get(kind)
+    driver = FAMILIES.load(family, family.driver)
+    chosen: type[WireBus] = driver if isinstance(driver, type) else driver(servos)
+    return chosen
+
+
+def check_model(kind: str, model: str, simulates: str = "dynamixel") -> None:
+    """Whether a kind of bus drives a servo model.
+
+    Raises
+    ------
+    DriverError : it does not; the hint lists names that look like it.
+    """
+    family = FAMILIES.get(simulates if kind == SIMULATED else kind)
+    FAMILIES.load(family, family.check_model)(model)
+
+
+def simulator_of(kind: str) -> Any:
+    """The :class:`drivers.sim.wire.simulator.Simulator` of a family.
+
+    Raises
+    ------
+    DriverError : unknown kind, or a family that has none.
+    """
+    family = FAMILIES.get(kind)
+    if not family.simulator:
+        raise PluginError(f"bus kind {kind!r} has no simulator", hint=f"use a real bus: kind = {kind!r} and its port")
+    return FAMILIES.load(family, family.simulator)
+
+
+def _simulated(kind: str, servos: Sequence[ServoSpec]) -> Any:
+    simulator_of(kind)  # what has none cannot be stood in for
+    family = FAMILIES.get(kind)
+    return FAMILIES.load(family, "drivers.sim.serving.standin:simulated")(driver_of(kind, servos), kind)

@@ -1,0 +1,50 @@
+"""What stands in for a family: how its far end is made, and what ``omote simulate`` can be told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from drivers.core.traffic import Decoder, TextDecoder
+from drivers.sim.wire.line import Line
+
+Servos = Sequence[tuple[int, Any]]
+"""(id, model) of each servo."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What every simulated far end is made in.
+
+    Attributes
+    ----------
+    now_s : time. baud : rate of the wire. seed : of random faults.
+    names : names of all parameters, for far ends that speak of them.
+    """
+
+    now_s: float
+    baud: int
+    seed: int = 0
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulator:
+    """What stands in for a family.
+
+    Attributes
+    ----------
+    far_end : makes what a driver of the family expects at the other end of its wire, from the ids and models of its
+        servos and from what the driver gives as ``far_end()``, plain values that can travel to another process.
+    alone : makes what ``omote simulate KIND`` serves, from an instance of ``options``.
+    options : dataclass of the command's options (:mod:`drivers.base.options`), ``--baud`` and those of serving aside.
+    help : the command's help; its last line is an example.
+    decoder : makes what shows the traffic of a far end in words.
+    """
+
+    far_end: Callable[[Servos, Mapping[str, Any], Setting], Line]
+    alone: Callable[[Any, Setting], Line]
+    options: type
+    help: str
+    decoder: Callable[[Line], Decoder] = field(default=lambda line: TextDecoder())

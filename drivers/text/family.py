@@ -1,0 +1,47 @@
+"""The family of boards that read lines of text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drivers.base.errors import DriverError
+from drivers.base.options import option
+from drivers.core.families import Family, PulseSettings
+from drivers.text.template import check_texts
+
+TEXTS = ("template", "begin", "separator", "end", "off", "query", "answer")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextSettings(PulseSettings):
+    """What the driver of a text board can be told."""
+
+    template: str | None = option("How one servo's move is written.")
+    begin: str | None = option("What stands before the moves of one line.")
+    separator: str | None = option("What stands between them.")
+    end: str | None = option("What stands behind them.")
+    off: str | None = option("What switches one servo off.")
+    query: str | None = option("What asks for one servo.")
+    answer: str | None = option("What comes back; it goes with query.")
+
+    def check(self, rate_hz: float) -> None:
+        """Raises ValueError where the texts are no templates, or do not go together."""
+        if self.template is None:
+            raise ValueError(r'template is missing: how a move is written, for example "#{ch}P{us}\r"')
+        try:
+            check_texts(**{key: getattr(self, key) or "" for key in TEXTS})
+        except DriverError as error:
+            raise ValueError(f"{error} ({error.hint})") from error
+
+
+FAMILY = Family(
+    api=1,
+    kind="text",
+    title="boards that read lines of text",
+    driver="drivers.text.bus:TextBus",
+    settings=TextSettings,
+    check_model="drivers.boards.hobby:check_hobby",
+    simulator="drivers.sim.boards.textboard:SIMULATOR",
+    hobby=True,
+    install="pyserial",
+)
