@@ -27,10 +27,10 @@ from controller.base.signals import ENDINGS, let_interrupts_through
 from controller.body.insight import InsightWriter, insight_size
 from controller.body.sources import Sources, Voice
 from controller.body.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
-from controller.links.host import load_script
-from controller.links.linelink import LineLink
+from controller.links.line.host import load_script
+from controller.links.line.link import LineLink
+from controller.links.line.show import Shows
 from controller.links.links import open_links
-from controller.links.show import Shows
 from controller.robot.busloop import BusLoop
 from controller.robot.following import Puppet, Reflection
 from controller.robot.robot import RobotSettings

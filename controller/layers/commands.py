@@ -24,7 +24,7 @@ from controller.motion.motion import MotionLimiter
 from controller.vocabulary.expression import Vocabulary
 
 if TYPE_CHECKING:
-    from controller.links.show import Shows
+    from controller.links.line.show import Shows
 
 StatusValue = str | int | float
 

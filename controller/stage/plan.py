@@ -9,9 +9,9 @@ import numpy as np
 
 from controller.base.parameters import Parameters
 from controller.layers.commands import CommandState
-from controller.links.host import load_script
-from controller.links.script import Script
-from controller.links.show import Show
+from controller.links.line.host import load_script
+from controller.links.line.script import Script
+from controller.links.line.show import Show
 from controller.robot.channels import build_table
 from controller.robot.robot import ChannelSettings, RobotSettings
 from controller.stage.rehearsal import Feed, Rehearsal

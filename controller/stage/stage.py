@@ -17,7 +17,7 @@ from controller.layers.commands import CommandState
 from controller.layers.layers import load_layers
 from controller.layers.life import LifeSettings
 from controller.layers.mixer import LayerSettings
-from controller.links.host import load_script
+from controller.links.line.host import load_script
 from controller.robot.robot import RobotSettings, load_robot
 from controller.stage.identity import check_identity
 from controller.stage.picture import PictureSettings

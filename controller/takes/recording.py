@@ -23,7 +23,7 @@ from controller.layers.commands import CommandState, StatusValue, Watch
 from controller.vocabulary.expression import Vocabulary
 
 if TYPE_CHECKING:
-    from controller.links.show import Shows
+    from controller.links.line.show import Shows
 
 SUFFIX = ".rec"
 """What names of recordings end in."""

@@ -11,7 +11,7 @@ import numpy as np
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.paths import config_dir, find_config
-from controller.links.host import load_script
+from controller.links.line.host import load_script
 from controller.takes.recording import SUFFIX, replay
 
 if TYPE_CHECKING:

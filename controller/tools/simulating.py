@@ -182,7 +182,7 @@ def serve_host(script: str, link: Path | None, console: Console) -> None:
     ConfigError
         when the script is unknown or wrong.
     """
-    from controller.links.host import HostPort, RobotHost, load_script
+    from controller.links.line.host import HostPort, RobotHost, load_script
 
     loaded = load_script(script, PARAMETERS)
     with HostPort(link) as port, stop_flag() as flag:

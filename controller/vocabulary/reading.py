@@ -35,7 +35,7 @@ class Readings:
 
         Parameters
         ----------
-        what : one of :data:`controller.links.linewords.READINGS`.
+        what : one of :data:`controller.links.line.words.READINGS`.
 
         Raises
         ------

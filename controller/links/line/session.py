@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.layers.commands import CommandSink
-from controller.links.linecommands import COMMANDS, MAX_RATE_HZ, Grammar
-from controller.links.lineprotocol import (
+from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Grammar
+from controller.links.line.protocol import (
     MAX_LINE,
     VERSION,
     Code,
@@ -27,7 +27,7 @@ from controller.links.lineprotocol import (
     number,
     pairs,
 )
-from controller.links.linewords import (
+from controller.links.line.words import (
     Command,
     Expr,
     Gaze,
@@ -52,7 +52,7 @@ from controller.links.linewords import (
 )
 
 if TYPE_CHECKING:
-    from controller.links.show import Shows
+    from controller.links.line.show import Shows
     from controller.vocabulary.reading import Readings
 
 
