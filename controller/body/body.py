@@ -33,7 +33,7 @@ from controller.links.line.show import Shows
 from controller.links.links import open_links
 from controller.robot.busloop import BusLoop
 from controller.robot.following import Puppet, Reflection
-from controller.robot.robot import RobotSettings
+from controller.robot.settings import RobotSettings
 from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import Take, TakePlayer
 from controller.takes.recording import SUFFIX, Face, Recorder, Replay

@@ -13,7 +13,7 @@ from rich.console import Console
 from controller.base.errors import ConfigError
 
 if TYPE_CHECKING:
-    from controller.robot.robot import ChannelSettings, RobotSettings
+    from controller.robot.settings import ChannelSettings, RobotSettings
 
 console = Console(highlight=False)
 

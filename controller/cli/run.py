@@ -160,7 +160,7 @@ def _run(
 
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: its threads would spin where others have work
     with console.status("starting") as status, WaitingBody() as waiting, uncollected():
-        from controller.stage.picture import with_picture
+        from controller.stage.stage import with_picture
         from controller.tools.session import Session, has_display, write_report
 
         session = Session.load(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from controller.base.parameters import REGIONS, Parameters
 from controller.body.insight import Insight
 from controller.body.wire import Calm, Hold, Show
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 
 Wish = Hold | Show | Calm
 

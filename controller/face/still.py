@@ -18,7 +18,7 @@ from controller.base.paths import find_config
 from controller.stage.identity import check_identity, parse_identity
 from controller.stage.picture import PictureSettings, checked
 from controller.stage.stage import FaceSettings, load_head, load_stage
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
     from surface.head import Head

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from controller.base.errors import ConfigError
 from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
-from controller.robot.robot import AnchorSettings, ChannelSettings, RobotSettings
+from controller.robot.settings import AnchorSettings, ChannelSettings, RobotSettings
 
 if TYPE_CHECKING:
     from surface.head import Head

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from controller.base.clock import Clock, Samples
 from controller.base.parameters import Parameters
+from controller.robot.buses import BusSettings
 from controller.robot.channels import build_table, limiter_of, play, servo_specs
 from controller.robot.following import Following, regions_of
-from controller.robot.robot import BusSettings, ChannelSettings
 from controller.robot.rules import RuleSettings
 from controller.robot.safety import Guard
+from controller.robot.settings import ChannelSettings
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState
 from drivers.base.errors import DriverError, NoReply, PortLost

@@ -12,7 +12,6 @@ from controller.base.config import Settings
 from controller.base.errors import ParameterError
 
 if TYPE_CHECKING:
-    from controller.stage.stage import Stage
     from surface.view.scene.camera import Camera
     from surface.view.scene.theme import Colour, Light, Theme
 
@@ -96,12 +95,6 @@ def checked(settings: PictureSettings, wanted: Mapping[str, object]) -> Any:
         if option == "background":
             said = "#rrggbb, or #rrggbb,#rrggbb from top to bottom"
         raise ParameterError(f"--{option} {_said(given.get(option))}: must be {said}") from error
-
-
-def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
-    """``stage`` with command-line options laid over its ``[face]``; see :func:`checked`."""
-    face = checked(stage.settings.face, wanted)
-    return replace(stage, settings=stage.settings.model_copy(update={"face": face}))
 
 
 def parse_background(words: str | None) -> str | tuple[str, ...] | None:

@@ -13,7 +13,7 @@ from controller.links.line.host import load_script
 from controller.links.line.script import Script
 from controller.links.line.show import Show
 from controller.robot.channels import build_table
-from controller.robot.robot import ChannelSettings, RobotSettings
+from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.stage.rehearsal import Feed, Rehearsal
 from controller.stage.stage import Stage
 from controller.takes.livelink import TakePlayer

@@ -15,9 +15,9 @@ import numpy as np
 from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState
 from controller.robot.channels import build_table, limiter_of, play
-from controller.robot.robot import ChannelSettings, RobotSettings
 from controller.robot.rules import RuleSettings
 from controller.robot.safety import Guard
+from controller.robot.settings import ChannelSettings, RobotSettings
 
 if TYPE_CHECKING:
     from controller.robot.anchors import AnchorMap

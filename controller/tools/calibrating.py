@@ -13,9 +13,10 @@ from rich.console import Console
 from rich.live import Live
 
 from controller.base.signals import stop_flag
+from controller.robot.buses import BusSettings
 from controller.robot.calibration import rest_deg, save_calibration
 from controller.robot.channels import servo_specs
-from controller.robot.robot import BusSettings, ChannelSettings, RobotSettings
+from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.tools.capturing import Capturing
 from controller.tools.keys import Keyboard
 from drivers import open_bus

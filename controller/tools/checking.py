@@ -15,7 +15,7 @@ from controller.links.line.host import load_script
 from controller.takes.recording import SUFFIX, replay
 
 if TYPE_CHECKING:
-    from controller.robot.robot import RobotSettings
+    from controller.robot.settings import RobotSettings
     from surface.head import Head
 
 
@@ -145,7 +145,7 @@ def _check_toml(path: Path) -> list[str]:
 
 def _check_expressions(path: Path) -> list[str]:
     """A user's expressions beside the shipped ones; or the shipped file itself."""
-    from controller.vocabulary.expression import Vocabulary
+    from controller.vocabulary.vocabulary import Vocabulary
 
     shipped = config_dir() / "vocabularies" / "expressions.toml"
     more = () if path.resolve() == shipped.resolve() else (path,)
@@ -166,7 +166,7 @@ def _what_it_cannot_show(path: Path, robot: RobotSettings, parameters: Parameter
     if all(channel.anchor is None for channel in robot.channels):
         return []
     from controller.robot.anchors import load_anchors, residual_rows
-    from controller.vocabulary.expression import Vocabulary
+    from controller.vocabulary.vocabulary import Vocabulary
 
     anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), parameters, where=str(path))
     vocabulary = Vocabulary.load(parameters)

@@ -20,7 +20,8 @@ from controller.base.paths import find_config
 from controller.base.signals import stop_flag
 from controller.robot.buses import BOARDS, SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
-from controller.robot.robot import ChannelSettings, load_robot
+from controller.robot.robot import load_robot
+from controller.robot.settings import ChannelSettings
 from controller.tools.watching import Watch
 from drivers.tools.traffic import Decoder
 

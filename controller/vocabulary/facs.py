@@ -13,7 +13,7 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, did_you_mean, file_error, read_toml
 from controller.base.paths import config_dir
-from controller.vocabulary.expression import sides
+from controller.vocabulary.sides import sides
 
 if TYPE_CHECKING:
     from controller.base.solve import BoundedSolver

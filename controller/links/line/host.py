@@ -25,7 +25,7 @@ from controller.base.signals import ENDINGS
 from controller.links.line.hostport import HostPort
 from controller.links.line.protocol import MAX_REPLY, LineDecoder, LineError, Reply, format_words, number, parse_reply
 from controller.links.line.script import Script, Wave
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 
 _ANSWER_LIMIT_S = 1.0
 _HELLO_EVERY_S = 0.1

@@ -12,7 +12,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
-from controller.layers.commands import CommandSink
+from controller.layers.commands import CommandSink, Player
 from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Grammar
 from controller.links.line.protocol import (
     MAX_LINE,
@@ -52,7 +52,6 @@ from controller.links.line.words import (
 )
 
 if TYPE_CHECKING:
-    from controller.links.line.show import Shows
     from controller.vocabulary.reading import Readings
 
 
@@ -262,7 +261,7 @@ def _receipt(command: Command) -> str:
     return "NEUTRAL"
 
 
-def _play(shows: Shows | None, what: str, to: str) -> None:
+def _play(shows: Player | None, what: str, to: str) -> None:
     """Raises ConfigError or ParameterError: no shows here, no such script, mark or time."""
     if shows is None:
         raise ParameterError("no shows can be played here", hint="omote run plays them")

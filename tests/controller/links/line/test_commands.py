@@ -36,7 +36,7 @@ from controller.links.line.commands import (
     Unsubscribe,
 )
 from controller.links.line.protocol import Code, LineError, checksum
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
 GRAMMAR = Grammar(P, lambda name: VOCABULARY[name].name)

@@ -10,7 +10,7 @@ import pytest
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.links.line.script import Script, Wave
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
 
