@@ -115,7 +115,7 @@ class Body:
     def _loops(self, robot: RobotSettings, parameters: Parameters, limp: bool) -> list[BusLoop]:
         anchors = None
         if any(channel.anchor is not None for channel in robot.channels):
-            from controller.robot.anchors import load_anchors
+            from controller.robot.anchors import load_anchors  # start-up: loads the head
 
             anchors = load_anchors(robot, self.stage.head, parameters)
         return [

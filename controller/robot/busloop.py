@@ -30,7 +30,7 @@ from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.base.priority import take_priority
 
 if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorMap
+    from controller.robot.anchors import AnchorMap  # start-up: loads the head
 
 log = logging.getLogger(__name__)
 

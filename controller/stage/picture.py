@@ -12,8 +12,8 @@ from controller.base.config import Settings
 from controller.base.errors import ParameterError
 
 if TYPE_CHECKING:
-    from surface.view.scene.camera import Camera
-    from surface.view.scene.theme import Colour, Light, Theme
+    from surface.view.scene.camera import Camera  # start-up: the body reads stages and draws nothing
+    from surface.view.scene.theme import Colour, Light, Theme  # start-up: the body reads stages and draws nothing
 
 HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 Share = Annotated[float, Field(ge=0, le=4)]
@@ -54,7 +54,7 @@ class PictureSettings(Settings):
 
     def make_theme(self) -> Theme:
         """The theme with this background and these lights."""
-        from surface.view.scene.theme import THEMES
+        from surface.view.scene.theme import THEMES  # start-up: the body reads stages and draws nothing
 
         theme, light = THEMES[self.theme], self.light
         lit = replace(
@@ -73,7 +73,7 @@ class PictureSettings(Settings):
 
     def make_camera(self) -> Camera:
         """The camera of that name."""
-        from surface.view.scene.camera import PRESETS
+        from surface.view.scene.camera import PRESETS  # start-up: the body reads stages and draws nothing
 
         return PRESETS[self.camera.replace("_", "-")]()
 

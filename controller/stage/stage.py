@@ -26,7 +26,7 @@ from controller.takes.speech import load_take
 from controller.vocabulary.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
-    from surface.head import Head
+    from surface.head import Head  # start-up: the body reads stages and draws nothing
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 
@@ -133,8 +133,8 @@ def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tupl
     ------
     SurfaceError : the head cannot be read. ConfigError : a group does not fit it.
     """
-    from controller.stage.dragging import load_group, wear
-    from surface.head import Head
+    from controller.stage.dragging import load_group, wear  # start-up: as Head
+    from surface.head import Head  # start-up: the body reads stages and draws nothing
 
     head = Head.load(folder, identity)
     for path, amount in groups:

@@ -9,7 +9,6 @@ import math
 from collections import Counter
 from functools import cache, cached_property
 from importlib import metadata
-from typing import TYPE_CHECKING
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.layers.commands import CommandSink, Player
@@ -50,9 +49,7 @@ from controller.links.line.words import (
     Subscribe,
     Unsubscribe,
 )
-
-if TYPE_CHECKING:
-    from controller.vocabulary.reading import Readings
+from controller.vocabulary.reading import Readings
 
 
 class LineSession:
@@ -205,7 +202,6 @@ class LineSession:
 
     @cached_property
     def _readings(self) -> Readings:
-        from controller.vocabulary.reading import Readings  # takes a moment to import; few ask for it
 
         return Readings(self._parameters, self._sink.vocabulary)
 
