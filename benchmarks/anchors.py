@@ -23,8 +23,9 @@ from scipy.optimize import lsq_linear
 from controller.base.parameters import PARAMETERS, Floats
 from controller.base.paths import find_config
 from controller.robot.anchors import AnchorMap, Rows, anchored, first, load_anchors, sample_skin, servo_field, travel
-from controller.robot.robot import ChannelSettings, load_robot
-from controller.vocabulary.expression import Vocabulary
+from controller.robot.robot import load_robot
+from controller.robot.settings import ChannelSettings
+from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 
 NAIVE = {

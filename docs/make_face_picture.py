@@ -9,7 +9,7 @@ import numpy as np
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.face.still import for_head, sheet_poses
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.view import PRESETS, Camera, Offscreen, compose, contact_sheet, write_png
 from surface.view.pictures.imagefile import as_image, replacing

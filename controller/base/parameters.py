@@ -149,7 +149,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def file_error(path: Path, faults: list[str]) -> ConfigError:
     """One error for all faults of a file. Imports the models of configuration only when there is one to report."""
-    from controller.base.config import config_error
+    from controller.base.config import config_error  # start-up: pydantic, only for a fault
 
     return config_error(path, faults)
 

@@ -27,13 +27,13 @@ from controller.base.signals import ENDINGS, let_interrupts_through
 from controller.body.insight import InsightWriter, insight_size
 from controller.body.sources import Sources, Voice
 from controller.body.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
-from controller.links.host import load_script
-from controller.links.linelink import LineLink
+from controller.links.line.host import load_script
+from controller.links.line.link import LineLink
+from controller.links.line.show import Shows
 from controller.links.links import open_links
-from controller.links.show import Shows
 from controller.robot.busloop import BusLoop
 from controller.robot.following import Puppet, Reflection
-from controller.robot.robot import RobotSettings
+from controller.robot.settings import RobotSettings
 from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import Take, TakePlayer
 from controller.takes.recording import SUFFIX, Face, Recorder, Replay
@@ -115,7 +115,7 @@ class Body:
     def _loops(self, robot: RobotSettings, parameters: Parameters, limp: bool) -> list[BusLoop]:
         anchors = None
         if any(channel.anchor is not None for channel in robot.channels):
-            from controller.robot.anchors import load_anchors
+            from controller.robot.anchors import load_anchors  # start-up: loads the head
 
             anchors = load_anchors(robot, self.stage.head, parameters)
         return [

@@ -13,15 +13,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 from controller.base.signals import interrupts_held
 
 if TYPE_CHECKING:
-    from multiprocessing.context import SpawnProcess
-
-    from controller.body.wire import BodyOrders
+    from controller.body.wire import BodyOrders  # start-up: it loads numpy
 
 _END_S = 5.0
 
@@ -95,7 +94,7 @@ def _wait(pipe: Connection, heard: Connection) -> None:
     """Load the body's code, then be the body."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
     with uncollected():
-        from controller.body.body import body_main
+        from controller.body.body import body_main  # start-up: in the child, while main reads its orders
     try:
         orders: BodyOrders = pipe.recv()
     except (EOFError, OSError):

@@ -11,20 +11,20 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from typer import Typer
+    from typer import Typer  # start-up: Ctrl-C ends it quietly from main() on
 
 
 def make_app() -> Typer:
     """All commands."""
-    from typer import Typer
+    from typer import Typer  # start-up: Ctrl-C ends it quietly from main() on
 
-    from controller.cli import bench as cli_bench
-    from controller.cli import bus as cli_bus
-    from controller.cli import calibrate as cli_calibrate
-    from controller.cli import check as cli_check
-    from controller.cli import fit as cli_fit
-    from controller.cli import picture as cli_picture
-    from controller.cli import run as cli_run
+    from controller.cli import bench as cli_bench  # start-up: Ctrl-C ends it quietly from main() on
+    from controller.cli import bus as cli_bus  # start-up: Ctrl-C ends it quietly from main() on
+    from controller.cli import calibrate as cli_calibrate  # start-up: Ctrl-C ends it quietly from main() on
+    from controller.cli import check as cli_check  # start-up: Ctrl-C ends it quietly from main() on
+    from controller.cli import fit as cli_fit  # start-up: Ctrl-C ends it quietly from main() on
+    from controller.cli import picture as cli_picture  # start-up: Ctrl-C ends it quietly from main() on
+    from controller.cli import run as cli_run  # start-up: Ctrl-C ends it quietly from main() on
 
     app = Typer(
         name="omote",
@@ -42,7 +42,7 @@ def make_app() -> Typer:
 
 def report_error(error: BaseException, remark: str = "") -> None:
     """Print what failed and what to do next on standard error."""
-    from rich.console import Console
+    from rich.console import Console  # start-up: Ctrl-C ends it quietly from main() on
 
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     console.print(f"[bold red]error:[/] {_plain(error)}")
@@ -64,7 +64,7 @@ def _escape(text: str) -> str:
 def main() -> None:
     """Entry point of the ``omote`` command; nothing is imported before Ctrl-C would end it quietly."""
     try:
-        from controller.base.errors import OMOTE_ERRORS
+        from controller.base.errors import OMOTE_ERRORS  # start-up: Ctrl-C ends it quietly from main() on
 
         make_app()()
     except KeyboardInterrupt:

@@ -13,9 +13,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from controller.base.errors import ControllerError
+from controller.base.files import replacing
+
 if TYPE_CHECKING:
-    from controller.tools.benching import Tables
-    from surface.bench.bench import Measure
+    from controller.tools.benching import Tables  # start-up: --help does without it
+    from surface.bench.bench import Measure  # start-up: --help does without it
 
 console = Console(highlight=False)
 PICTURES = (".png", ".svg", ".jpg", ".webp")
@@ -93,8 +96,6 @@ def bench(
 @contextmanager
 def _opened(picture: Path | None) -> Iterator[Path | None]:
     """Where to draw; a place that cannot be written is refused before anything is measured."""
-    from controller.base.errors import ControllerError
-    from controller.base.files import replacing
 
     if picture is None:
         yield None
@@ -106,7 +107,7 @@ def _opened(picture: Path | None) -> Iterator[Path | None]:
 
 
 def _bus(seconds: float, face: bool, as_json: bool) -> None:
-    from controller.tools.benching_bus import bench_bus, to_json
+    from controller.tools.benching_bus import bench_bus, to_json  # start-up: --help does without it
 
     says = Console(stderr=True)  # lines and no moving bar: drawing one would disturb what is measured
     tables = bench_bus(max(seconds, 1.0), lambda text: says.print(f"measuring {text}"), face=face)
@@ -122,7 +123,7 @@ def _bus(seconds: float, face: bool, as_json: bool) -> None:
 
 
 def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None, vertices: int) -> Tables:
-    from controller.tools.benching import bench_growth, bench_large, bench_surface
+    from controller.tools.benching import bench_growth, bench_large, bench_surface  # start-up: --help does without it
 
     tables = bench_surface(seconds, bar.tell, vertices)
     if large:
@@ -133,7 +134,7 @@ def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None, vertice
 
 
 def _head(what: Subject, head: str, seconds: float, bar: Bar, out: Path | None, updates: int, level: int) -> Tables:
-    from controller.tools.benching import bench_drift, bench_head, bench_quadtree
+    from controller.tools.benching import bench_drift, bench_head, bench_quadtree  # start-up: --help does without it
 
     if what is Subject.head:
         return bench_head(head, seconds, bar.tell)
@@ -141,7 +142,7 @@ def _head(what: Subject, head: str, seconds: float, bar: Bar, out: Path | None, 
         return bench_drift(head, updates, bar.tell)
     tables, variants = bench_quadtree(head, bar.tell, level)
     if out is not None:
-        from surface.bench.comparison import draw
+        from surface.bench.comparison import draw  # start-up: --help does without it
 
         draw(variants, out)
     return tables

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.progress import Progress
 from rich.table import Table
 
 from controller.cli import simulate as cli_simulate
@@ -27,7 +28,7 @@ def ports() -> None:
 
     Example: omote ports
     """
-    from drivers.port.ports import list_ports
+    from drivers.port.ports import list_ports  # start-up: --help does without it
 
     found = list_ports()
     if not found:
@@ -58,9 +59,8 @@ def scan(
 
     Example: omote scan /dev/ttyUSB0 --baud 1000000
     """
-    from rich.progress import Progress
 
-    from controller.tools.scanning import STEPS, plan_scan, scan_port
+    from controller.tools.scanning import STEPS, plan_scan, scan_port  # start-up: --help does without it
 
     plan = plan_scan(baud, protocol or (2, 1))
     table = Table("baud", "prot.", "id", "model", "fw", "supply", "temp.", "error", "torque")
@@ -94,7 +94,7 @@ def set_id(
 
     Example: omote set-id /dev/ttyUSB0 1 12
     """
-    from drivers.tools.rename import set_id as change
+    from drivers.tools.rename import set_id as change  # start-up: --help does without it
 
     info = change(port, baud, protocol, old, new, release=release)
     console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}")
@@ -119,10 +119,10 @@ def monitor(
 
     Example: omote monitor /dev/ttyUSB0 --baud 57600
     """
-    from controller.base.signals import stop_flag
-    from controller.body.run import Deadline
-    from controller.tools.monitoring import ask
-    from controller.tools.monitoring import listen as only_listen
+    from controller.base.signals import stop_flag  # start-up: --help does without it
+    from controller.body.run import Deadline  # start-up: --help does without it
+    from controller.tools.monitoring import ask  # start-up: --help does without it
+    from controller.tools.monitoring import listen as only_listen  # start-up: --help does without it
 
     deadline = Deadline(seconds)
     with stop_flag() as flag:

@@ -11,9 +11,10 @@ import typer
 from rich.console import Console
 
 from controller.base.errors import ConfigError
+from controller.base.paths import find_config
 
 if TYPE_CHECKING:
-    from controller.robot.robot import ChannelSettings, RobotSettings
+    from controller.robot.settings import ChannelSettings, RobotSettings  # start-up: --help does without it
 
 console = Console(highlight=False)
 
@@ -40,11 +41,10 @@ def calibrate(
 
     Example: omote calibrate head24 --name desk
     """
-    from controller.base.parameters import PARAMETERS
-    from controller.base.paths import find_config
-    from controller.robot.calibration import calibration_path
-    from controller.robot.robot import load_robot
-    from controller.tools.calibrating import run_calibration
+    from controller.base.parameters import PARAMETERS  # start-up: --help does without it
+    from controller.robot.calibration import calibration_path  # start-up: --help does without it
+    from controller.robot.robot import load_robot  # start-up: --help does without it
+    from controller.tools.calibrating import run_calibration  # start-up: --help does without it
 
     path = find_config("robots", robot)
     settings = load_robot(path, PARAMETERS)
@@ -58,7 +58,7 @@ def calibrate(
 
 
 def _chosen(robot: RobotSettings, names: list[str] | None) -> Sequence[ChannelSettings]:
-    from controller.base.parameters import did_you_mean
+    from controller.base.parameters import did_you_mean  # start-up: --help does without it
 
     known = [channel.name for channel in robot.channels]
     for name in names or ():

@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from controller.base.errors import ConfigError
+
 console = Console(highlight=False)
 
 
@@ -43,9 +45,8 @@ def fit(
 
     Example: omote fit me.glb -o heads/me --report report
     """
-    from controller.base.errors import ConfigError
-    from controller.tools.fitting import add_with_progress, fit_with_progress
-    from surface.fit.source.load import LoadOptions
+    from controller.tools.fitting import add_with_progress, fit_with_progress  # start-up: --help does without it
+    from surface.fit.source.load import LoadOptions  # start-up: --help does without it
 
     if keep and identities is None:
         raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
@@ -74,6 +75,6 @@ def export(
 
     Example: omote export head.glb
     """
-    from controller.tools.exporting import export_with_progress
+    from controller.tools.exporting import export_with_progress  # start-up: --help does without it
 
     export_with_progress(head, out, settings or [], expression or [], identity, console)

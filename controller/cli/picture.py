@@ -62,8 +62,8 @@ def render(
 
     Example: omote render --set jawOpen=0.8 --size 800x800 -o out.png
     """
-    from controller.face.still import Still, draw_sheet, draw_still
-    from controller.stage.picture import parse_background
+    from controller.face.still import Still, draw_sheet, draw_still  # start-up: --help does without it
+    from controller.stage.picture import parse_background  # start-up: --help does without it
 
     look = {
         "camera": camera, "quality": quality, "theme": theme, "background": parse_background(background),

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.table import Table
 
 from controller.stage.identity import parse_identity
+from controller.tools.report import rows
 
 if TYPE_CHECKING:
-    from controller.body.sources import Voice
+    from controller.body.sources import Voice  # start-up: --help does without it
 
 console = Console(highlight=False)
 
@@ -61,7 +63,7 @@ def demo(
 
     Example: omote demo --seconds 5 --headless
     """
-    from controller.tools.session import has_display
+    from controller.tools.session import has_display  # start-up: --help does without it
 
     windowed = has_display() and not headless
     pictures, report = (None, None) if windowed else (out, out / "report.json")
@@ -99,7 +101,7 @@ def run(
     if dry_run:
         _rehearse(stage, None, seconds, report)
         return
-    from controller.body.sources import Voice
+    from controller.body.sources import Voice  # start-up: --help does without it
 
     heard = Voice(voice, voice_hz) if voice is not None else None
     _run(
@@ -131,7 +133,7 @@ def play(
     Example: omote play alex_rom_3.csv --headless --report r.json
     """
     if str(take) == "-":
-        from controller.body.sources import Voice
+        from controller.body.sources import Voice  # start-up: --help does without it
 
         heard = Voice("-", voice_hz, alone=True)
         _run(stage, None, seconds, headless, no_face, pictures, report, voice=heard, record=record)
@@ -156,12 +158,12 @@ def _run(
     identity: dict[str, float] | None = None,
     picture: dict[str, object] | None = None,
 ) -> None:
-    from controller.body.waiting import WaitingBody, uncollected
+    from controller.body.waiting import WaitingBody, uncollected  # start-up: --help does without it
 
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: its threads would spin where others have work
     with console.status("starting") as status, WaitingBody() as waiting, uncollected():
-        from controller.stage.picture import with_picture
-        from controller.tools.session import Session, has_display, write_report
+        from controller.stage.stage import with_picture  # start-up: --help does without it
+        from controller.tools.session import Session, has_display, write_report  # start-up: --help does without it
 
         session = Session.load(
             stage, take, status.update,
@@ -181,7 +183,7 @@ def _run(
 
 
 def _rehearse(stage: str, take: Path | None, seconds: float | None, report: Path | None) -> None:
-    from controller.tools.session import Session, write_report
+    from controller.tools.session import Session, write_report  # start-up: --help does without it
 
     with console.status("rehearsing"):
         rows, sent = Session.load(stage, take).plan(seconds)
@@ -193,9 +195,6 @@ def _rehearse(stage: str, take: Path | None, seconds: float | None, report: Path
 
 def show_report(report: dict[str, Any]) -> None:
     """Print the table of what was measured."""
-    from rich.table import Table
-
-    from controller.tools.report import rows
 
     table = Table("measured", "value", title=f"omote {report['stage']}", title_justify="left")
     for name, value in rows(report):
@@ -207,7 +206,6 @@ def show_report(report: dict[str, Any]) -> None:
 
 def show_plan(plan: list[dict[str, str]]) -> None:
     """Print what a stage would send, a channel a row."""
-    from rich.table import Table
 
     if not plan:
         console.print("This stage has no robot; nothing would be sent.")

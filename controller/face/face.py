@@ -20,8 +20,8 @@ from controller.base.parameters import Parameters
 from controller.stage.stage import FaceSettings
 
 if TYPE_CHECKING:
-    from surface.head import Head
-    from surface.view.pictures.offscreen import Offscreen
+    from surface.head import Head  # start-up: the body gets its orders first
+    from surface.view.pictures.offscreen import Offscreen  # start-up: the body gets its orders first
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -187,7 +187,7 @@ class HeadlessFace:
         values: Callable[[], Floats],
         recorder: Recorder | None = None,
     ) -> None:
-        from surface.view.pictures.offscreen import Offscreen
+        from surface.view.pictures.offscreen import Offscreen  # start-up: the body gets its orders first
 
         self._screen: Offscreen = Offscreen(
             head, settings.size, quality=settings.quality, theme=settings.make_theme(), evaluator=settings.evaluator

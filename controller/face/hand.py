@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from controller.base.parameters import PARAMETERS, Floats
 from controller.body.wire import Hold
 from controller.face.handling import Handles, Screen
-
-if TYPE_CHECKING:
-    from surface.head import Head
-    from surface.view.scene.camera import Camera
+from surface.head import Head
+from surface.view.scene.camera import Camera
 
 
 class Hand:
@@ -33,7 +31,7 @@ class Hand:
 
     def __call__(self, camera: Camera) -> None:
         """Take in this frame's mouse and keys."""
-        from imgui_bundle import imgui
+        from imgui_bundle import imgui  # optional
 
         io = imgui.get_io()
         screen = Screen(camera, (max(io.display_size.x, 1.0), max(io.display_size.y, 1.0)))

@@ -10,7 +10,6 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,9 @@ from numpy.typing import NDArray
 from controller.base.parameters import Floats, Parameters
 from controller.robot.anchors import Skin, head_order, sample_skin, shapes_of, skin_points
 from controller.stage.dragging import Dragger, Reshape, Reshaper, save_group
-
-if TYPE_CHECKING:
-    from surface.head import Head
-    from surface.view.scene.camera import Camera
+from surface.head import Head
+from surface.head.model.parameters import read_pose, rotation
+from surface.view.scene.camera import Camera
 
 PART = "face"
 _POINTS = 900
@@ -247,6 +245,5 @@ def _spread(ids: NDArray[np.int32], moves: Floats, n: int) -> Floats:
 
 def _turn(head_values: Floats) -> Floats:
     """(3, 3) rotation of the head for values (h,) in its own order."""
-    from surface.head.model.parameters import read_pose, rotation
 
     return rotation(*read_pose(head_values).head)

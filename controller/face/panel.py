@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from controller.base.parameters import REGIONS, Parameters
 from controller.body.insight import Insight
 from controller.body.wire import Calm, Hold, Show
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 
 Wish = Hold | Show | Calm
 
@@ -51,7 +51,7 @@ class Panel:
 
     def __call__(self) -> None:
         """Draw; called by the window between its frames."""
-        from imgui_bundle import imgui
+        from imgui_bundle import imgui  # optional
 
         imgui.set_next_window_pos(imgui.ImVec2(12, 12), imgui.Cond_.first_use_ever)
         imgui.set_next_window_size(imgui.ImVec2(320, 640), imgui.Cond_.first_use_ever)

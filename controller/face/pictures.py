@@ -8,6 +8,8 @@ import numpy as np
 
 from controller.base.errors import ControllerError
 from controller.face.face import Recorder
+from surface.view.pictures.clip import write_clip
+from surface.view.pictures.sheet import compose, write_png
 
 _MOMENTS = 12
 _COLUMNS = 4
@@ -21,8 +23,6 @@ def write_pictures(recorder: Recorder, folder: Path) -> list[str]:
     ControllerError, ViewError
         when the folder cannot be made, or a picture cannot be written.
     """
-    from surface.view.pictures.clip import write_clip
-    from surface.view.pictures.sheet import compose, write_png
 
     if not recorder.frames:
         return []

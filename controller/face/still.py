@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,10 @@ from controller.base.paths import find_config
 from controller.stage.identity import check_identity, parse_identity
 from controller.stage.picture import PictureSettings, checked
 from controller.stage.stage import FaceSettings, load_head, load_stage
-from controller.vocabulary.expression import Vocabulary
-
-if TYPE_CHECKING:
-    from surface.head import Head
+from controller.vocabulary.vocabulary import Vocabulary
+from surface.head import Head
+from surface.view.pictures.offscreen import Offscreen
+from surface.view.pictures.sheet import contact_sheet, write_png
 
 
 @dataclass(frozen=True)
@@ -133,8 +132,6 @@ def _add_expression(vocabulary: Vocabulary, values: NDArray[np.float64], word: s
 
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
-    from surface.view.pictures.offscreen import Offscreen
-    from surface.view.pictures.sheet import write_png
 
     head, look = still.load_head(), still.look
     with Offscreen(head, still.size, quality=look.quality, theme=look.make_theme(), evaluator=look.evaluator) as screen:
@@ -169,7 +166,6 @@ def _vector(values: dict[int, float]) -> NDArray[np.float64]:
 
 def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Draw every parameter and every named expression on one sheet (PNG); ``progress(done, total)`` is told."""
-    from surface.view.pictures.sheet import contact_sheet, write_png
 
     head, look = still.load_head(), still.look
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]

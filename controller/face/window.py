@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.parameters import PARAMETERS
+from controller.body.run import BodyProcess
 from controller.face.face import FrameLog, HeadValues
 from controller.face.hand import Hand
 from controller.face.panel import Panel
 from controller.stage.stage import FaceSettings
-
-if TYPE_CHECKING:
-    from controller.body.run import BodyProcess
-    from surface.head import Head
-    from surface.view.scene.viewpoint import Viewpoint
+from surface.head import Head
+from surface.view.scene.viewpoint import Viewpoint
+from surface.view.window import run_window
 
 _TITLE = "omote"
 
@@ -58,8 +56,6 @@ class WindowFace:
         ViewError
             when no window can be opened.
         """
-        from surface.view.scene.viewpoint import Viewpoint
-        from surface.view.window import run_window
 
         viewpoint = Viewpoint(self._settings.make_camera())
         began = time.monotonic_ns()

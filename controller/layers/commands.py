@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,25 @@ from controller.layers.layers import default_layers
 from controller.layers.life import Life, LifeSettings
 from controller.layers.mixer import LayerSettings, Mixer
 from controller.motion.motion import MotionLimiter
-from controller.vocabulary.expression import Vocabulary
-
-if TYPE_CHECKING:
-    from controller.links.show import Shows
+from controller.vocabulary.vocabulary import Vocabulary
 
 StatusValue = str | int | float
+
+
+class Player(Protocol):
+    """What plays shows on the clock of the control loop; see :class:`controller.links.line.show.Shows`."""
+
+    def start(self, name: str) -> None:
+        """Play a script from its beginning. Raises ConfigError."""
+
+    def act(self, what: str, to: str | float = 0.0) -> None:
+        """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s). Raises ParameterError."""
+
+    def tick(self, now_ns: int) -> None:
+        """Say what is due."""
+
+    def status(self) -> str:
+        """Which show plays and where it is, in one word."""
 
 
 class CommandSink(Protocol):
@@ -39,7 +52,7 @@ class CommandSink(Protocol):
 
     parameters: Parameters
     vocabulary: Vocabulary
-    shows: Shows | None
+    shows: Player | None
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         """Hold parameters at values, until released."""
@@ -134,7 +147,7 @@ class CommandState:
         self._speech = self.mixer["speech"]
         self._everything = np.ones(len(parameters), dtype=bool)
         self.watch: Watch | None = None
-        self.shows: Shows | None = None
+        self.shows: Player | None = None
         self._lock = threading.Lock()
         self._stamp_ns = 0
         self._now_s = 0.0

@@ -14,7 +14,7 @@ from typing import Protocol
 from controller.base.errors import LinkError
 from controller.base.paths import find_config
 from controller.layers.commands import CommandSink
-from controller.links.linelink import LineLink
+from controller.links.line.link import LineLink
 
 _START_LIMIT_S = 20.0
 _END_LIMIT_S = 3.0
@@ -85,7 +85,7 @@ class HostProcess:
     """
 
     def __init__(self, script: str, vocabularies: Sequence[Path] = ()) -> None:
-        command = [sys.executable, "-m", "controller.links.host", "--script", script]
+        command = [sys.executable, "-m", "controller.links.line.host", "--script", script]
         command += [word for path in vocabularies for word in ("--vocabulary", str(path))]
         self.counts: dict[str, object] = {}
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)

@@ -93,7 +93,7 @@ class MotionLimiter:
         max_jerk: Floats | float = np.inf,
         period_s: float = 0.01,
     ) -> None:
-        from controller.motion.braking import move  # numba, which only what moves needs
+        from controller.motion.braking import move  # start-up: numba, which only what moves needs
 
         n = len(low)
         self._low, self._high = _vector(low, n), _vector(high, n)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +18,10 @@ from numpy.typing import NDArray
 from controller.base.errors import ConfigError
 from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
-from controller.robot.robot import AnchorSettings, ChannelSettings, RobotSettings
-
-if TYPE_CHECKING:
-    from surface.head import Head
-    from surface.head.posing.part import HeadPart
+from controller.robot.settings import AnchorSettings, ChannelSettings, RobotSettings
+from surface.head import Head
+from surface.head.model.parameters import SHAPES, read_pose
+from surface.head.posing.part import HeadPart
 
 _LEVELS = 4
 _STRAIGHT_MM = 0.02
@@ -80,7 +78,7 @@ def sample_skin(head: Head, part: str, uv: Floats) -> Skin:
     index = head.parts.index(head.part(part))
     basis = head.part(part).surface.basis_matrix(uv)
     rest = basis @ head.place_points(np.zeros(len(head.parameters)))[0][index]
-    shapes = _shape_names()
+    shapes = SHAPES
     moves = np.zeros((len(uv), 3, len(shapes), _LEVELS))
 
     def at(values: dict[str, float]) -> Floats:
@@ -110,15 +108,8 @@ def _way(name: str, at) -> Floats:  # type: ignore[no-untyped-def]
     return np.array([one(0.25), half, one(0.75), full])
 
 
-def _shape_names() -> tuple[str, ...]:
-    from surface.head.model.parameters import SHAPES
-
-    return SHAPES
-
-
 def shapes_of(values: Floats, order: NDArray[np.intp]) -> Floats:
     """(s,) shapes of a face ``values`` (p,); ``order`` (h,) leads from omote's parameters to the head's."""
-    from surface.head.model.parameters import read_pose
 
     return read_pose(values[order]).shapes
 
@@ -146,7 +137,7 @@ def servo_field(anchors: Sequence[AnchorSettings], at: Skin, points: Skin) -> Fl
     for j, anchor in enumerate(anchors):
         way = np.array(anchor.direction) / np.linalg.norm(anchor.direction)
         if anchor.like is not None:
-            shape = _shape_names().index(anchor.like)
+            shape = SHAPES.index(anchor.like)
             field[:, :, j] = points.full(shape) / (at.full(shape)[j] @ way)
             continue
         for side in (1.0, -1.0) if anchor.both else (1.0,):
@@ -252,8 +243,8 @@ class AnchorMap:
 
     def _all_linear(self, parameters: Parameters) -> Floats:
         rows = np.zeros((len(self.names), len(parameters)))
-        for s, name in enumerate(_shape_names()):
-            one = np.zeros((len(_shape_names()), _LEVELS))
+        for s, name in enumerate(SHAPES):
+            one = np.zeros((len(SHAPES), _LEVELS))
             one[s] = 1.0
             rows[:, parameters.index(name)] = self._solver.solve(self._moves @ one.ravel())
         return rows
@@ -289,9 +280,7 @@ def load_anchors(
     if not channels:
         return None
     if isinstance(head, Path):
-        from surface.head import Head as Heads
-
-        head = Heads.load(head)
+        head = Head.load(head)
     anchors = [channel.anchor for channel in channels if channel.anchor is not None]
     keys = [f"channels[{i}].anchor" for i, channel in enumerate(robot.channels) if channel.anchor is not None]
     _check(keys, anchors, head, where or robot.name)
@@ -327,7 +316,7 @@ def _check(keys: Sequence[str], anchors: Sequence[AnchorSettings], head: Head, w
     faults += [f"{key}.part: all anchors of a robot lie on one part" for key, a in zip(keys, anchors, strict=True)
                if a.part != anchors[0].part and a.part in parts]  # fmt: skip
     faults += [f"{key}.like: the head has no shape of that name" for key, a in zip(keys, anchors, strict=True)
-               if a.like is not None and a.like not in _shape_names()]  # fmt: skip
+               if a.like is not None and a.like not in SHAPES]  # fmt: skip
     _raise(faults, where)
 
 
@@ -336,7 +325,7 @@ def _check_like(keys: Sequence[str], anchors: Sequence[AnchorSettings], at: Skin
     for j, (key, anchor) in enumerate(zip(keys, anchors, strict=True)):
         if anchor.like is not None:
             way = np.array(anchor.direction) / np.linalg.norm(anchor.direction)
-            moved = float(at.full(_shape_names().index(anchor.like))[j] @ way)
+            moved = float(at.full(SHAPES.index(anchor.like))[j] @ way)
             if moved < 0.5:
                 faults.append(f"{key}.like: {anchor.like} moves the point by {moved:.1f} mm along direction")
     _raise(faults, where)
@@ -361,5 +350,5 @@ def residual_rows(
 def point_regions(skin: Skin, parameters: Parameters) -> NDArray[np.str_]:
     """(m,) region of the parameter that moves each point most."""
     most = np.linalg.norm(skin.moves.sum(axis=3), axis=1).argmax(axis=1)
-    names = _shape_names()
+    names = SHAPES
     return np.array([parameters.regions[parameters.index(names[s])] for s in most])

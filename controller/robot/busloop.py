@@ -21,16 +21,16 @@ from controller.base.parameters import Parameters
 from controller.robot.buses import BusSettings
 from controller.robot.channels import build_table, limiter_of, play, servo_specs
 from controller.robot.following import Following, regions_of
-from controller.robot.robot import ChannelSettings
 from controller.robot.rules import RuleSettings
 from controller.robot.safety import Guard
+from controller.robot.settings import ChannelSettings
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState
 from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.base.priority import take_priority
 
 if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorMap
+    from controller.robot.anchors import AnchorMap  # start-up: loads the head
 
 log = logging.getLogger(__name__)
 

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from controller.base.config import Settings, config_error, load
 from controller.base.files import replacing
 from controller.base.parameters import did_you_mean
-from controller.robot.robot import Calibration, ChannelSettings, RobotSettings
+from controller.robot.settings import Calibration, ChannelSettings, RobotSettings
 
 Degrees = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from controller.base.parameters import Parameters
 from controller.motion.motion import MotionLimiter
-from controller.robot.robot import ChannelSettings
+from controller.robot.settings import ChannelSettings
 from controller.robot.terms import bend
 from drivers.base.bus import ServoSpec
 

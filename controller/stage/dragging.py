@@ -11,7 +11,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +20,7 @@ from controller.base.files import replacing
 from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.robot.anchors import Skin, head_order, sample_skin, shapes_of
-
-if TYPE_CHECKING:
-    from surface.head import Head
+from surface.head import Head
 
 _RIDGE = 1e-3
 _SPARSITY = 0.02
@@ -157,8 +154,8 @@ class Reshaper:
     """
 
     def __init__(self, head: Head, part: str = "face", *, fairness: float = 10.0) -> None:
-        from scipy.sparse import identity
-        from scipy.sparse.linalg import splu
+        from scipy.sparse import identity  # start-up: only reshaping needs it
+        from scipy.sparse.linalg import splu  # start-up: only reshaping needs it
 
         self.part, self._surface = part, head.part(part).surface
         points = self._surface.points
@@ -193,8 +190,8 @@ class Reshaper:
 
 def _differences(points: Floats, jaw: NDArray):  # type: ignore[no-untyped-def]
     """(n, n) sparse: each control point minus the mean of its nearest ones, never across the mouth."""
-    from scipy.sparse import coo_matrix, identity
-    from scipy.spatial import cKDTree
+    from scipy.sparse import coo_matrix, identity  # start-up: only reshaping needs it
+    from scipy.spatial import cKDTree  # start-up: only reshaping needs it
 
     # the lips lie close together but belong to different jaws: set them apart
     apart = np.column_stack([points, 60.0 * np.asarray(jaw, np.float64)])

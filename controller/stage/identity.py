@@ -35,7 +35,7 @@ EXAMPLE = "--identity broad=0.6,young=0.4"
 
 def check_identity(head: Path, wanted: Mapping[str, float]) -> None:
     """Raise ConfigError for a name that the head in folder ``head`` does not have."""
-    from surface.head.model.identity import load_identities
+    from surface.head.model.identity import load_identities  # start-up: --help loads this module
 
     known = load_identities(head) if wanted else {}
     for name in wanted:

@@ -12,9 +12,8 @@ from controller.base.config import Settings
 from controller.base.errors import ParameterError
 
 if TYPE_CHECKING:
-    from controller.stage.stage import Stage
-    from surface.view.scene.camera import Camera
-    from surface.view.scene.theme import Colour, Light, Theme
+    from surface.view.scene.camera import Camera  # start-up: the body reads stages and draws nothing
+    from surface.view.scene.theme import Colour, Light, Theme  # start-up: the body reads stages and draws nothing
 
 HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 Share = Annotated[float, Field(ge=0, le=4)]
@@ -55,7 +54,7 @@ class PictureSettings(Settings):
 
     def make_theme(self) -> Theme:
         """The theme with this background and these lights."""
-        from surface.view.scene.theme import THEMES
+        from surface.view.scene.theme import THEMES  # start-up: the body reads stages and draws nothing
 
         theme, light = THEMES[self.theme], self.light
         lit = replace(
@@ -74,7 +73,7 @@ class PictureSettings(Settings):
 
     def make_camera(self) -> Camera:
         """The camera of that name."""
-        from surface.view.scene.camera import PRESETS
+        from surface.view.scene.camera import PRESETS  # start-up: the body reads stages and draws nothing
 
         return PRESETS[self.camera.replace("_", "-")]()
 
@@ -96,12 +95,6 @@ def checked(settings: PictureSettings, wanted: Mapping[str, object]) -> Any:
         if option == "background":
             said = "#rrggbb, or #rrggbb,#rrggbb from top to bottom"
         raise ParameterError(f"--{option} {_said(given.get(option))}: must be {said}") from error
-
-
-def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
-    """``stage`` with command-line options laid over its ``[face]``; see :func:`checked`."""
-    face = checked(stage.settings.face, wanted)
-    return replace(stage, settings=stage.settings.model_copy(update={"face": face}))
 
 
 def parse_background(words: str | None) -> str | tuple[str, ...] | None:

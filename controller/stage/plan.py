@@ -9,15 +9,17 @@ import numpy as np
 
 from controller.base.parameters import Parameters
 from controller.layers.commands import CommandState
-from controller.links.host import load_script
-from controller.links.script import Script
-from controller.links.show import Show
+from controller.links.line.host import load_script
+from controller.links.line.script import Script
+from controller.links.line.show import Show
+from controller.robot.anchors import load_anchors
 from controller.robot.channels import build_table
-from controller.robot.robot import ChannelSettings, RobotSettings
+from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.stage.rehearsal import Feed, Rehearsal
 from controller.stage.stage import Stage
 from controller.takes.livelink import TakePlayer
 from controller.takes.recording import SUFFIX, replay
+from controller.takes.speech import layer_of, load_take
 
 _LONGEST_S = 30.0
 _EACH_S = 1.5
@@ -48,7 +50,6 @@ def rehearse(
 def _anchors(stage: Stage, robot: RobotSettings, parameters: Parameters):  # type: ignore[no-untyped-def]
     if all(channel.anchor is None for channel in robot.channels):
         return None
-    from controller.robot.anchors import load_anchors
 
     return load_anchors(robot, stage.head, parameters)
 
@@ -69,7 +70,6 @@ def _feed(stage: Stage, take: Path | None, state: CommandState) -> tuple[Feed, f
 
 
 def _of_take(stage: Stage, take: Path, state: CommandState) -> tuple[Feed, float]:
-    from controller.takes.speech import layer_of, load_take
 
     if take.suffix == SUFFIX:
         return _of_recording(stage, take, state)

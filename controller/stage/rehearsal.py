@@ -8,19 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState
+from controller.robot.anchors import AnchorMap
 from controller.robot.channels import build_table, limiter_of, play
-from controller.robot.robot import ChannelSettings, RobotSettings
 from controller.robot.rules import RuleSettings
 from controller.robot.safety import Guard
-
-if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorMap
+from controller.robot.settings import ChannelSettings, RobotSettings
 
 Feed = Callable[[int], object]
 """Gives the layers what is due at a time (ns)."""

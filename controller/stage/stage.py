@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,15 +17,16 @@ from controller.layers.commands import CommandState
 from controller.layers.layers import load_layers
 from controller.layers.life import LifeSettings
 from controller.layers.mixer import LayerSettings
-from controller.links.host import load_script
-from controller.robot.robot import RobotSettings, load_robot
+from controller.links.line.host import load_script
+from controller.robot.robot import load_robot
+from controller.robot.settings import RobotSettings
 from controller.stage.identity import check_identity
-from controller.stage.picture import PictureSettings
+from controller.stage.picture import PictureSettings, checked
 from controller.takes.speech import load_take
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
-    from surface.head import Head
+    from surface.head import Head  # start-up: the body reads stages and draws nothing
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 
@@ -132,13 +133,19 @@ def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tupl
     ------
     SurfaceError : the head cannot be read. ConfigError : a group does not fit it.
     """
-    from controller.stage.dragging import load_group, wear
-    from surface.head import Head
+    from controller.stage.dragging import load_group, wear  # start-up: as Head
+    from surface.head import Head  # start-up: the body reads stages and draws nothing
 
     head = Head.load(folder, identity)
     for path, amount in groups:
         wear(head, load_group(path, head)[1], amount)
     return head
+
+
+def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
+    """``stage`` with command-line options laid over its ``[face]``; see :func:`controller.stage.picture.checked`."""
+    face = checked(stage.settings.face, wanted)
+    return replace(stage, settings=stage.settings.model_copy(update={"face": face}))
 
 
 def load_stage(name: str, parameters: Parameters) -> Stage:

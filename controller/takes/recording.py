@@ -12,18 +12,15 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.errors import ControllerError
 from controller.base.parameters import Floats, Parameters
-from controller.layers.commands import CommandState, StatusValue, Watch
-from controller.vocabulary.expression import Vocabulary
-
-if TYPE_CHECKING:
-    from controller.links.show import Shows
+from controller.layers.commands import CommandState, Player, StatusValue, Watch
+from controller.vocabulary.vocabulary import Vocabulary
 
 SUFFIX = ".rec"
 """What names of recordings end in."""
@@ -58,7 +55,7 @@ class Recorder:
         self.parameters: Parameters = state.parameters
         self.vocabulary: Vocabulary = state.vocabulary
         self.mixer, self.limiter = state.mixer, state.limiter
-        self.shows: Shows | None = None
+        self.shows: Player | None = None
         self._lock = threading.Lock()
         try:
             self._file: TextIO = path.open("w", encoding="ascii")

@@ -19,7 +19,8 @@ from controller.base.errors import ParameterError, TakeError
 from controller.base.parameters import Floats, Parameters
 from controller.motion.motion import minimum_jerk
 from controller.takes.livelink import Take
-from controller.vocabulary.visemes import Visemes, spread
+from controller.vocabulary.sides import spread
+from controller.vocabulary.visemes import Visemes
 
 RATE_HZ = 100.0
 """Rows per second of the takes made here."""

@@ -5,20 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.paths import find_config
+from surface.base.progress import Progress
+from surface.bench import growth
 from surface.bench.bench import Measure, build_table, large_table, least, measure, speed_table
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from surface.base.progress import Progress
-    from surface.bench.comparison import Variant
-    from surface.head import Head
+from surface.bench.comparison import Variant, compare
+from surface.bench.drift import drift
+from surface.head import Head
+from surface.head.model.meshes import domain_of
 
 Tell = Callable[[str], None]
 Tables = list[tuple[str, list[Measure]]]
@@ -32,7 +31,6 @@ VERTICES = 100_000  # of the sheet that the bounds are for
 
 def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
     """Tables of a head: posing it, and the engine on its largest surface."""
-    from surface.head import Head
 
     tell("loading")
     started = time.perf_counter()
@@ -65,7 +63,6 @@ def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES
 
     Sizes run from a tenth to ten times ``vertices``, and from a thousandth of it to as many control points.
     """
-    from surface.bench import growth
 
     share = vertices / VERTICES
     sizes = tuple(max(256, round(share * count)) for count in growth.VERTICES)
@@ -80,8 +77,6 @@ def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES
 
 def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
     """Random updates of every kind on a head's largest surface, against a fresh evaluation."""
-    from surface.bench.drift import drift
-    from surface.head import Head
 
     tell("loading")
     head = Head.load(find_config("heads", name))
@@ -105,9 +100,6 @@ def bench_quadtree(name: str, tell: Tell, level: int = UNIFORM_LEVEL) -> tuple[T
     the pictures are of the second. A way that finds no mesh within the bound is left out. The uniform mesh is
     quartered ``level`` times.
     """
-    from surface.bench.comparison import compare
-    from surface.head import Head
-    from surface.head.model.meshes import domain_of
 
     tell("loading")
     head = Head.load(find_config("heads", name))

@@ -16,21 +16,21 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import dynamixel_sdk as sdk
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.base.clock import Clock, Samples
 from controller.base.paths import find_config
 from controller.base.stolen import Stolen
+from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.priority import ORDINARY, give_priority_back, take_priority, take_turns_quickly
 from drivers.dynamixel.frames import GoalFrame, GroupRead, Run
 from drivers.port.serialport import SerialPort
 from drivers.sim import SimulatedBus
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Tell = Callable[[str], None]
 Cycle = Callable[["NDArray[np.float64]"], "bool | NDArray[np.bool_]"]
@@ -167,7 +167,6 @@ def _round(wire: SimulatedBus, specs: list[ServoSpec], seconds: float, number: i
 
 def _ours(wire: SimulatedBus, specs: list[ServoSpec], seconds: float, fast: bool, rate_hz: float) -> Loop:
     """Our own loop; `rate_hz` 0 for as many cycles as there can be."""
-    from drivers import open_bus
 
     options: dict[str, Any] = {"fast": fast, "feedback": "position", "slow_group": 0, "watchdog_ms": 0}
     with open_bus("dynamixel", specs, port=wire.path, baud=BAUD, **options) as bus:
@@ -209,7 +208,6 @@ def _theirs(path: str, seconds: float, rate_hz: float) -> Loop:
     again and again, with a better one it keeps the system from carrying the bytes it waits for, gives up, and takes
     late replies for those to its next question.
     """
-    import dynamixel_sdk as sdk
 
     port, packets = sdk.PortHandler(path), sdk.PacketHandler(2.0)
     port.openPort()

@@ -16,7 +16,7 @@ from controller.base.signals import stop_flag
 from controller.robot.buses import BusSettings
 from controller.robot.calibration import rest_deg, save_calibration
 from controller.robot.channels import servo_specs
-from controller.robot.robot import ChannelSettings, RobotSettings
+from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.tools.capturing import Capturing
 from controller.tools.keys import Keyboard
 from drivers import open_bus

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from controller.robot.calibration import Captured
-from controller.robot.robot import ChannelSettings
+from controller.robot.settings import ChannelSettings
 
 Floats = NDArray[np.float64]
 

@@ -11,12 +11,17 @@ import numpy as np
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.paths import config_dir, find_config
-from controller.links.host import load_script
+from controller.links.line.host import load_script
+from controller.robot.robot import load_robot
+from controller.robot.settings import RobotSettings
+from controller.stage.stage import load_stage
 from controller.takes.recording import SUFFIX, replay
+from controller.takes.speech import load_take
+from controller.vocabulary.vocabulary import Vocabulary
+from surface.readers import is_plain, read_surface, summary
 
 if TYPE_CHECKING:
-    from controller.robot.robot import RobotSettings
-    from surface.head import Head
+    from surface.head import Head  # start-up: only heads and groups need it
 
 
 DEFAULT_HEAD = "ict"
@@ -62,7 +67,7 @@ def _find(name: str) -> Path:
 
 
 def _check_head(folder: Path) -> list[str]:
-    from surface.head import Head
+    from surface.head import Head  # start-up: only heads and groups need it
 
     head = Head.load(folder)
     _check_poses(head, folder)
@@ -85,8 +90,6 @@ def _is_surface(path: Path) -> bool:
     """By suffix; .json is speech, too, and says by its keys which it is."""
     kind = path.suffix.lower()
     if kind == ".json":
-        from surface.readers import is_plain
-
         return is_plain(path)
     return kind in SURFACE_SUFFIXES
 
@@ -100,8 +103,8 @@ def _is_group(path: Path) -> bool:
 
 
 def _check_group(path: Path) -> list[str]:
-    from controller.stage.dragging import load_group
-    from surface.head import Head
+    from controller.stage.dragging import load_group  # start-up: as Head
+    from surface.head import Head  # start-up: only heads and groups need it
 
     head = Head.load(find_config("heads", DEFAULT_HEAD))
     name, shape = load_group(path, head)
@@ -116,13 +119,11 @@ def _check_recording(path: Path) -> list[str]:
 
 
 def _check_surface(path: Path) -> list[str]:
-    from surface.readers import read_surface, summary
 
     return [f"surface {summary(item)}: good" for item in read_surface(path)]
 
 
 def _check_take(path: Path) -> list[str]:
-    from controller.takes.speech import load_take
 
     take = load_take(path, PARAMETERS)
     return [f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz: good"]
@@ -145,7 +146,6 @@ def _check_toml(path: Path) -> list[str]:
 
 def _check_expressions(path: Path) -> list[str]:
     """A user's expressions beside the shipped ones; or the shipped file itself."""
-    from controller.vocabulary.expression import Vocabulary
 
     shipped = config_dir() / "vocabularies" / "expressions.toml"
     more = () if path.resolve() == shipped.resolve() else (path,)
@@ -154,7 +154,6 @@ def _check_expressions(path: Path) -> list[str]:
 
 
 def _check_robot(path: Path, parameters: Parameters) -> list[str]:
-    from controller.robot.robot import load_robot
 
     robot = load_robot(path, parameters)
     lines = [f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels: good"]
@@ -165,8 +164,7 @@ def _what_it_cannot_show(path: Path, robot: RobotSettings, parameters: Parameter
     """For a robot with anchors: the emotions' motion by region, and how much of it is left over (rms, mm)."""
     if all(channel.anchor is None for channel in robot.channels):
         return []
-    from controller.robot.anchors import load_anchors, residual_rows
-    from controller.vocabulary.expression import Vocabulary
+    from controller.robot.anchors import load_anchors, residual_rows  # start-up: as Head
 
     anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), parameters, where=str(path))
     vocabulary = Vocabulary.load(parameters)
@@ -177,7 +175,6 @@ def _what_it_cannot_show(path: Path, robot: RobotSettings, parameters: Parameter
 
 
 def _check_stage(path: Path, parameters: Parameters) -> list[str]:
-    from controller.stage.stage import load_stage
 
     stage = load_stage(str(path), parameters)
     if stage.groups:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-if TYPE_CHECKING:
-    from surface.fit.points.report import FitReport
-    from surface.fit.source.load import LoadOptions
+from surface.base.errors import ViewError
+from surface.fit.api import fit_head
+from surface.fit.identities import add_identities
+from surface.fit.points.report import FitReport, face_bounds
+from surface.fit.source.load import LoadOptions
+from surface.view.draw.lean import lean_head
+from surface.view.pictures.occlusion import shade_head
 
 
 def fit_with_progress(
@@ -28,7 +31,6 @@ def fit_with_progress(
     FitError
         when the mesh cannot be turned into a head; nothing is written then.
     """
-    from surface.fit.api import fit_head
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
@@ -56,7 +58,6 @@ def add_with_progress(mesh: Path, head: Path, modes: Path, console: Console) -> 
     FitError
         when head, mesh and modes do not belong together; nothing is written then.
     """
-    from surface.fit.identities import add_identities
 
     with console.status("fitting identities"):
         names = add_identities(head, mesh, modes)
@@ -65,9 +66,6 @@ def add_with_progress(mesh: Path, head: Path, modes: Path, console: Console) -> 
 
 def _shade(out: Path, console: Console) -> bool:
     """Bake how much light reaches each vertex of the head; False without OpenGL. Find its lean triangles."""
-    from surface.base.errors import ViewError
-    from surface.view.draw.lean import lean_head
-    from surface.view.pictures.occlusion import shade_head
 
     with console.status("finding fewer triangles for live pictures"):
         lean_head(out)
@@ -81,7 +79,6 @@ def _shade(out: Path, console: Console) -> bool:
 
 def remarks(report: FitReport) -> list[str]:
     """How the face keeps its bounds, what was guessed and what is missing, a line each."""
-    from surface.fit.points.report import face_bounds
 
     out = [face_bounds(report), *report.notes]
     if report.missing:

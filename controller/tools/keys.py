@@ -34,8 +34,8 @@ class Keyboard:
         if not os.isatty(self._fd):
             raise ControllerError("keys can only be read from a terminal", hint="start omote in a terminal window")
         if sys.platform != "win32":
-            import termios
-            import tty
+            import termios  # not on Windows
+            import tty  # not on Windows
 
             self._before = termios.tcgetattr(self._fd)
             tty.setcbreak(self._fd)
@@ -45,7 +45,7 @@ class Keyboard:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._before is not None:
-            import termios
+            import termios  # not on Windows
 
             termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
 
@@ -77,7 +77,7 @@ def split(text: str) -> list[str]:
 
 
 def _windows_keys(wait_s: float) -> list[str]:  # pragma: no cover
-    import msvcrt
+    import msvcrt  # Windows only
 
     names = {"H": "up", "P": "down", "M": "right", "K": "left"}
     end, keys = time.monotonic() + wait_s, []

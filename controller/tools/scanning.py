@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from drivers import open_bus
 from drivers.base.bus import ServoInfo, ServoSpec
+from drivers.port.serialport import SerialPort
+from drivers.tools.probe1 import describe, ping_all
 
 BAUDS = {
     2: (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600),
@@ -80,7 +83,6 @@ def scan_port(
 
 
 def _protocol_2(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
-    from drivers import open_bus
 
     with open_bus("dynamixel", [_ANY], port=port, baud=baud) as bus:
         for info in bus.discover():
@@ -88,8 +90,6 @@ def _protocol_2(port: str, baud: int, step: Callable[[int], None]) -> Iterator[F
 
 
 def _protocol_1(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
-    from drivers.port.serialport import SerialPort
-    from drivers.tools.probe1 import describe, ping_all
 
     link = SerialPort(port, baud)
     link.open()

@@ -19,16 +19,16 @@ from controller.base.parameters import PARAMETERS
 from controller.base.signals import stop_flag
 from controller.body.run import BodyProcess, Deadline
 from controller.body.sources import Voice
+from controller.body.waiting import WaitingBody
 from controller.face.face import HeadlessFace, HeadValues, Recorder
-from controller.face.pictures import write_pictures
 from controller.stage.identity import check_identity
 from controller.stage.stage import Stage, load_stage
 from controller.takes.recording import SUFFIX, replay
+from controller.takes.speech import load_take
 from drivers.base.priority import yield_to_servos
 
 if TYPE_CHECKING:
-    from controller.body.waiting import WaitingBody
-    from surface.head import Head
+    from surface.head import Head  # start-up: the body gets its orders first
 
 
 Tell = Callable[[str], None]
@@ -120,16 +120,18 @@ class Session:
                 face.close()
             report = self._end(body, face.report())
         if recorder is not None and pictures is not None:
+            from controller.face.pictures import write_pictures  # start-up: only --pictures draws any
+
             self.tell("writing the pictures")
             report["written"] = write_pictures(recorder, pictures)
         return report
 
     def run_window(self, seconds: float | None) -> dict[str, Any]:
         """Run with a window until it is closed, the take ends or ``seconds`` are over; returns the report."""
-        from controller.face.window import WindowFace
-
         with stop_flag() as flag, self._body() as body:
             values, head = self._head(body)
+            from controller.face.window import WindowFace  # start-up: the body gets its orders first
+
             face = WindowFace(head, self.stage.settings.face, values, body, self.stage.load_head)
             face.run(self._begin(body, flag, seconds))
             return self._end(body, face.report())
@@ -187,7 +189,7 @@ class Session:
         -------
         A row a channel for people, and every angle of every cycle for programs.
         """
-        from controller.stage.plan import rehearse
+        from controller.stage.plan import rehearse  # start-up: only a dry run needs it
 
         return rehearse(self.stage, self.take, seconds, PARAMETERS)
 
@@ -197,7 +199,6 @@ def check_take(take: Path, stage: Stage) -> None:
     if take.suffix == SUFFIX:
         next(replay(take, PARAMETERS, make=stage.state), None)
         return
-    from controller.takes.speech import load_take
 
     load_take(take, PARAMETERS)
 

@@ -20,7 +20,8 @@ from controller.base.paths import find_config
 from controller.base.signals import stop_flag
 from controller.robot.buses import SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
-from controller.robot.robot import ChannelSettings, load_robot
+from controller.robot.robot import load_robot
+from controller.robot.settings import ChannelSettings
 from controller.tools.watching import Watch
 from drivers import open_bus
 from drivers.core.registry import simulator_of
@@ -154,7 +155,7 @@ def serve_host(script: str, link: Path | None, console: Console) -> None:
     ConfigError
         when the script is unknown or wrong.
     """
-    from controller.links.host import HostPort, RobotHost, load_script
+    from controller.links.line.host import HostPort, RobotHost, load_script
 
     loaded = load_script(script, PARAMETERS)
     with HostPort(link) as port, stop_flag() as flag:

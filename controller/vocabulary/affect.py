@@ -14,7 +14,7 @@ import numpy as np
 
 from controller.base.parameters import Floats, did_you_mean, file_error, read_toml
 from controller.base.paths import config_dir
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.expression import Expressions
 
 _POWER = 3.0
 _NEAR = 1e-6
@@ -35,7 +35,7 @@ class Affect:
         self._faces = faces
 
     @classmethod
-    def load(cls, vocabulary: Vocabulary, path: Path | None = None) -> Affect:
+    def load(cls, expressions: Expressions, path: Path | None = None) -> Affect:
         """Read a space of moods; the shipped one without ``path``.
 
         Raises
@@ -48,8 +48,8 @@ class Affect:
         points = {"neutral": (0.0, 0.0, 0.0)}
         for name, given in table.get("anchors", {}).items():
             at: Any = given.get("at") if isinstance(given, dict) else None
-            if name not in vocabulary.names:
-                faults.append(f"anchors.{name}: unknown expression{did_you_mean(name, vocabulary.names)}")
+            if name not in expressions.names:
+                faults.append(f"anchors.{name}: unknown expression{did_you_mean(name, expressions.names)}")
             if not _is_point(at):
                 faults.append(f"anchors.{name}.at: must be [valence, arousal, dominance], each -1 to 1 (is {at!r})")
             else:
@@ -58,7 +58,7 @@ class Affect:
             faults.append("anchors: missing")
         if faults:
             raise file_error(path, faults)
-        faces = np.stack([vocabulary[name].weights for name in points])
+        faces = np.stack([expressions[name].weights for name in points])
         return cls(tuple(points), np.array(list(points.values())), faces)
 
     def weights(self, valence: float, arousal: float, dominance: float | None = None) -> Floats:

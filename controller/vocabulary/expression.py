@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from controller.base.errors import ConfigError, ParameterError
+from controller.base.errors import ConfigError
 from controller.base.parameters import Floats, Parameters, did_you_mean, file_error, fold, read_toml
-from controller.base.paths import config_dir
+from controller.vocabulary.sides import sides
 
 KINDS = ("emotion", "gesture", "user")
 OVERRIDES = ("keep", "block", "blend")
@@ -42,84 +42,40 @@ class Expression:
     mouth: str = "keep"
 
 
-class Vocabulary:
-    """The expressions of one file, by name.
-
-    Parameters
-    ----------
-    expressions : the expressions, in file order.
-    aliases : folded other names to canonical ones.
-    formulas : makes an expression of a formula, None of anything else; see :mod:`controller.vocabulary.formulas`.
-    """
-
-    def __init__(
-        self,
-        expressions: dict[str, Expression],
-        aliases: dict[str, str] | None = None,
-        formulas: Callable[[str], Expression | None] | None = None,
-    ) -> None:
-        self._expressions = expressions
-        self._formulas = formulas
-        self._lookup = {fold(name): name for name in expressions} | (aliases or {})
-
-    @classmethod
-    def load(cls, parameters: Parameters, path: Path | None = None, more: Sequence[Path] = ()) -> Vocabulary:
-        """Read a vocabulary of expressions; the shipped one without ``path``.
-
-        Parameters
-        ----------
-        more : further files whose expressions are added, such as a user's own; they may mix those before them.
-
-        Raises
-        ------
-        ConfigError : a file cannot be read or is wrong; every fault of every file with its key.
-        """
-        known: dict[str, Expression] = {}
-        aliases: dict[str, str] = {}
-        errors: list[ConfigError] = []
-        for file in (path or config_dir() / "vocabularies" / "expressions.toml", *more):
-            reader = _Reader(parameters, known)
-            known = known | reader.read(read_toml(file))
-            aliases |= reader.aliases(known, aliases)
-            if reader.faults:
-                errors.append(file_error(file, reader.faults))
-        if errors:
-            raise errors[0] if len(errors) == 1 else ConfigError("\n".join(map(str, errors)), hint=errors[0].hint)
-        from controller.vocabulary.formulas import Formulas  # it needs this module
-
-        vocabulary = cls(known, aliases)
-        vocabulary._formulas = Formulas(parameters, vocabulary)
-        return vocabulary
+class Expressions(Protocol):
+    """Named expressions, as whoever mixes them sees them."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Canonical names, in file order."""
-        return tuple(self._expressions)
 
     def __getitem__(self, name: str) -> Expression:
-        """The expression called ``name``, any case, or of a formula such as ``AU1+2+5B`` or ``VA:0.6,-0.2``.
+        """The expression called ``name``. Raises ParameterError."""
 
-        Raises
-        ------
-        ParameterError : unknown name, with the nearest ones, or a wrong formula.
-        """
-        made = self._formulas(name) if self._formulas is not None else None
-        if made is not None:
-            return made
-        found = self._lookup.get(name) or self._lookup.get(fold(name))
-        if found is None:
-            raise ParameterError(
-                f"unknown expression {name!r}{did_you_mean(name, self.names)}",
-                hint="list the names: LIST EXPRESSIONS on the link, or configs/vocabularies/expressions.toml",
-            )
-        return self._expressions[found]
 
-    def expand(self, name: str, intensity: float = 1.0) -> dict[int, float]:
-        """Parameter index to value for ``name`` at ``intensity`` 0..1. Raises ParameterError."""
-        weights = self[name].weights
-        if not 0.0 <= intensity <= 1.0:
-            raise ParameterError(f"intensity must be 0 to 1, not {intensity}", hint="0.5 is half of the expression")
-        return {int(i): float(weights[i] * intensity) for i in np.flatnonzero(weights)}
+def read_expressions(parameters: Parameters, files: Iterable[Path]) -> tuple[dict[str, Expression], dict[str, str]]:
+    """The expressions of files, in order, and folded other names to canonical ones.
+
+    Parameters
+    ----------
+    files : may mix the expressions of those before them.
+
+    Raises
+    ------
+    ConfigError : a file cannot be read or is wrong; every fault of every file with its key.
+    """
+    known: dict[str, Expression] = {}
+    aliases: dict[str, str] = {}
+    errors: list[ConfigError] = []
+    for file in files:
+        reader = _Reader(parameters, known)
+        known = known | reader.read(read_toml(file))
+        aliases |= reader.aliases(known, aliases)
+        if reader.faults:
+            errors.append(file_error(file, reader.faults))
+    if errors:
+        raise errors[0] if len(errors) == 1 else ConfigError("\n".join(map(str, errors)), hint=errors[0].hint)
+    return known, aliases
 
 
 class _Reader:
@@ -234,16 +190,3 @@ class _Reader:
             self.faults.append(f"{name}.{key}: must be one of {', '.join(known)} (is {value!r})")
             return default
         return str(value)
-
-
-def sides(parameters: Parameters, name: str) -> list[int]:
-    """Positions that ``name`` means: itself, or its left and right; empty when unknown."""
-    found = []
-    for spelling in (name, f"{name}Left", f"{name}Right"):
-        try:
-            found.append(parameters.index(spelling))
-        except ParameterError:
-            continue
-        if spelling == name:
-            break
-    return found

@@ -13,10 +13,10 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, did_you_mean, file_error, read_toml
 from controller.base.paths import config_dir
-from controller.vocabulary.expression import sides
+from controller.vocabulary.sides import sides
 
 if TYPE_CHECKING:
-    from controller.base.solve import BoundedSolver
+    from controller.base.solve import BoundedSolver  # start-up: numba and scipy, only for reading back
 
 LETTERS = "ABCDE"
 """Intensities of FACS, 0.2 to 1.0."""
@@ -147,7 +147,7 @@ class Facs:
 
     @cached_property
     def _solver(self) -> BoundedSolver:
-        from controller.base.solve import BoundedSolver  # takes a moment to import; not every user reads back
+        from controller.base.solve import BoundedSolver  # start-up: numba and scipy, only for reading back
 
         high = self._read.astype(np.float64)
         return BoundedSolver(

@@ -9,7 +9,7 @@ from functools import cached_property
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters
 from controller.vocabulary.affect import Affect
-from controller.vocabulary.expression import Expression, Vocabulary
+from controller.vocabulary.expression import Expression, Expressions
 from controller.vocabulary.facs import Facs
 
 _UNITS = re.compile(r"(AU|AD)[LR]?\d", re.IGNORECASE)
@@ -21,12 +21,12 @@ class Formulas:
 
     Parameters
     ----------
-    parameters : the registry. vocabulary : the named expressions, which moods are blended from.
+    parameters : the registry. expressions : the named ones, which moods are blended from.
     """
 
-    def __init__(self, parameters: Parameters, vocabulary: Vocabulary) -> None:
+    def __init__(self, parameters: Parameters, expressions: Expressions) -> None:
         self._parameters = parameters
-        self._vocabulary = vocabulary
+        self._expressions = expressions
 
     def __call__(self, text: str) -> Expression | None:
         """The expression of a formula; None when ``text`` is none.
@@ -51,7 +51,7 @@ class Formulas:
 
     @cached_property
     def _affect(self) -> Affect:
-        return Affect.load(self._vocabulary)
+        return Affect.load(self._expressions)
 
 
 def _point(kind: str, text: str) -> list[float]:

@@ -10,7 +10,7 @@ import numpy as np
 from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.vocabulary.affect import Affect
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.expression import Expressions
 from controller.vocabulary.facs import Facs
 from controller.vocabulary.visemes import Visemes
 
@@ -23,11 +23,11 @@ class Readings:
 
     Parameters
     ----------
-    parameters : the registry. vocabulary : the named expressions, which moods are blended from.
+    parameters : the registry. expressions : the named ones, which moods are blended from.
     """
 
-    def __init__(self, parameters: Parameters, vocabulary: Vocabulary) -> None:
-        self._parameters, self._vocabulary = parameters, vocabulary
+    def __init__(self, parameters: Parameters, expressions: Expressions) -> None:
+        self._parameters, self._expressions = parameters, expressions
         self._lock = threading.Lock()
 
     def read(self, what: str, values: Floats) -> list[tuple[str, float]]:
@@ -35,7 +35,7 @@ class Readings:
 
         Parameters
         ----------
-        what : one of :data:`controller.links.linewords.READINGS`.
+        what : one of :data:`controller.links.line.words.READINGS`.
 
         Raises
         ------
@@ -74,8 +74,8 @@ class Readings:
 
     @cached_property
     def _affect(self) -> tuple[Affect, _Levels]:
-        affect = Affect.load(self._vocabulary)
-        faces = np.stack([self._vocabulary[name].weights for name in affect.names[1:]], axis=1)
+        affect = Affect.load(self._expressions)
+        faces = np.stack([self._expressions[name].weights for name in affect.names[1:]], axis=1)
         return affect, _Levels(faces)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, did_you_mean, file_error, read_toml
 from controller.base.paths import config_dir
-from controller.vocabulary.expression import sides
+from controller.vocabulary.sides import spread
 
 _KEYS = {"sounds", "duration", "hold", "aliases", "weights"}
 _TABLES = {"visemes", "rhubarb", "phonemes", "through"}
@@ -109,20 +109,6 @@ def _read(parameters: Parameters, given: dict[str, Any], table: dict[str, Any], 
     for array in (visemes.matrix, visemes.hold, visemes.duration, visemes.through):
         array.flags.writeable = False
     return visemes
-
-
-def spread(parameters: Parameters, where: str, table: dict[str, Any], rest: float, faults: list[str]) -> Floats:
-    """(P,) values of a table of names, ``rest`` elsewhere; a name without a side means both. Faults are noted."""
-    values = np.full(len(parameters), rest)
-    for key, value in table.items():
-        positions = sides(parameters, key)
-        if not positions:
-            faults.append(f"{where}.{key}: unknown parameter{did_you_mean(key, parameters.names)}")
-        elif isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
-            faults.append(f"{where}.{key}: must be a number from 0 to 1 (is {value!r})")
-        else:
-            values[positions] = value
-    return values
 
 
 def _numbers(given: dict[str, Any], key: str, most: float, faults: list[str]) -> Floats:

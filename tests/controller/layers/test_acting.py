@@ -7,7 +7,8 @@ import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.acting import Actor
-from controller.vocabulary.expression import Expression, Vocabulary
+from controller.vocabulary.expression import Expression
+from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
 SMILE = P.index("mouthSmileLeft")

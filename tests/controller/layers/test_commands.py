@@ -11,7 +11,8 @@ import pytest
 from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.vocabulary.expression import Expression, Vocabulary
+from controller.vocabulary.expression import Expression
+from controller.vocabulary.vocabulary import Vocabulary
 
 JAW, SMILE = P.index("jawOpen"), P.index("mouthSmileLeft")
 STEP_NS = 10_000_000

@@ -13,7 +13,7 @@ import pytest
 from controller.base.errors import LinkError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.links.hostport import HostPort
+from controller.links.line.hostport import HostPort
 from controller.links.links import HostProcess, open_links
 from controller.stage.stage import LinkSettings
 from drivers.base.errors import PortMissing

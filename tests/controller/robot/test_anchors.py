@@ -24,9 +24,10 @@ from controller.robot.anchors import (
 )
 from controller.robot.channels import build_table
 from controller.robot.mirror import Mirror
-from controller.robot.robot import RobotSettings, load_robot
+from controller.robot.robot import load_robot
+from controller.robot.settings import RobotSettings
 from controller.tools.checking import check_anything
-from controller.vocabulary.expression import Vocabulary
+from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 
 ROBOT = """

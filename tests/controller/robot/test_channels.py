@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from controller.base.parameters import PARAMETERS
 from controller.robot.channels import ChannelTable, build_table, limiter_of, servo_specs
-from controller.robot.robot import Calibration, ChannelSettings
+from controller.robot.settings import Calibration, ChannelSettings
 
 
 def channel(**changes: object) -> ChannelSettings:

@@ -14,7 +14,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.body.body import Body
 from controller.layers.commands import CommandState
-from controller.links.linesession import LineSession
+from controller.links.line.session import LineSession
 from controller.robot.channels import build_table
 from controller.robot.following import Following, Puppet, Reflection, regions_of
 from controller.robot.robot import load_robot

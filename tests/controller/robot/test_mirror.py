@@ -10,8 +10,8 @@ from controller.base.paths import find_config
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.mirror import Mirror
 from controller.robot.robot import load_robot
-from controller.vocabulary.expression import Vocabulary
 from controller.vocabulary.facs import Facs
+from controller.vocabulary.vocabulary import Vocabulary
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,10 @@ import pytest
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.channels import ChannelTable, build_table, limiter_of, play
-from controller.robot.robot import ChannelSettings, load_robot
+from controller.robot.robot import load_robot
 from controller.robot.rules import LoadRule, PreventRule, RuleSettings, TimingRule
 from controller.robot.safety import Guard
+from controller.robot.settings import ChannelSettings
 from drivers.base.bus import BusState
 
 DT = 0.02

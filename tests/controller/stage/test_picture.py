@@ -5,9 +5,7 @@ from __future__ import annotations
 import pytest
 
 from controller.base.errors import ParameterError
-from controller.base.parameters import PARAMETERS
-from controller.stage.picture import LightSettings, PictureSettings, checked, parse_background, with_picture
-from controller.stage.stage import load_stage
+from controller.stage.picture import LightSettings, PictureSettings, checked, parse_background
 from surface.view.scene.camera import PRESETS
 from surface.view.scene.theme import THEMES
 
@@ -56,15 +54,6 @@ def test_a_wrong_word_is_told(wanted: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError) as caught:
         checked(PictureSettings(), wanted)
     assert message in str(caught.value)
-
-
-def test_options_lie_over_the_stage() -> None:
-    stage = load_stage("everything", PARAMETERS)
-    other = with_picture(stage, {"kiosk": True, "quality": "fast", "theme": None})
-    face = other.settings.face
-    assert (face.kiosk, face.quality, face.theme) == (True, "fast", "skin")
-    assert (face.size, face.fps) == (stage.settings.face.size, stage.settings.face.fps)
-    assert stage.settings.face.quality == "full"
 
 
 def test_backgrounds_on_the_command_line() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
-from controller.stage.stage import load_stage
+from controller.stage.stage import load_stage, with_picture
 
 
 def stage_file(tmp_path: Path, text: str) -> str:
@@ -89,3 +89,12 @@ def test_faults_of_its_own_files_are_told_with_the_rest(tmp_path: Path) -> None:
         "head: no head 'nobody'",
     ):
         assert part in message
+
+
+def test_options_lie_over_the_stage() -> None:
+    stage = load_stage("everything", PARAMETERS)
+    other = with_picture(stage, {"kiosk": True, "quality": "fast", "theme": None})
+    face = other.settings.face
+    assert (face.kiosk, face.quality, face.theme) == (True, "fast", "skin")
+    assert (face.size, face.fps) == (stage.settings.face.size, stage.settings.face.fps)
+    assert stage.settings.face.quality == "full"

@@ -10,7 +10,7 @@ import pytest
 from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.links.linesession import LineSession
+from controller.links.line.session import LineSession
 from controller.takes.recording import Recorder, Replay, replay
 
 STEP_NS = 10_000_000

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.vocabulary.affect import Affect
-from controller.vocabulary.expression import Vocabulary
 from controller.vocabulary.facs import Facs
+from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
 AFFECT = Affect.load(VOCABULARY)

@@ -1,156 +1,30 @@
-"""Named expressions."""
+"""Files of named expressions."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from controller.base.errors import ConfigError, ParameterError
+from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.vocabulary.expression import Vocabulary, sides
+from controller.vocabulary.expression import read_expressions
 
 
-@pytest.fixture(scope="module")
-def vocabulary() -> Vocabulary:
-    return Vocabulary.load(P)
+def test_a_later_file_mixes_those_before_it(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
+    first.write_text('[a]\naliases = ["The A"]\nweights = { jawOpen = 0.8 }\n')
+    second.write_text("[b]\nof = { a = 0.5 }\n")
+    known, aliases = read_expressions(P, (first, second))
+    assert list(known) == ["a", "b"] and list(aliases.values()) == ["a"]
+    assert known["b"].weights == pytest.approx(known["a"].weights / 2)
+    with pytest.raises(ConfigError, match="a"):
+        read_expressions(P, (second, first))
 
 
-def test_the_basic_emotions_are_there_and_differ(vocabulary: Vocabulary) -> None:
-    basic = ["happiness", "sadness", "surprise", "fear", "anger", "disgust", "contempt"]
-    assert {*basic, "neutral", "smile", "wink"} <= set(vocabulary.names)
-    weights = np.array([vocabulary[name].weights for name in basic])
-    unit = weights / np.linalg.norm(weights, axis=1, keepdims=True)
-    alike = unit @ unit.T - np.eye(len(basic))
-    assert alike.max() < 0.75  # cosine; the read-out by template needs them apart
-
-
-def test_neutral_is_all_zero(vocabulary: Vocabulary) -> None:
-    assert not vocabulary["neutral"].weights.any()
-    assert vocabulary.expand("neutral") == {}
-
-
-def test_expand_scales_with_intensity(vocabulary: Vocabulary) -> None:
-    full, half = vocabulary.expand("anger", 1.0), vocabulary.expand("anger", 0.5)
-    assert full.keys() == half.keys()
-    assert full[P.index("browDownLeft")] == full[P.index("browDownRight")] > 0.8
-    assert all(half[i] == pytest.approx(full[i] / 2) for i in full)
-    assert not any(vocabulary.expand("anger", 0.0).values())
-
-
-def test_names_in_any_case_and_aliases(vocabulary: Vocabulary) -> None:
-    assert vocabulary["Happy"] is vocabulary["happiness"] is vocabulary["JOY"]
-    assert vocabulary["Wink-Left"] is vocabulary["wink"]
-
-
-def test_unknown_name_suggests_the_nearest(vocabulary: Vocabulary) -> None:
-    with pytest.raises(ParameterError, match="unknown expression 'hapiness', did you mean 'happiness'"):
-        vocabulary["hapiness"]
-    with pytest.raises(ParameterError, match=r"intensity must be 0 to 1, not 1\.5"):
-        vocabulary.expand("anger", 1.5)
-
-
-def test_weights_stay_in_range_and_cannot_be_changed(vocabulary: Vocabulary) -> None:
-    for name in vocabulary.names:
-        weights = vocabulary[name].weights
-        assert np.all(weights >= P.low) and np.all(weights <= P.high)
-        assert not weights.flags.writeable
-
-
-def test_every_expression_says_where_it_comes_from(vocabulary: Vocabulary) -> None:
-    assert all(vocabulary[name].source for name in vocabulary.names)
-
-
-def test_sides() -> None:
-    assert sides(P, "mouthSmile") == [P.index("mouthSmileLeft"), P.index("mouthSmileRight")]
-    assert sides(P, "jawOpen") == [P.index("jawOpen")]
-    assert sides(P, "nothing") == []
-
-
-def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
-    path = tmp_path / "own.toml"
-    path.write_text(
-        """
-        plain = 1
-        [grin]
-        kind = "mood"
-        aliases = ["sneer"]
-        onset_s = -1
-        blnk = "keep"
-        [grin.weights]
-        mouthSmil = 0.5
-        jawOpen = 1.5
-        [sneer]
-        aliases = 3
-        """
-    )
-    with pytest.raises(ConfigError) as caught:
-        Vocabulary.load(P, path)
-    text = str(caught.value)
-    for part in (
-        "plain: must be a table", "grin.kind", "grin.aliases: 'sneer' is already a name of 'sneer'", "grin.onset_s",
-        "grin.blnk: unknown key, did you mean 'blink'", "grin.weights.mouthSmil: unknown parameter, did you mean",
-        "grin.weights.jawOpen: must be a number from 0 to 1 (is 1.5)", "sneer.weights: missing", "sneer.aliases",
-    ):  # fmt: skip
-        assert part in text
-
-
-def own(tmp_path: Path, text: str, name: str = "own.toml") -> Path:
-    path = tmp_path / name
-    path.write_text(text)
-    return path
-
-
-def test_own_files_add_expressions_and_mix_those_before_them(tmp_path: Path) -> None:
-    path = own(
-        tmp_path,
-        """
-        [smirk]
-        aliases = ["half_smile"]
-        weights = { mouthSmileLeft = 0.7 }
-        [glee]
-        of = { happiness = 0.5, smirk = 1.0 }
-        weights = { jawOpen = 0.3 }
-        mouth = "blend"
-        """,
-    )
-    vocabulary = Vocabulary.load(P, more=[path])
-    happy, glee = Vocabulary.load(P)["happiness"].weights, vocabulary["glee"]
-    left = P.index("mouthSmileLeft")
-    assert vocabulary["Half-Smile"].name == "smirk" and vocabulary["smile"].name == "smile"
-    assert glee.weights[left] == pytest.approx(min(1.0, 0.5 * happy[left] + 0.7)) and glee.mouth == "blend"
-    assert glee.weights[P.index("jawOpen")] == 0.3
-    more = own(tmp_path, "[joyful]\nof = { glee = 0.5 }", "more.toml")
-    assert Vocabulary.load(P, more=[path, more])["joyful"].weights[left] == pytest.approx(glee.weights[left] / 2)
-
-
-def test_faults_of_all_files_come_together_circles_too(tmp_path: Path) -> None:
-    first = own(
-        tmp_path,
-        """
-        smile = { weights = {} }
-        [a]
-        of = { b = 1.0 }
-        [b]
-        of = { c = 0.5, a = 1.0 }
-        [c]
-        of = { happines = 1.0, sadness = 2.0 }
-        aliases = ["joy"]
-        """,
-    )
-    second = own(tmp_path, "[d]\nof = 3", "second.toml")
-    with pytest.raises(ConfigError) as caught:
-        Vocabulary.load(P, more=[first, second])
-    text = str(caught.value)
-    for part in (
-        "own.toml: 5 faults",
-        "smile: is already an expression of a file before this one",
-        "b.of.a: goes in a circle: a -> b -> a",
-        "c.of.happines: unknown expression, did you mean 'happiness'",
-        "c.of.sadness: must be a number from 0 to 1",
-        "c.aliases: 'joy' is already a name of 'happiness'",
-        "second.toml: 1 fault",
-        "d.of: must be a table of expressions",
-    ):
-        assert part in text
+def test_weights_cannot_be_written_over(tmp_path: Path) -> None:
+    file = tmp_path / "one.toml"
+    file.write_text("[a]\nweights = { jawOpen = 0.8 }\n")
+    known, _ = read_expressions(P, (file,))
+    with pytest.raises(ValueError):
+        known["a"].weights[0] = 1.0

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS as P
-from controller.vocabulary.expression import Vocabulary
 from controller.vocabulary.facs import Facs
+from controller.vocabulary.vocabulary import Vocabulary
 
 FACS = Facs.load(P)
 EMOTIONS = [name for name, formula in FACS.emotions.items() if formula]

@@ -8,9 +8,9 @@ import pytest
 from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS as P
 from controller.vocabulary.affect import Affect
-from controller.vocabulary.expression import Vocabulary
 from controller.vocabulary.facs import Facs
 from controller.vocabulary.formulas import Formulas
+from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
 FORMULAS = Formulas(P, VOCABULARY)

@@ -7,10 +7,10 @@ import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.vocabulary.affect import Affect
-from controller.vocabulary.expression import Vocabulary
 from controller.vocabulary.facs import Facs
 from controller.vocabulary.reading import Readings
 from controller.vocabulary.visemes import Visemes
+from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
 EMOTIONS = ("happiness", "sadness", "surprise", "fear", "anger", "disgust", "contempt")

@@ -14,7 +14,7 @@ import pytest
 
 from controller.base.parameters import PARAMETERS
 from controller.layers.commands import CommandState
-from controller.links.linesession import LineSession
+from controller.links.line.session import LineSession
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import NoReply, WrongModel

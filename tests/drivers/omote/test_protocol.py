@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.base.parameters import PARAMETERS
-from controller.links import lineprotocol
+from controller.links.line import protocol as lineprotocol
 from drivers.omote import protocol
 
 WORDS = st.text(st.characters(min_codepoint=0x21, max_codepoint=0x7E, exclude_characters="*#"), min_size=1, max_size=9)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.links.lineprotocol import MAX_LINE, MAX_REPLY, Reply, checksum, format_words, parse_reply
-from controller.links.linesession import LineSession
+from controller.links.line.protocol import MAX_LINE, MAX_REPLY, Reply, checksum, format_words, parse_reply
+from controller.links.line.session import LineSession
 
 SECOND = 10**9
 JAW = P.index("jawOpen")

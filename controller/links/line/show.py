@@ -10,8 +10,8 @@ from collections.abc import Callable
 from controller.base.errors import ParameterError
 from controller.base.parameters import did_you_mean
 from controller.layers.commands import CommandSink
-from controller.links.linesession import LineSession
-from controller.links.script import Script
+from controller.links.line.script import Script
+from controller.links.line.session import LineSession
 
 
 class Show:

@@ -1,7 +1,7 @@
 """The omote line protocol, bytes to words and back: framing, checksums, tags, replies. No I/O here.
 
 The rules are written down for other programmers in docs/line-protocol.md; what the words of a command mean
-is in :mod:`controller.links.linecommands`.
+is in :mod:`controller.links.line.commands`.
 """
 
 from __future__ import annotations

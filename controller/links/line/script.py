@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from controller.base.parameters import Floats, Parameters, did_you_mean, file_error, read_toml
-from controller.links.linecommands import Grammar
-from controller.links.lineprotocol import LineError
-from controller.vocabulary.expression import Vocabulary
+from controller.links.line.commands import Grammar
+from controller.links.line.protocol import LineError
+from controller.vocabulary.vocabulary import Vocabulary
 
 _KEYS = ("name", "description", "loop_s", "frames_hz", "marks", "steps")
 _MAX_FRAMES_HZ = 200.0

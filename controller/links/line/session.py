@@ -9,12 +9,11 @@ import math
 from collections import Counter
 from functools import cache, cached_property
 from importlib import metadata
-from typing import TYPE_CHECKING
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
-from controller.layers.commands import CommandSink
-from controller.links.linecommands import COMMANDS, MAX_RATE_HZ, Grammar
-from controller.links.lineprotocol import (
+from controller.layers.commands import CommandSink, Player
+from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Grammar
+from controller.links.line.protocol import (
     MAX_LINE,
     VERSION,
     Code,
@@ -27,7 +26,7 @@ from controller.links.lineprotocol import (
     number,
     pairs,
 )
-from controller.links.linewords import (
+from controller.links.line.words import (
     Command,
     Expr,
     Gaze,
@@ -50,10 +49,7 @@ from controller.links.linewords import (
     Subscribe,
     Unsubscribe,
 )
-
-if TYPE_CHECKING:
-    from controller.links.show import Shows
-    from controller.vocabulary.reading import Readings
+from controller.vocabulary.reading import Readings
 
 
 class LineSession:
@@ -206,7 +202,6 @@ class LineSession:
 
     @cached_property
     def _readings(self) -> Readings:
-        from controller.vocabulary.reading import Readings  # takes a moment to import; few ask for it
 
         return Readings(self._parameters, self._sink.vocabulary)
 
@@ -262,7 +257,7 @@ def _receipt(command: Command) -> str:
     return "NEUTRAL"
 
 
-def _play(shows: Shows | None, what: str, to: str) -> None:
+def _play(shows: Player | None, what: str, to: str) -> None:
     """Raises ConfigError or ParameterError: no shows here, no such script, mark or time."""
     if shows is None:
         raise ParameterError("no shows can be played here", hint="omote run plays them")

@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean
-from controller.links.lineprotocol import Code, LineError, Words, format_words, parse_words
-from controller.links.linewords import (
+from controller.links.line.protocol import Code, LineError, Words, format_words, parse_words
+from controller.links.line.words import (
     READINGS,
     Command,
     Expr,

@@ -11,9 +11,9 @@ import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.links.hostport import HostPort
-from controller.links.linelink import LineLink
-from controller.links.lineprotocol import MAX_REPLY, LineDecoder, Reply, format_words, parse_reply
+from controller.links.line.hostport import HostPort
+from controller.links.line.link import LineLink
+from controller.links.line.protocol import MAX_REPLY, LineDecoder, Reply, format_words, parse_reply
 from drivers.base.errors import PortMissing
 
 LIMIT_S = 5.0

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.base.parameters import PARAMETERS as P
-from controller.links.linecommands import (
+from controller.links.line.commands import (
     COMMANDS,
     LISTS,
     MAX_DURATION_S,
@@ -35,8 +35,8 @@ from controller.links.linecommands import (
     Subscribe,
     Unsubscribe,
 )
-from controller.links.lineprotocol import Code, LineError, checksum
-from controller.vocabulary.expression import Vocabulary
+from controller.links.line.protocol import Code, LineError, checksum
+from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
 GRAMMAR = Grammar(P, lambda name: VOCABULARY[name].name)

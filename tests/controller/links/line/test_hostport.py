@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from controller.base.errors import LinkError
-from controller.links.hostport import HostPort
+from controller.links.line.hostport import HostPort
 from drivers.port.serialport import SerialPort
 
 

@@ -13,7 +13,7 @@ import time
 from types import TracebackType
 
 from controller.layers.commands import CommandSink
-from controller.links.linesession import LineSession
+from controller.links.line.session import LineSession
 from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
 

@@ -10,9 +10,9 @@ import pytest
 from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.links.linesession import LineSession
-from controller.links.script import Script
-from controller.links.show import Show, Shows
+from controller.links.line.script import Script
+from controller.links.line.session import LineSession
+from controller.links.line.show import Show, Shows
 
 STEPS = ((0.0, "EXPR smile"), (1.0, "SET jawOpen 0.5"), (2.0, "NEUTRAL 0"), (2.0, "EXPR anger"))
 SECOND = 10**9

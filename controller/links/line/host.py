@@ -1,7 +1,7 @@
 """A simulated robot host: it sends a script over a pseudo-terminal and checks every answer.
 
-``python -m controller.links.host --script tour`` makes the port, prints ``ready PATH``, serves until its standard input
-ends, and prints what it counted as one line of JSON. It so ends with whoever started it.
+``python -m controller.links.line.host --script tour`` makes the port, prints ``ready PATH``, serves until its standard
+input ends, and prints what it counted as one line of JSON. It so ends with whoever started it.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import Parameters, standard
 from controller.base.paths import find_config
 from controller.base.signals import ENDINGS
-from controller.links.hostport import HostPort
-from controller.links.lineprotocol import MAX_REPLY, LineDecoder, LineError, Reply, format_words, number, parse_reply
-from controller.links.script import Script, Wave
-from controller.vocabulary.expression import Vocabulary
+from controller.links.line.hostport import HostPort
+from controller.links.line.protocol import MAX_REPLY, LineDecoder, LineError, Reply, format_words, number, parse_reply
+from controller.links.line.script import Script, Wave
+from controller.vocabulary.vocabulary import Vocabulary
 
 _ANSWER_LIMIT_S = 1.0
 _HELLO_EVERY_S = 0.1
@@ -187,7 +187,7 @@ def load_script(
 
 def main(arguments: list[str] | None = None) -> int:
     """Serve a script in a process of its own; see the module's text."""
-    parser = argparse.ArgumentParser(prog="controller.links.host", description="simulated robot host")
+    parser = argparse.ArgumentParser(prog="controller.links.line.host", description="simulated robot host")
     parser.add_argument("--script", default="tour", help="a path, or a name in configs/scripts")
     parser.add_argument("--vocabulary", type=Path, action="append", default=[], help="file of further expressions")
     parser.add_argument("--link", type=Path, default=None, help="make this path a link to the port")

@@ -15,11 +15,11 @@ import pytest
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.links import host as host_module
-from controller.links.host import RobotHost, load_script, main
-from controller.links.hostport import HostPort
-from controller.links.linelink import LineLink
-from controller.links.script import Script
+from controller.links.line import host as host_module
+from controller.links.line.host import RobotHost, load_script, main
+from controller.links.line.hostport import HostPort
+from controller.links.line.link import LineLink
+from controller.links.line.script import Script
 
 
 @pytest.fixture

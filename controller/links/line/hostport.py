@@ -31,8 +31,8 @@ class HostPort:
 
     def __init__(self, link: Path | None = None) -> None:
         try:
-            import pty
-            import tty
+            import pty  # not on Windows
+            import tty  # not on Windows
 
             self._fd, self._other = pty.openpty()
             tty.setraw(self._other)  # no echo and no line editing, as on a wire

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.links.lineprotocol import (
+from controller.links.line.protocol import (
     MAX_LINE,
     MAX_REPLY,
     Code,

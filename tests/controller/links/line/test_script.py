@@ -9,8 +9,8 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.links.script import Script, Wave
-from controller.vocabulary.expression import Vocabulary
+from controller.links.line.script import Script, Wave
+from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
 
