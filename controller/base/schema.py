@@ -5,14 +5,23 @@ from __future__ import annotations
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import Field
+from pydantic import BaseModel, Field
 
-from drivers.base.options import Entry, Option, entries
+from drivers.base.options import REQUIRED, Entry, Option, entries
 
 
 def fields_of(options: type) -> dict[str, tuple[Any, Any]]:
     """For :func:`pydantic.create_model`: the annotated type and the default of each option of a dataclass."""
-    return {entry.name: (_annotated(entry), entry.default) for entry in entries(options)}
+    return {
+        entry.name: (_annotated(entry), ... if entry.default is REQUIRED else entry.default)
+        for entry in entries(options)
+    }
+
+
+def given_in(table: BaseModel, options: type) -> Any:
+    """An instance of a dataclass of options with what a table of :func:`fields_of` it was given."""
+    names = table.model_fields_set & {entry.name for entry in entries(options)}
+    return options(**{name: getattr(table, name) for name in names})
 
 
 def bare_type(annotation: Any) -> Any:

@@ -27,8 +27,8 @@ from controller.base.signals import ENDINGS, let_interrupts_through
 from controller.body.insight import InsightWriter, insight_size
 from controller.body.sources import Sources, Voice
 from controller.body.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
+from controller.links.kind import Around, Link
 from controller.links.line.host import load_script
-from controller.links.line.link import LineLink
 from controller.links.line.show import Shows
 from controller.links.links import open_links
 from controller.robot.busloop import BusLoop
@@ -36,8 +36,8 @@ from controller.robot.following import Puppet, Reflection
 from controller.robot.settings import RobotSettings
 from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import Take, TakePlayer
+from controller.takes.reader import layer_of, load_take
 from controller.takes.recording import SUFFIX, Face, Recorder, Replay
-from controller.takes.speech import layer_of, load_take
 from drivers.base.priority import take_priority, take_turns_quickly
 from drivers.base.shutdown import Closers, with_those_before
 
@@ -82,7 +82,7 @@ class Body:
         self.clock = Clock(stage.settings.control_hz)
         self.state.live(0.0 if mirror else stage.settings.liveliness, 0)  # no command: it has no time of arrival
         self.replay = replay
-        self.links: list[LineLink] = []
+        self.links: list[Link] = []
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
         self.reflection = self._reflection(parameters)
         self.state.watch = self.reflection
@@ -158,8 +158,8 @@ class Body:
             when a link does not come up.
         """
         if self.live:
-            links = [link for link in self.stage.settings.links if self.puppet is None or link.port != "simulated"]
-            self.links = open_links(links, self.state, self._closers, self.stage.vocabularies, beside=self.stage.path)
+            links = [link for link in self.stage.settings.links if self.puppet is None or link.simulated is None]
+            self.links = open_links(links, Around(self.state, self._closers, self.stage.vocabularies, self.stage.path))
             self._closers.callback(self.sources.stop)
             self.sources.begin()
         for bus in self.buses:

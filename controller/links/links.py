@@ -1,132 +1,107 @@
-"""Opening the links of a stage, simulated hosts included."""
+"""The links of a stage: read from their tables, and opened."""
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-import threading
 from collections.abc import Sequence
-from contextlib import ExitStack
-from pathlib import Path
-from typing import Protocol
+from functools import cache
+from typing import Annotated, Any
 
-from controller.base.errors import LinkError
-from controller.base.paths import find_config
-from controller.layers.commands import CommandSink
-from controller.links.line.link import LineLink
+from pydantic import ValidatorFunctionWrapHandler, WrapValidator, create_model, field_validator, model_validator
 
-_START_LIMIT_S = 20.0
-_END_LIMIT_S = 3.0
+from controller.base.config import Settings
+from controller.base.schema import fields_of, given_in
+from controller.links.kind import LINKS, Around, Link, LinkKind
+from drivers.base.errors import PluginError
 
 
-class LinkChoice(Protocol):
-    """What a stage says about a link."""
+class LinkSettings(Settings):
+    """One way in, as a stage has it; the fields of its kind's own options come besides (:func:`read_link`)."""
 
-    @property
-    def port(self) -> str:
-        """Device path, or ``"simulated"``."""
+    kind: str = "line"
 
-    @property
-    def baud(self) -> int:
-        """Rate of the port."""
+    @classmethod
+    def known_keys(cls) -> list[str]:
+        """Keys of such a table, those of all kinds included."""
+        own = {key for kind in LINKS.all() for key in fields_of(kind.settings)}
+        return [*super().known_keys(), *sorted(own)]
 
     @property
-    def script(self) -> str | None:
-        """Script of a simulated host."""
+    def own(self) -> Any:
+        """What the kind itself is told: an instance of its settings."""
+        return given_in(self, LINKS.get(self.kind).settings)
 
+    @property
+    def simulated(self) -> str | None:
+        """The script that a simulated far end plays; None where there is none."""
+        return getattr(self.own, "simulated", None)
 
-def open_links(
-    choices: Sequence[LinkChoice],
-    sink: CommandSink,
-    closers: ExitStack,
-    vocabularies: Sequence[Path] = (),
-    *,
-    beside: Path | None = None,
-) -> list[LineLink]:
-    """Open every link of a stage; ``closers`` gets what closes them, simulated hosts last.
+    def __str__(self) -> str:
+        address = getattr(self.own, "address", "")
+        return f"{self.kind} on {address}" if address else self.kind
 
-    Parameters
-    ----------
-    vocabularies : files of further expressions that scripts of simulated hosts name.
-    beside : the stage's file; scripts may lie beside it.
-
-    Raises
-    ------
-    LinkError : a simulated host does not start. PortError : a port cannot be opened.
-    """
-    links = []
-    for choice in choices:
-        port = choice.port
-        if port == "simulated":
-            host = HostProcess(str(find_config("scripts", choice.script or "tour", beside=beside)), vocabularies)
-            closers.callback(host.stop)
-            port = host.path
-        link = LineLink(port, choice.baud, sink).start()
-        closers.callback(link.stop)
-        links.append(link)
-    return links
-
-
-class HostProcess:
-    """A simulated robot host in a process of its own, which ends with this one.
-
-    Parameters
-    ----------
-    script : a path, or a name in ``configs/scripts``. vocabularies : files of further expressions it names.
-
-    Attributes
-    ----------
-    path : the port it serves. counts : what it counted, once stopped.
-
-    Raises
-    ------
-    LinkError : it does not start.
-    """
-
-    def __init__(self, script: str, vocabularies: Sequence[Path] = ()) -> None:
-        command = [sys.executable, "-m", "controller.links.line.host", "--script", script]
-        command += [word for path in vocabularies for word in ("--vocabulary", str(path))]
-        self.counts: dict[str, object] = {}
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        patience = threading.Timer(_START_LIMIT_S, self._process.kill)
-        patience.start()
-        word, _, rest = self._line().partition(" ")
-        patience.cancel()
-        if word != "ready":
-            self.stop()
-            raise _failure(word, rest, script)
-        self.path = rest
-
-    def stop(self) -> None:
-        """End it and take its counts; may be called again."""
-        process = self._process
-        if process.stdin is None or process.stdin.closed:
-            return
-        process.stdin.close()
+    @field_validator("kind")
+    @classmethod
+    def _is_known(cls, value: str) -> str:
         try:
-            process.wait(_END_LIMIT_S)
-            self.counts = _table(self._line())
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
+            LINKS.get(value)
+        except PluginError as error:
+            raise ValueError(f"{error} ({error.hint})") from error
+        return value
 
-    def _line(self) -> str:
-        return self._process.stdout.readline().strip() if self._process.stdout is not None else ""
-
-
-def _failure(word: str, rest: str, script: str) -> LinkError:
-    if word != "failed":
-        return LinkError(f"the simulated robot host for script {script!r} did not start")
-    message, hint = json.loads(rest)
-    return LinkError(message, hint=hint)
+    @model_validator(mode="after")
+    def _fits(self) -> LinkSettings:
+        check = getattr(self.own, "check", None)
+        if check is not None:
+            check()
+        return self
 
 
-def _table(line: str) -> dict[str, object]:
+def read_link(table: dict[str, Any]) -> LinkSettings:
+    """A link from its table in a stage, with the options of its kind.
+
+    Raises
+    ------
+    pydantic.ValidationError : every fault with its key.
+    """
     try:
-        table = json.loads(line)
-    except json.JSONDecodeError:
-        return {}
-    return table if isinstance(table, dict) else {}
+        kind = LINKS.get(str(table.get("kind", "line")))
+    except PluginError:
+        return _Unknown.model_validate(table)  # which says what is wrong with the kind
+    return _model_of(kind).model_validate(table)
+
+
+def open_links(choices: Sequence[LinkSettings], around: Around) -> list[Link]:
+    """Open every link of a stage; ``around.closers`` gets what closes them.
+
+    Raises
+    ------
+    LinkError, PortError : one does not come up. PluginError : a package that it needs is not installed.
+    """
+    found = []
+    for choice in choices:
+        kind = LINKS.get(choice.kind)
+        link: Link = LINKS.load(kind, kind.open)(choice.own, around)
+        found.append(link)
+    return found
+
+
+class _Unknown(LinkSettings, extra="ignore"):
+    """A link of an unknown kind: nothing is known of its other keys."""
+
+
+@cache
+def _model_of(kind: LinkKind) -> type[LinkSettings]:
+    make: Any = create_model
+    made: type[LinkSettings] = make(f"{kind.kind} link", __base__=LinkSettings, **fields_of(kind.settings))
+    return made
+
+
+def _by_kind(table: Any, handler: ValidatorFunctionWrapHandler) -> LinkSettings:
+    if isinstance(table, dict):
+        return read_link(table)
+    link: LinkSettings = handler(table)
+    return link
+
+
+LinkTable = Annotated[LinkSettings, WrapValidator(_by_kind)]
+"""An entry of ``[[links]]``: read by its kind's own options."""

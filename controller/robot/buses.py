@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, create_model, field_validator, model_validator
 
 from controller.base.config import Settings
-from controller.base.schema import fields_of
+from controller.base.schema import fields_of, given_in
 from drivers.base.errors import PluginError
 from drivers.core.families import SERVO_BAUD, Family
 from drivers.core.registry import FAMILIES, SIMULATED
@@ -74,8 +74,7 @@ class BusSettings(Settings):
         settings = FAMILIES.get(self.family).settings
         check = getattr(settings, "check", None)
         if check is not None:
-            given = {key: getattr(self, key) for key in fields_of(settings) if key in self.model_fields_set}
-            check(settings(**given), self.rate_hz)
+            check(given_in(self, settings), self.rate_hz)
         return self
 
     def _check_port(self) -> None:
@@ -101,7 +100,7 @@ def read_bus(table: dict[str, Any]) -> BusSettings:
     try:
         family = FAMILIES.get(family_in(table))
     except PluginError:
-        return BusSettings.model_validate(table)  # which says what is wrong with the kind
+        return _Unknown.model_validate(table)  # which says what is wrong with the kind
     return _model_of(family).model_validate(table)
 
 
@@ -112,6 +111,10 @@ def takers() -> dict[str, list[str]]:
         for key in fields_of(family.settings):
             found.setdefault(key, []).append(family.kind)
     return found
+
+
+class _Unknown(BusSettings, extra="ignore"):
+    """A bus of an unknown kind: nothing is known of its other keys."""
 
 
 @cache

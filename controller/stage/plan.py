@@ -18,8 +18,8 @@ from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.stage.rehearsal import Feed, Rehearsal
 from controller.stage.stage import Stage
 from controller.takes.livelink import TakePlayer
+from controller.takes.reader import layer_of, load_take
 from controller.takes.recording import SUFFIX, replay
-from controller.takes.speech import layer_of, load_take
 
 _LONGEST_S = 30.0
 _EACH_S = 1.5
@@ -58,7 +58,7 @@ def _feed(stage: Stage, take: Path | None, state: CommandState) -> tuple[Feed, f
     """What gives the layers what is due, and for how long it does (s)."""
     if take is not None:
         return _of_take(stage, take, state)
-    names = [link.script or "tour" for link in stage.settings.links if link.port == "simulated"]
+    names = [script for link in stage.settings.links if (script := link.simulated) is not None]
     names += [stage.settings.show] if stage.settings.show is not None else []
     scripts = [load_script(name, state.parameters, stage.vocabulary, beside=stage.path) for name in names] or [
         _every(state)

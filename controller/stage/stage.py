@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from controller.base.config import Settings, load
 from controller.base.errors import ConfigError, TakeError
@@ -18,11 +18,12 @@ from controller.layers.layers import load_layers
 from controller.layers.life import LifeSettings
 from controller.layers.mixer import LayerSettings
 from controller.links.line.host import load_script
+from controller.links.links import LinkTable
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
 from controller.stage.identity import check_identity
 from controller.stage.picture import PictureSettings, checked
-from controller.takes.speech import load_take
+from controller.takes.reader import load_take
 from controller.vocabulary.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
@@ -36,21 +37,6 @@ class FaceSettings(PictureSettings):
 
     size: tuple[Pixels, Pixels] = (1280, 720)
     fps: Annotated[float, Field(ge=1, le=1000)] = 60.0
-
-
-class LinkSettings(Settings):
-    """One way commands come in. ``simulated`` starts the simulated robot host with ``script``."""
-
-    kind: Literal["line"] = "line"
-    port: str
-    baud: Annotated[int, Field(ge=300, le=12_000_000)] = 115_200
-    script: str | None = None
-
-    @model_validator(mode="after")
-    def _script_is_simulated(self) -> LinkSettings:
-        if self.script is not None and self.port != "simulated":
-            raise ValueError('script needs port = "simulated"')
-        return self
 
 
 class StageSettings(Settings):
@@ -73,7 +59,7 @@ class StageSettings(Settings):
     groups: dict[str, Annotated[float, Field(ge=-1, le=1)]] = {}
     layers: dict[str, dict[str, Any]] = {}
     face: FaceSettings = FaceSettings()
-    links: list[LinkSettings] = []
+    links: list[LinkTable] = []
 
 
 @dataclass(frozen=True)
@@ -188,7 +174,9 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
     layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
     life = _collect(faults, "life", lambda: LifeSettings.named(settings.life, parameters))
-    scripts = [("show", settings.show)] + [(f"links[{i}].script", link.script) for i, link in enumerate(settings.links)]
+    scripts = [("show", settings.show)] + [
+        (f"links[{i}].script", link.simulated) for i, link in enumerate(settings.links)
+    ]
     for key, script in scripts:
         if script is not None:
             _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary, beside=path))

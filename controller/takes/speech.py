@@ -85,36 +85,13 @@ def _dominance(t: float, start: float, end: float, room: float) -> float:
     return 1.0
 
 
-def load_take(path: Path, parameters: Parameters, visemes: Visemes | None = None) -> Take:
-    """A take of any kind omote reads, told apart by the file's ending.
-
-    ``.csv`` Live Link Face; ``.tsv`` and ``.json`` Rhubarb Lip Sync, or sounds one a line; ``.wav`` a voice.
-
-    Raises
-    ------
-    TakeError : the file cannot be read or is wrong.
-    """
-    kind = path.suffix.lower()
-    if kind == ".csv":
-        return Take.load(path, parameters)
-    if kind == ".wav":
-        return wav_take(path, parameters, visemes or Visemes.load(parameters))
-    if kind in (".tsv", ".json"):
-        return cue_take(path, parameters, visemes or Visemes.load(parameters))
-    raise TakeError(f"{path}: no take: its name ends in {kind or 'nothing'}", hint="use .csv, .tsv, .json or .wav")
-
-
-def layer_of(path: Path) -> str:
-    """The layer a take plays into: a captured face moves all of it, speech leaves the rest alone."""
-    return "capture" if path.suffix.lower() == ".csv" else "speech"
-
-
-def cue_take(path: Path, parameters: Parameters, visemes: Visemes) -> Take:
+def cue_take(path: Path, parameters: Parameters, visemes: Visemes | None = None) -> Take:
     """A take from Rhubarb's TSV or JSON, or from a TSV of phonemes or visemes (time, tab, name). Raises TakeError."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise TakeError(f"{path}: cannot be read: {error}", hint=f"look at: ls -l {path}") from error
+    visemes = visemes or Visemes.load(parameters)
     rows, end_s = _json_rows(path, text) if path.suffix.lower() == ".json" else _tsv_rows(path, text)
     shapes = all(name in visemes.rhubarb for _, _, name in rows)
     cues = [Cue(start_s, _weights(path, line, name, visemes, shapes)) for line, start_s, name in rows]
@@ -168,13 +145,14 @@ def _seconds(text: str) -> float | None:
     return value if math.isfinite(value) and value >= 0.0 else None
 
 
-def wav_take(path: Path, parameters: Parameters, visemes: Visemes) -> Take:
+def wav_take(path: Path, parameters: Parameters, visemes: Visemes | None = None) -> Take:
     """A mouth that follows a voice: the jaw its loudness, the lips how bright it is. Good enough for a servo mouth.
 
     Raises
     ------
     TakeError : not a PCM WAV file.
     """
+    visemes = visemes or Visemes.load(parameters)
     sound, rate = _read_wav(path)
     low, high = _bands(sound, rate)
     loud = np.percentile(low, _LOUD_PERCENTILE) or 1.0

@@ -15,8 +15,8 @@ from controller.links.line.host import load_script
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
 from controller.stage.stage import load_stage
+from controller.takes.reader import load_take, suffixes
 from controller.takes.recording import SUFFIX, replay
-from controller.takes.speech import load_take
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.readers import is_plain, read_surface, summary
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 
 DEFAULT_HEAD = "ict"
-TAKE_SUFFIXES = (".csv", ".tsv", ".json", ".wav")
 SURFACE_SUFFIXES = (".3dm", ".xml", ".tsm")
 
 
@@ -50,7 +49,7 @@ def check_anything(name: str) -> list[str]:
         return _check_surface(path)
     if path.suffix == SUFFIX:
         return _check_recording(path)
-    if path.suffix.lower() in TAKE_SUFFIXES:
+    if path.suffix.lower() in suffixes():
         return _check_take(path)
     return _check_toml(path)
 
@@ -179,6 +178,6 @@ def _check_stage(path: Path, parameters: Parameters) -> list[str]:
     stage = load_stage(str(path), parameters)
     if stage.groups:
         stage.load_head()
-    links = ", ".join(f"{link.kind} on {link.port}" for link in stage.settings.links) or "none"
+    links = ", ".join(map(str, stage.settings.links)) or "none"
     robots = ", ".join(robot.name for robot in stage.robots) or "none"
     return [f"stage {stage.settings.name}: head {stage.head.name}, links: {links}, robots: {robots}: good"]

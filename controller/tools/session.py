@@ -23,8 +23,8 @@ from controller.body.waiting import WaitingBody
 from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.stage.identity import check_identity
 from controller.stage.stage import Stage, load_stage
+from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
-from controller.takes.speech import load_take
 from drivers.base.priority import yield_to_servos
 
 if TYPE_CHECKING:

@@ -34,13 +34,17 @@ class Option:
     flag: str = ""
 
 
+REQUIRED: Any = MISSING
+"""Default of an option that must be given."""
+
+
 def option(help: str, default: Any = None, **limits: Any) -> Any:
     """A field of a dataclass of options.
 
     Parameters
     ----------
     help : one sentence for people.
-    default : None says that the driver's own default holds.
+    default : None says that the plug-in's own default holds; :data:`REQUIRED` that a value must be given.
     limits : further fields of :class:`Option`.
     """
     return field(default=default, metadata={"option": Option(help=help, **limits)})
@@ -48,7 +52,7 @@ def option(help: str, default: Any = None, **limits: Any) -> Any:
 
 @dataclass(frozen=True)
 class Entry:
-    """One option of a dataclass: its name, its type as annotated, its default and its limits."""
+    """One option of a dataclass: its name, its type as annotated, its default (or :data:`REQUIRED`), its limits."""
 
     name: str
     type: Any
@@ -60,8 +64,7 @@ def entries(options: type) -> Iterator[Entry]:
     """The options of a dataclass in order."""
     types = get_type_hints(options)
     for each in fields(options):
-        default = None if each.default is MISSING else each.default
-        yield Entry(each.name, types[each.name], default, each.metadata.get("option", Option()))
+        yield Entry(each.name, types[each.name], each.default, each.metadata.get("option", Option()))
 
 
 def parse_ids(text: str, most: int = 252) -> list[int]:

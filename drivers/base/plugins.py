@@ -11,6 +11,7 @@ from __future__ import annotations
 import difflib
 import logging
 from collections.abc import Callable, Iterable, Mapping
+from functools import reduce
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -118,7 +119,7 @@ class Registry(Generic[P]):
         """
         module, _, name = reference.partition(":")
         try:
-            return getattr(import_module(module), name)
+            return reduce(getattr, name.split("."), import_module(module))
         except ModuleNotFoundError as error:
             missing = error.name or module
             raise self._error(

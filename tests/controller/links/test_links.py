@@ -13,9 +13,10 @@ import pytest
 from controller.base.errors import LinkError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
+from controller.links.kind import Around
 from controller.links.line.hostport import HostPort
-from controller.links.links import HostProcess, open_links
-from controller.stage.stage import LinkSettings
+from controller.links.line.opening import HostProcess
+from controller.links.links import open_links, read_link
 from drivers.base.errors import PortMissing
 
 
@@ -24,7 +25,7 @@ def test_a_simulated_host_drives_the_face_from_its_own_process(tmp_path: Path) -
     script.write_text('steps = ["0 SET jawOpen 0.8"]')
     state = CommandState(P)
     with ExitStack() as closers:
-        links = open_links([LinkSettings(port="simulated", script=str(script))], state, closers)
+        links = open_links([read_link({"port": "simulated", "script": str(script)})], Around(state, closers))
         end = time.monotonic() + 10
         while state.status()["manual"] != 1:
             assert time.monotonic() < end
@@ -56,4 +57,4 @@ def test_a_host_that_cannot_start_says_why() -> None:
 
 def test_a_missing_port_closes_what_was_open() -> None:
     with HostPort() as port, ExitStack() as closers, pytest.raises(PortMissing):
-        open_links([LinkSettings(port=port.path), LinkSettings(port="/dev/none")], CommandState(P), closers)
+        open_links([read_link({"port": port.path}), read_link({"port": "/dev/none"})], Around(CommandState(P), closers))

@@ -13,7 +13,8 @@ from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.takes.livelink import TakePlayer
-from controller.takes.speech import Cue, load_take, speech_take
+from controller.takes.reader import load_take
+from controller.takes.speech import Cue, speech_take
 from controller.vocabulary.visemes import Visemes
 
 VISEMES = Visemes.load(P)

@@ -1,0 +1,71 @@
+"""What a kind of link says of itself, and every kind there is.
+
+A link is a folder of ``controller/links`` with a module ``kind`` that holds ``LINK``, or a package of somebody else
+with an entry point in the group ``omote.links`` that names a :class:`LinkKind`; see docs/extending.md.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from controller.layers.commands import CommandSink
+from drivers.base.plugins import Registry, folders_with
+
+API = 1
+"""Version of what a link must keep: this module and :class:`controller.layers.commands.CommandSink`."""
+
+
+@dataclass(frozen=True)
+class Around:
+    """What a link is opened into.
+
+    Attributes
+    ----------
+    sink : where accepted commands go, with the time they arrived.
+    closers : gets what closes the link and all that was started with it; called in reverse order.
+    vocabularies : files of further expressions that the stage names. beside : the stage's file.
+    """
+
+    sink: CommandSink
+    closers: ExitStack
+    vocabularies: tuple[Path, ...] = ()
+    beside: Path | None = None
+
+
+class Link(Protocol):
+    """A link that is open; it takes commands in a thread of its own until it is closed."""
+
+    def report(self) -> dict[str, object]:
+        """What was counted: ``port`` (what people call its far end), ``accepted``, ``refused`` (counts by reason)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkKind:
+    """One way in.
+
+    Attributes
+    ----------
+    api : version of the registry it is made for; see :data:`API`.
+    kind : what stages call it. title : what people call it.
+    settings : dataclass of what a stage can say of it (:mod:`drivers.base.options`). It may have a method ``check()``
+        that raises ValueError, a property ``address`` (where it listens, for people), and a property ``simulated``
+        (the script that a simulated far end plays, or None).
+    open : ``"module:name"`` of a function that takes such settings and an :class:`Around` and gives a :class:`Link`;
+        it raises LinkError or PortError.
+    install : what ``pip install`` takes where a package is missing.
+    """
+
+    api: int
+    kind: str
+    title: str
+    settings: type
+    open: str
+    install: str = ""
+
+
+LINKS: Registry[LinkKind] = Registry(
+    LinkKind, "link kind", "omote.links", API, lambda: folders_with("controller.links", "kind"), "LINK"
+)

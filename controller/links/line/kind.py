@@ -1,0 +1,44 @@
+"""The link that speaks the omote line protocol over a serial port."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from controller.links.kind import LinkKind
+from drivers.base.options import REQUIRED, option
+
+SIMULATED = "simulated"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineSettings:
+    """What a stage says about such a link."""
+
+    port: str = option("Device path; simulated starts a simulated robot host.", REQUIRED)
+    baud: int = option("Rate of the port.", 115_200, at_least=300, at_most=12_000_000)
+    script: str | None = option("What a simulated host plays: a name in configs/scripts, or a path.")
+
+    def check(self) -> None:
+        """Raises ValueError for a script that nobody would play."""
+        if self.script is not None and self.port != SIMULATED:
+            raise ValueError('script needs port = "simulated"')
+
+    @property
+    def simulated(self) -> str | None:
+        """The script that a simulated host plays; None where a real one is at the port."""
+        return (self.script or "tour") if self.port == SIMULATED else None
+
+    @property
+    def address(self) -> str:
+        """Where the link listens."""
+        return self.port
+
+
+LINK = LinkKind(
+    api=1,
+    kind="line",
+    title="the omote line protocol on a serial port",
+    settings=LineSettings,
+    open="controller.links.line.opening:open_line",
+    install="pyserial",
+)

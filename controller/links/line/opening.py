@@ -1,0 +1,101 @@
+"""Opening a link that speaks the line protocol, with a simulated robot host where the stage wants one."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+from controller.base.errors import LinkError
+from controller.base.paths import find_config
+from controller.links.kind import Around
+from controller.links.line.kind import LineSettings
+from controller.links.line.link import LineLink
+
+_START_LIMIT_S = 20.0
+_END_LIMIT_S = 3.0
+
+
+def open_line(settings: LineSettings, around: Around) -> LineLink:
+    """Open the port and listen.
+
+    Raises
+    ------
+    LinkError : the simulated host does not start. PortError : the port cannot be opened.
+    """
+    port = settings.port
+    if settings.simulated is not None:
+        script = find_config("scripts", settings.simulated, beside=around.beside)
+        host = HostProcess(str(script), around.vocabularies)
+        around.closers.callback(host.stop)
+        port = host.path
+    link = LineLink(port, settings.baud, around.sink).start()
+    around.closers.callback(link.stop)
+    return link
+
+
+class HostProcess:
+    """A simulated robot host in a process of its own, which ends with this one.
+
+    Parameters
+    ----------
+    script : a path, or a name in ``configs/scripts``. vocabularies : files of further expressions it names.
+
+    Attributes
+    ----------
+    path : the port it serves. counts : what it counted, once stopped.
+
+    Raises
+    ------
+    LinkError : it does not start.
+    """
+
+    def __init__(self, script: str, vocabularies: Sequence[Path] = ()) -> None:
+        command = [sys.executable, "-m", "controller.links.line.host", "--script", script]
+        command += [word for path in vocabularies for word in ("--vocabulary", str(path))]
+        self.counts: dict[str, object] = {}
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        patience = threading.Timer(_START_LIMIT_S, self._process.kill)
+        patience.start()
+        word, _, rest = self._line().partition(" ")
+        patience.cancel()
+        if word != "ready":
+            self.stop()
+            raise _failure(word, rest, script)
+        self.path = rest
+
+    def stop(self) -> None:
+        """End it and take its counts; may be called again."""
+        process = self._process
+        if process.stdin is None or process.stdin.closed:
+            return
+        process.stdin.close()
+        try:
+            process.wait(_END_LIMIT_S)
+            self.counts = _table(self._line())
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+
+    def _line(self) -> str:
+        return self._process.stdout.readline().strip() if self._process.stdout is not None else ""
+
+
+def _failure(word: str, rest: str, script: str) -> LinkError:
+    if word != "failed":
+        return LinkError(f"the simulated robot host for script {script!r} did not start")
+    message, hint = json.loads(rest)
+    return LinkError(message, hint=hint)
+
+
+def _table(line: str) -> dict[str, object]:
+    try:
+        table = json.loads(line)
+    except json.JSONDecodeError:
+        return {}
+    return table if isinstance(table, dict) else {}

@@ -1,0 +1,86 @@
+"""What a reader of takes says of itself, every one there is, and reading a take of any kind.
+
+A reader is a module in ``controller/takes/readers`` that holds ``TAKE``, or a package of somebody else with an entry
+point in the group ``omote.takes`` that names a :class:`TakeReader`; see docs/extending.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from controller.base.errors import TakeError
+from controller.base.parameters import Parameters
+from controller.takes.livelink import Take
+from drivers.base.plugins import Registry, modules_in
+
+API = 1
+"""Version of what a reader must keep: this module and :class:`controller.takes.livelink.Take`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TakeReader:
+    """One sort of files.
+
+    Attributes
+    ----------
+    api : version of the registry it is made for; see :data:`API`.
+    kind : a short name. title : what people call such files.
+    suffixes : how their names end, in small letters; no two readers share one.
+    read : ``"module:name"`` of a function that takes a path and the parameters and gives a
+        :class:`controller.takes.livelink.Take`, or raises TakeError.
+    layer : the layer they play into: ``"capture"`` for what moves all of the face, ``"speech"`` for what leaves the
+        rest of it alone.
+    install : what ``pip install`` takes where a package is missing.
+    """
+
+    api: int
+    kind: str
+    title: str
+    suffixes: tuple[str, ...]
+    read: str
+    layer: str = "capture"
+    install: str = ""
+
+
+TAKES: Registry[TakeReader] = Registry(
+    TakeReader, "take", "omote.takes", API, lambda: modules_in("controller.takes.readers"), "TAKE"
+)
+
+
+def suffixes() -> list[str]:
+    """How the names of all takes end."""
+    return [suffix for reader in TAKES.all() for suffix in reader.suffixes]
+
+
+def reader_of(path: Path) -> TakeReader:
+    """Who reads a file, told apart by the ending of its name.
+
+    Raises
+    ------
+    TakeError : nobody does.
+    """
+    kind = path.suffix.lower()
+    for reader in TAKES.all():
+        if kind in reader.suffixes:
+            return reader
+    *most, last = suffixes()
+    hint = f"use {', '.join(most)} or {last}"
+    raise TakeError(f"{path}: no take: its name ends in {kind or 'nothing'}", hint=hint)
+
+
+def load_take(path: Path, parameters: Parameters) -> Take:
+    """A take of any kind omote reads.
+
+    Raises
+    ------
+    TakeError : the file cannot be read or is wrong. PluginError : a package that it needs is not installed.
+    """
+    reader = reader_of(path)
+    take: Take = TAKES.load(reader, reader.read)(path, parameters)
+    return take
+
+
+def layer_of(path: Path) -> str:
+    """The layer a take plays into."""
+    return reader_of(path).layer

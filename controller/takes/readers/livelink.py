@@ -1,0 +1,11 @@
+"""Takes of Live Link Face."""
+
+from controller.takes.reader import TakeReader
+
+TAKE = TakeReader(
+    api=1,
+    kind="livelink",
+    title="Live Link Face",
+    suffixes=(".csv",),
+    read="controller.takes.livelink:Take.load",
+)

@@ -1,0 +1,12 @@
+"""Timed sounds, one a line, and what Rhubarb Lip Sync writes."""
+
+from controller.takes.reader import TakeReader
+
+TAKE = TakeReader(
+    api=1,
+    kind="sounds",
+    title="Rhubarb Lip Sync, or timed phonemes or visemes",
+    suffixes=(".tsv", ".json"),
+    read="controller.takes.speech:cue_take",
+    layer="speech",
+)

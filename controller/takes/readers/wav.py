@@ -1,0 +1,12 @@
+"""Voices."""
+
+from controller.takes.reader import TakeReader
+
+TAKE = TakeReader(
+    api=1,
+    kind="wav",
+    title="a voice",
+    suffixes=(".wav",),
+    read="controller.takes.speech:wav_take",
+    layer="speech",
+)
