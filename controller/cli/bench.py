@@ -96,7 +96,6 @@ def bench(
 @contextmanager
 def _opened(picture: Path | None) -> Iterator[Path | None]:
     """Where to draw; a place that cannot be written is refused before anything is measured."""
-
     if picture is None:
         yield None
         return

@@ -59,7 +59,6 @@ def scan(
 
     Example: omote scan /dev/ttyUSB0 --baud 1000000
     """
-
     from controller.tools.scanning import STEPS, plan_scan, scan_port  # start-up: --help does without it
 
     plan = plan_scan(baud, protocol or (2, 1))

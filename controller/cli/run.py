@@ -195,7 +195,6 @@ def _rehearse(stage: str, take: Path | None, seconds: float | None, report: Path
 
 def show_report(report: dict[str, Any]) -> None:
     """Print the table of what was measured."""
-
     table = Table("measured", "value", title=f"omote {report['stage']}", title_justify="left")
     for name, value in rows(report):
         table.add_row(name, value)
@@ -206,7 +205,6 @@ def show_report(report: dict[str, Any]) -> None:
 
 def show_plan(plan: list[dict[str, str]]) -> None:
     """Print what a stage would send, a channel a row."""
-
     if not plan:
         console.print("This stage has no robot; nothing would be sent.")
         return

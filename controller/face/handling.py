@@ -245,5 +245,4 @@ def _spread(ids: NDArray[np.int32], moves: Floats, n: int) -> Floats:
 
 def _turn(head_values: Floats) -> Floats:
     """(3, 3) rotation of the head for values (h,) in its own order."""
-
     return rotation(*read_pose(head_values).head)

@@ -23,7 +23,6 @@ def write_pictures(recorder: Recorder, folder: Path) -> list[str]:
     ControllerError, ViewError
         when the folder cannot be made, or a picture cannot be written.
     """
-
     if not recorder.frames:
         return []
     try:

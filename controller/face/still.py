@@ -132,7 +132,6 @@ def _add_expression(vocabulary: Vocabulary, values: NDArray[np.float64], word: s
 
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
-
     head, look = still.load_head(), still.look
     with Offscreen(head, still.size, quality=look.quality, theme=look.make_theme(), evaluator=look.evaluator) as screen:
         picture = screen.render(for_head(still.values, head.parameters), look.make_camera())
@@ -166,7 +165,6 @@ def _vector(values: dict[int, float]) -> NDArray[np.float64]:
 
 def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Draw every parameter and every named expression on one sheet (PNG); ``progress(done, total)`` is told."""
-
     head, look = still.load_head(), still.look
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]
     page = contact_sheet(

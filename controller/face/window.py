@@ -56,7 +56,6 @@ class WindowFace:
         ViewError
             when no window can be opened.
         """
-
         viewpoint = Viewpoint(self._settings.make_camera())
         began = time.monotonic_ns()
 

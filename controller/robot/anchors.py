@@ -110,7 +110,6 @@ def _way(name: str, at) -> Floats:  # type: ignore[no-untyped-def]
 
 def shapes_of(values: Floats, order: NDArray[np.intp]) -> Floats:
     """(s,) shapes of a face ``values`` (p,); ``order`` (h,) leads from omote's parameters to the head's."""
-
     return read_pose(values[order]).shapes
 
 

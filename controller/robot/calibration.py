@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
 from controller.base.config import Settings, config_error, load
 from controller.base.files import replacing
+from controller.base.formats import format_fault
 from controller.base.parameters import did_you_mean
 from controller.robot.settings import Calibration, ChannelSettings, RobotSettings
 
 Degrees = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 
 SUFFIX = ".calibration.toml"
+FORMAT = 1
+"""Version of what :func:`save_calibration` writes; files of before there was one state none and are of version 1."""
 
 
 class Captured(Settings):
@@ -39,9 +42,19 @@ class Captured(Settings):
 class CalibrationFile(Settings):
     """What a calibration file holds; channels that are not in it stay as the robot file has them."""
 
+    format: int = FORMAT
     name: str
     robot: str
     channels: dict[str, Captured] = Field(min_length=1)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_a_known_format(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """A newer file is refused for that alone, not for each of its new keys."""
+        fault = format_fault(table.get("format", FORMAT), FORMAT)
+        if fault is not None:
+            raise ValueError(fault)
+        return table
 
 
 def calibration_path(name: str, robot: Path) -> Path:
@@ -119,7 +132,7 @@ def save_calibration(path: Path, name: str, robot: str, channels: dict[str, Capt
     ControllerError
         when it cannot be written; a file that was there stays as it was.
     """
-    lines = [f"name = {json.dumps(name)}", f"robot = {json.dumps(robot)}", ""]
+    lines = [f"format = {FORMAT}", f"name = {json.dumps(name)}", f"robot = {json.dumps(robot)}", ""]
     for channel, captured in channels.items():
         lines += [f"[channels.{json.dumps(channel)}]", *(f"{key} = {value:.2f}" for key, value in captured), ""]
     with replacing(path) as temporary:

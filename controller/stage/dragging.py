@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from controller.base.errors import ConfigError
 from controller.base.files import replacing
+from controller.base.formats import format_fault
 from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.robot.anchors import Skin, head_order, sample_skin, shapes_of
@@ -233,8 +234,9 @@ def load_group(path: Path, head: Head) -> tuple[str, Reshape]:
         table = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise _bad(path, "file", f"cannot be read ({error})") from error
-    if not isinstance(table, dict) or table.get("format") != FORMAT:
-        raise _bad(path, "format", f"this omote reads {FORMAT}")
+    fault = format_fault(table.get("format"), FORMAT) if isinstance(table, dict) else "file: must hold a table"
+    if fault is not None:
+        raise ConfigError(f"{path}: {fault}", hint="bring omote up to date, or make the file again by dragging")
     counts = {part.name: len(part.points) for part in head.data.parts}
     if table.get("part") not in counts:
         raise _bad(path, "part", f"the head has no part {table.get('part')!r}")

@@ -70,7 +70,6 @@ def _feed(stage: Stage, take: Path | None, state: CommandState) -> tuple[Feed, f
 
 
 def _of_take(stage: Stage, take: Path, state: CommandState) -> tuple[Feed, float]:
-
     if take.suffix == SUFFIX:
         return _of_recording(stage, take, state)
     loaded = load_take(take, state.parameters)

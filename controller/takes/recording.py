@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.errors import ControllerError
+from controller.base.formats import format_fault
 from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState, Player, StatusValue, Watch
 from controller.vocabulary.vocabulary import Vocabulary
@@ -25,7 +26,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 SUFFIX = ".rec"
 """What names of recordings end in."""
 
-_VERSION = 1
+_KIND, _VERSION = "omote recording", 1
 _COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live", "set_gains")
 
 
@@ -61,7 +62,7 @@ class Recorder:
             self._file: TextIO = path.open("w", encoding="ascii")
         except OSError as error:
             raise ControllerError(f"{path}: cannot be written: {error.strerror}", hint="choose another path") from error
-        self._write("omote recording", _VERSION, seed, period_s, list(state.parameters.names))
+        self._write(_KIND, _VERSION, seed, period_s, list(state.parameters.names))
 
     def tick(self, now_ns: int, dt: float, out: Floats) -> int:
         """See :meth:`CommandState.tick`."""
@@ -288,7 +289,9 @@ def _lines(path: Path) -> Iterator[tuple[int, list[Any]]]:
 def _header(path: Path, lines: Iterator[tuple[int, list[Any]]], parameters: Parameters) -> tuple[int, float]:
     """Seed and length of a tick (s), once the header says that this is a recording of these parameters."""
     _, items = next(lines, (1, []))
-    if len(items) != 5 or items[:2] != ["omote recording", _VERSION] or not isinstance(items[2], int):
+    if items[:1] == [_KIND] and (fault := format_fault(items[1:2] and items[1], _VERSION)):
+        raise ControllerError(f"{path}: {fault}", hint="bring omote up to date, or record it again")
+    if len(items) != 5 or items[0] != _KIND or not isinstance(items[2], int):
         raise ControllerError(f"{path}: not a recording of version {_VERSION}", hint="record it again")
     if items[4] != list(parameters.names):
         raise ControllerError(f"{path}: recorded with other parameters", hint="use the vocabulary it was recorded with")

@@ -31,7 +31,6 @@ VERTICES = 100_000  # of the sheet that the bounds are for
 
 def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
     """Tables of a head: posing it, and the engine on its largest surface."""
-
     tell("loading")
     started = time.perf_counter()
     head = Head.load(find_config("heads", name))
@@ -63,7 +62,6 @@ def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES
 
     Sizes run from a tenth to ten times ``vertices``, and from a thousandth of it to as many control points.
     """
-
     share = vertices / VERTICES
     sizes = tuple(max(256, round(share * count)) for count in growth.VERTICES)
     points = tuple(max(25, round(share * count)) for count in growth.POINTS)
@@ -77,7 +75,6 @@ def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES
 
 def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
     """Random updates of every kind on a head's largest surface, against a fresh evaluation."""
-
     tell("loading")
     head = Head.load(find_config("heads", name))
     part = max(head.parts, key=lambda part: part.surface.n)
@@ -100,7 +97,6 @@ def bench_quadtree(name: str, tell: Tell, level: int = UNIFORM_LEVEL) -> tuple[T
     the pictures are of the second. A way that finds no mesh within the bound is left out. The uniform mesh is
     quartered ``level`` times.
     """
-
     tell("loading")
     head = Head.load(find_config("heads", name))
     domain = domain_of(next(part for part in head.data.parts if part.name == "face"))

@@ -167,7 +167,6 @@ def _round(wire: SimulatedBus, specs: list[ServoSpec], seconds: float, number: i
 
 def _ours(wire: SimulatedBus, specs: list[ServoSpec], seconds: float, fast: bool, rate_hz: float) -> Loop:
     """Our own loop; `rate_hz` 0 for as many cycles as there can be."""
-
     options: dict[str, Any] = {"fast": fast, "feedback": "position", "slow_group": 0, "watchdog_ms": 0}
     with open_bus("dynamixel", specs, port=wire.path, baud=BAUD, **options) as bus:
         bus.start()
@@ -208,7 +207,6 @@ def _theirs(path: str, seconds: float, rate_hz: float) -> Loop:
     again and again, with a better one it keeps the system from carrying the bytes it waits for, gives up, and takes
     late replies for those to its next question.
     """
-
     port, packets = sdk.PortHandler(path), sdk.PacketHandler(2.0)
     port.openPort()
     port.setBaudRate(BAUD)

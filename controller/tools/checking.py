@@ -118,12 +118,10 @@ def _check_recording(path: Path) -> list[str]:
 
 
 def _check_surface(path: Path) -> list[str]:
-
     return [f"surface {summary(item)}: good" for item in read_surface(path)]
 
 
 def _check_take(path: Path) -> list[str]:
-
     take = load_take(path, PARAMETERS)
     return [f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz: good"]
 
@@ -145,7 +143,6 @@ def _check_toml(path: Path) -> list[str]:
 
 def _check_expressions(path: Path) -> list[str]:
     """A user's expressions beside the shipped ones; or the shipped file itself."""
-
     shipped = config_dir() / "vocabularies" / "expressions.toml"
     more = () if path.resolve() == shipped.resolve() else (path,)
     known = len(Vocabulary.load(PARAMETERS).names) if more else 0
@@ -153,7 +150,6 @@ def _check_expressions(path: Path) -> list[str]:
 
 
 def _check_robot(path: Path, parameters: Parameters) -> list[str]:
-
     robot = load_robot(path, parameters)
     lines = [f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels: good"]
     return lines + _what_it_cannot_show(path, robot, parameters)
@@ -174,7 +170,6 @@ def _what_it_cannot_show(path: Path, robot: RobotSettings, parameters: Parameter
 
 
 def _check_stage(path: Path, parameters: Parameters) -> list[str]:
-
     stage = load_stage(str(path), parameters)
     if stage.groups:
         stage.load_head()

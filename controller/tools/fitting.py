@@ -31,7 +31,6 @@ def fit_with_progress(
     FitError
         when the mesh cannot be turned into a head; nothing is written then.
     """
-
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
@@ -58,7 +57,6 @@ def add_with_progress(mesh: Path, head: Path, modes: Path, console: Console) -> 
     FitError
         when head, mesh and modes do not belong together; nothing is written then.
     """
-
     with console.status("fitting identities"):
         names = add_identities(head, mesh, modes)
     console.print(f"identities: {', '.join(names)}", soft_wrap=True)
@@ -66,7 +64,6 @@ def add_with_progress(mesh: Path, head: Path, modes: Path, console: Console) -> 
 
 def _shade(out: Path, console: Console) -> bool:
     """Bake how much light reaches each vertex of the head; False without OpenGL. Find its lean triangles."""
-
     with console.status("finding fewer triangles for live pictures"):
         lean_head(out)
     try:
@@ -79,7 +76,6 @@ def _shade(out: Path, console: Console) -> bool:
 
 def remarks(report: FitReport) -> list[str]:
     """How the face keeps its bounds, what was guessed and what is missing, a line each."""
-
     out = [face_bounds(report), *report.notes]
     if report.missing:
         out.append(f"no shape for {', '.join(report.missing)}: these parameters will not move this head")

@@ -83,14 +83,12 @@ def scan_port(
 
 
 def _protocol_2(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
-
     with open_bus("dynamixel", [_ANY], port=port, baud=baud) as bus:
         for info in bus.discover():
             yield Found(baud, 2, info)
 
 
 def _protocol_1(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
-
     link = SerialPort(port, baud)
     link.open()
     try:

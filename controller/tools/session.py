@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
 Tell = Callable[[str], None]
 
+REPORT_FORMAT = 1
+"""Version of a report's keys: raised when one changes its meaning or goes; reports before it state none."""
+
 _IDLE_S = 0.05
 
 
@@ -204,6 +207,6 @@ def check_take(take: Path, stage: Stage) -> None:
 
 
 def write_report(report: dict[str, Any], path: Path) -> None:
-    """Write a report as JSON, whole or not at all."""
+    """Write a report as JSON with the version of its keys, whole or not at all."""
     with replacing(path) as temporary:
-        temporary.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+        temporary.write_text(json.dumps({"format": REPORT_FORMAT, **report}, indent=2) + "\n", encoding="utf-8")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+from controller.base.children import child_environment, module_command
 from controller.base.errors import LinkError
 from controller.base.paths import find_config
 from controller.links.kind import Around
@@ -54,10 +54,12 @@ class HostProcess:
     """
 
     def __init__(self, script: str, vocabularies: Sequence[Path] = ()) -> None:
-        command = [sys.executable, "-m", "controller.links.line.host", "--script", script]
+        command = [*module_command("controller.links.line.host"), "--script", script]
         command += [word for path in vocabularies for word in ("--vocabulary", str(path))]
         self.counts: dict[str, object] = {}
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=child_environment()
+        )
         patience = threading.Timer(_START_LIMIT_S, self._process.kill)
         patience.start()
         word, _, rest = self._line().partition(" ")

@@ -202,7 +202,6 @@ class LineSession:
 
     @cached_property
     def _readings(self) -> Readings:
-
         return Readings(self._parameters, self._sink.vocabulary)
 
     def _get(self, indices: tuple[int, ...]) -> str:

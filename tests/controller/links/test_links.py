@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -53,6 +55,23 @@ def test_a_host_that_cannot_start_says_why() -> None:
     with pytest.raises(LinkError, match="did you mean 'tour'") as caught:
         HostProcess("toor")
     assert "tour" in caught.value.hint
+
+
+def test_a_host_starts_from_a_folder_with_modules_of_the_same_names(root: Path, tmp_path: Path) -> None:
+    """The program finds omote as an uninstalled one is found: by its path alone."""
+    for name in ("controller", "drivers", "json", "signal"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('the wrong one')\n")
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from controller.links.line.opening import HostProcess\n"
+        "host = HostProcess('tour'); host.stop(); print(host.counts['script'])"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program, str(root)],
+        cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("tour\n", "")
 
 
 def test_a_missing_port_closes_what_was_open() -> None:

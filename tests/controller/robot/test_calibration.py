@@ -85,3 +85,21 @@ def test_angles_out_of_order_are_refused(angles: tuple[float, float, float], tmp
     )
     with pytest.raises(ConfigError, match=r"channels\.jawOpen"):
         calibrated(load_robot(HEAD, PARAMETERS), path)
+
+
+def test_a_file_without_a_version_is_read_as_one_with(tmp_path: Path) -> None:
+    new, old = tmp_path / "new.toml", tmp_path / "old.toml"
+    save_calibration(new, "desk", "head24", {"jawOpen": Captured(min_deg=-4, neutral_deg=3, max_deg=19)})
+    first, rest = new.read_text().split("\n", 1)
+    assert first == "format = 1"
+    old.write_text(rest)
+    robot = load_robot(HEAD, PARAMETERS)
+    assert calibrated(robot, old) == calibrated(robot, new) != robot
+
+
+def test_a_newer_file_is_refused_for_that_alone(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text('format = 2\nwhatever = "is new"\n')
+    with pytest.raises(ConfigError, match="newer omote") as caught:
+        calibrated(load_robot(HEAD, PARAMETERS), path)
+    assert "1 fault" in str(caught.value)

@@ -143,7 +143,15 @@ def test_a_kept_group_is_what_a_head_moves(head: Head, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("format", 9), ("part", "hat"), ("ids", [99999]), ("ids", "x"), ("moves_mm", [[1, 2]]), ("moves_mm", [["a"] * 3])],
+    [
+        ("format", 9),
+        ("format", None),
+        ("part", "hat"),
+        ("ids", [99999]),
+        ("ids", "x"),
+        ("moves_mm", [[1, 2]]),
+        ("moves_mm", [["a"] * 3]),
+    ],
 )
 def test_a_damaged_group_file_names_its_key(head: Head, tmp_path: Path, key: str, value: object) -> None:
     table = {"format": 1, "name": "n", "part": "face", "ids": [1], "moves_mm": [[0.0, 0.0, 1.0]]}
