@@ -7,66 +7,36 @@ expression for a CG robot using real-time surface modification", Eq. 1).
 
 from __future__ import annotations
 
-from copy import copy
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surface.base.checks import check_inside, check_length, check_points, check_sides, check_uv, check_weights
+from surface.base.arrays import Floats
+from surface.base.checks import check_inside, check_uv
 from surface.base.progress import Progress, silent
-from surface.spline.basis import Floats, Ints, check_padded, pad_knots
-from surface.spline.closed import Interval, wrap
+from surface.mesh.domain import Domain
+from surface.mesh.mesh import Mesh
 from surface.spline.controlpoints import ControlPoints
+from surface.spline.curvature import curvatures
+from surface.spline.matrix import basis_matrix
+from surface.spline.nurbs import nurbs_arrays
+from surface.spline.refine import Refinement, insert_knot, refine
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
     from surface.deform.deformation import Deformation
-    from surface.mesh.domain import Domain
-    from surface.mesh.mesh import Mesh
-    from surface.spline.refine import Refinement
 
 
 class DCPSurface(ControlPoints):
-    """A surface of scattered control points; immutable.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-    weights : (n,) float64, positive
-    knots_u, knots_v : n sequences of degree + 2 knots each, or (n, degree + 2) arrays; the degree may differ
-        per point and direction (0 to 7)
-    closed_u, closed_v : (start, end) of a direction that is joined at its ends, as around a neck or a torus; the
-        points that reach over one end act at the other
-
-    Raises
-    ------
-    ValueError
-        For wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
-        decreasing knots or fewer than two distinct knots; names the argument and the index.
+    """A surface of scattered control points; immutable. Parameters and errors as :class:`ControlPoints`.
 
     Notes
     -----
     Blending functions are right-continuous as in NURBS. Where that leaves (u, v) uncovered, the limits from
     the left are tried (first in u, then v, then both), which includes the right end of a clamped domain.
     """
-
-    def __init__(
-        self,
-        points: ArrayLike,
-        weights: ArrayLike,
-        knots_u: Any,
-        knots_v: Any,
-        *,
-        closed_u: Interval = None,
-        closed_v: Interval = None,
-    ) -> None:
-        xyz, w = check_points(points), check_weights(weights)
-        check_length(w, len(xyz))
-        ku, pu = pad_knots(knots_u, "knots_u", len(xyz))
-        kv, pv = pad_knots(knots_v, "knots_v", len(xyz))
-        self._set(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
 
     @classmethod
     def from_nurbs(
@@ -77,59 +47,12 @@ class DCPSurface(ControlPoints):
         knots_v: ArrayLike,
         control_points: ArrayLike,
         weights: ArrayLike | None = None,
-    ) -> DCPSurface:
+    ) -> Self:
         """The same surface as a NURBS surface; arguments and errors as :func:`surface.spline.nurbs.nurbs_arrays`.
 
         Point (i, j) of the net becomes control point ``i * nv + j``.
         """
-        from surface.spline.nurbs import nurbs_arrays
-
         return cls(*nurbs_arrays(degree_u, degree_v, knots_u, knots_v, control_points, weights))
-
-    @classmethod
-    def from_padded(
-        cls,
-        points: ArrayLike,
-        weights: ArrayLike,
-        knots_u: ArrayLike,
-        knots_v: ArrayLike,
-        degrees_u: ArrayLike,
-        degrees_v: ArrayLike,
-        *,
-        closed_u: Interval = None,
-        closed_v: Interval = None,
-    ) -> DCPSurface:
-        """From the arrays that :attr:`padded` gives: the fast way in and out of a binary file.
-
-        Parameters
-        ----------
-        points, weights : (n, 3), (n,) float64
-        knots_u, knots_v : (n, w) float64, row i holds ``degrees[i] + 2`` knots and repeats the last one
-        degrees_u, degrees_v : (n,) int
-
-        Raises
-        ------
-        ValueError
-            As the constructor.
-        """
-        xyz, w = check_points(points), check_weights(weights)
-        ku, pu = check_padded(knots_u, degrees_u, "u", len(xyz))
-        kv, pv = check_padded(knots_v, degrees_v, "v", len(xyz))
-        check_length(w, len(xyz))
-        surface = cls.__new__(cls)
-        surface._set(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
-        return surface
-
-    def with_points(self, points: ArrayLike) -> DCPSurface:
-        """The same surface with other positions ``(n, 3)``; knots and bins are shared."""
-        xyz = check_points(points)
-        if xyz.shape != (self._n, 3):
-            raise ValueError(f"points: shape {xyz.shape}, expected {(self._n, 3)}")
-        surface = copy(self)
-        surface._points = np.tile(xyz, (len(self._shifts), 1))
-        surface._points.flags.writeable = False
-        surface._lazy_bins = self.bins
-        return surface
 
     def evaluate(self, uv: ArrayLike, side: ArrayLike | None = None) -> Floats:
         """Points of the surface.
@@ -167,11 +90,9 @@ class DCPSurface(ControlPoints):
 
     def curvatures(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats]:
         """Gaussian and mean curvature, each (m,) float64; see :func:`surface.spline.curvature.curvatures`."""
-        from surface.spline.curvature import curvatures
-
         return curvatures(self, self._inside(uv), side)
 
-    def insert_knot(self, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement:
+    def insert_knot(self, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement[Self]:
         """The same surface with one more knot, exactly.
 
         Parameters
@@ -184,17 +105,13 @@ class DCPSurface(ControlPoints):
         -------
         Refinement : the new surface, and how data of the old points is carried over
         """
-        from surface.spline.refine import insert_knot
-
         return insert_knot(self, axis, value, ids)
 
-    def refine(self, region: tuple[float, float, float, float]) -> Refinement:
+    def refine(self, region: tuple[float, float, float, float]) -> Refinement[Self]:
         """The same surface with half as wide control points where ``region`` (u0, u1, v0, v1) is, exactly.
 
         Points whose subdomain does not reach the region stay as they are.
         """
-        from surface.spline.refine import refine
-
         return refine(self, region)
 
     def basis_matrix(
@@ -212,8 +129,6 @@ class DCPSurface(ControlPoints):
         -------
         (m, n) scipy CSR matrix, float64; rows where nothing covers are empty
         """
-        from surface.spline.matrix import basis_matrix
-
         return basis_matrix(self, self._inside(uv), derivative, side)
 
     def tessellate(
@@ -248,7 +163,7 @@ class DCPSurface(ControlPoints):
         ValueError
             For limits out of range, or where they ask for millions of cells.
         """
-        from surface.mesh.tessellate import tessellate
+        from surface.mesh.tessellate import tessellate  # compiled: loaded when first used
 
         return tessellate(
             self,
@@ -265,7 +180,7 @@ class DCPSurface(ControlPoints):
 
     def deformation(
         self, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = silent
-    ) -> Deformation:
+    ) -> Deformation[Self]:
         """A mesh that follows moves of control points, changes of weights and of knots (Eq. 2).
 
         Parameters
@@ -275,37 +190,9 @@ class DCPSurface(ControlPoints):
         threads : how many threads compute everything anew
         progress : as for :meth:`tessellate`
         """
-        from surface.deform.deformation import Deformation
+        from surface.deform.deformation import Deformation  # compiled: loaded when first used
 
         return Deformation(self, mesh, normals=normals, threads=threads, progress=progress)
 
     def _inside(self, uv: ArrayLike) -> Floats:
         return check_inside(check_uv(uv), self.rect, self._closed)
-
-    def sample_derivatives(
-        self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False
-    ) -> tuple[Ints, Floats]:
-        """Derivatives, and the limits that were taken; places outside :attr:`rect` are uncovered, not refused.
-
-        Returns
-        -------
-        side : (m,) int64, the limit each evaluation really takes, -1 where nothing covers
-        out : (m, 3, 3) float64 with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them
-        """
-        from .spline import kernels
-
-        samples = wrap(check_uv(uv), self._closed)
-        sides = check_sides(samples, side)
-        out = np.zeros((len(samples), 6 if second else 3, 3))
-        kernels.sample_derivatives(*self.arrays(), *self.bin_arrays(), samples, sides, out)
-        return sides, out
-
-    def sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
-        """Checked samples, the side really used (-1: uncovered) and S; as :meth:`sample_derivatives`."""
-        from .spline import kernels
-
-        samples = wrap(check_uv(uv), self._closed)
-        sides = check_sides(samples, side)
-        out = np.zeros((len(samples), 3))
-        kernels.sample(*self.arrays(), *self.bin_arrays(), samples, sides, out)
-        return samples, sides, out

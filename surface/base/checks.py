@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surface.spline.basis import Floats, Ints
+from surface.base.arrays import Floats, Ints
 
 
 def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.spline.basis import Ints
+from surface.base.arrays import Ints
 
 from .jit import kernel
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surface.base.arrays import Floats
 from surface.base.progress import Progress, between, silent
 from surface.dcp import DCPSurface
 from surface.deform.deformation import Deformation
 from surface.mesh.mesh import Mesh
-from surface.spline.basis import Floats
 
 from . import peers
 
@@ -93,7 +93,7 @@ def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, tell: Tell
     """
     rows: list[Measure] = []
     shaded, bare = surface.deformation(mesh), surface.deformation(mesh, normals=False)
-    weights = bare._lists.value
+    weights = bare.table.lists.value
 
     def add(name: str, call: Callable[[], object], against: str = "", reach: str = "", base: float = 0.0) -> float:
         tell(name)
@@ -185,7 +185,7 @@ def large_table(vertices: int = 1_000_000, seconds: float = 0.5, tell: Tell = la
     surface, mesh = sheet(vertices)
     one = surface.deformation(mesh, normals=False)
     two = surface.deformation(mesh, normals=False, threads=2)
-    weights = one._lists.value
+    weights = one.table.lists.value
     tell("two threads")
     with ThreadPoolExecutor(1) as pool:
         calls: list[Callable[[], object]] = [one.refresh, two.refresh, weights.sum, _shared_read(weights, pool)]

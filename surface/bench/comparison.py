@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from surface.base.arrays import Floats
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
-from surface.spline.basis import Floats
 
 if TYPE_CHECKING:
     from surface.dcp import DCPSurface

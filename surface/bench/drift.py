@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surface.base.arrays import Floats
 from surface.base.jit import kernel
 from surface.dcp import DCPSurface
 from surface.deform.binding import place_bound
-from surface.deform.deformation import BIAS, GAP, LIMIT, Deformation
+from surface.deform.deformation import Deformation
+from surface.deform.table import BIAS, GAP, LIMIT
 from surface.mesh.mesh import Mesh
-from surface.spline.basis import Floats
+from surface.mesh.tessellate import unit_normals
 
 from .bench import Tell
 
@@ -70,11 +72,12 @@ def drift(
 
 def _reshape(deformation: Deformation, rng: np.random.Generator, count: dict[str, int]) -> None:
     """Change one weight, and the knots of one point by a little."""
-    ids = rng.integers(0, deformation._n, 1)
+    basis = deformation.table.basis
+    ids = rng.integers(0, basis.n, 1)
     deformation.set_weights(ids, rng.uniform(0.5, 2.0, 1))
     count["weights"] += 1
-    i = int(rng.integers(deformation._n))
-    knots = [k[i, : p[i] + 2] for k, p in zip(deformation._knots, deformation._degrees, strict=True)]
+    i = int(rng.integers(basis.n))
+    knots = [k[i, : p[i] + 2] for k, p in zip(basis.knots, basis.degrees, strict=True)]
     deformation.set_knots(i, *(_shaken(k, rng) for k in knots))
     count["knots"] += 1
 
@@ -89,16 +92,15 @@ def _move(deformation: Deformation, rng: np.random.Generator, count: int, size: 
     """Make ``count`` calls of ``move`` with ``size`` points each, without Python between them."""
     if not count:
         return
-    first = rng.integers(0, deformation._n, count)
-    ids = (first[:, None] + np.arange(size)) % deformation._n
+    table, state = deformation.table, deformation.state
+    n, blocks = table.basis.n, len(table.basis.shifts)
+    first = rng.integers(0, n, count)
+    ids = (first[:, None] + np.arange(size)) % n
     steps = rng.normal(0, length, (count, size, 3))
-    blocks = len(deformation._shifts)  # shifted copies of a closed surface move along
-    ids = np.concatenate([ids + b * deformation._n for b in range(blocks)], axis=1)
+    ids = np.concatenate([ids + b * n for b in range(blocks)], axis=1)  # copies of a closed surface move along
     steps = np.ascontiguousarray(np.tile(steps, (1, blocks, 1)))
-    _play(
-        deformation._addresses(), ids, steps, deformation._most, LIMIT, BIAS, GAP,
-        deformation._sign,
-    )  # fmt: skip
+    table.address(state)
+    _play(state.addresses, ids, steps, state.most, LIMIT, BIAS, GAP, table.sign)
 
 
 @kernel
@@ -110,8 +112,6 @@ def _play(table, ids, steps, most, limit, bias, gap, sign):
 
 def _errors(deformation: Deformation, size: float) -> tuple[float, float]:
     """Greatest distances of vertices, as a part of ``size``, and of normals from those of a new surface."""
-    from surface.mesh.tessellate import unit_normals
-
     mesh, surface = deformation.mesh, deformation.surface
     points, su, sv = surface.derivatives(mesh.uv, mesh.side)
     normals = unit_normals(points, su, sv, mesh.triangles) * (-1 if mesh.flip else 1)

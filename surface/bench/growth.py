@@ -86,7 +86,7 @@ def _add(
     deformation = surface.deformation(mesh, normals=False)
     built = 1e3 * (time.perf_counter() - begin)
     one = shaker(deformation, nearest(deformation.surface, 1))
-    read, full = least_of([deformation._lists.value.sum, deformation.refresh], seconds)
+    read, full = least_of([deformation.table.lists.value.sum, deformation.refresh], seconds)
     amounts = {READ: read, FULL: full, MOVE: least(one, seconds), LISTS: built, MEMORY: deformation.nbytes / 1e6}
     for name, amount in amounts.items():
         lines[axis, name].size.append(size)

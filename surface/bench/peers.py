@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from surface.spline.basis import Floats
+from surface.base.arrays import Floats
 
 if TYPE_CHECKING:
     from surface.dcp import DCPSurface

@@ -1,7 +1,7 @@
 """One update in one short call: the addresses of all work arrays in a table.
 
-A compiled function looks at every array it is given, which takes longer than a small update. So the arrays of a
-deformation are given as a table of addresses, made anew whenever one of them is replaced.
+A compiled function looks at every array it is given, which takes longer than a small update. So they are given as a
+table of addresses, made anew whenever one of them is replaced.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="import-untyped, call-arg"
@@ -20,7 +20,7 @@ from .updates import place
 NAMES = (
     "changed_ids", "delta", "hits", "touched", "anew", "ranges", "back_start", "back_count", "back_cell", "back_row",
     "points", "origin", "cell_start", "tile_start", "rows", "room", "at", "ids_at", "ids", "value", "slope", "below",
-    "bend", "state", "kept", "vertices", "normals", "local", "spare",
+    "bend", "numerators", "kept", "vertices", "normals", "local", "spare",
 )  # fmt: skip
 
 

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from surface.base.arrays import Ints
 from surface.base.progress import Progress, silent
 from surface.mesh.mesh import Mesh
-from surface.spline.basis import Ints
-
-if TYPE_CHECKING:
-    from surface.dcp import DCPSurface
+from surface.spline import weighing
+from surface.spline.controlpoints import ControlPoints
 
 LANES = 8
 STEP = 100_000  # vertices whose weights are computed between two reports of progress
@@ -65,7 +63,7 @@ class Lists:
         return sum(value.nbytes for value in vars(self).values() if isinstance(value, np.ndarray))
 
 
-def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool, progress: Progress = silent) -> Lists:
+def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Progress = silent) -> Lists:
     """Weights of ``surface`` for the vertices of ``mesh``, from float64 blending functions.
 
     Parameters
@@ -75,8 +73,6 @@ def build_lists(surface: DCPSurface, mesh: Mesh, normals: bool, progress: Progre
     normals : also derivative weights
     progress : is called with a stage and the part that is done
     """
-    from surface.spline import weighing
-
     count = np.diff(mesh.cell_start)
     tiles = (count + LANES - 1) // LANES
     candidates = np.diff(mesh.list_start)

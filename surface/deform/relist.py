@@ -1,44 +1,62 @@
-"""Change one control point's subdomain: only cells that the old or the new one reaches get other lists."""
+"""Other weights and other knots: only what a change reaches is computed, so it costs that and not the whole mesh.
+
+Weights are written into the arrays of a table. Knots can need longer lists: of one table another is made, which takes
+over the arrays of the first; that one is not to be used any more.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
-from surface.spline.basis import Floats, Ints, blending
+from surface.base.arrays import Floats, Ints
+from surface.mesh import blocks
+from surface.mesh.mesh import Mesh
+from surface.spline.basis import blending
 
+from . import blockedit
 from .lists import LANES, Lists, back_lists
-
-if TYPE_CHECKING:
-    from .deformation import Deformation
-
-Row = tuple[Floats, Floats, int, int]
+from .rows import entries_of, write_rows
+from .table import StencilTable, sum_weights
 
 
-def change_knots(deformation: Deformation, i: int, knots: list[Floats], degrees: list[int]) -> Ints:
-    """Give point i other knots; returns the rising cells whose vertices have to be computed anew.
+def change_weights(table: StencilTable, which: Ints, weights: Floats) -> Ints:
+    """Give points ``which (k,)`` other ``weights (k,)``; returns the rising cells to compute anew."""
+    basis, lists, cells = table.basis, table.lists, [np.zeros(0, dtype=np.int64)]
+    which = basis.copies(which)
+    basis.weights[which] = np.tile(weights, len(basis.shifts))
+    for i in which:
+        reached, rows = entries_of(lists, int(i))
+        write_rows(basis, lists, table.mesh, int(i), reached, rows)
+        cells.append(reached)
+    changed = np.unique(np.concatenate(cells))
+    sum_weights(table, changed)
+    return changed
+
+
+def change_knots(
+    table: StencilTable, i: int, knots: list[Floats], degrees: list[int]
+) -> tuple[StencilTable, Ints]:  # fmt: skip
+    """The table with other knots for point i, and the rising cells to compute anew.
 
     Raises
     ------
     ValueError
-        Where a vertex would be covered by no point; everything is as before then.
+        Where a vertex would be covered by no point; the table is as before then.
     """
-    n, shifts = deformation._n, deformation._shifts
-    copies = [(b * n + i, [knots[k] + shift[k] for k in range(2)]) for b, shift in enumerate(shifts)]
+    basis = table.basis
+    copies = [(b * basis.n + i, [knots[k] + shift[k] for k in range(2)]) for b, shift in enumerate(basis.shifts)]
     for copy, moved in copies:
-        bare = _bare(deformation, copy, moved)
+        bare = _bare(table.lists, table.mesh, copy, moved)
         if bare >= 0:
             raise ValueError(f"knots_u, knots_v: point {i} would leave vertex {bare} of the mesh uncovered")
-    cells = [_exchange(deformation, copy, moved, degrees) for copy, moved in copies]
-    return np.unique(np.concatenate(cells))
+    cells = [_exchange(table, copy, moved, degrees) for copy, moved in copies]
+    return replace(table), np.unique(np.concatenate(cells))
 
 
-def _bare(deformation: Deformation, i: int, knots: list[Floats]) -> int:
+def _bare(lists: Lists, mesh: Mesh, i: int, knots: list[Floats]) -> int:
     """The first vertex that only point i covers and that the new knots do not reach, or -1."""
-    from . import blockedit
-
-    lists, mesh = deformation._lists, deformation.mesh
     own = slice(lists.back_start[i], lists.back_start[i] + lists.back_count[i])
     alone = np.zeros(len(mesh.uv), dtype=np.int64)
     count = blockedit.alone(
@@ -55,26 +73,25 @@ def _bare(deformation: Deformation, i: int, knots: list[Floats]) -> int:
     return -1
 
 
-def _exchange(deformation: Deformation, i: int, knots: list[Floats], degrees: list[int]) -> Ints:
+def _exchange(table: StencilTable, i: int, knots: list[Floats], degrees: list[int]) -> Ints:
     """Write the knots and make lists and weights agree with them."""
-    lists = deformation._lists
-    old = lists.back_cell[lists.back_start[i] : lists.back_start[i] + lists.back_count[i]].astype(np.int64)
+    basis, lists, mesh = table.basis, table.lists, table.mesh
+    old = entries_of(lists, i)[0]
     for k in range(2):
-        deformation._knots[k] = _write(deformation._knots[k], i, knots[k])
-        deformation._degrees[k][i] = degrees[k]
-    cells = np.union1d(old, _reached(deformation, knots))
-    nonzero = _weigh(deformation, i, cells, np.full(len(cells), -1, dtype=np.int64))
+        basis.knots[k] = _write(basis.knots[k], i, knots[k])
+        basis.degrees[k][i] = degrees[k]
+    cells = np.union1d(old, _reached(mesh, knots))
+    nonzero = write_rows(basis, lists, mesh, i, cells, np.full(len(cells), -1, dtype=np.int64))
     held = np.isin(cells, old)
     for c in cells[held & ~nonzero]:
         _drop(lists, i, int(c))
     for c in cells[nonzero & ~held]:
         _append(lists, i, int(c))
     _tidy(lists)
-    deformation._reserve_local()
     now = cells[nonzero]
-    _weigh(deformation, i, now, _places(lists, i, now))
+    write_rows(basis, lists, mesh, i, now, _places(lists, i, now))
     changed = cells[held | nonzero]
-    deformation._sum_weights(changed)
+    sum_weights(table, changed)
     return changed
 
 
@@ -87,35 +104,16 @@ def _write(table: Floats, i: int, row: Floats) -> Floats:
     return np.ascontiguousarray(table)
 
 
-def _reached(deformation: Deformation, knots: list[Floats]) -> Ints:
+def _reached(mesh: Mesh, knots: list[Floats]) -> Ints:
     """Cells whose vertices lie within the rectangle of the new knots."""
-    from surface.mesh import blocks
-
-    if deformation._cell_boxes is None:
-        deformation._cell_boxes = blocks.cell_boxes(deformation.mesh.cell_start, deformation.mesh.uv)
-    boxes, bins = deformation._cell_boxes
+    boxes, bins = mesh.cell_boxes
     box = np.array([knots[0][0], knots[0][-1], knots[1][0], knots[1][-1]])
     out = np.zeros(len(boxes), dtype=np.int32)
     found = blocks.reach(box, boxes, bins.grid, bins.shape, bins.start, bins.ids, out)
     return np.sort(out[:found]).astype(np.int64)
 
 
-def _weigh(deformation: Deformation, i: int, cells: Ints, places: Ints) -> np.ndarray:
-    """Write point i's rows (none where the place is -1); which are not all zero?"""
-    from surface.spline import weighing
-
-    lists, nonzero = deformation._lists, np.zeros(len(cells), dtype=np.bool_)
-    weighing.rewrite_rows(
-        *deformation._knots, *deformation._degrees, deformation._weights, deformation.mesh.uv,
-        deformation.mesh.side, lists.cell_start, i, cells, places, lists.value, lists.slope, lists.at,
-        lists.room, nonzero,
-    )  # fmt: skip
-    return nonzero
-
-
 def _places(lists: Lists, i: int, cells: Ints) -> Ints:
-    from . import blockedit
-
     entries = [blockedit.find_entry(i, c, lists.back_start, lists.back_count, lists.back_cell) for c in cells]
     return lists.back_row[entries].astype(np.int64) if entries else np.zeros(0, dtype=np.int64)
 
@@ -125,8 +123,6 @@ def _tiles(lists: Lists, c: int) -> int:
 
 
 def _drop(lists: Lists, i: int, c: int) -> None:
-    from . import blockedit
-
     row = lists.back_row[blockedit.find_entry(i, c, lists.back_start, lists.back_count, lists.back_cell)]
     blockedit.drop_row(
         c, row, lists.rows, lists.room, lists.at, lists.ids_at, lists.ids, lists.value, lists.slope,
@@ -146,8 +142,6 @@ def _append(lists: Lists, i: int, c: int) -> None:
 
 def _enlarge(lists: Lists, c: int, room: int) -> None:
     """Give a cell a block with more room, at the end of the arrays."""
-    from . import blockedit
-
     tiles = _tiles(lists, c)
     place, listed = lists.used, lists.ids_used
     lists.used, lists.ids_used = place + tiles * room * LANES, listed + room
@@ -185,8 +179,6 @@ def _grow(table: np.ndarray, wanted: int) -> np.ndarray:
 
 def _tidy(lists: Lists) -> None:
     """Once half of the arrays is abandoned, copy what is in use to fresh ones."""
-    from . import blockedit
-
     tiles = np.diff(lists.tile_start)
     live = int((lists.rows * tiles).sum()) * LANES
     if lists.used <= 2 * live and lists.back_used <= 2 * int(lists.back_count.sum()) + 1024:

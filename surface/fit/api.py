@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +16,12 @@ from surface.fit.features.pieces import Body, eyeball_part, hair_parts, skin_par
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.wrinkles import deepened
 from surface.fit.points.recipe import PartRecipe, Recipe, recipe_for
-from surface.fit.points.refine import Fitted, fit_chart
+from surface.fit.points.refine import fit_chart
 from surface.fit.points.report import FitReport, PartReport, measure
 from surface.fit.points.seat import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.points.strokes import make_paint
+from surface.fit.reportfile import write_report
+from surface.fit.result import FitResult, FittedPart
 from surface.fit.source.chart import Chart, make_chart
 from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island, find_islands
@@ -39,25 +41,6 @@ Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 # the pose that decides how finely a part is cut into triangles
 LIVELY = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
-
-
-@dataclass(frozen=True)
-class FittedPart:
-    """One fitted chart of a head, for reports; ``targets`` (m, 3) is where the mesh is at the chart's samples."""
-
-    name: str
-    chart: Chart
-    fitted: Fitted
-    targets: Floats
-
-
-@dataclass(frozen=True)
-class FitResult:
-    """A fitted head: its data, the report, and the charts it was fitted in."""
-
-    head: HeadData
-    report: FitReport
-    parts: list[FittedPart]
 
 
 def fit_head(
@@ -87,8 +70,6 @@ def fit_head(
     loaded = load_mesh(mesh_path, options)
     result = fit_mesh(loaded, name, tell, str(mesh_path))
     if report_dir is not None:
-        from surface.fit.reportfile import write_report
-
         write_report(result, report_dir, tell)
     save_data(out_dir, result.head)
     return result.report

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from surface.base.errors import FitError, ViewError
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import Errors, FitReport, face_bounds
+from surface.fit.result import FitResult, FittedPart
 from surface.fit.source.chart import TILE
-
-if TYPE_CHECKING:
-    from surface.fit.api import FitResult, FittedPart
+from surface.head import Head
 
 Floats = NDArray[np.float64]
 FULL_MM = 1.0  # error at the end of the colour scale
@@ -133,8 +132,6 @@ def _net_lines(nets: list[UniformNet]) -> list[str]:
 
 def _draw(result: FitResult, folder: Path) -> list[str]:
     """Pictures of the error at rest and of each sample's worst shape; none without OpenGL."""
-    from surface.head import Head
-
     head = Head(result.head)
     chosen = {"error_neutral.png": _neutral, "error_shapes.png": _worst_shape}
     names = []
@@ -175,7 +172,7 @@ def _colours(uv: Floats, part: FittedPart, error: Floats) -> NDArray[np.float32]
 
 def _picture(head: Any, path: Path) -> None:
     """Front, three-quarter, profile, and from below into the nostrils."""
-    from surface.view.pictures.offscreen import Offscreen
+    from surface.view.pictures.offscreen import Offscreen  # takes a moment to import; most fits draw nothing
     from surface.view.pictures.sheet import compose, write_png
     from surface.view.scene.camera import Camera
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
-from surface.spline.basis import Floats, Ints
 from surface.spline.bins import Bins, build_bins
 
 LANES = 8  # float32 numbers per vector operation

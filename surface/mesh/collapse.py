@@ -12,7 +12,7 @@ import heapq
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.head.posing.part import border_edges
+from surface.mesh.borders import border_edges
 
 Floats = NDArray[np.float64]
 Ids = NDArray[np.integer]

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surface.base.arrays import Floats
 from surface.base.checks import numbers
-from surface.spline.basis import Floats
+from surface.spline.controlpoints import ControlPoints
 
 
 @dataclass(frozen=True)
@@ -86,13 +87,13 @@ class Domain:
         object.__setattr__(self, "segments", segments)
 
     @classmethod
-    def of(cls, surface: object) -> Domain:
+    def of(cls, surface: ControlPoints) -> Domain:
         """The rectangle that holds every subdomain of ``surface``."""
-        return cls(surface.rect)  # type: ignore[attr-defined]
+        return cls(surface.rect)
 
     def inside(self, uv: ArrayLike) -> np.ndarray:
         """(m,) bool: which of ``uv (m, 2)`` are in the rectangle and inside by the even-odd rule."""
-        from . import loops
+        from . import loops  # compiled: loaded when first used
 
         samples = np.ascontiguousarray(np.asarray(uv, dtype=np.float64))
         u0, u1, v0, v1 = self.rect

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
-from surface.spline.basis import Floats, Ints
 
 
 def improve(points: Floats, triangles: Ints, kept: Ints, rounds: int = 6) -> None:

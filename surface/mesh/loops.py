@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
-from surface.spline.basis import Floats, Ints
 
 
 def row_lists(segments: Floats, extra: float = 0.0) -> tuple[float, float, Ints, Ints]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from surface.spline.basis import Floats, Ints
+from surface.base.arrays import Floats, Ints
+from surface.spline.bins import Bins
 
 
 @dataclass(frozen=True)
@@ -47,3 +49,10 @@ class Mesh:
     def points_of(self, cell: int) -> np.ndarray:
         """(k,) int32: control points that may reach a cell."""
         return self.list_ids[self.list_start[cell] : self.list_start[cell + 1]]
+
+    @cached_property
+    def cell_boxes(self) -> tuple[Floats, Bins]:
+        """(c, 4) u0, u1, v0, v1 around the vertices of every cell, and the cells by region of (u, v)."""
+        from . import blocks  # compiled: loaded when first used
+
+        return blocks.cell_boxes(self.cell_start, self.uv)

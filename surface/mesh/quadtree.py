@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
 from surface.base.progress import Progress, silent
-from surface.spline.basis import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from surface.base import keys
-from surface.spline.basis import Floats, Ints
+from surface.base.arrays import Floats, Ints
+from surface.spline.controlpoints import ControlPoints
 
 from . import blocks, loops, quadtree
 from .domain import Domain
 from .quadtree import Lattice
-
-if TYPE_CHECKING:
-    from surface.dcp import DCPSurface
 
 MOST_CELLS = 4_000_000
 RIM = 64  # cells along a side where the border of what is covered is followed
@@ -27,7 +23,7 @@ class SplitTests:
     chord_error: float | None = None
     min_depth = 0
 
-    def __init__(self, surface: DCPSurface, domain: Domain, lattice: Lattice, scale: tuple[float, float]) -> None:
+    def __init__(self, surface: ControlPoints, domain: Domain, lattice: Lattice, scale: tuple[float, float]) -> None:
         self.surface, self.domain, self.lattice, self.scale = surface, domain, lattice, scale
         self.rings: list[tuple[Floats, Floats]] = []
         self.anchors: tuple[Floats, Floats] | None = None
@@ -139,7 +135,7 @@ class SplitTests:
         np.fmax.at(worst, cell, np.abs((offset * normal).sum(axis=1)))
 
 
-def _anchors(surface: DCPSurface, domain: Domain) -> tuple[Floats, Floats]:
+def _anchors(surface: ControlPoints, domain: Domain) -> tuple[Floats, Floats]:
     """(k, 2) and (k, 3): the surface where the blending functions of its points are near their greatest."""
     knots, degrees = surface.padded, surface.degrees
     uv = np.zeros((surface.n, 2))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from surface.base import keys
+from surface.base.arrays import Floats, Ints
 from surface.base.progress import Progress, between, silent
-from surface.spline.basis import Floats, Ints
+from surface.spline.controlpoints import ControlPoints
 
 from . import blocks, quadtree
 from .domain import Domain
@@ -17,15 +16,12 @@ from .quadtree import Lattice, Leaves
 from .splitting import MOST_CELLS, SplitTests, inner_side
 from .trim import Flat, trim
 
-if TYPE_CHECKING:
-    from surface.dcp import DCPSurface
-
 MOST_ROOTS = 24  # along the longer side
 CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
 
 
 def tessellate(
-    surface: DCPSurface,
+    surface: ControlPoints,
     *,
     max_points: int | None = None,
     chord_error: float | None = None,
@@ -82,7 +78,7 @@ def _check_sizes(loop_error: float | None, roots: tuple[int, int] | None) -> Non
         raise ValueError(f"roots: {roots[0]} x {roots[1]} cells are more than {MOST_CELLS}")
 
 
-def _lengths(surface: DCPSurface, domain: Domain) -> tuple[float, float]:
+def _lengths(surface: ControlPoints, domain: Domain) -> tuple[float, float]:
     """Mean length on the surface per unit of u and of v."""
     u0, u1, v0, v1 = domain.rect
     steps = (np.arange(24) + 0.5) / 24
@@ -119,7 +115,7 @@ def _lattice(
     return Lattice(_divide(lines_u, edge_u / scale[0]), _divide(lines_v, edge_v / scale[1]), depth, joined)
 
 
-def _joined(surface: DCPSurface, domain: Domain) -> tuple[bool, bool]:
+def _joined(surface: ControlPoints, domain: Domain) -> tuple[bool, bool]:
     """In which directions does the rectangle go once around a closed surface?"""
     u0, u1, v0, v1 = domain.rect
     return surface.closed[0] == (u0, u1), surface.closed[1] == (v0, v1)
@@ -133,7 +129,7 @@ def _divide(borders: Floats, edge: float) -> Floats:
 
 
 def _finish(
-    surface: DCPSurface, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool, progress: Progress
+    surface: ControlPoints, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool, progress: Progress
 ) -> Mesh:
     """Split vertices on slits, evaluate, drop uncovered triangles, order by cell, make the lists."""
     flat, side = _open_slits(flat, domain)
@@ -181,7 +177,7 @@ def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
     return Flat(flat.uv[copies // 4], triangles, flat.owner), copies % 4
 
 
-def _evaluated(surface: DCPSurface, uv: Floats, side: Ints, code: Ints, progress: Progress) -> tuple[Ints, Floats]:
+def _evaluated(surface: ControlPoints, uv: Floats, side: Ints, code: Ints, progress: Progress) -> tuple[Ints, Floats]:
     """S, S_u and S_v ``(m, 3, 3)``, neighbours after each other, and where each vertex stands in that.
 
     ``side`` gets the limits that were taken.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surface.base import keys
-from surface.spline.basis import Floats, Ints
+from surface.base.arrays import Floats, Ints
 
 from . import flips, loops
 from .domain import Domain

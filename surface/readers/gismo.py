@@ -14,10 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+from surface.base.arrays import Floats, Ints
 from surface.base.checks import check_weights
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
-from surface.spline.basis import MAX_DEGREE, Floats, Ints
+from surface.spline.basis import MAX_DEGREE
 from surface.spline.nurbs import nurbs_arrays
 
 from . import xmltree

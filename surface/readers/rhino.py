@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from surface.base.arrays import Floats
 from surface.base.errors import SurfaceError
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
-from surface.spline.basis import Floats
 from surface.spline.nurbs import nurbs_arrays
 
 from .named import NamedSurface, Place, read_bytes

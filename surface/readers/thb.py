@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from surface.spline.basis import Floats, Ints
+from surface.base.arrays import Floats, Ints
 
 Pieces = dict[tuple[int, int], Floats]
 """By function (i, j): its weight, and its position times that weight; (4,) each."""

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.spline.basis import Floats
 
 STARTS = 24  # samples along u and v, in every quarter, that the search may begin at
 ROUNDS = 40

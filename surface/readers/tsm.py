@@ -26,8 +26,8 @@ from pathlib import Path
 
 import numpy as np
 
+from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.spline.basis import Floats
 
 from .named import NamedSurface, Place, read_text
 from .tsmfile import COMPASS, HINT, TsmFile, parse

@@ -7,7 +7,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from surface.spline.basis import Floats
+from surface.base.arrays import Floats
 
 from .named import Place
 

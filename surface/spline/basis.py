@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from surface.base.arrays import Floats, Ints
 
 MAX_DEGREE = 7
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str = "right") -> Floats:
@@ -36,7 +35,7 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
     ValueError
         For bad knots, samples that are not finite, an unknown derivative or an unknown side.
     """
-    from . import blends
+    from . import blends  # compiled: loaded when first used
 
     row, _ = pad_knots([np.asarray(knots, dtype=np.float64)], "knots", 1)
     if derivative not in (0, 1, 2):

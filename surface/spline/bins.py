@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .basis import Floats, Ints
+from surface.base.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def build_bins(knots_u: Floats, knots_v: Floats) -> Bins:
     ----------
     knots_u, knots_v : (n, w) float64 padded knots
     """
-    from . import kernels
+    from . import kernels  # compiled: loaded when first used
 
     axes = [_axis(knots_u), _axis(knots_v)]
     shape = np.array([axes[0][3], axes[1][3]], dtype=np.int64)

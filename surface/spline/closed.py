@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .basis import Floats
+from surface.base.arrays import Floats
 
 Interval = tuple[float, float] | None
 MOST_PERIODS = 16  # that knots may reach over: each takes a copy of every point

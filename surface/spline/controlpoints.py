@@ -1,20 +1,103 @@
-"""The arrays of a surface's control points, and what follows from them alone."""
+"""A plain table of control points, and Eq. (1) evaluated over it: S = sum b_i w_i P_i / sum b_i w_i."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .basis import Floats, Ints
+from surface.base.arrays import Floats, Ints
+from surface.base.checks import check_length, check_points, check_sides, check_uv, check_weights
+
+from .basis import check_padded, pad_knots
 from .bins import Bins, build_bins
-from .closed import Interval, check_closed, shifts_of
+from .closed import Interval, check_closed, shifts_of, wrap
 
 
 class ControlPoints:
-    """Positions, weights, knots and degrees of n control points; read-only."""
+    """Positions, weights, knots and degrees of n control points; immutable.
 
-    def _set(
+    Parameters
+    ----------
+    points : (n, 3) float64
+    weights : (n,) float64, positive
+    knots_u, knots_v : n sequences of degree + 2 knots each, or (n, degree + 2) arrays; the degree may differ
+        per point and direction (0 to 7)
+    closed_u, closed_v : (start, end) of a direction that is joined at its ends, as around a neck or a torus; the
+        points that reach over one end act at the other
+
+    Raises
+    ------
+    ValueError
+        For wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
+        decreasing knots or fewer than two distinct knots; names the argument and the index.
+    """
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        weights: ArrayLike,
+        knots_u: Any,
+        knots_v: Any,
+        *,
+        closed_u: Interval = None,
+        closed_v: Interval = None,
+    ) -> None:
+        xyz, w = check_points(points), check_weights(weights)
+        check_length(w, len(xyz))
+        ku, pu = pad_knots(knots_u, "knots_u", len(xyz))
+        kv, pv = pad_knots(knots_v, "knots_v", len(xyz))
+        self._keep(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
+
+    @classmethod
+    def from_padded(
+        cls,
+        points: ArrayLike,
+        weights: ArrayLike,
+        knots_u: ArrayLike,
+        knots_v: ArrayLike,
+        degrees_u: ArrayLike,
+        degrees_v: ArrayLike,
+        *,
+        closed_u: Interval = None,
+        closed_v: Interval = None,
+    ) -> Self:
+        """From the arrays that :attr:`padded` gives: the fast way in and out of a binary file.
+
+        Parameters
+        ----------
+        points, weights : (n, 3), (n,) float64
+        knots_u, knots_v : (n, w) float64, row i holds ``degrees[i] + 2`` knots and repeats the last one
+        degrees_u, degrees_v : (n,) int
+
+        Raises
+        ------
+        ValueError
+            As the constructor.
+        """
+        xyz, w = check_points(points), check_weights(weights)
+        ku, pu = check_padded(knots_u, degrees_u, "u", len(xyz))
+        kv, pv = check_padded(knots_v, degrees_v, "v", len(xyz))
+        check_length(w, len(xyz))
+        table = cls.__new__(cls)
+        table._keep(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
+        return table
+
+    def with_points(self, points: ArrayLike) -> Self:
+        """The same table with other positions ``(n, 3)``; knots and bins are shared."""
+        xyz = check_points(points)
+        if xyz.shape != (self._n, 3):
+            raise ValueError(f"points: shape {xyz.shape}, expected {(self._n, 3)}")
+        table = copy(self)
+        table._points = np.tile(xyz, (len(self._shifts), 1))
+        table._points.flags.writeable = False
+        table._bins = self.bins
+        return table
+
+    def _keep(
         self,
         points: Floats,
         weights: Floats,
@@ -31,7 +114,7 @@ class ControlPoints:
         moved = [np.concatenate([knots[k] + shift[k] for shift in self._shifts]) for k in range(2)]
         self._ku, self._kv = moved
         self._pu, self._pv = (np.tile(p, blocks) for p in degrees)
-        self._lazy_bins: Bins | None = None
+        self._bins: Bins | None = None
         for array in (self._points, self._weights, self._ku, self._kv, self._pu, self._pv):
             array.flags.writeable = False
 
@@ -101,9 +184,9 @@ class ControlPoints:
     @property
     def bins(self) -> Bins:
         """Control points by region of (u, v); built at the first evaluation."""
-        if self._lazy_bins is None:
-            self._lazy_bins = build_bins(self._ku, self._kv)
-        return self._lazy_bins
+        if self._bins is None:
+            self._bins = build_bins(self._ku, self._kv)
+        return self._bins
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """Knots in u and v, degrees, points and weights, shifted copies included; what the kernels take."""
@@ -112,3 +195,31 @@ class ControlPoints:
     def bin_arrays(self) -> tuple[np.ndarray, ...]:
         """The arrays of :attr:`bins`, as the kernels take them."""
         return self.bins.grid, self.bins.shape, self.bins.start, self.bins.ids
+
+    def sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
+        """Checked samples, the side really used (-1: uncovered) and S; as :meth:`sample_derivatives`."""
+        from . import kernels  # compiled: loaded when first used
+
+        samples = wrap(check_uv(uv), self._closed)
+        sides = check_sides(samples, side)
+        out = np.zeros((len(samples), 3))
+        kernels.sample(*self.arrays(), *self.bin_arrays(), samples, sides, out)
+        return samples, sides, out
+
+    def sample_derivatives(
+        self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False
+    ) -> tuple[Ints, Floats]:
+        """Derivatives, and the limits that were taken; places outside :attr:`rect` are uncovered, not refused.
+
+        Returns
+        -------
+        side : (m,) int64, the limit each evaluation really takes, -1 where nothing covers
+        out : (m, 3, 3) float64 with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them
+        """
+        from . import kernels
+
+        samples = wrap(check_uv(uv), self._closed)
+        sides = check_sides(samples, side)
+        out = np.zeros((len(samples), 6 if second else 3, 3))
+        kernels.sample_derivatives(*self.arrays(), *self.bin_arrays(), samples, sides, out)
+        return sides, out

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .basis import Floats
+from surface.base.arrays import Floats
 
-if TYPE_CHECKING:
-    from surface.dcp import DCPSurface
+from .controlpoints import ControlPoints
 
 
-def curvatures(surface: DCPSurface, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats]:
+def curvatures(surface: ControlPoints, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats]:
     """Curvatures at ``uv``.
 
     Parameters

@@ -8,31 +8,32 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surface.base.arrays import Floats, Ints
 from surface.base.checks import check_sides, check_uv
 
-from .basis import Floats, Ints
 from .closed import wrap
+from .controlpoints import ControlPoints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-    from surface.dcp import DCPSurface
-
 CHUNK = 8192  # samples per pass: bounds the scratch memory
 
 
-def basis_matrix(surface: DCPSurface, uv: ArrayLike, derivative: tuple[int, int], side: ArrayLike | None) -> csr_matrix:
+def basis_matrix(
+    surface: ControlPoints, uv: ArrayLike, derivative: tuple[int, int], side: ArrayLike | None
+) -> csr_matrix:
     """See :meth:`surface.DCPSurface.basis_matrix`."""
     return basis_matrices(surface, uv, [derivative], side)[0]
 
 
 def basis_matrices(
-    surface: DCPSurface, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None = None
+    surface: ControlPoints, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None = None
 ) -> list[csr_matrix]:
     """Several of :func:`basis_matrix` at the same samples, for hardly more than the time of one."""
-    from scipy.sparse import csr_matrix
+    from scipy.sparse import csr_matrix  # takes a moment to import
 
-    from .kernels import TINY
+    from .kernels import TINY  # compiled: loaded when first used
 
     for wanted in derivatives:
         if tuple(wanted) not in ((0, 0), (1, 0), (0, 1)):
@@ -61,7 +62,7 @@ def _sums(data: Floats, start: Ints) -> tuple[Ints, Floats]:
     return rows, np.stack([np.bincount(rows, data[:, k], len(start) - 1) for k in range(3)], axis=1)
 
 
-def _rows(surface: DCPSurface, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:
+def _rows(surface: ControlPoints, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:
     """b w and its derivatives (k, 3), columns (k,) and row starts (m + 1,), a chunk at a time."""
     from . import kernels
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surface.base.arrays import Floats
 from surface.base.checks import numbers
 
-from .basis import MAX_DEGREE, Floats
+from .basis import MAX_DEGREE
 
 
 def nurbs_arrays(

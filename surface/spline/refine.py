@@ -9,31 +9,32 @@ same place with weights a w and b w; points with equal knots are then joined at 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surface.base.arrays import Floats, Ints
 from surface.base.checks import check_ids
 
-from .basis import Floats, Ints
+from .controlpoints import ControlPoints
 
-if TYPE_CHECKING:
-    from surface.dcp import DCPSurface
+Table = TypeVar("Table", bound=ControlPoints)
 
 
 @dataclass(frozen=True)
-class Refinement:
+class Refinement(Generic[Table]):
     """A refined surface, and where its points come from.
 
     Attributes
     ----------
-    surface : the same surface with n' >= n control points; those that were not split come first, in order
+    surface : the same surface, of the same class, with n' >= n control points; those that were not split come first,
+        in order
     point, parent : (k,) int64, new point and old point of every share
     share : (k,) float64, the shares of a new point sum to 1
     """
 
-    surface: DCPSurface
+    surface: Table
     point: Ints
     parent: Ints
     share: Floats
@@ -67,7 +68,7 @@ class _Pieces:
         )
 
 
-def insert_knot(surface: DCPSurface, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement:
+def insert_knot(surface: Table, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement[Table]:
     """See :meth:`surface.DCPSurface.insert_knot`."""
     if axis not in ("u", "v"):
         raise ValueError(f'axis: must be "u" or "v", not {axis!r}')
@@ -88,7 +89,7 @@ def insert_knot(surface: DCPSurface, axis: str, value: float, ids: ArrayLike | N
     return _join(surface, pieces)
 
 
-def refine(surface: DCPSurface, region: tuple[float, float, float, float]) -> Refinement:
+def refine(surface: Table, region: tuple[float, float, float, float]) -> Refinement[Table]:
     """See :meth:`surface.DCPSurface.refine`."""
     if np.shape(region) != (4,):
         raise ValueError(f"region: needs (u0, u1, v0, v1), got {region!r}")
@@ -107,7 +108,7 @@ def refine(surface: DCPSurface, region: tuple[float, float, float, float]) -> Re
     return _join(surface, pieces)
 
 
-def _pieces(surface: DCPSurface) -> _Pieces:
+def _pieces(surface: ControlPoints) -> _Pieces:
     knots = [k.copy() for k in surface.padded]
     degrees = [p.copy() for p in surface.degrees]
     return _Pieces(np.arange(surface.n), surface.weights.copy(), knots, degrees, np.zeros(surface.n, dtype=bool))
@@ -161,10 +162,8 @@ def _halves(rows: Floats, x: Floats, p: Ints) -> tuple[Floats, Floats]:
     return low, high
 
 
-def _join(surface: DCPSurface, pieces: _Pieces) -> Refinement:
+def _join(surface: Table, pieces: _Pieces) -> Refinement[Table]:
     """Join split pieces that stand on equal knots; the rest keep their order and come first."""
-    from surface.dcp import DCPSurface
-
     order = np.concatenate([np.flatnonzero(~pieces.split), np.flatnonzero(pieces.split)])
     pieces = pieces.take(order)
     columns = [*pieces.knots, *(p[:, None].astype(np.float64) for p in pieces.degree)]
@@ -181,5 +180,5 @@ def _join(surface: DCPSurface, pieces: _Pieces) -> Refinement:
     np.add.at(xyz, point, surface.points[pieces.parent] * share[:, None])
     knots, degrees = [k[keep] for k in pieces.knots], [p[keep] for p in pieces.degree]
     closed_u, closed_v = surface.closed
-    made = DCPSurface.from_padded(xyz, weight, *knots, *degrees, closed_u=closed_u, closed_v=closed_v)
+    made = type(surface).from_padded(xyz, weight, *knots, *degrees, closed_u=closed_u, closed_v=closed_v)
     return Refinement(made, point, pieces.parent, share)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surface import DCPSurface
+from surface.dcp import DCPSurface
 from surface.fit.points.refine import Fitted
 from surface.fit.points.solve import basis
 

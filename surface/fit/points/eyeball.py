@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surface import DCPSurface
+from surface.dcp import DCPSurface
 
 Floats = NDArray[np.float64]
 IRIS = 0.49  # radius of the iris (limbus), in eyeball radii: 11.8 mm across at 24 mm

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from surface import DCPSurface
+from surface.dcp import DCPSurface
 from surface.fit.points.net import Net
 from surface.fit.source.slopes import Slopes
 from surface.spline.matrix import basis_matrices

@@ -15,6 +15,7 @@ from surface.head.model.parameters import Pose, rotation_vector
 from surface.head.model.rules import Drivers
 from surface.head.posing.kernels import carry, turn_head
 from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
+from surface.mesh.borders import border_edges
 from surface.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -183,10 +184,3 @@ class RigidPart(HeadPart):
     def place_points(self, pose: Pose) -> Floats:
         linear, shift = rigid_motion(self.follows, self._head, pose)
         return np.vstack([linear.T, shift])
-
-
-def border_edges(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
-    """(k, 2) edges that only one triangle has, in the direction of that triangle."""
-    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-    key, back = edges[:, 0] << 32 | edges[:, 1], edges[:, 1] << 32 | edges[:, 0]
-    return edges[~np.isin(key, back)]

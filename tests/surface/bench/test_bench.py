@@ -33,7 +33,7 @@ def test_rows_of_a_small_sheet() -> None:
 
 def test_every_vertex_of_the_sheet_has_at_most_sixteen_influences() -> None:
     surface, mesh = sheet(2_000)
-    lists = surface.deformation(mesh, normals=False)._lists
+    lists = surface.deformation(mesh, normals=False).table.lists
     assert (lists.rows == 16).all()
     assert abs(len(mesh.vertices) / 2_000 - 1) < 0.3
 

@@ -6,6 +6,7 @@ import numpy as np
 import shapes
 
 from surface.deform import apply
+from surface.deform.table import stencil_table
 
 
 def test_ranges_join_over_small_gaps() -> None:
@@ -33,11 +34,11 @@ def test_positions_and_normals_are_those_of_the_surface() -> None:
 def test_denominators_are_sums_of_weights() -> None:
     surface = shapes.scattered(30, 4)
     mesh = surface.tessellate(chord_error=0.3, max_depth=3)
-    deformation = surface.deformation(mesh)
-    lists = deformation._lists
+    table = stencil_table(surface, mesh)
+    lists = table.lists
     for c in range(len(lists.rows)):
         first, size = lists.cell_start[c], lists.cell_start[c + 1] - lists.cell_start[c]
         block = lists.value[lists.at[c] :][: lists.rows[c] * (-(-size // 8)) * 8].reshape(-1, lists.rows[c], 8)
         total = block.sum(axis=1).ravel()[:size]
-        mine = deformation._below[8 * lists.tile_start[c] :][:size]
+        mine = table.below[8 * lists.tile_start[c] :][:size]
         assert np.allclose(mine, 1 / total, rtol=1e-5), first

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.head.posing.part import border_edges
+from surface.mesh.borders import border_edges
 from surface.mesh.collapse import Collapse
 
 
