@@ -138,9 +138,9 @@ class BusReport:
     ----------
     cycles, writes : reads and writes done.
     errors : count by kind: ``no_reply``, ``corrupt``, ``refused``, ``alert``, ``torque_lost``, ``watchdog``,
-        ``reset`` (a servo forgot what it was told, as after a dip of its supply), ``port_lost``, ``held_back`` (goals
-        a line head had no room for) and ``board_...`` (what a board says of itself). A kind that never happened is
-        missing.
+        ``reset`` (a servo forgot what it was told, as after a dip of its supply), ``port_lost``, ``unkept`` (nobody
+        would let the servos go should the program be killed), ``held_back`` (goals a line head had no room for) and
+        ``board_...`` (what a board says of itself). A kind that never happened is missing.
     errors_by_servo : the same by servo id.
     limits_hit : targets clipped to an angle limit.
     speed_limited : targets shortened because they asked for more than the servo's top speed.

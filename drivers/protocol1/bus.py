@@ -22,6 +22,7 @@ from drivers.core.keeper import Keeper
 from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
 from drivers.packets.packet1 import Packet1
+from drivers.port.serialport import SerialPort
 from drivers.protocol1 import startup
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.registers import Registers
@@ -33,6 +34,8 @@ from drivers.tables.tables import ControlTable, load_table, model_name
 log = logging.getLogger(__name__)
 
 LAST_ID = 252
+LOOK_S = 1.0
+"""How often a running bus looks whether its keeper is still there."""
 
 
 class Protocol1Bus(WireBus):
@@ -48,7 +51,8 @@ class Protocol1Bus(WireBus):
     slow_group : servos asked for one slow value (torque) each cycle; 0 asks only those that raise an alert.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
     watchdog_ms : these servos have none; 0 says that they may hold on when this program is killed, any other time
-        keeps a small process beside it that lets them go then (:mod:`drivers.core.keeper`).
+        keeps a small process beside it that lets them go then (:mod:`drivers.core.keeper`); that there is none, or
+        no longer, is told once, and counted as ``unkept``.
     clock : monotonic seconds.
     policy : fields of :class:`~drivers.protocol1.startup.Policy`, such as ``torque_limit``.
 
@@ -77,6 +81,7 @@ class Protocol1Bus(WireBus):
         self.policy = Policy(**policy)
         self._port, self._keep = port, watchdog_ms > 0 and os.name == "posix"
         self._keeper: Keeper | None = None
+        self._unkept, self._look_s = False, 0.0
         self._registers = Registers(packets, port, self.servos)
         self._tables([load_table(servo.model) for servo in self.servos])
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, singles, slow_group)
@@ -150,12 +155,39 @@ class Protocol1Bus(WireBus):
         return self.scale.radians(np.array([started.ticks[servo] for servo in self.ids]))
 
     def _watch(self) -> None:
-        """Have the servos let go when this program is killed. A simulated bus dies with it and needs nobody."""
+        """Have the servos let go when this program is killed."""
+        if not self._keep or hasattr(self, "simulation") or not _outlives_us(self._port.link):
+            return
         if self._keeper is not None and self._keeper.watching:
             return
-        if self._keep and not hasattr(self, "simulation"):
-            frames = self._registers.frames(dict.fromkeys(self.ids, 0), "torque")
+        self._dismiss()
+        frames = self._registers.frames(dict.fromkeys(self.ids, 0), "torque")
+        try:
             self._keeper = Keeper(self.path, self._port.baudrate, frames)
+            self._unkept = False
+        except DriverError as error:
+            self._tell_unkept(str(error), error.hint)
+
+    def _settle(self, now_s: float) -> None:
+        """Look now and then whether the keeper is still there."""
+        if self._keeper is None or now_s - self._look_s < LOOK_S:
+            return
+        self._look_s = now_s
+        if not self._keeper.watching:
+            why = f"who stood by to let the servos on {self.path} go, should this program be killed, has ended itself"
+            self._tell_unkept(why, "stop and start again, which starts another")
+
+    def _tell_unkept(self, why: str, hint: str) -> None:
+        """Say once that the servos hold on when this program is killed."""
+        if not self._unkept:
+            self._unkept = True
+            self._report.count("unkept")
+            log.warning("%s; %s", why, hint)
+
+    def _dismiss(self) -> None:
+        keeper, self._keeper = self._keeper, None
+        if keeper is not None:
+            keeper.dismiss()
 
     def _started(self, started: Started) -> None:
         self._report.eeprom_writes += started.eeprom
@@ -187,9 +219,7 @@ class Protocol1Bus(WireBus):
 
     def _release(self) -> None:
         super()._release()
-        keeper, self._keeper = self._keeper, None
-        if keeper is not None:
-            keeper.dismiss()
+        self._dismiss()
 
     def _tables(self, tables: list[ControlTable]) -> None:
         self._registers.tables = dict(zip(self.ids, tables, strict=True))
@@ -225,3 +255,8 @@ class Protocol1Bus(WireBus):
         self._report.stray = self._port.stray
         self._report.silent = self._telemetry.silent_ids()
         return super().report()
+
+
+def _outlives_us(link: object) -> bool:
+    """Whether what is behind a port is still there when this program is not: a bus simulated in it dies with it."""
+    return isinstance(link, SerialPort) and not link.path.startswith("memory://")

@@ -6,14 +6,13 @@ import json
 import os
 import socket
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from drivers.base.children import command, environment
 from drivers.base.errors import PortError
 from drivers.sim.serving.control import Commands
 from drivers.sim.serving.farend import make_line
@@ -24,6 +23,7 @@ from drivers.sim.wire.line import Line
 
 START_S = 20.0
 """A child process that is not ready after this time is given up."""
+_CHILD = "drivers.sim.serving.child"
 
 
 class ServoView:
@@ -222,14 +222,8 @@ class SimulatedBus:
 
     # ------------------------------------------------------------ in a child process
     def _start_child(self) -> None:
-        root = str(Path(__file__).resolve().parents[3])
-        environment = dict(os.environ)
-        environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
         self._child = subprocess.Popen(
-            [sys.executable, "-m", "drivers.sim.serving.child"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=environment,
+            command(_CHILD), stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment(_CHILD)
         )
         settings = {
             "servos": self._servos,
