@@ -132,6 +132,11 @@ class Registry(Generic[P]):
                 hint="update the package that it comes from",
             ) from error
 
+    def package_of(self, kind: str) -> str:
+        """Name and version of the package a kind comes from; empty for a built-in one."""
+        entry = None if kind in self._builtin() else self._foreign().get(kind)
+        return f"{entry.dist.name} {entry.dist.version}" if entry is not None and entry.dist is not None else ""
+
     def forget(self) -> None:
         """Look for everything anew, as after another package was installed."""
         self._loaded.clear()

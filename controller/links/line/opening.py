@@ -8,13 +8,15 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
-from controller.base.children import child_environment, module_command
 from controller.base.errors import LinkError
 from controller.base.paths import find_config
 from controller.links.kind import Around
 from controller.links.line.kind import LineSettings
 from controller.links.line.link import LineLink
+from drivers.base.children import command as module_command
+from drivers.base.children import environment
 
+_HOST = "controller.links.line.host"
 _START_LIMIT_S = 20.0
 _END_LIMIT_S = 3.0
 
@@ -54,11 +56,11 @@ class HostProcess:
     """
 
     def __init__(self, script: str, vocabularies: Sequence[Path] = ()) -> None:
-        command = [*module_command("controller.links.line.host"), "--script", script]
+        command = module_command(_HOST, "--script", script)
         command += [word for path in vocabularies for word in ("--vocabulary", str(path))]
         self.counts: dict[str, object] = {}
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=child_environment()
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment(_HOST)
         )
         patience = threading.Timer(_START_LIMIT_S, self._process.kill)
         patience.start()

@@ -1,0 +1,170 @@
+"""docs/extending.md: its driver and its link, installed as one foreign package, are known to everything in omote."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+FILE = re.compile(r"^`([\w./]+)`:\n\n```\w+\n(.*?)^```$", re.M | re.S)
+MOST_LINES = 100
+
+ROBOT = """
+name = "puppet"
+[[buses]]
+name = "head"
+kind = "{kind}"
+{more}
+[[channels]]
+name = "jaw"
+bus = "head"
+id = 1
+model = "rc-180"
+mix = {{ jawOpen = 1 }}
+map = {{ at = [0, 1], deg = [0, 20] }}
+limit_deg = [0, 20]
+max_speed_deg_s = 100
+max_accel_deg_s2 = 1000
+"""
+STAGE = """
+name = "foreign"
+robots = ["robot.toml"]
+[[links]]
+kind = "jsonudp"
+listen = "127.0.0.1:{port}"
+"""
+CONTRACT = """
+import math
+
+import pytest
+
+from drivers.base.bus import ServoSpec
+from drivers.sim.serving.virtual import VirtualBus
+from tests.drivers.contract import BusContract
+
+SERVOS = tuple(ServoSpec(i, f"servo{i}", "rc-180", -0.6, 0.9, 8.0, 200.0, reverse=i == 2) for i in (1, 2, 7))
+
+
+"""
+
+Omote = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture(scope="session")
+def page(root: Path) -> str:
+    return (root / "docs" / "extending.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def site(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that holds the package of the page as an installer would leave it."""
+    source, site = tmp_path_factory.mktemp("package"), tmp_path_factory.mktemp("site")
+    for name, text in FILE.findall(page):
+        (source / name).parent.mkdir(exist_ok=True)
+        (source / name).write_text(text, encoding="utf-8")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(source / "dist")]
+    subprocess.run(build, cwd=source, check=True, capture_output=True, timeout=120)
+    with zipfile.ZipFile(next((source / "dist").glob("*.whl"))) as wheel:
+        wheel.extractall(site)
+    return site
+
+
+@pytest.fixture
+def omote(site: Path, root: Path, tmp_path: Path) -> Omote:
+    """Runs ``omote`` where the package is installed, in a folder of its own."""
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", "from controller.cli import main; main()", *words]
+        return subprocess.run(
+            command, cwd=tmp_path, env=environment(site, root), capture_output=True, text=True, timeout=120
+        )
+
+    return run
+
+
+def environment(site: Path, root: Path) -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(site), str(root)]), "COLUMNS": "200"}
+
+
+def test_the_examples_are_short(page: str) -> None:
+    lines: dict[str, int] = {}
+    for name, text in FILE.findall(page):
+        folder = name.partition("/")[0]
+        lines[folder] = lines.get(folder, 0) + sum(bool(line.strip()) for line in text.splitlines())
+    assert {folder for folder in lines if folder != "pyproject.toml"} == {"omote_puppet8", "omote_jsonudp"}
+    for name, text in FILE.findall(page):
+        assert len(text.splitlines()) < MOST_LINES, name
+
+
+def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, root: Path, tmp_path: Path) -> None:
+    block = page.partition("## Proving a driver")[2].partition("```python\n")[2].partition("```")[0]
+    test = tmp_path / "test_puppet8.py"
+    test.write_text(CONTRACT + block, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-c", os.devnull, str(test)],
+        cwd=root, env=environment(site, root), capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert int(re.search(r"(\d+) passed", done.stdout)[1]) >= 12, done.stdout  # type: ignore[index]
+
+
+def test_every_list_has_them(omote: Omote) -> None:
+    said = omote("plugins").stdout
+    for word in ("puppet8", "Puppet8 boards", "jsonudp", "omote-example 0.1.0"):
+        assert word in said
+    assert "puppet8" in omote("simulate", "--help").stdout
+    help_text = omote("simulate", "puppet8", "--help").stdout
+    assert "--offset" in help_text and "Example: omote simulate puppet8" in help_text
+
+
+def test_robot_files_and_stages_are_checked_by_their_own_options(omote: Omote, tmp_path: Path) -> None:
+    robot, stage = tmp_path / "robot.toml", tmp_path / "stage.toml"
+    robot.write_text(ROBOT.format(kind="puppet8", more='port = "/dev/null"\noffset = 8\nstagger_s = 0.1'))
+    assert omote("check", "robot.toml").returncode == 0
+    robot.write_text(ROBOT.format(kind="puppet8", more='port = "/dev/null"\noffset = 300\nofset = 1'))
+    said = omote("check", "robot.toml").stderr
+    assert "buses[0].offset" in said and "less than or equal to 120" in said
+    assert "buses[0].ofset: unknown key, did you mean 'offset'?" in said
+    robot.write_text(ROBOT.format(kind="maestro", more='port = "/dev/null"\noffset = 8'))
+    assert "offset is not for maestro, but for puppet8" in omote("check", "robot.toml").stderr
+    robot.write_text(ROBOT.format(kind="puppet9", more='port = "/dev/null"'))
+    assert "unknown bus kind 'puppet9', did you mean 'puppet8'?" in omote("check", "robot.toml").stderr
+    robot.write_text(ROBOT.format(kind="simulated", more='simulates = "puppet8"'))
+    stage.write_text(STAGE.format(port=9400))
+    assert "jsonudp on 127.0.0.1:9400" in omote("check", "stage.toml").stdout
+    stage.write_text(STAGE.format(port=94000))
+    assert "links[0]: listen: must be HOST:PORT" in omote("check", "stage.toml").stderr
+
+
+def test_a_stage_runs_with_both(site: Path, root: Path, tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    (tmp_path / "robot.toml").write_text(ROBOT.format(kind="simulated", more='simulates = "puppet8"'))
+    (tmp_path / "stage.toml").write_text(STAGE.format(port=port))
+    words = ["run", "stage.toml", "--headless", "--no-face", "--seconds", "4", "--report", "report.json"]
+    command = [sys.executable, "-c", "from controller.cli import main; main()", *words]
+    running = subprocess.Popen(
+        command, cwd=tmp_path, env=environment(site, root), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        while running.poll() is None:
+            sender.sendto(json.dumps({"jawOpen": 0.5}).encode(), ("127.0.0.1", port))
+            sender.sendto(b"no json", ("127.0.0.1", port))
+            time.sleep(0.05)
+    _, said = running.communicate()
+    assert running.returncode == 0, said
+    report = json.loads((tmp_path / "report.json").read_text())
+    (link,) = report["links"]
+    assert link["accepted"] > 5 and link["refused"]["JSONDecodeError"] > 5
+    (bus,) = report["buses"]
+    assert bus["writes"] > 20 and bus["errors"] == {}
