@@ -8,7 +8,6 @@ the simulated servos (in a process of their own) too.
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,7 @@ import dynamixel_sdk as sdk
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.base.children import child_environment
 from controller.base.clock import Clock, Samples
 from controller.base.paths import find_config
 from controller.base.stolen import Stolen
@@ -339,16 +339,17 @@ def _run_program(frames_per_second: int, seconds: float, ordinary: bool) -> tupl
     """The report of ``omote run everything`` with the bus at 100 Hz and the face at a rate, and how late (ms, 99 of
     100) a program is meanwhile that does nothing but sleep from tick to tick: less is not to be had on the machine.
     """
-    environment = dict(os.environ) | ({ORDINARY: "1"} if ordinary else {})
+    environment = child_environment() | ({ORDINARY: "1"} if ordinary else {})
     with tempfile.TemporaryDirectory(prefix="omote-") as folder:
         robot, stage, report = (Path(folder) / name for name in ("robot.toml", "stage.toml", "report.json"))
         _write_changed(find_config("robots", "head24"), robot, {"rate_hz": str(JITTER_HZ)})
         changes = {"fps": str(frames_per_second), "robots": json.dumps([str(robot)])}
         _write_changed(find_config("stages", "everything"), stage, changes)
-        command = [sys.executable, "-c", "from controller.cli.app import main; main()", "run", str(stage), "--headless"]
+        program = "from controller.cli.app import main; main()"
+        command = [sys.executable, "-P", "-c", program, "run", str(stage), "--headless"]
         command += ["--seconds", str(seconds), "--report", str(report)]
         with subprocess.Popen(
-            [sys.executable, "-c", _SLEEPER, str(JITTER_HZ), str(round(JITTER_HZ * seconds))],
+            [sys.executable, "-P", "-c", _SLEEPER, str(JITTER_HZ), str(round(JITTER_HZ * seconds))],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
