@@ -167,4 +167,4 @@ def test_a_stage_runs_with_both(site: Path, root: Path, tmp_path: Path) -> None:
     (link,) = report["links"]
     assert link["accepted"] > 5 and link["refused"]["JSONDecodeError"] > 5
     (bus,) = report["buses"]
-    assert bus["writes"] > 20 and bus["errors"] == {}
+    assert bus["bus"]["writes"] > 20 and bus["bus"]["errors"] == {}

@@ -11,20 +11,16 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from typer import Typer  # start-up: Ctrl-C ends it quietly from main() on
+    # start-up: main() ends Ctrl-C quietly from its first line on, while all this still loads
+    from typer import Typer
 
 
 def make_app() -> Typer:
     """All commands."""
-    from typer import Typer  # start-up: Ctrl-C ends it quietly from main() on
+    # start-up: main() ends Ctrl-C quietly from its first line on, while all this still loads
+    from typer import Typer
 
-    from controller.cli import bench as cli_bench  # start-up: Ctrl-C ends it quietly from main() on
-    from controller.cli import bus as cli_bus  # start-up: Ctrl-C ends it quietly from main() on
-    from controller.cli import calibrate as cli_calibrate  # start-up: Ctrl-C ends it quietly from main() on
-    from controller.cli import check as cli_check  # start-up: Ctrl-C ends it quietly from main() on
-    from controller.cli import fit as cli_fit  # start-up: Ctrl-C ends it quietly from main() on
-    from controller.cli import picture as cli_picture  # start-up: Ctrl-C ends it quietly from main() on
-    from controller.cli import run as cli_run  # start-up: Ctrl-C ends it quietly from main() on
+    from controller.cli import bench, bus, calibrate, check, fit, picture, plugins, run
 
     app = Typer(
         name="omote",
@@ -35,7 +31,7 @@ def make_app() -> Typer:
         rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for module in (cli_run, cli_picture, cli_fit, cli_bus, cli_calibrate, cli_check, cli_bench):
+    for module in (run, picture, fit, bus, calibrate, check, plugins, bench):
         module.register(app)
     return app
 

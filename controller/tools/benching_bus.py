@@ -21,12 +21,12 @@ import dynamixel_sdk as sdk
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.base.children import child_environment
 from controller.base.clock import Clock, Samples
 from controller.base.paths import find_config
 from controller.base.stolen import Stolen
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
+from drivers.base.children import environment as child_environment
 from drivers.base.priority import ORDINARY, give_priority_back, take_priority, take_turns_quickly
 from drivers.dynamixel.frames import GoalFrame, GroupRead, Run
 from drivers.port.serialport import SerialPort
@@ -339,7 +339,7 @@ def _run_program(frames_per_second: int, seconds: float, ordinary: bool) -> tupl
     """The report of ``omote run everything`` with the bus at 100 Hz and the face at a rate, and how late (ms, 99 of
     100) a program is meanwhile that does nothing but sleep from tick to tick: less is not to be had on the machine.
     """
-    environment = child_environment() | ({ORDINARY: "1"} if ordinary else {})
+    environment = child_environment("controller") | ({ORDINARY: "1"} if ordinary else {})
     with tempfile.TemporaryDirectory(prefix="omote-") as folder:
         robot, stage, report = (Path(folder) / name for name in ("robot.toml", "stage.toml", "report.json"))
         _write_changed(find_config("robots", "head24"), robot, {"rate_hz": str(JITTER_HZ)})
