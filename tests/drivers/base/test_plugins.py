@@ -43,10 +43,10 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
         info = tmp_path / "somebody-0.3.dist-info"
         info.mkdir()
         (info / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 0.3\n")
-        entries = "".join(f"{kind} = trial_{kind}:THING\n" for kind in modules)
+        entries = "".join(f"{kind} = trial_of_{kind}:THING\n" for kind in modules)
         (info / "entry_points.txt").write_text(f"[{GROUP}]\n{entries}")
         for kind, text in modules.items():
-            (tmp_path / f"trial_{kind}.py").write_text(text)
+            (tmp_path / f"trial_of_{kind}.py").write_text(text)
         return registry
 
     return add
