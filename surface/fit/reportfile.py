@@ -161,7 +161,7 @@ def _worst_shape(part: FittedPart) -> Floats:
 
 def _colours(uv: Floats, part: FittedPart, error: Floats) -> NDArray[np.float32]:
     """(m, 3) linear RGB of the error at vertices: the mean of the nearest samples; excluded ones violet."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import cKDTree  # takes a moment to import
 
     nearest = cKDTree(part.chart.uv).query(uv, k=min(4, len(part.chart.uv)))[1].reshape(len(uv), -1)
     at = np.clip(error[nearest].mean(axis=1) / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)

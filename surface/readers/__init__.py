@@ -40,7 +40,7 @@ def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
     file = Path(path)
     kind = file.suffix.lower()
     if kind == ".json":
-        from .plain import read
+        from .plain import read  # of the readers only the one that is needed is loaded
     elif kind == ".3dm":
         from .rhino import read
     elif kind == ".xml":
