@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from surface.head import Head
-from surface.head.posing.lean import lean_path, write_lean
+from surface.head import Head, load_data
+from surface.head.posing.lean import write_lean
 from surface.head.posing.part import HeadPart
 from surface.mesh.collapse import Collapse
 from surface.view.draw.materials import attribute, of, strip_uv
@@ -40,8 +40,7 @@ def lean_head(folder: str | Path) -> Path:
     ------
     HeadFileError : the head cannot be read.
     """
-    lean_path(folder).unlink(missing_ok=True)  # a damaged one would be refused
-    head = Head.load(folder)
+    head = Head(load_data(folder), str(folder))  # without what stands beside it and is made for another, perhaps
     return write_lean(folder, head.parts, lean_triangles(head))
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from surface.head import Head
+from surface.head import Head, load_data
 from surface.head.posing.shade import shade_path, write_shade
 from surface.view.draw.programs import build, put
 from surface.view.pictures.offscreen import open_context
@@ -239,6 +239,6 @@ def shade_head(folder: str | Path) -> Path:
     ViewError : no OpenGL on this machine.
     """
     shade_path(folder).unlink(missing_ok=True)
-    head = Head.load(folder)
+    head = Head(load_data(folder), str(folder))  # without what stands beside it and is made for another, perhaps
     open_pose = np.array([_OPEN.get(name, 0.0) for name in head.parameters])
-    return write_shade(folder, bake_head(head, open_pose))
+    return write_shade(folder, bake_head(head, open_pose), head.parts)
