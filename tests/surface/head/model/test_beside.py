@@ -52,9 +52,7 @@ def test_a_file_without_a_version_is_read_and_one_of_a_newer_version_is_refused(
     found = read_beside(path, lambda kept: kept, "")
     assert found is not None and found.arrays.keys() == {"a"}
     np.savez_compressed(path, **{"a": np.arange(3), FORMAT: np.array([VERSION + 1])})
-    with pytest.raises(
-        HeadFileError, match=rf"more\.npz: is of version {VERSION + 1}, this"
-    ) as caught:
+    with pytest.raises(HeadFileError, match=rf"more\.npz: is of version {VERSION + 1}, this") as caught:
         read_beside(path, lambda kept: kept, "make it again")
     assert caught.value.hint == "update omote"
 
