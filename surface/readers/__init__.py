@@ -1,5 +1,7 @@
 """Readers of surface files: each turns its file into control points with local knots, exactly.
 
+In: paths of files. Out: surfaces with names and domains, or an error that names the line. Imports base to dcp.
+
 ====== =========================================== =================================
 suffix what                                        module
 ====== =========================================== =================================
