@@ -4,21 +4,20 @@ In: control points, surface files, head folders, meshes to fit, values of parame
 follow, pictures, heads, files for other programs. Imports numpy, numba and scipy, OpenGL under ``view`` alone, and
 neither ``drivers`` nor ``controller``.
 
-What stands here is loaded when it is first asked for: whoever only needs an error's name does not wait for numpy.
+The errors are here at once; the rest is loaded when it is first asked for, for it brings numpy.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from surface.base.errors import FitError, HeadFileError, SurfaceError, SurfaceFileError, ViewError
+
 if TYPE_CHECKING:
-    from surface.base.errors import FitError, HeadFileError, SurfaceError, SurfaceFileError, ViewError
+    from surface.dcp import DCPSurface
     from surface.mesh.domain import Domain, Slit
     from surface.mesh.mesh import Mesh
     from surface.spline.basis import blending
-
-    from .dcp import DCPSurface
 
 __all__ = [
     "DCPSurface",
@@ -32,15 +31,18 @@ __all__ = [
     "ViewError",
     "blending",
 ]
-_ERRORS = ("FitError", "HeadFileError", "SurfaceError", "SurfaceFileError", "ViewError")
-_WHERE = {"DCPSurface": "dcp", "Domain": "mesh.domain", "Mesh": "mesh.mesh", "Slit": "mesh.domain"}
-_WHERE |= {"blending": "spline.basis"} | dict.fromkeys(_ERRORS, "base.errors")
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _WHERE:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_WHERE[name]}", __name__), name)
+    # start-up: whoever only needs an error does not wait for numpy
+    from surface.dcp import DCPSurface
+    from surface.mesh.domain import Domain, Slit
+    from surface.mesh.mesh import Mesh
+    from surface.spline.basis import blending
+
+    return {each.__name__: each for each in (DCPSurface, Domain, Mesh, Slit, blending)}[name]
 
 
 def __dir__() -> list[str]:

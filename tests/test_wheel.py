@@ -93,7 +93,7 @@ def install(wheel: Path, *words: str, python: Path = Path(sys.executable)) -> No
     """Install a wheel without what it depends on, by whichever installer there is."""
     if importlib.util.find_spec("pip"):
         command = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check"]
-        last = ["--no-compile", "--no-warn-script-location"]
+        last = ["--no-compile", "--no-warn-script-location", "--ignore-installed"]  # this environment's omote stays
     elif uv := shutil.which("uv"):
         command, last = [uv, "pip"], ["--python", str(python), "--offline"]
     else:

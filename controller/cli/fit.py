@@ -58,7 +58,10 @@ def fit(
 
 
 def export(
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write: .glb or .obj.")],
+    out: Annotated[
+        Path,
+        typer.Argument(metavar="OUT", help="File to write: .glb, .obj or what a plug-in adds."),
+    ],
     head: Annotated[str, typer.Option("--head", help="Head: a name from configs/heads or a folder.")] = "ict",
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Pose it: set a parameter; may be repeated.")

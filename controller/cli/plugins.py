@@ -1,4 +1,4 @@
-"""``omote plugins``: every kind of bus, link and take there is."""
+"""``omote plugins``: every kind of bus, link, take and export there is."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def register(app: typer.Typer) -> None:
 
 
 def plugins() -> None:
-    """List every kind of bus, link and take: what omote brings, and what other packages add.
+    """List every kind of bus, link, take and export: what omote brings, and what other packages add.
 
     Example: omote plugins
     """

@@ -8,8 +8,18 @@ from rich.console import Console
 
 from controller.base.parameters import PARAMETERS
 from controller.face.still import Still
-from surface.export import export_head
+from drivers.base.plugins import Registry
+from surface.export import API, Exporter, export_head, exporters
 from surface.head import Head
+
+EXPORTERS: Registry[Exporter] = Registry(
+    Exporter,
+    "exporter",
+    "omote.exporters",
+    API,
+    lambda: {one.kind: f"surface.export.{one.kind}" for one in exporters()},
+    "EXPORTER",
+)
 
 
 def export_with_progress(
@@ -28,6 +38,12 @@ def export_with_progress(
     pose = {name: float(v) for name, v in zip(PARAMETERS.names, still.values, strict=True) if v}
     with console.status("exporting"):
         loaded = Head.load(still.head, still.identity)
-        written = export_head(loaded, out, {n: v for n, v in pose.items() if n in loaded.parameters})
+        written = export_head(loaded, out, {n: v for n, v in pose.items() if n in loaded.parameters}, _foreign())
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
+
+
+def _foreign() -> list[Exporter]:
+    """Exporters that other packages add."""
+    own = {one.kind for one in exporters()}
+    return [one for one in EXPORTERS.all() if one.kind not in own]

@@ -8,11 +8,12 @@ from typing import Any
 
 from controller.links.kind import LINKS
 from controller.takes.reader import TAKES
+from controller.tools.exporting import EXPORTERS
 from drivers.base.errors import PluginError
 from drivers.base.plugins import Registry
 from drivers.core.registry import FAMILIES
 
-SORTS: dict[str, Registry[Any]] = {"bus": FAMILIES, "link": LINKS, "take": TAKES}
+SORTS: dict[str, Registry[Any]] = {"bus": FAMILIES, "link": LINKS, "take": TAKES, "export": EXPORTERS}
 """Every sort of plug-in, by what people call one."""
 
 

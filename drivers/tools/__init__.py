@@ -1,4 +1,4 @@
-"""What looks at servos from outside a run: traffic in words, probing, giving ids.
+"""What looks at servos from outside a run: probing, giving ids.
 
 In: a port. Out: findings. Imports any room left of it.
 """

@@ -23,7 +23,7 @@ def _leave_scipy() -> None:
 
     This is inside numba: where a version of it is made otherwise, scipy is imported, and nothing else changes.
     """
-    from numba.np import linalg
+    from numba.np import linalg  # only to be changed here
 
     ask = getattr(linalg, "ensure_blas", None)
     if ask is None:

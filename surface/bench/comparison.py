@@ -185,7 +185,7 @@ def draw(variants: list[Variant], path: str | Path, *, height: int = 900) -> Non
     path : PNG or another format that pillow writes
     height : of the picture in pixels
     """
-    from PIL import Image, ImageDraw
+    from PIL import Image, ImageDraw  # optional: the extra view
 
     low = np.min([v.mesh.vertices.min(axis=0) for v in variants], axis=0)
     high = np.max([v.mesh.vertices.max(axis=0) for v in variants], axis=0)

@@ -34,12 +34,12 @@ def exporters(extra: Iterable[Exporter] = ()) -> tuple[Exporter, ...]:
 
     Raises
     ------
-    ExportError : an exporter was made for a newer omote, or two want the same suffix.
+    ExportError : an exporter was made for another omote, or two want the same suffix.
     """
     found = (*_own()[0], *extra)
     owner: dict[str, Exporter] = {}
     for one in found:
-        if one.api > API:
+        if one.api != API:
             why = f"was made for exporters of version {one.api}, this omote has {API}"
             raise ExportError(f"exporter {one.kind!r}: {why}", hint="update omote")
         for suffix in one.suffixes:
@@ -66,7 +66,7 @@ def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
 
 def listing(extra: Iterable[Exporter] = ()) -> str:
     """One line an exporter: its suffixes and what the file will hold."""
-    return "\n".join(f"{', '.join(one.suffixes)}: {one.help}" for one in exporters(extra))
+    return "\n".join(f"{', '.join(one.suffixes)}: {one.title}" for one in exporters(extra))
 
 
 def export_head(

@@ -8,26 +8,29 @@ from pathlib import Path
 
 from surface.head import Head
 
-API = 1  # counts up when exporters have to be written otherwise
+API = 1
+"""Version of what an exporter must keep: this module and :class:`surface.head.Head`."""
 Write = Callable[[Head, Path, Mapping[str, float]], list[Path]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Exporter:
     """One kind of file.
 
     Attributes
     ----------
-    kind : a short name, as "glb"
+    api : version it is made for; see :data:`API`
+    kind : a short name, as "glb"; the module's own for the exporters of this folder
+    title : what the file will hold, in half a sentence
     suffixes : what names of such files end in, in lower case, as (".glb",)
-    help : what the file will hold, in half a sentence
+    install : what ``pip install`` takes where a package is missing
     write : is called with the head, the path and a pose (values by parameter, empty at rest) and returns the paths
         written. It leaves nothing half-written, and raises ExportError, or OSError where a place cannot be written to
-    api : the :data:`API` it was written for
     """
 
+    api: int
     kind: str
+    title: str
     suffixes: tuple[str, ...]
-    help: str
     write: Write
-    api: int = API
+    install: str = ""

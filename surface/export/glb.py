@@ -43,7 +43,11 @@ def write_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
 
 
 EXPORTER = Exporter(
-    kind="glb", suffixes=(".glb",), help="all parts, materials, and one morph target a shape", write=write_glb
+    api=1,
+    kind="glb",
+    title="all parts, materials, and one morph target a shape",
+    suffixes=(".glb",),
+    write=write_glb,
 )
 
 

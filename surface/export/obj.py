@@ -35,9 +35,10 @@ def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
 
 
 EXPORTER = Exporter(
+    api=1,
     kind="obj",
+    title="the face at rest with its materials, and a folder beside it with one file a shape",
     suffixes=(".obj",),
-    help="the face at rest with its materials, and a folder beside it with one file a shape",
     write=write_obj,
 )
 

@@ -44,11 +44,11 @@ def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
     if kind == ".json":
         from .plain import read  # of the readers only the one that is needed is loaded
     elif kind == ".3dm":
-        from .rhino import read
+        from .rhino import read  # the same
     elif kind == ".xml":
-        from .gismo import read
+        from .gismo import read  # the same
     elif kind == ".tsm":
-        from .tsm import read
+        from .tsm import read  # the same
     else:
         raise Place(file).error(f"no surface file: its name ends in {kind or 'nothing'}", hint="use " + _kinds())
     surfaces = read(file)

@@ -25,7 +25,7 @@ def as_image(pixels: np.ndarray) -> Image:
     ViewError : Pillow is missing.
     """
     try:
-        from PIL import Image as pillow
+        from PIL import Image as pillow  # optional: the extra view
     except ImportError as error:
         raise ViewError(f"image files need Pillow ({error})", hint="pip install '.[view]' in the checkout") from error
     return pillow.fromarray(np.ascontiguousarray(pixels))

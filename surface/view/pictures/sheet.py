@@ -157,7 +157,7 @@ def _layout(count: int, tile: tuple[int, int], columns: int | None) -> Layout:
 
 def _write_label(sheet: Image, label: str, index: int, layout: Layout) -> None:
     """Write `label` centred in the line under a picture, smaller when it would not fit."""
-    from PIL import ImageDraw, ImageFont
+    from PIL import ImageDraw, ImageFont  # optional: the extra view
 
     draw: ImageDraw.ImageDraw = ImageDraw.Draw(sheet)
     label = label.replace("\N{MINUS SIGN}", "-")  # Pillow's own font has no such sign

@@ -165,7 +165,7 @@ def write(head, path, pose):
     return [path]
 
 
-EXPORTER = Exporter(kind="{kind}", suffixes=(".{kind}",), help="a name", write=write)
+EXPORTER = Exporter(api=1, kind="{kind}", title="a name", suffixes=(".{kind}",), write=write)
 """
 USE = """
 import sys
@@ -203,7 +203,7 @@ def test_exporters_from_outside_are_used_and_refused_where_they_cannot_be(tmp_pa
         path.write_text(str(dict(pose)))
         return [path]
 
-    mine = Exporter("txt", (".txt", ".text"), "a pose", write)
+    mine = Exporter(api=API, kind="txt", title="a pose", suffixes=(".txt", ".text"), write=write)
     (path,) = export_head(head, tmp_path / "h.TEXT", {"jawOpen": 0.5}, extra=[mine])
     assert path.read_text() == "{'jawOpen': 0.5}"
     assert listing([mine]).splitlines()[-1] == ".txt, .text: a pose"
@@ -211,9 +211,9 @@ def test_exporters_from_outside_are_used_and_refused_where_they_cannot_be(tmp_pa
     with pytest.raises(ExportError, match="is neither"):
         export_head(head, tmp_path / "h.txt")
     with pytest.raises(ExportError, match=r"exporter 'other': \.glb is written by 'glb' already"):
-        exporters([Exporter("other", (".glb",), "", write)])
+        exporters([Exporter(api=API, kind="other", title="", suffixes=(".glb",), write=write)])
     with pytest.raises(ExportError, match=f"made for exporters of version {API + 1}, this omote has {API}") as caught:
-        exporters([Exporter("other", (".x",), "", write, api=API + 1)])
+        exporters([Exporter(api=API + 1, kind="other", title="", suffixes=(".x",), write=write)])
     assert caught.value.hint == "update omote"
 
 
