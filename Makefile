@@ -12,7 +12,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench setup lock clean
+.PHONY: help demo test check bench setup api lock clean
 
 help: ## this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
@@ -70,6 +70,9 @@ $(VENV)/.compiled: $(VENV)/.installed
 	@$(PY) -c 'import drivers.core.kernels, controller.motion.braking'
 	@$(BIN)/omote run everything --headless --seconds 1 >$(VENV)/first-run.log 2>&1 || true # pictures, links and mirror
 	@touch $@
+
+api: setup ## renew the snapshot of the public API, where a change of it is meant
+	@$(PY) -m tests.public_api > tests/public_api.new && mv tests/public_api.new tests/public_api.txt
 
 lock: ## renew requirements.lock (needs uv)
 	@uv pip compile pyproject.toml --extra all --group dev --universal --python-version 3.11 \

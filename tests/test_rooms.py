@@ -95,6 +95,52 @@ def test_no_import_goes_in_a_circle() -> None:
         pytest.fail(" imports ".join(reversed(error.args[1])))
 
 
+def has_reason(node: ast.stmt, lines: list[str]) -> bool:
+    """Whether a comment stands with an import, or above the run of lines of imports and comments it belongs to."""
+    if any("#" in line for line in lines[node.lineno - 1 : node.end_lineno]):
+        return True
+    at = node.lineno - 2
+    while lines[at].strip().startswith(("import ", "from ", "#")):
+        if "#" in lines[at]:
+            return True
+        at -= 1
+    return False
+
+
+@pytest.mark.parametrize("room", ORDER)
+def test_an_import_inside_a_function_says_why(room: str) -> None:
+    """Only an optional package or start-up time asks for one; see CONTRIBUTING.md."""
+    bare = []
+    for name, path in MODULES.items():
+        text = path.read_text(encoding="utf-8")
+        for function in ast.walk(ast.parse(text)):
+            if name.split(".")[0] == room and isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+                found = [node for node in ast.walk(function) if isinstance(node, ast.Import | ast.ImportFrom)]
+                bare += [f"{name}:{node.lineno}" for node in found if not has_reason(node, text.splitlines())]
+    assert sorted(set(bare)) == []
+
+
+@pytest.mark.parametrize("room", ORDER)
+def test_own_modules_are_imported_by_name_only_in_the_registry(room: str) -> None:
+    """``import_module`` elsewhere would hide an import from the tests above; it may name other people's packages."""
+    hidden = []
+    for name, path in MODULES.items():
+        if name.split(".")[0] != room or name == "drivers.base.plugins":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            called = ast.unparse(node.func).split(".")[-1] if isinstance(node, ast.Call) else ""
+            if called in ("import_module", "__import__") and not is_foreign(node.args[0]):
+                hidden.append(f"{name}:{node.lineno}")
+    assert hidden == []
+
+
+def is_foreign(argument: ast.expr) -> bool:
+    """Whether a module's name plainly begins with that of a package that is not one of the rooms."""
+    first = argument.values[0] if isinstance(argument, ast.JoinedStr) else argument
+    text = first.value if isinstance(first, ast.Constant) else ""
+    return isinstance(text, str) and text.partition(".")[0] not in ("", *ORDER)
+
+
 @pytest.mark.parametrize("room", ORDER)
 def test_a_room_does_without_packages_that_are_not_for_it(room: str) -> None:
     used = {

@@ -1,16 +1,24 @@
-"""Where the configuration files are: beside the code in a checkout, under share/ when installed."""
+"""Where the configuration files are: beside the code in a checkout, under share/ when installed.
+
+An installer puts ``share/`` under the environment, under the user's own folder, or beside the code (``pip install
+--target``), and writes down where. What lies beside the code goes first, then what was written down.
+"""
 
 from __future__ import annotations
 
 import difflib
 import os
+import site
 import sys
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from controller.base.errors import ConfigError
 
 VARIABLE = "OMOTE_CONFIGS"
 """Environment variable that names another configuration folder."""
+_SHARE = Path("share/omote/configs")
 
 
 def config_dir() -> Path:
@@ -20,12 +28,13 @@ def config_dir() -> Path:
     ------
     ConfigError : no such folder is found.
     """
-    folders = _candidates()
-    for folder in folders:
+    looked: list[Path] = []
+    for folder in _candidates():
         if (folder / "vocabularies").is_dir():
             return folder
+        looked.append(folder)
     raise ConfigError(
-        f"the configuration folder is missing; looked in {', '.join(map(str, folders))}",
+        f"the configuration folder is missing; looked in {', '.join(map(str, dict.fromkeys(looked)))}",
         hint=f"set {VARIABLE} to a folder that holds vocabularies/ and heads/",
     )
 
@@ -68,8 +77,29 @@ def _unknown(kind: str, name: str, folder: Path) -> ConfigError:
     )
 
 
-def _candidates() -> list[Path]:
+def _candidates() -> Iterator[Path]:
+    """Where it can be, the likeliest first; the folder of the environment variable alone where that is set."""
     override = os.environ.get(VARIABLE)
     if override:
-        return [Path(override)]
-    return [Path(__file__).resolve().parents[2] / "configs", Path(sys.prefix) / "share/omote/configs"]
+        yield Path(override)
+        return
+    code = Path(__file__).resolve().parents[2]
+    yield code / "configs"
+    yield code / _SHARE
+    yield from _written_down()
+    yield Path(sys.prefix) / _SHARE
+    yield Path(site.getuserbase()) / _SHARE
+
+
+@cache
+def _written_down() -> tuple[Path, ...]:
+    """Where the installer put the configuration, by its own list of files; nothing where it kept none."""
+    from importlib import metadata  # takes a while, and a checkout does without
+
+    try:
+        files = metadata.files("omote") or []
+    except metadata.PackageNotFoundError:
+        return ()
+    mark = (_SHARE / "vocabularies").parts
+    found = (file for file in files if file.parts[-len(mark) - 1 : -1] == mark)
+    return tuple(Path(os.path.abspath(file.locate())).parents[1] for file in found)[:1]

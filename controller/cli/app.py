@@ -20,6 +20,7 @@ def make_app() -> Typer:
     # start-up: main() ends Ctrl-C quietly from its first line on, while all this still loads
     from typer import Typer
 
+    # start-up: the same
     from controller.cli import bench, bus, calibrate, check, fit, picture, plugins, run
 
     app = Typer(

@@ -21,7 +21,7 @@ def plugins() -> None:
     from rich.markup import escape  # start-up: --help does without it
     from rich.table import Table
 
-    from controller.tools.plugins import listed
+    from controller.tools.plugins import listed  # start-up: --help does without it
 
     table, broken = Table(box=None, pad_edge=False), []
     for head in ("sort", "kind", "what it is", "from"):

@@ -15,7 +15,7 @@ from controller.base.errors import ConfigError
 from drivers.base.options import Entry, entries
 
 if TYPE_CHECKING:
-    from controller.tools.simulating import Serving
+    from controller.tools.simulating import Serving  # start-up: --help does without it
 
 console = Console(highlight=False)
 
@@ -78,7 +78,7 @@ def _serving(
     watch: Look = False,
 ) -> Serving:
     """Where and how to serve: a link to a pseudo-terminal, or a TCP address."""
-    from controller.tools.simulating import Serving
+    from controller.tools.simulating import Serving  # start-up: --help does without it
 
     if link is not None and tcp is not None:
         raise ConfigError("--link and --tcp do not go together", hint="run it twice for two ports")
@@ -140,7 +140,7 @@ def simulate_robot(
 
     Example: omote simulate robot head24 --link /tmp/head
     """
-    from controller.tools.simulating import serve_robot
+    from controller.tools.simulating import serve_robot  # start-up: --help does without it
 
     serve_robot(robot, bus, how, console)
 
@@ -153,6 +153,6 @@ def simulate_host(
 
     Example: omote simulate host tour --link /tmp/robot
     """
-    from controller.tools.simulating import serve_host
+    from controller.tools.simulating import serve_host  # start-up: --help does without it
 
     serve_host(script, link, console)

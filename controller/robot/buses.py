@@ -5,7 +5,15 @@ from __future__ import annotations
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, create_model, field_validator, model_validator
+from pydantic import (
+    Field,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from controller.base.config import Settings
 from controller.base.schema import fields_of, given_in
@@ -57,8 +65,8 @@ class BusSettings(Settings):
 
     @field_validator("kind", "simulates")
     @classmethod
-    def _is_known(cls, value: str) -> str:
-        if value != SIMULATED:
+    def _is_known(cls, value: str, info: ValidationInfo) -> str:
+        if value != SIMULATED or info.field_name == "simulates":
             try:
                 FAMILIES.get(value)
             except PluginError as error:

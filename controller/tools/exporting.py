@@ -8,6 +8,8 @@ from rich.console import Console
 
 from controller.base.parameters import PARAMETERS
 from controller.face.still import Still
+from surface.export import export_head
+from surface.head import Head
 
 
 def export_with_progress(
@@ -22,9 +24,6 @@ def export_with_progress(
     HeadFileError, ExportError
         when the head cannot be read or written.
     """
-    from surface.export import export_head
-    from surface.head import Head
-
     still = Still.parse(settings, expressions, head=head, identity=identity)
     pose = {name: float(v) for name, v in zip(PARAMETERS.names, still.values, strict=True) if v}
     with console.status("exporting"):

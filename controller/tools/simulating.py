@@ -18,6 +18,8 @@ from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.base.signals import stop_flag
+from controller.links.line.host import RobotHost, load_script
+from controller.links.line.hostport import HostPort
 from controller.robot.buses import SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.robot import load_robot
@@ -155,8 +157,6 @@ def serve_host(script: str, link: Path | None, console: Console) -> None:
     ConfigError
         when the script is unknown or wrong.
     """
-    from controller.links.line.host import HostPort, RobotHost, load_script
-
     loaded = load_script(script, PARAMETERS)
     with HostPort(link) as port, stop_flag() as flag:
         console.print(f"ready {link or port.path}", soft_wrap=True)

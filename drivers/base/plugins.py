@@ -123,8 +123,8 @@ class Registry(Generic[P]):
         except ModuleNotFoundError as error:
             missing = error.name or module
             raise self._error(
-                f"{self.what} {plugin.kind!r} needs the package {missing!r}, which is not installed",
-                hint=f"pip install {plugin.install or missing.partition('.')[0]}",
+                f"{self.what} {plugin.kind!r} needs the package {missing.partition('.')[0]!r}, which is not installed",
+                hint=f"pip install {_quoted(plugin.install) or missing.partition('.')[0]}",
             ) from error
         except AttributeError as error:
             raise self._error(
@@ -158,7 +158,7 @@ class Registry(Generic[P]):
         package = entry.dist.name if entry.dist is not None else entry.module
         try:
             plugin = entry.load()
-        except Exception as error:  # whatever a foreign module does, it must break nothing but itself
+        except (Exception, SystemExit) as error:  # whatever a foreign module does, it must break nothing but itself
             raise self._error(
                 f"{self.what} {kind!r} of the package {package} cannot be loaded: {type(error).__name__}: {error}",
                 hint=f"pip install --upgrade {package}",
@@ -187,6 +187,11 @@ class Registry(Generic[P]):
         close = difflib.get_close_matches(kind, known, n=1)
         guess = f", did you mean {close[0]!r}?" if close else ""
         return self._error(f"unknown {self.what} {kind!r}{guess}", hint=f"use one of: {', '.join(known)}")
+
+
+def _quoted(requirement: str) -> str:
+    """What a shell would read brackets in as a pattern is put in quotes."""
+    return f'"{requirement}"' if "[" in requirement else requirement
 
 
 def folders_with(package: str, module: str) -> dict[str, str]:

@@ -79,7 +79,7 @@ class Keeper:
         if self._process.stdin is not None and not self._process.stdin.closed:
             self._say("bye")
             _close(self._process.stdin)
-        import subprocess
+        import subprocess  # start-up: the process itself does without
 
         try:
             self._process.wait(timeout=_END_S)
@@ -129,7 +129,7 @@ def _anywhere(path: str) -> str:
 
 
 def _unready(path: str, why: str) -> Exception:
-    from drivers.base.errors import DriverError
+    from drivers.base.errors import DriverError  # start-up: the process itself loads it when it is ready
 
     return DriverError(
         f"nobody stands by to let the servos on {path} go should this program be killed: {why}",
@@ -228,7 +228,7 @@ def rehearse(path: str, baud: int, frames: Iterable[str]) -> None:
     try:
         far, near = os.openpty()
     except OSError:  # a system without them: loading is what can be done
-        from drivers.port.serialport import SerialPort
+        from drivers.port.serialport import SerialPort  # start-up: see let_go
 
         SerialPort(path, baud)
         return
@@ -241,7 +241,7 @@ def rehearse(path: str, baud: int, frames: Iterable[str]) -> None:
 
 def _load_scheme(scheme: str) -> None:
     """What pyserial and the system load only when a port in the network is opened."""
-    from importlib import import_module
+    from importlib import import_module  # start-up: few ports are in the network
 
     "localhost".encode("idna")
     if scheme != "socket":
@@ -250,6 +250,7 @@ def _load_scheme(scheme: str) -> None:
 
 def let_go(path: str, baud: int, frames: Iterable[str], repeats: int = REPEATS) -> bool:
     """Send packets (hexadecimal) on a port, some times over. False where it cannot be had."""
+    # start-up: the process says that it is there before it loads this
     from drivers.base.errors import PortBusy, PortError
     from drivers.port.serialport import SerialPort
 

@@ -98,6 +98,7 @@ class Sweep:
 def _fields(question: Question, joint: bool) -> NDArray[np.int64]:
     """Registers of each servo, (k, 7, 3); see ``drivers.core.kernels.register``. Data begin behind the error byte, and
     in a joint reply behind the id."""
+    # start-up: compiled, and only who drives servos pays for it
     from drivers.core.kernels import FIELDS, SIGN_MAGNITUDE, TWOS_COMPLEMENT, UNSIGNED
 
     block, fields = question.block, np.zeros((len(FIELDS), 3), np.int64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from drivers.base.errors import DriverError
+from drivers.tables.tables import known_models, load_table, model_number
 
 FEETECH = ("sts", "sm", "scs")
 """What the names of Feetech's models begin with."""
@@ -10,8 +11,6 @@ FEETECH = ("sts", "sm", "scs")
 
 def check_dynamixel(model: str) -> None:
     """A Dynamixel model of either protocol; raises DriverError for any other."""
-    from drivers.tables.tables import load_table, model_number
-
     table = load_table(model_number(model))
     if table.model.startswith(FEETECH):
         raise DriverError(
@@ -22,8 +21,6 @@ def check_dynamixel(model: str) -> None:
 
 def check_feetech(model: str) -> None:
     """A Feetech model; raises DriverError for any other."""
-    from drivers.tables.tables import known_models, model_number
-
     known = known_models()
     ours = sorted(name for name in known.values() if name.startswith(FEETECH))
     try:

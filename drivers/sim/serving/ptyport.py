@@ -63,7 +63,7 @@ class PtyPort:
     def open(self, link: str | os.PathLike[str] | None = None) -> None:
         """Make the terminal (a new one after `close`) and the link."""
         try:
-            import tty
+            import tty  # a system without pseudo-terminals lacks it
 
             self._master, self._slave = os.openpty()
         except (ImportError, AttributeError, OSError) as error:
@@ -111,7 +111,7 @@ class PtyPort:
         """Bit rate the client has set, or None where none was set or it cannot be known."""
         if sys.platform != "linux":
             return None
-        import fcntl
+        import fcntl  # other systems lack it
 
         try:
             raw = fcntl.ioctl(self._slave, _TCGETS2, bytes(_TERMIOS2.size))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from controller.base import paths
 from controller.base.errors import ConfigError
 from controller.base.paths import VARIABLE, config_dir, find_config
 
@@ -41,3 +42,20 @@ def test_another_folder_by_environment(tmp_path: Path, monkeypatch: pytest.Monke
         config_dir()
     (tmp_path / "vocabularies").mkdir()
     assert config_dir() == tmp_path
+
+
+def test_folders_of_installers_are_looked_through_after_the_checkout(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What an installer wrote down is tested with a wheel, in tests/test_wheel.py."""
+    code = tmp_path / "lib" / "python3" / "site-packages"
+    monkeypatch.setattr(paths, "__file__", str(code / "controller" / "base" / "paths.py"))
+    monkeypatch.setattr(paths.sys, "prefix", str(tmp_path / "environment"))
+    monkeypatch.setattr(paths.site, "getuserbase", lambda: str(tmp_path / "user"))
+    with pytest.raises(ConfigError, match="configuration folder is missing") as caught:
+        config_dir()
+    for base in (tmp_path / "user", tmp_path / "environment", code):
+        folder = base / "share" / "omote" / "configs"
+        assert str(folder) in str(caught.value)
+        (folder / "vocabularies").mkdir(parents=True)
+        assert config_dir() == folder

@@ -40,9 +40,9 @@ def servos() -> Iterator[SimulatedBus]:
 
 @pytest.fixture
 def stage(tmp_path: Path, root: Path, servos: SimulatedBus) -> Stage:
-    """The shipped head on the simulated bus's port, no links."""
+    """The shipped head on the simulated bus's port, no links; late answers of a busy machine are waited for."""
     robot = (root / "configs/robots/head24.toml").read_text()
-    robot = robot.replace('kind = "simulated"', f'kind = "dynamixel"\nport = "{servos.path}"')
+    robot = robot.replace('kind = "simulated"', f'kind = "dynamixel"\nport = "{servos.path}"\nmargin_s = 0.5')
     (tmp_path / "robot.toml").write_text(robot)
     (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["robot.toml"]\n')
     return load_stage(str(tmp_path / "stage.toml"), PARAMETERS)

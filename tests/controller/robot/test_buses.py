@@ -75,6 +75,8 @@ def test_what_is_not_given_is_left_to_the_driver() -> None:
     ("table", "message"),
     [
         ({"kind": "maestro"}, "port is needed"),
+        ({"kind": "simulated", "simulates": "simulated"}, "unknown bus kind 'simulated'"),
+        ({"kind": "dynamixal", "port": "x", "fast": 1}, "unknown bus kind 'dynamixal', did you mean 'dynamixel'?"),
         ({"kind": "simulated", "port": "x"}, "port is for a real bus"),
         (
             {"kind": "maestro", "port": "x", "takeover": "adopt"},

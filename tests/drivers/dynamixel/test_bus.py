@@ -55,6 +55,14 @@ def torques(wire: SimulatedBus) -> list[bool]:
     return [wire.servo(i).torque for i in IDS]
 
 
+def goals(wire: SimulatedBus) -> list[int]:
+    return [wire.servo(i).goal for i in IDS]
+
+
+def positions(wire: SimulatedBus) -> list[int]:
+    return [wire.servo(i).position_ticks for i in IDS]
+
+
 def wait_until(done: Callable[[], bool], timeout_s: float = 10.0) -> None:
     end = time.monotonic() + timeout_s
     while not done():
@@ -67,6 +75,8 @@ def wait_until(done: Callable[[], bool], timeout_s: float = 10.0) -> None:
 
 def test_unplugging_is_told_once_and_the_bus_comes_back_where_the_servos_are(wire: SimulatedBus, bus: Bus) -> None:
     settle(bus, [0.2, 0.2, 0.2])
+    wait_until(lambda: positions(wire) == goals(wire))  # settled is near: the last steps are still to come
+    before = goals(wire)
     wire.fault("unplug")
     with pytest.raises(PortLost, match="went away"):
         for _ in range(3):
@@ -81,14 +91,12 @@ def test_unplugging_is_told_once_and_the_bus_comes_back_where_the_servos_are(wir
         bus.reconnect()
     assert bus.running
 
-    goals = [wire.servo(i).goal for i in IDS]
+    assert goals(wire) == before, "none of the goals after the loss went out"
     wire.clear("unplug")
     wait_until(lambda: Path(wire.path).exists())
     bus.reconnect()
     assert torques(wire) == [True] * 3
-    here = [wire.servo(i).position_ticks for i in IDS]
-    assert [wire.servo(i).goal for i in IDS] == here
-    assert here == pytest.approx(goals, abs=3)
+    assert goals(wire) == positions(wire) == before
     settle(bus, [0.0, 0.0, 0.0])
 
 
