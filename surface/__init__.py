@@ -1,5 +1,9 @@
 """The DCP engine: control-point surfaces, their tessellation and their deformation.
 
+In: control points, surface files, head folders, meshes to fit, values of parameters. Out: vertices and normals that
+follow, pictures, heads, files for other programs. Imports numpy, numba and scipy, OpenGL under ``view`` alone, and
+neither ``drivers`` nor ``controller``.
+
 What stands here is loaded when it is first asked for: whoever only needs an error's name does not wait for numpy.
 """
 

@@ -30,7 +30,12 @@ if TYPE_CHECKING:
 
 
 class DCPSurface(ControlPoints):
-    """A surface of scattered control points; immutable. Parameters and errors as :class:`ControlPoints`.
+    """A surface of scattered control points; immutable.
+
+    Parameters
+    ----------
+    points : (n, 3) float64; weights : (n,) float64, positive; knots_u, knots_v : n sequences of degree + 2 knots each.
+        See :class:`surface.spline.controlpoints.ControlPoints` for these, ``closed_u`` and ``closed_v``, and errors.
 
     Notes
     -----

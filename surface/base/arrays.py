@@ -8,5 +8,4 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 Ints = NDArray[np.int64]
-Ints32 = NDArray[np.int32]
 Bools = NDArray[np.bool_]

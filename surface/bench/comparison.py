@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
-
-if TYPE_CHECKING:
-    from surface.dcp import DCPSurface
 
 FINER = 4  # samples of the reference per edge of the uniform mesh
 MOST_SAMPLES = 40  # along an edge of one large triangle

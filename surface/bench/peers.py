@@ -9,15 +9,14 @@ import importlib
 import importlib.util
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.dcp import DCPSurface
+from surface.mesh.mesh import Mesh
 
-if TYPE_CHECKING:
-    from surface.dcp import DCPSurface
-    from surface.mesh.mesh import Mesh
+from .stencils import stencil_evaluator
 
 BLENDSHAPES = 52
 SAMPLES = 200  # vertices that geomdl computes; all would take minutes
@@ -49,8 +48,6 @@ def blendshapes(surface: DCPSurface, mesh: Mesh) -> Evaluator:
 
 def stencils(surface: DCPSurface, mesh: Mesh) -> Evaluator:
     """A stencil table, evaluated row by row."""
-    from .stencils import stencil_evaluator
-
     return stencil_evaluator(surface, mesh)[0]
 
 

@@ -8,15 +8,12 @@ they are and with what weight. It is the plain layout; the engine's own is in :m
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from surface.base.jit import kernel
-
-if TYPE_CHECKING:
-    from surface.dcp import DCPSurface
-    from surface.mesh.mesh import Mesh
+from surface.dcp import DCPSurface
+from surface.mesh.mesh import Mesh
 
 
 def stencil_evaluator(surface: DCPSurface, mesh: Mesh) -> tuple[Callable[[], None], np.ndarray]:

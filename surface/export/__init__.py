@@ -1,27 +1,84 @@
-"""Heads for other programs: GLB with morph targets, OBJ with a folder of shapes."""
+"""Heads for other programs, one module an exporter: GLB with morph targets, OBJ with a folder of shapes.
+
+In: a head and a pose, exporters from other packages. Out: files. Imports base and head.
+
+A module of this folder that defines ``EXPORTER``, an :class:`surface.export.exporter.Exporter`, is found by itself.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import pkgutil
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from surface.base.errors import ExportError
+from surface.export.exporter import API, Exporter
 from surface.head import Head
 
-__all__ = ["SUFFIXES", "export_head"]
+__all__ = ["API", "SUFFIXES", "Exporter", "export_head", "exporters", "listing"]
 
-SUFFIXES = (".glb", ".obj")
+SUFFIXES: tuple[str, ...]  # of the exporters of this folder
 
 
-def export_head(head: Head, path: str | Path, pose: Mapping[str, float] | None = None) -> list[Path]:
-    """Write a head to a file that other programs open; the suffix says which kind.
+def __getattr__(name: str) -> Any:
+    if name == "SUFFIXES":
+        return tuple(suffix for one in exporters() for suffix in one.suffixes)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def exporters(extra: Iterable[Exporter] = ()) -> tuple[Exporter, ...]:
+    """The exporters of this folder, by module, and ``extra`` ones after them.
+
+    Raises
+    ------
+    ExportError : an exporter was made for a newer omote, or two want the same suffix.
+    """
+    found = (*_own()[0], *extra)
+    owner: dict[str, Exporter] = {}
+    for one in found:
+        if one.api > API:
+            why = f"was made for exporters of version {one.api}, this omote has {API}"
+            raise ExportError(f"exporter {one.kind!r}: {why}", hint="update omote")
+        for suffix in one.suffixes:
+            if owner.setdefault(suffix, one) is not one:
+                why = f"{suffix} is written by {owner[suffix].kind!r} already"
+                raise ExportError(f"exporter {one.kind!r}: {why}", hint="remove the package that brings one of them")
+    return found
+
+
+@cache
+def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
+    """Exporters of this folder, and what is missing for those that cannot be imported."""
+    found, missing = [], []
+    for module in pkgutil.iter_modules(__path__):
+        try:
+            exporter = getattr(import_module(f"{__name__}.{module.name}"), "EXPORTER", None)
+        except ImportError as error:
+            missing.append(f"{module.name} needs {error.name or error}")
+            continue
+        if isinstance(exporter, Exporter):
+            found.append(exporter)
+    return tuple(found), tuple(missing)
+
+
+def listing(extra: Iterable[Exporter] = ()) -> str:
+    """One line an exporter: its suffixes and what the file will hold."""
+    return "\n".join(f"{', '.join(one.suffixes)}: {one.help}" for one in exporters(extra))
+
+
+def export_head(
+    head: Head, path: str | Path, pose: Mapping[str, float] | None = None, extra: Iterable[Exporter] = ()
+) -> list[Path]:
+    """Write a head to a file that other programs open; the suffix says which kind (:func:`listing` has all of them).
 
     Parameters
     ----------
-    path : ``.glb``: all parts, materials and one morph target a shape. ``.obj``: the face at rest with its materials,
-        and a folder beside it with one file a shape.
     pose : values by parameter. A .glb stands in this pose when it is opened, its shapes can still be moved; an .obj is
         written in it, without shapes.
+    extra : exporters from other packages.
 
     Returns
     -------
@@ -32,17 +89,16 @@ def export_head(head: Head, path: str | Path, pose: Mapping[str, float] | None =
     ExportError : another suffix, a pose that a file of this kind cannot hold, or a place that cannot be written to;
         nothing is left half-written.
     """
-    path = Path(path)
-    kind = path.suffix.lower()
-    try:
-        if kind == ".glb":
-            from surface.export.glb import write_glb
-
-            return write_glb(head, path, pose or {})
-        if kind == ".obj":
-            from surface.export.obj import write_obj
-
-            return write_obj(head, path, pose or {})
-    except OSError as e:
-        raise ExportError(f"{path}: cannot be written ({e})", hint="choose a folder that can be written to") from e
-    raise ExportError(f"{path}: is neither .glb nor .obj", hint="for example: omote export head.glb")
+    path, known = Path(path), exporters(extra)
+    for one in known:
+        if path.suffix.lower() in one.suffixes:
+            try:
+                return one.write(head, path, pose or {})
+            except OSError as e:
+                hint = "choose a folder that can be written to"
+                raise ExportError(f"{path}: cannot be written ({e})", hint=hint) from e
+    *most, last = (suffix for one in known for suffix in one.suffixes)
+    why = "".join(f"; {note}" for note in _own()[1])
+    raise ExportError(
+        f"{path}: is neither {', '.join(most)} nor {last}{why}", hint="for example: omote export head.glb"
+    )

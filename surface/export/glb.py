@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.errors import ExportError
+from surface.export.exporter import Exporter
 from surface.export.png import png_bytes
 from surface.export.shapes import Piece, pieces_of
 from surface.head import Head
@@ -39,6 +40,11 @@ def write_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
         if path.parent.is_dir():
             new.unlink(missing_ok=True)
     return [path]
+
+
+EXPORTER = Exporter(
+    kind="glb", suffixes=(".glb",), help="all parts, materials, and one morph target a shape", write=write_glb
+)
 
 
 @cache

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.export.exporter import Exporter
 from surface.export.glb import materials
 from surface.export.shapes import Piece, pieces_of
 from surface.head import Head
@@ -31,6 +32,14 @@ def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
             moved = rest + np.concatenate([p.moves.get(name, np.zeros_like(p.vertices)) for p in pieces])
             _write(folder / "shapes" / f"{name}.obj", [*head_line[:1], *_points("v", moved), *textures, *faces])
         return _put_in_place(folder, path, bool(shapes))
+
+
+EXPORTER = Exporter(
+    kind="obj",
+    suffixes=(".obj",),
+    help="the face at rest with its materials, and a folder beside it with one file a shape",
+    write=write_obj,
+)
 
 
 def _write(path: Path, lines: list[str]) -> None:

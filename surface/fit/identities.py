@@ -104,7 +104,7 @@ def read_modes(path: Path, mesh: FitMesh, mesh_path: str | Path) -> Floats:
 
 def symmetric(vertices: Floats, modes: Floats) -> Floats:
     """Modes (k, n, 3) without their difference between left and right."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import cKDTree  # takes a moment to import
 
     other = cKDTree(vertices).query(vertices * [-1.0, 1.0, 1.0])[1]
     return 0.5 * (modes + modes[:, other] * [-1.0, 1.0, 1.0])

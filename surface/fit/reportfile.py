@@ -21,6 +21,7 @@ from surface.fit.source.chart import TILE
 from surface.head import Head
 
 Floats = NDArray[np.float64]
+FORMAT, VERSION = "omote fit report", 1
 FULL_MM = 1.0  # error at the end of the colour scale
 SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0.75, 0.24, 0.04], [0.55, 0.02, 0.02]])
 EXCLUDED = np.array([0.45, 0.05, 0.50])
@@ -65,6 +66,8 @@ def _nets(result: FitResult) -> list[UniformNet]:
 def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
     """The report as plain values."""
     return {
+        "format": FORMAT,
+        "version": VERSION,
         "head": report.name,
         "scale": report.scale,
         "control_points": report.points,
@@ -161,7 +164,7 @@ def _worst_shape(part: FittedPart) -> Floats:
 
 def _colours(uv: Floats, part: FittedPart, error: Floats) -> NDArray[np.float32]:
     """(m, 3) linear RGB of the error at vertices: the mean of the nearest samples; excluded ones violet."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import cKDTree  # takes a moment to import
 
     nearest = cKDTree(part.chart.uv).query(uv, k=min(4, len(part.chart.uv)))[1].reshape(len(uv), -1)
     at = np.clip(error[nearest].mean(axis=1) / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)

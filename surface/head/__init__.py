@@ -1,4 +1,7 @@
-"""The head: parts, groups, parameters, and the file they are kept in."""
+"""The head: parts, groups, parameters, and the file they are kept in.
+
+In: a head's folder and values of parameters. Out: vertices and normals of its parts. Imports base to dcp.
+"""
 
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.file import load_data, save_data

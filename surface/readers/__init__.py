@@ -1,5 +1,7 @@
 """Readers of surface files: each turns its file into control points with local knots, exactly.
 
+In: paths of files. Out: surfaces with names and domains, or an error that names the line. Imports base to dcp.
+
 ====== =========================================== =================================
 suffix what                                        module
 ====== =========================================== =================================
@@ -40,7 +42,7 @@ def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
     file = Path(path)
     kind = file.suffix.lower()
     if kind == ".json":
-        from .plain import read
+        from .plain import read  # of the readers only the one that is needed is loaded
     elif kind == ".3dm":
         from .rhino import read
     elif kind == ".xml":

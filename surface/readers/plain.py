@@ -52,7 +52,8 @@ def read(path: Path) -> list[NamedSurface]:
     if not isinstance(table, dict) or table.get("format") != FORMAT:
         raise place.error(f'"format" must be "{FORMAT}"')
     if table.get("version") != VERSION:
-        raise place.at("version").error(f"must be {VERSION}, not {table.get('version')!r}", hint="update omote")
+        why = f"must be {VERSION}, not {table.get('version')!r}"
+        raise place.at("version").error(why, hint="update omote, or write the file again with this one")
     return [_surface(place, f"surfaces[{i}]", row) for i, row in enumerate(_list(place, table, "", "surfaces"))]
 
 

@@ -1,5 +1,7 @@
 """The picture: a head drawn with OpenGL 3.1, off-screen or in a window.
 
+In: a head, poses, a camera and a theme. Out: pixels, image files, a window. Imports base, mesh and head.
+
 Nothing here imports moderngl, Pillow or imgui-bundle before it is used, so a machine without them can still
 import the package; what needs one of them raises a :class:`surface.base.errors.ViewError` that says so.
 """

@@ -122,7 +122,7 @@ def _no_window(error: Exception) -> ViewError:
 def _imgui() -> Any:
     """The runner module of imgui-bundle."""
     try:
-        from imgui_bundle import hello_imgui
+        from imgui_bundle import hello_imgui  # optional
     except ImportError as error:
         raise ViewError(
             f"the window needs imgui-bundle ({error})", hint="pip install '.[view]' in the checkout"
@@ -179,7 +179,7 @@ class _Window:
 
     def start(self) -> None:
         """Attach moderngl to the window's context."""
-        import moderngl
+        import moderngl  # optional
 
         try:
             self._ctx = moderngl.create_context(require=310)

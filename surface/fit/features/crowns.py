@@ -30,7 +30,7 @@ def crown_chart(mesh: FitMesh, teeth: list[NDArray[np.int64]], upper: bool) -> t
     teeth : face indices of each tooth.
     upper : upper teeth point down, lower ones up.
     """
-    from scipy.sparse import identity
+    from scipy.sparse import identity  # takes a moment to import
 
     middle = np.mean([_centre(mesh, t) for t in teeth], axis=0)
     grids = [_sample(mesh, t, upper, middle) for t in teeth]

@@ -84,7 +84,7 @@ def make_plan(mesh: FitMesh) -> Plan:
 
 def _pieces(mesh: FitMesh) -> tuple[NDArray[np.int64], Floats]:
     """(f,) which connected piece of one material a face belongs to, and each one's area."""
-    from scipy.sparse import coo_matrix
+    from scipy.sparse import coo_matrix  # takes a moment to import
     from scipy.sparse.csgraph import connected_components
 
     kinds = np.array([_kind(name) for name in mesh.pieces] or ["skin"])

@@ -89,7 +89,7 @@ def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
     path : (k, 7) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, how much
         of its thickness and of its width is left, and how much further down it hangs.
     """
-    from scipy.interpolate import PchipInterpolator
+    from scipy.interpolate import PchipInterpolator  # takes a moment to import
 
     hanging = path[:, 1:6].copy()
     hanging[:, 1] -= path[:, 6]

@@ -58,7 +58,7 @@ def _side_for(uv: Floats, wanted: float, guess: float) -> int:
 
 def _rows(uv: Floats, spans: int):  # type: ignore[no-untyped-def]
     """(m, (spans + 3)^2) sparse: the bicubic B-splines of a uniform net at the samples."""
-    from scipy.interpolate import BSpline
+    from scipy.interpolate import BSpline  # takes a moment to import
     from scipy.sparse import csr_matrix
 
     low, high = uv.min(axis=0), uv.max(axis=0)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.dcp import DCPSurface
+from surface.fit.points.gram import add_normal
 from surface.fit.points.net import Net
 from surface.fit.source.slopes import Slopes
 from surface.spline.matrix import basis_matrices
@@ -31,7 +32,7 @@ def fairness(net: Net) -> csr_matrix:
 
     A Laplacian in effect: it decides what the samples leave open, and damps waves between levels.
     """
-    from scipy.sparse import identity
+    from scipy.sparse import identity  # takes a moment to import
 
     return (identity(len(net)) - basis(net, net.centres)).tocsr()
 
@@ -45,8 +46,6 @@ class System:
 
     def add(self, rows: csr_matrix, weight: NDArray[np.float64], targets: NDArray[np.float64]) -> None:
         """Ask for rows (m, n) @ x = targets (m, c), each row with its weight (m,)."""
-        from surface.fit.points.gram import add_normal
-
         matrix, right = np.zeros_like(self.matrix), np.zeros_like(self.right)
         rows.sort_indices()
         add_normal(rows.indptr, rows.indices, rows.data, weight, targets, matrix, right)

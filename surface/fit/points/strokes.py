@@ -51,7 +51,7 @@ def vertex_line(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64], *, closed: 
 
 def uv_of(chart: Chart, mesh: FitMesh, points: Floats) -> Floats:
     """(m, 2) where points (m, 3) near the mesh lie in (u, v), from the samples around each."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import cKDTree  # takes a moment to import
 
     samples = chart.mix @ mesh.vertices
     distance, nearest = cKDTree(samples).query(points, k=6)

@@ -72,7 +72,7 @@ def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True, 
     """
     placed = [_place(island, k) if normalise else island for k, island in enumerate(islands)]
     pieces = [_piece(mesh, island, doubt_slivers=doubt_slivers) for island in placed]
-    from scipy.sparse import vstack
+    from scipy.sparse import vstack  # takes a moment to import
 
     return Chart(
         np.concatenate([p.uv for p in pieces]), vstack([p.mix for p in pieces]).tocsr(),

@@ -35,7 +35,7 @@ class Island:
 
 def find_islands(mesh: FitMesh, faces: NDArray[np.int64] | None = None) -> list[Island]:
     """All islands of the mesh, or of the chosen face indices, largest first."""
-    from scipy.sparse import coo_matrix
+    from scipy.sparse import coo_matrix  # takes a moment to import
     from scipy.sparse.csgraph import connected_components
 
     chosen = np.arange(len(mesh.faces)) if faces is None else faces

@@ -23,7 +23,7 @@ SMALLEST = 0.12  # tiles are as large as their islands, but never smaller than t
 
 def separate(island: Island) -> list[Island]:
     """The island without overlap: parts that run clockwise in (u, v) and those that run anticlockwise."""
-    from scipy.sparse import coo_matrix
+    from scipy.sparse import coo_matrix  # takes a moment to import
     from scipy.sparse.csgraph import connected_components
 
     area = signed_areas(island)

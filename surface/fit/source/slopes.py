@@ -44,7 +44,7 @@ def face_slopes(island: Island, vertices: int, weight: Floats, *, doubt_slivers:
     (u, v) say next to nothing of the slope across it: their errors come out larger by the variance inflation factor
     1 / (1 - r^2), r the correlation of u and v over them, and so the weight is multiplied by 1 - r^2.
     """
-    from scipy.sparse import csr_matrix
+    from scipy.sparse import csr_matrix  # takes a moment to import
 
     used = island.faces >= 0
     corner = np.where(used, island.faces, 0)

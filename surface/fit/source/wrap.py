@@ -82,7 +82,7 @@ def _filled(
     which: NDArray[np.int64], shares: Floats, corners: NDArray[np.int64], uv: Floats, n: int
 ) -> csr_matrix:  # fmt: skip
     """(r, n) samples as mixes of vertices; a ray that meets nothing takes the sample that is nearest in (u, v)."""
-    from scipy.sparse import csr_matrix
+    from scipy.sparse import csr_matrix  # takes a moment to import
     from scipy.spatial import cKDTree
 
     met = np.flatnonzero(which >= 0)

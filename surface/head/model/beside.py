@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 from surface.base.errors import HeadFileError
 
 Made = TypeVar("Made")
+VERSION = 1
+OWN = "omote/"  # names of what stands in every such file beside its arrays
+FORMAT, CHECK = f"{OWN}format", f"{OWN}checksum/"
 
 
 def beside(head: str | Path, file: str) -> Path:
@@ -22,31 +26,59 @@ def beside(head: str | Path, file: str) -> Path:
     return (folder.parent if folder.suffix == ".toml" else folder) / file
 
 
-def read_beside(path: Path, make: Callable[[np.lib.npyio.NpzFile], Made], hint: str) -> Made | None:
+@dataclass(frozen=True)
+class Beside:
+    """What such a file holds.
+
+    Attributes
+    ----------
+    path : the file
+    arrays : by name
+    checks : checksums of what each part's arrays depend on, by part; empty in files of before there were any
+    """
+
+    path: Path
+    arrays: dict[str, NDArray[Any]]
+    checks: dict[str, int]
+
+
+def read_beside(path: Path, make: Callable[[Beside], Made], hint: str) -> Made | None:
     """What ``make`` makes of the arrays of a file; None where there is no such file.
 
     Raises
     ------
-    HeadFileError : the file is damaged, or ``make`` raised KeyError or ValueError over what it holds.
+    HeadFileError : the file is damaged or of a newer version, or ``make`` raised KeyError or ValueError over what it
+        holds.
     """
     if not path.is_file():
         return None
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            return make(stored)
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+            every = {name: stored[name] for name in stored.files}
+        _check_version(path, every)
+        checks = {name.removeprefix(CHECK): int(array[0]) for name, array in every.items() if name.startswith(CHECK)}
+        return make(Beside(path, {k: v for k, v in every.items() if not k.startswith(OWN)}, checks))
+    except (OSError, ValueError, EOFError, KeyError, IndexError, zipfile.BadZipFile, zlib.error) as error:
         raise HeadFileError(f"{path}: {error}", hint=hint) from error
 
 
-def write_beside(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
-    """Keep arrays by name, all or none of them; returns the file's path.
+def _check_version(path: Path, stored: Mapping[str, NDArray[Any]]) -> None:
+    """HeadFileError for a file of a later omote; those without a version are from before there was one."""
+    version = int(stored[FORMAT][0]) if FORMAT in stored else 0
+    if version > VERSION:
+        raise HeadFileError(f"{path}: is of version {version}, this omote reads up to {VERSION}", hint="update omote")
+
+
+def write_beside(path: Path, arrays: Mapping[str, NDArray[Any]], checks: Mapping[str, int] | None = None) -> Path:
+    """Keep arrays by name, all or none of them, and checksums by part; returns the file's path.
 
     Raises
     ------
     HeadFileError : the file cannot be written, or the disk is full.
     """
     new = path.with_suffix(".npz.new")
-    packed: dict[str, Any] = dict(arrays)
+    packed: dict[str, Any] = {**arrays, FORMAT: np.array([VERSION], np.int64)}
+    packed |= {f"{CHECK}{part}": np.array([check], np.int64) for part, check in (checks or {}).items()}
     try:
         with new.open("wb") as stream:
             np.savez_compressed(stream, **packed)

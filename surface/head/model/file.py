@@ -46,8 +46,12 @@ class Source:
             raise self.bad(self.toml_path, "file", "missing") from e
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as e:
             raise self.bad(self.toml_path, "file", f"cannot be read ({e})") from e
-        if table.get("format") != VERSION:
-            raise self.bad(self.toml_path, "format", f"is {table.get('format')!r}, this omote reads {VERSION}")
+        version = table.get("format")
+        if isinstance(version, int) and version > VERSION:
+            why = f"is {version}, this omote reads up to {VERSION}"
+            raise HeadFileError(f"{self.toml_path}: format: {why}", hint="update omote")
+        if version != VERSION:
+            raise self.bad(self.toml_path, "format", f"is {version!r}, this omote reads {VERSION}")
         return table
 
     def _npz(self) -> dict[str, NDArray]:

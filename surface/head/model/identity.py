@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.errors import HeadFileError
-from surface.head.model.beside import beside, read_beside, write_beside
+from surface.head.model.beside import Beside, beside, read_beside, write_beside
 from surface.head.model.data import Group, HeadData, PartData
 
 FILE = "identities.npz"
 Floats = NDArray[np.float64]
+Arrays = Mapping[str, NDArray]
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,15 @@ def load_identities(head: str | Path) -> dict[str, Identity]:
 
     Raises
     ------
-    HeadFileError : the file is damaged.
+    HeadFileError : the file is damaged or of a newer version.
     """
     hint = "make it again: omote fit MESH -o FOLDER --keep --identities FILE"
     return read_beside(identities_path(head), _identities, hint) or {}
 
 
-def _identities(z: np.lib.npyio.NpzFile) -> dict[str, Identity]:
+def _identities(kept: Beside) -> dict[str, Identity]:
     """By name, as a file has them."""
+    z = kept.arrays
     names = [str(n) for n in z["names"]]
     eyes, jaw = _finite(z["eyes"], (len(names), 2, 3)), _finite(z["jaw"], (len(names), 3))
     fit = int(z["fit"])
@@ -87,9 +89,9 @@ def _finite(a: NDArray, shape: tuple[int, ...]) -> Floats:
     return a.astype(np.float64)
 
 
-def _groups(z: np.lib.npyio.NpzFile, k: int, name: str) -> dict[str, Group]:
+def _groups(z: Arrays, k: int, name: str) -> dict[str, Group]:
     out = {}
-    for key in z.files:
+    for key in z:
         if key.startswith(f"{k}/ids/"):
             part = key.split("/", 2)[2]
             ids = _indices(z[key])
@@ -97,9 +99,9 @@ def _groups(z: np.lib.npyio.NpzFile, k: int, name: str) -> dict[str, Group]:
     return out
 
 
-def _changes(z: np.lib.npyio.NpzFile, k: int) -> dict[str, list[Group]]:
+def _changes(z: Arrays, k: int) -> dict[str, list[Group]]:
     out: dict[str, list[Group]] = {}
-    for key in z.files:
+    for key in z:
         if key.startswith(f"{k}/change_ids/"):
             part, shape = key.split("/", 2)[2].rsplit("/", 1)
             ids = _indices(z[key])

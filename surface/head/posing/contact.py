@@ -22,6 +22,7 @@ from surface.head.posing.contact_kernels import (
     move_points,
     place_samples,
 )
+from surface.spline.kernels import fill_rows, row_capacity
 
 Floats = NDArray[np.float64]
 MEET = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
@@ -234,8 +235,6 @@ def _cushion(samples: Floats, radius: float) -> Cushion | None:
 def shares_at(surface: DCPSurface, uv: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
     """The rational weights of a surface's points at places (s, 2), without scipy: those of place k are ``share (m,)``
     of the points ``ids (m,)`` from ``start[k]`` to ``start[k + 1]``."""
-    from surface.spline.kernels import fill_rows, row_capacity
-
     samples, sides, _ = surface.sample(uv, None)
     arrays, bins = surface.arrays(), surface.bin_arrays()
     capacity = row_capacity(*bins[:3], samples)

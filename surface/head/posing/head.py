@@ -56,15 +56,15 @@ class Head:
 
         Raises
         ------
-        HeadFileError : a file is missing, damaged, cut short or of another version; names file and key. Or the head
-            has no identity of that name.
+        HeadFileError : a file is missing, damaged, cut short, of another version or made for another mesh; names file
+            and key. Or the head has no identity of that name.
         """
         data = load_data(path)
         if identity:
             data = with_identities(data, load_identities(path), identity, str(path))
         head = cls(data, str(path))
-        apply_shade(head.parts, read_shade(path))
-        apply_lean(head.parts, read_lean(path))
+        apply_shade(head.parts, read_shade(path, head.parts))
+        apply_lean(head.parts, read_lean(path, head.parts))
         return head
 
     @property
@@ -148,9 +148,13 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
         raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e
     attributes = paint_part(head.paint, part.name, mesh.uv, where)
     attributes |= _eye_directions(part, head, mesh.vertices)
-    if part.follows == "skin":
-        return SkinPart(part, head, mesh, surface, attributes, drivers)
-    return RigidPart(part, head, mesh, surface, attributes)
+    made: HeadPart = (
+        SkinPart(part, head, mesh, surface, attributes, drivers)
+        if part.follows == "skin"
+        else RigidPart(part, head, mesh, surface, attributes)
+    )
+    made.stored = kept is not None
+    return made
 
 
 def _eye_directions(part: PartData, head: HeadData, vertices: NDArray) -> dict[str, NDArray[np.float32]]:

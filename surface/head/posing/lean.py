@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.head.model.beside import beside, read_beside, write_beside
+from surface.head.posing.order import belonging, checksums
 from surface.head.posing.part import HeadPart
 
 FILE = "lean.npz"
@@ -27,22 +28,24 @@ def lean_path(head: str | Path) -> Path:
     return beside(head, FILE)
 
 
-def read_lean(head: str | Path) -> dict[str, Triangles]:
+def read_lean(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, Triangles]:
     """Triangles (k, 3) by "PART/LEVEL", and under "PART" what they were made from; empty where there is no such file.
 
     Raises
     ------
-    HeadFileError : the file is damaged.
+    HeadFileError : the file is damaged, of a newer version, or was made for another mesh of one of ``parts``.
     """
     path = lean_path(head)
     hint = f"delete {path}, or make the head again: omote fit"
-    return read_beside(path, lambda z: {name: z[name].astype(np.int32) for name in z.files}, hint) or {}
+    made = read_beside(path, lambda kept: {k: v.astype(np.int32) for k, v in belonging(kept, parts).items()}, hint)
+    return made or {}
 
 
 def write_lean(head: str | Path, parts: Iterable[HeadPart], lean: Mapping[str, Triangles]) -> Path:
     """Keep triangles by "PART/LEVEL" beside the head; returns the file's path."""
+    own = list(parts)
     packed: dict[str, NDArray[Any]] = {name: _packed(triangles) for name, triangles in lean.items()}
-    return write_beside(lean_path(head), packed | {part.name: made_from(part) for part in parts})
+    return write_beside(lean_path(head), packed | {part.name: made_from(part) for part in own}, checksums(own))
 
 
 def _packed(triangles: Triangles) -> NDArray[np.unsignedinteger]:

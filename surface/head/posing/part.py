@@ -42,8 +42,11 @@ class HeadPart:
     attributes : static per-vertex arrays (m, k) float32 by name.
     lean : fewer triangles over the same vertices, by level; see :mod:`surface.head.posing.lean`.
     borders : (k, 2) directed edges that only one triangle of the tessellation has.
-    surface : the DCP surface at rest.
+    surface : the DCP surface at rest. mesh : its tessellation.
+    stored : was the tessellation kept in the head's file? Else it was made when the head was loaded.
     """
+
+    stored = False
 
     def __init__(self, data: PartData, mesh: Mesh, surface: DCPSurface, attributes: Mapping[str, Floats32]) -> None:
         self.name, self.material, self.follows = data.name, data.material, data.follows

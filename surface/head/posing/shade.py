@@ -3,7 +3,8 @@
 For some parts there is more: which way the sky lies, ``PART/visible`` (m, 4), and how thin the flesh is,
 ``PART/thin`` (m, 1), 0 thick.
 
-The file belongs to one tessellation. Parts that it does not fit, or a head without it, are drawn unshaded.
+The file belongs to one tessellation, see :mod:`surface.head.posing.order`. Parts that are tessellated in another way,
+or a head without it, are drawn unshaded.
 """
 
 from __future__ import annotations
@@ -15,34 +16,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.head.model.beside import beside, read_beside, write_beside
+from surface.head.posing.order import belonging, checksums
 from surface.head.posing.part import HeadPart
 
 FILE = "occlusion.npz"
 Shares = Mapping[str, NDArray[np.floating]]
 
 
-def read_shade(head: str | Path) -> dict[str, NDArray[np.float32]]:
+def read_shade(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, NDArray[np.float32]]:
     """Shares (m, k) of each part, 0..1, by the part's name; empty where the head has no such file.
 
     Parameters
     ----------
     head : the head's folder or its head.toml.
+    parts : what the shares are for; those of another tessellation are left out.
 
     Raises
     ------
-    HeadFileError : the file is damaged.
+    HeadFileError : the file is damaged, of a newer version, or was made for another mesh of a part.
     """
     path = shade_path(head)
     hint = f"delete {path}, or make the head again: omote fit"
-    return read_beside(path, lambda z: {name: _rows(z[name]) for name in z.files}, hint) or {}
+    return read_beside(path, lambda kept: {k: _rows(v) for k, v in belonging(kept, parts).items()}, hint) or {}
 
 
-def write_shade(head: str | Path, shares: Shares) -> Path:
-    """Keep shares (m, k), 0..1, beside the head; returns the file's path."""
+def write_shade(head: str | Path, shares: Shares, parts: Iterable[HeadPart] = ()) -> Path:
+    """Keep shares (m, k), 0..1, of ``parts`` beside the head; returns the file's path."""
     packed = {
         name: np.rint(np.clip(np.squeeze(share), 0.0, 1.0) * 255.0).astype(np.uint8) for name, share in shares.items()
     }
-    return write_beside(shade_path(head), packed)
+    return write_beside(shade_path(head), packed, checksums(parts))
 
 
 def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:

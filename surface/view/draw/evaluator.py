@@ -91,7 +91,7 @@ class GpuEvaluator:
     name = "gpu"
 
     def __init__(self, ctx: moderngl.Context, head: Head, reason: str) -> None:
-        from surface.head.posing.influence import Influence
+        from surface.head.posing.influence import Influence  # compiled: loaded when first used
 
         self._head, self.reason, self._ctx = head, reason, ctx
         self._sums = Influence(head)
@@ -165,7 +165,7 @@ class GpuEvaluator:
 
     def _sparse(self, part: ViewPart, ids: np.ndarray) -> tuple[Any, np.ndarray]:
         """Matrix (k, points) that gives vertices `ids` of a part before the head turns, and their shares (k,)."""
-        from scipy.sparse import csr_matrix
+        from scipy.sparse import csr_matrix  # takes a moment to import
 
         vertices = self._range(part)[0] + np.asarray(ids)
         low, high = self._sums.start[vertices], self._sums.start[vertices + 1]

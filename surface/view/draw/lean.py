@@ -7,16 +7,14 @@ from __future__ import annotations
 
 from collections import deque
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from surface.head import Head, load_data
+from surface.head.posing.lean import write_lean
+from surface.head.posing.part import HeadPart
 from surface.mesh.collapse import Collapse
 from surface.view.draw.materials import attribute, of, strip_uv
-
-if TYPE_CHECKING:
-    from surface.head import Head
-    from surface.head.posing.part import HeadPart
 
 #: How far triangles of quality "fast" may be off, mm (root mean square), by material; those of "full" by this share.
 ERROR_MM = {"skin": 0.5, "brow": 0.56, "lash": 0.42, "teeth": 0.2, "gums": 0.5, "mouth": 0.84, "eye": 0.35}
@@ -42,11 +40,7 @@ def lean_head(folder: str | Path) -> Path:
     ------
     HeadFileError : the head cannot be read.
     """
-    from surface.head import Head
-    from surface.head.posing.lean import lean_path, write_lean
-
-    lean_path(folder).unlink(missing_ok=True)  # a damaged one would be refused
-    head = Head.load(folder)
+    head = Head(load_data(folder), str(folder))  # without what stands beside it and is made for another, perhaps
     return write_lean(folder, head.parts, lean_triangles(head))
 
 

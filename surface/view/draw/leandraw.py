@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from surface.head import Head
 from surface.head.posing.leanhead import LeanHead, LeanPart
 from surface.view.draw import materials
+from surface.view.scene.openings import Openings
 from surface.view.scene.parts import Moving, ViewPart, static_buffers
 
 if TYPE_CHECKING:
     import moderngl
-
-    from surface.head import Head
-    from surface.view.scene.openings import Openings
 
 Ranges = Sequence[tuple[int, int]]
 

@@ -49,7 +49,7 @@ def build(
     ------
     ViewError : when the driver refuses the shader; the message carries the driver's words.
     """
-    import moderngl
+    import moderngl  # optional
 
     texts: dict[str, Any] = {"vertex_shader": assemble(vertex, defines or {})}
     if fragment:

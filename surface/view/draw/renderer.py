@@ -110,7 +110,7 @@ class Renderer:
         """The head's lean triangles, evaluated for themselves; none where it has none."""
         if not any(getattr(part, "lean", None) for part in self.head.parts):
             return []
-        from surface.view.draw.leandraw import LeanEvaluator, lean_drawn
+        from surface.view.draw.leandraw import LeanEvaluator, lean_drawn  # compiled: loaded when first used
 
         lean: Any = LeanEvaluator(self.head, self.quality, self.openings, self.evaluator.reason)  # type: ignore[arg-type]
         lean.pose(self._posed)

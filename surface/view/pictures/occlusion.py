@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from surface.head import Head, load_data
+from surface.head.posing.shade import shade_path, write_shade
 from surface.view.draw.programs import build, put
 from surface.view.pictures.offscreen import open_context
 from surface.view.scene.parts import ViewHead, ViewPart
@@ -81,7 +83,7 @@ def calm(values: np.ndarray, triangles: np.ndarray, passes: int = 2) -> np.ndarr
 
     Views are few, and what neighbours differ by for that reason shows as streaks where skin stretches.
     """
-    from scipy.sparse import coo_array
+    from scipy.sparse import coo_array  # takes a moment to import
 
     start, end = np.asarray(triangles).T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     ones = np.ones(2 * len(start), np.float32)
@@ -236,10 +238,7 @@ def shade_head(folder: str | Path) -> Path:
     HeadFileError : the head cannot be read.
     ViewError : no OpenGL on this machine.
     """
-    from surface.head import Head
-    from surface.head.posing.shade import shade_path, write_shade
-
     shade_path(folder).unlink(missing_ok=True)
-    head = Head.load(folder)
+    head = Head(load_data(folder), str(folder))  # without what stands beside it and is made for another, perhaps
     open_pose = np.array([_OPEN.get(name, 0.0) for name in head.parameters])
-    return write_shade(folder, bake_head(head, open_pose))
+    return write_shade(folder, bake_head(head, open_pose), head.parts)

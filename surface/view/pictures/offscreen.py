@@ -30,7 +30,7 @@ def open_context() -> moderngl.Context:
     ViewError : moderngl is missing, or no OpenGL 3.1 is to be had.
     """
     try:
-        import moderngl
+        import moderngl  # optional
     except ImportError as error:
         raise ViewError(f"pictures need moderngl ({error})", hint="pip install '.[view]' in the checkout") from error
     reasons = []

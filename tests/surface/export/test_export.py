@@ -1,16 +1,20 @@
 """Heads for other programs: structure of the GLB, names, shapes, the way back, OBJ, and what is refused."""
 
 import json
+import os
 import shutil
 import struct
 import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from small_head import all_points, part, small_head
 
+import surface
 from surface.base.errors import ExportError
-from surface.export import export_head
+from surface.export import API, SUFFIXES, Exporter, export_head, exporters, listing
 from surface.export.png import png_bytes
 from surface.export.shapes import pieces_of
 from surface.fit.source.load import load_mesh
@@ -149,6 +153,68 @@ def test_other_suffixes_and_places_are_refused(tmp_path, head):
     for name in ("h.glb", "h.obj"):
         with pytest.raises(ExportError, match="cannot be written"):
             export_head(head, tmp_path / "none" / name)
+
+
+MODULE = """
+{needs}
+from surface.export.exporter import Exporter
+
+
+def write(head, path, pose):
+    path.write_text(head.name)
+    return [path]
+
+
+EXPORTER = Exporter(kind="{kind}", suffixes=(".{kind}",), help="a name", write=write)
+"""
+USE = """
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from surface import export
+from surface.base.errors import ExportError
+print(export.SUFFIXES)
+print(export.export_head(SimpleNamespace(name="small"), "h.txt")[0].read_text())
+try:
+    export.export_head(SimpleNamespace(name="small"), "h.fbx")
+except ExportError as error:
+    print(error)
+"""
+
+
+def test_a_module_dropped_into_the_folder_is_found_and_one_that_lacks_a_package_harms_nobody(tmp_path):
+    source = Path(surface.__file__).parent
+    shutil.copytree(source, tmp_path / "surface", ignore=shutil.ignore_patterns("__pycache__"))
+    folder = tmp_path / "surface" / "export"
+    (folder / "txt.py").write_text(MODULE.format(needs="", kind="txt"))
+    (folder / "fbx.py").write_text(MODULE.format(needs="import no_such_package", kind="fbx"))
+    env = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", USE], cwd=tmp_path, env=env, capture_output=True, text=True, check=True
+    )
+    suffixes, name, error = done.stdout.splitlines()
+    assert suffixes == "('.glb', '.obj', '.txt')"
+    assert name == "small"
+    assert error == "h.fbx: is neither .glb, .obj nor .txt; fbx needs no_such_package"
+
+
+def test_exporters_from_outside_are_used_and_refused_where_they_cannot_be(tmp_path, head):
+    def write(head, path, pose):
+        path.write_text(str(dict(pose)))
+        return [path]
+
+    mine = Exporter("txt", (".txt", ".text"), "a pose", write)
+    (path,) = export_head(head, tmp_path / "h.TEXT", {"jawOpen": 0.5}, extra=[mine])
+    assert path.read_text() == "{'jawOpen': 0.5}"
+    assert listing([mine]).splitlines()[-1] == ".txt, .text: a pose"
+    assert len(listing().splitlines()) == len(exporters()) == len(SUFFIXES)
+    with pytest.raises(ExportError, match="is neither"):
+        export_head(head, tmp_path / "h.txt")
+    with pytest.raises(ExportError, match=r"exporter 'other': \.glb is written by 'glb' already"):
+        exporters([Exporter("other", (".glb",), "", write)])
+    with pytest.raises(ExportError, match=f"made for exporters of version {API + 1}, this omote has {API}") as caught:
+        exporters([Exporter("other", (".x",), "", write, api=API + 1)])
+    assert caught.value.hint == "update omote"
 
 
 def test_png_is_what_pillow_reads():

@@ -37,6 +37,7 @@ def folder(result, tmp_path_factory):
 
 def test_the_figures_are_those_of_the_fit(folder, result):
     table = json.loads((folder / "report.json").read_text())
+    assert (table["format"], table["version"]) == ("omote fit report", 1)
     (part,) = table["parts"]
     assert part["control_points"] == result.report.points and set(part["shapes_mm"]) == {"jawOpen", "mouthSmileLeft"}
     assert part["neutral_mm"]["rms"] == result.report.parts[0].neutral.rms

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from surface.head import Head
+from surface.head.model.beside import read_beside
 from surface.head.posing.lean import LEVELS
+from surface.head.posing.order import checksums
 from surface.head.posing.shade import read_shade
 from surface.view.draw import materials
 
@@ -23,12 +25,17 @@ def head(folder: Path) -> Head:
 
 
 def test_every_part_has_its_baked_shade(head: Head, folder: Path) -> None:
-    shares = read_shade(folder)
+    shares = read_shade(folder, head.parts)
     sizes = {part.name: len(part.vertices) for part in head.parts}
     assert {name: len(share) for name, share in shares.items() if "/" not in name} == sizes
     assert all(len(share) == sizes[name.split("/")[0]] for name, share in shares.items())
     skins = {part.name for part in head.parts if materials.of(part.material).program == "skin"}
     assert skins <= {name.split("/")[0] for name in shares if name.endswith("/visible")}
+
+
+@pytest.mark.parametrize("file", ["occlusion.npz", "lean.npz"])
+def test_files_beside_it_say_which_tessellation_they_are_for(head: Head, folder: Path, file: str) -> None:
+    assert read_beside(folder / file, lambda kept: kept.checks, "") == checksums(head.parts)
 
 
 def test_every_part_has_its_lean_triangles(head: Head) -> None:

@@ -1,0 +1,84 @@
+"""Compiled code is kept until a file changes that it was made from."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from numba.core.registry import CPUDispatcher
+
+from surface.base import jit
+
+ROOT = jit.PACKAGE.parent
+FILES = {
+    "numbers.py": "AMOUNT = 3.0\n",
+    "shared.py": (
+        "from surface.base.jit import inlined\n\nfrom .numbers import AMOUNT\n\n\n"
+        "@inlined\ndef add(x):\n    return x + AMOUNT\n"
+    ),
+    "user.py": (
+        "from surface.base.jit import kernel\n\nfrom .shared import (\n    add,\n)\n\n\n"
+        "@kernel\ndef twice(x):\n    return 2.0 * add(x)\n"
+    ),
+}
+RUN = """
+from surface.trial.user import twice
+result = twice(1.0)
+print(result, sum(twice.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """A copy of the package's base with three files more: a number, a shared kernel, and one that uses it."""
+    skipped = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(jit.PACKAGE / "base", tmp_path / "surface" / "base", ignore=skipped)
+    shutil.copy(jit.PACKAGE / "__init__.py", tmp_path / "surface")
+    (tmp_path / "surface" / "trial").mkdir()
+    for name, text in FILES.items():
+        (tmp_path / "surface" / "trial" / name).write_text(text)
+    return tmp_path
+
+
+def run(folder: Path) -> list[float]:
+    """What the kernel gives in a process of its own, and how often compiled code was found on disk."""
+    env = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    env.pop("NUMBA_CACHE_DIR", None)
+    done = subprocess.run([sys.executable, "-c", RUN], cwd=folder, env=env, capture_output=True, text=True, check=True)
+    return [float(word) for word in done.stdout.split()]
+
+
+def test_an_edited_file_recompiles_the_kernels_that_draw_on_it(copy: Path) -> None:
+    trial = copy / "surface" / "trial"
+    assert run(copy) == [8.0, 0]
+    assert run(copy) == [8.0, 1]
+    (trial / "shared.py").write_text(FILES["shared.py"].replace("x + AMOUNT", "x - AMOUNT"))
+    assert run(copy) == [-4.0, 0]
+    assert run(copy) == [-4.0, 1]
+    (trial / "numbers.py").write_text("AMOUNT = 5.0\n")
+    assert run(copy) == [-8.0, 0]
+    (copy / "surface" / "__init__.py").write_text("# nothing that a kernel draws on\n")
+    assert run(copy) == [-8.0, 1]
+
+
+def kernel_modules() -> list[str]:
+    """Every module of the package that has compiled kernels."""
+    paths = (p for p in sorted(jit.PACKAGE.rglob("*.py")) if p != Path(jit.__file__))
+    return [".".join(p.relative_to(ROOT).with_suffix("").parts) for p in paths if "jit import" in p.read_text("utf-8")]
+
+
+@pytest.mark.parametrize("name", kernel_modules())
+def test_every_file_whose_kernels_a_file_calls_is_watched(name: str) -> None:
+    module = importlib.import_module(name)
+    watched = jit.drawn_on(Path(str(module.__file__)))
+    for value in vars(module).values():
+        functions = [value] if isinstance(value, CPUDispatcher) else []
+        if getattr(value, "__name__", "").startswith("surface."):  # a module, whose kernels may be called
+            functions = [v for v in vars(value).values() if isinstance(v, CPUDispatcher)]
+        for function in functions:
+            assert Path(function.py_func.__code__.co_filename) in watched, function
