@@ -16,6 +16,7 @@ from controller.takes.reader import TAKES, suffixes
 from drivers.base.options import entries
 from drivers.base.plugins import Registry
 from drivers.core.registry import FAMILIES, SIMULATED, simulator_of
+from surface.export import SUFFIXES
 
 Page = Callable[[str], str]
 
@@ -123,3 +124,8 @@ def test_every_kind_of_take_is_listed_with_its_layer(page: Page) -> None:
     takes = [TAKES.get(kind) for kind in own(TAKES)]
     assert written == {(suffix, take.layer) for take in takes for suffix in take.suffixes}
     assert {suffix for suffix, _ in written} <= set(suffixes())
+
+
+def test_every_kind_of_exported_file_is_told_of(page: Page) -> None:
+    section = page("docs/heads.md").partition("## For other programs\n")[2].partition("\n## ")[0]
+    assert sorted(re.findall(r"`omote export head(\.\w+)`", section)) == sorted(SUFFIXES)
