@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from drivers.base.options import option
-from drivers.core.families import BOARD_BAUD
 from drivers.sim.boards.board import Board
 from drivers.sim.boards.rc import RcChannel
 from drivers.sim.wire.faults import Fault
-from drivers.sim.wire.simulator import Servos, Setting, Simulator
+from drivers.sim.wire.simulator import BoardOptions, Servos, Setting, Simulator
 
 CHANNELS = 32
 MIN_US, MAX_US = 500, 2500
@@ -137,14 +134,7 @@ class Ssc32(Board):
         return True
 
 
-@dataclass(frozen=True, kw_only=True)
-class Ssc32Options:
-    """What ``omote simulate ssc32`` can be told."""
-
-    baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
-
-
-def _alone(options: Ssc32Options, setting: Setting) -> Ssc32:
+def _alone(options: BoardOptions, setting: Setting) -> Ssc32:
     return Ssc32(setting.now_s, seed=setting.seed)
 
 
@@ -155,7 +145,7 @@ def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Ss
 SIMULATOR = Simulator(
     far_end=_far_end,
     alone=_alone,
-    options=Ssc32Options,
+    options=BoardOptions,
     help="""Serve a simulated Lynxmotion SSC-32 until interrupted; prints `ready PATH`.
 
     Example: omote simulate ssc32 --link /tmp/ssc32

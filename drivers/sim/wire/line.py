@@ -30,6 +30,43 @@ class Reader(Protocol):
         """Forget the incomplete packet."""
 
 
+class FixedReader:
+    """Cuts a byte stream into packets of one length that begin with the same byte.
+
+    Parameters
+    ----------
+    head : first byte of every packet; bytes before one are passed over. length : of a packet, bytes.
+    """
+
+    def __init__(self, head: int, length: int) -> None:
+        self._head, self._length, self._data = bytes((head,)), length, b""
+
+    @property
+    def pending(self) -> int:
+        """Bytes of a packet that is not complete."""
+        return len(self._data)
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Packets completed by these bytes."""
+        self._data += data
+        packets = []
+        while (begin := self._data.find(self._head)) >= 0 and len(self._data) >= begin + self._length:
+            packets.append(self._data[begin : begin + self._length])
+            self._data = self._data[begin + self._length :]
+        self._data = self._data[begin:] if begin >= 0 else b""
+        return packets
+
+    def flush(self) -> list[bytes]:
+        """Give up on the incomplete packet."""
+        self._data = b""
+        return []
+
+    def take_pending(self) -> bytes:
+        """Forget the incomplete packet."""
+        data, self._data = self._data, b""
+        return data
+
+
 class Line(ABC):
     """What a server needs to know of a simulated bus, whatever is on it.
 
@@ -63,9 +100,9 @@ class Line(ABC):
     def make_reader(self) -> Reader:
         """A reader of what the host sends."""
 
-    @abstractmethod
     def size(self, packet: Any) -> int:
-        """Bytes of a packet on the wire."""
+        """Bytes of a packet on the wire; as many as it has unless it is said otherwise."""
+        return len(packet)
 
     @abstractmethod
     def carry_out(self, packet: Any, now_s: float) -> list[Reply]:

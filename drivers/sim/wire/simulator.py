@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from drivers.base.options import option
+from drivers.core.families import BOARD_BAUD
 from drivers.core.traffic import Decoder, TextDecoder
 from drivers.sim.wire.line import Line
 
@@ -27,6 +29,13 @@ class Setting:
     baud: int
     seed: int = 0
     names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoardOptions:
+    """What ``omote simulate`` can be told of every board."""
+
+    baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
 
 
 @dataclass(frozen=True, kw_only=True)
