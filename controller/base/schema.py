@@ -1,13 +1,18 @@
-"""Dataclasses of options (:mod:`drivers.base.options`) as fields of a checked table."""
+"""Dataclasses of options (:mod:`drivers.base.options`) as fields of a checked table, and tables that name a plug-in."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, ValidatorFunctionWrapHandler, WrapValidator
 
+from drivers.base.errors import PluginError
 from drivers.base.options import REQUIRED, Entry, Option, entries
+from drivers.base.plugins import Registry
+
+Model = TypeVar("Model", bound=BaseModel)
 
 
 def fields_of(options: type) -> dict[str, tuple[Any, Any]]:
@@ -22,6 +27,29 @@ def given_in(table: BaseModel, options: type) -> Any:
     """An instance of a dataclass of options with what a table of :func:`fields_of` it was given."""
     names = table.model_fields_set & {entry.name for entry in entries(options)}
     return options(**{name: getattr(table, name) for name in names})
+
+
+def known_kind(registry: Registry[Any], kind: str) -> str:
+    """A kind that is installed.
+
+    Raises
+    ------
+    ValueError : it is not, or it cannot be loaded; says which there are.
+    """
+    try:
+        registry.get(kind)
+    except PluginError as error:
+        raise ValueError(f"{error} ({error.hint})") from error
+    return kind
+
+
+def read_by(read: Callable[[dict[str, Any]], Model]) -> WrapValidator:
+    """For an entry of a list in a file: a table is read by ``read``, which knows the model of its kind."""
+
+    def check(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+        return read(value) if isinstance(value, dict) else handler(value)
+
+    return WrapValidator(check)
 
 
 def bare_type(annotation: Any) -> Any:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any
 
-from pydantic import ValidatorFunctionWrapHandler, WrapValidator, create_model, field_validator, model_validator
+from pydantic import create_model, field_validator, model_validator
 
 from controller.base.config import Settings
-from controller.base.schema import fields_of, given_in
+from controller.base.schema import fields_of, given_in, known_kind, read_by
 from controller.links.kind import LINKS, Around, Link, LinkKind
 from drivers.base.errors import PluginError
 
@@ -42,11 +42,7 @@ class LinkSettings(Settings):
     @field_validator("kind")
     @classmethod
     def _is_known(cls, value: str) -> str:
-        try:
-            LINKS.get(value)
-        except PluginError as error:
-            raise ValueError(f"{error} ({error.hint})") from error
-        return value
+        return known_kind(LINKS, value)
 
     @model_validator(mode="after")
     def _fits(self) -> LinkSettings:
@@ -96,12 +92,5 @@ def _model_of(kind: LinkKind) -> type[LinkSettings]:
     return made
 
 
-def _by_kind(table: Any, handler: ValidatorFunctionWrapHandler) -> LinkSettings:
-    if isinstance(table, dict):
-        return read_link(table)
-    link: LinkSettings = handler(table)
-    return link
-
-
-LinkTable = Annotated[LinkSettings, WrapValidator(_by_kind)]
+LinkTable = Annotated[LinkSettings, read_by(read_link)]
 """An entry of ``[[links]]``: read by its kind's own options."""

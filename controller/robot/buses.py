@@ -8,15 +8,13 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     Field,
     ValidationInfo,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
     create_model,
     field_validator,
     model_validator,
 )
 
 from controller.base.config import Settings
-from controller.base.schema import fields_of, given_in
+from controller.base.schema import fields_of, given_in, known_kind, read_by
 from drivers.base.errors import PluginError
 from drivers.core.families import SERVO_BAUD, Family
 from drivers.core.registry import FAMILIES, SIMULATED
@@ -66,12 +64,7 @@ class BusSettings(Settings):
     @field_validator("kind", "simulates")
     @classmethod
     def _is_known(cls, value: str, info: ValidationInfo) -> str:
-        if value != SIMULATED or info.field_name == "simulates":
-            try:
-                FAMILIES.get(value)
-            except PluginError as error:
-                raise ValueError(f"{error} ({error.hint})") from error
-        return value
+        return value if (info.field_name, value) == ("kind", SIMULATED) else known_kind(FAMILIES, value)
 
     @model_validator(mode="after")
     def _fits(self) -> BusSettings:
@@ -143,12 +136,5 @@ def _model_of(family: Family) -> type[BusSettings]:
     return made
 
 
-def _by_family(table: Any, handler: ValidatorFunctionWrapHandler) -> BusSettings:
-    if isinstance(table, dict):
-        return read_bus(table)
-    bus: BusSettings = handler(table)
-    return bus
-
-
-Bus = Annotated[BusSettings, WrapValidator(_by_family)]
+Bus = Annotated[BusSettings, read_by(read_bus)]
 """An entry of ``[[buses]]``: read by its family's own options."""
