@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
+from drivers.core.registry import FAMILIES
+
 WHOLE = ("surface", "surface.head", "surface.view", "surface.fit", "surface.readers", "surface.export", "drivers",
          "drivers.sim")  # fmt: skip
 """Packages of which everything in ``__all__`` is public."""
@@ -78,6 +80,8 @@ def _command(name: str, command: Any) -> Iterator[str]:
         yield " ".join([name, *words])
         return
     for each in sorted(command.list_commands(None)):
+        if each in FAMILIES.kinds() and FAMILIES.package_of(each):
+            continue  # what other packages add is none of ours
         yield from _command(f"{name} {each}", command.get_command(None, each))
 
 

@@ -215,5 +215,8 @@ HEAVY = "numba numba.core.registry scipy.sparse scipy.optimize pydantic rich.tab
 @pytest.mark.parametrize("room", ORDER)
 def test_every_module_can_be_imported_first(room: str) -> None:
     names = [name for name in MODULES if name.split(".")[0] == room]
-    done = subprocess.run([sys.executable, "-c", ALONE, HEAVY, *names], capture_output=True, text=True, cwd=ROOT)
+    done = subprocess.run([sys.executable, "-W", "ignore::DeprecationWarning", "-c", ALONE, HEAVY, *names],
+        capture_output=True, text=True, cwd=ROOT,
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},  # a process of one thread may fork
+    )  # fmt: skip
     assert (done.stdout, done.stderr, done.returncode) == ("", "", 0)

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from controller.base.errors import ConfigError
+from controller.base.formats import NEWER
 from controller.base.salvage import Rest
 
 Model = TypeVar("Model", bound="Settings")
@@ -69,7 +70,9 @@ def config_error(path: Path, faults: list[str]) -> ConfigError:
     """One error that lists all ``faults`` of ``path``."""
     listing = "\n".join(f"  {fault}" for fault in faults)
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
-    return ConfigError(f"{path}: {count}\n{listing}", hint=f"mend the file, then: omote check {path}")
+    newer = any(NEWER in fault for fault in faults)
+    hint = "pip install --upgrade omote" if newer else f"mend the file, then: omote check {path}"
+    return ConfigError(f"{path}: {count}\n{listing}", hint=hint)
 
 
 def describe(fault: Any, model: type[BaseModel]) -> str:

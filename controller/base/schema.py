@@ -6,8 +6,9 @@ from collections.abc import Callable
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, Field, ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import BaseModel, Field, ValidationError, ValidatorFunctionWrapHandler, WrapValidator, create_model
 
+from controller.base.errors import ConfigError
 from drivers.base.errors import PluginError
 from drivers.base.options import REQUIRED, Entry, Option, entries
 from drivers.base.plugins import Registry
@@ -27,6 +28,22 @@ def given_in(table: BaseModel, options: type) -> Any:
     """An instance of a dataclass of options with what a table of :func:`fields_of` it was given."""
     names = table.model_fields_set & {entry.name for entry in entries(options)}
     return options(**{name: getattr(table, name) for name in names})
+
+
+def from_words(options: type, given: dict[str, Any]) -> Any:
+    """An instance of a dataclass of options from what a command line gave.
+
+    Raises
+    ------
+    ConfigError : a value is beyond its limits; names every such option.
+    """
+    make: Any = create_model
+    try:
+        table = make(options.__name__, **fields_of(options)).model_validate(given)
+    except ValidationError as error:
+        faults = [f"--{str(fault['loc'][0]).replace('_', '-')}: {fault['msg']}" for fault in error.errors()]
+        raise ConfigError("; ".join(faults), hint="add --help to see what it takes") from error
+    return options(**{entry.name: getattr(table, entry.name) for entry in entries(options)})
 
 
 def known_kind(registry: Registry[Any], kind: str) -> str:

@@ -1,6 +1,6 @@
 """The ``omote`` command: one message and exit code 1 for everything that goes wrong, never a traceback.
 
-Each command lives in a ``cli_*`` module and imports what it needs when it runs, so that ``omote --help`` and
+Each command lives in a module of this folder and imports what it needs when it runs, so that ``omote --help`` and
 the simulated parts start at once.
 """
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
@@ -12,12 +13,14 @@ from rich.console import Console
 from typer.core import TyperGroup
 
 from controller.base.errors import ConfigError
-from drivers.base.options import Entry, entries
+from drivers.base.errors import PluginError
+from drivers.base.options import REQUIRED, Entry, entries
 
 if TYPE_CHECKING:
     from controller.tools.simulating import Serving  # start-up: --help does without it
 
 console = Console(highlight=False)
+log = logging.getLogger(__name__)
 
 
 class _Simulators(TyperGroup):
@@ -25,15 +28,30 @@ class _Simulators(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all commands."""
-        from drivers.core.registry import FAMILIES  # start-up: most commands need no families
-
-        return [*(family.kind for family in FAMILIES.all() if family.simulator), *super().list_commands(ctx)]
+        return [*_simulated_kinds(), *super().list_commands(ctx)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name; None where there is none."""
+        from drivers.core.registry import kinds  # start-up: most commands need no families
+
         if cmd_name in self.commands:
             return self.commands[cmd_name]
-        return _family_command(cmd_name) if cmd_name in self.list_commands(ctx) else None
+        return _family_command(cmd_name) if cmd_name in kinds() else None
+
+
+def _simulated_kinds() -> Iterator[str]:
+    """Families that have a simulator; one that cannot be loaded is told and left out."""
+    from drivers.core.registry import FAMILIES  # start-up: most commands need no families
+    from drivers.sim.wire.simulator import simulator_of
+
+    for family in FAMILIES.all():
+        if family.simulator:
+            try:
+                simulator_of(family.kind)
+            except PluginError as error:
+                log.warning("%s", error)
+            else:
+                yield family.kind
 
 
 def _family_command(kind: str) -> Any:
@@ -110,13 +128,14 @@ def _options(command: Callable[..., Any]) -> list[inspect.Parameter]:
 
 def _simulate_family(kind: str) -> Callable[..., None]:
     """The command that serves what stands in for a family."""
-    from controller.tools.simulating import serve_alone  # start-up: the command line shows its help without it
-    from drivers.core.registry import simulator_of
+    from controller.base.schema import from_words  # start-up: the command line shows its help without it
+    from controller.tools.simulating import serve_alone
+    from drivers.sim.wire.simulator import simulator_of
 
     simulator = simulator_of(kind)
 
     def command(how: Serving, **given: Any) -> None:
-        serve_alone(kind, simulator.options(**given), how, console)
+        serve_alone(kind, from_words(simulator.options, given), how, console)
 
     command.__doc__ = simulator.help
     return _served(command, [_parameter(entry) for entry in entries(simulator.options)])
@@ -124,10 +143,12 @@ def _simulate_family(kind: str) -> Callable[..., None]:
 
 def _parameter(entry: Entry) -> inspect.Parameter:
     """An option of a simulator as an option of the command."""
-    limits, flag = entry.option, f"--{entry.name.replace('_', '-')}"
-    shown = typer.Option(limits.flag or flag, min=limits.at_least, max=limits.at_most, help=limits.help)
-    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, shown])
+    limits, name = entry.option, entry.name.replace("_", "-")
+    flag = f"--{name}/--no-{name}" if entry.default is True else f"--{name}"
+    shown = typer.Option(flag, min=limits.at_least, max=limits.at_most, help=limits.help)
+    kind, empty = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.empty
+    default = empty if entry.default is REQUIRED else entry.default
+    return inspect.Parameter(entry.name, kind, default=default, annotation=Annotated[entry.type, shown])
 
 
 @_served

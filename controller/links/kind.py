@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 from controller.layers.commands import CommandSink
+from drivers.base.options import check_options
 from drivers.base.plugins import Registry, folders_with
 
 API = 1
@@ -67,5 +68,11 @@ class LinkKind:
 
 
 LINKS: Registry[LinkKind] = Registry(
-    LinkKind, "link kind", "omote.links", API, lambda: folders_with("controller.links", "kind"), "LINK"
+    LinkKind,
+    "link kind",
+    "omote.links",
+    API,
+    lambda: folders_with("controller.links", "kind"),
+    "LINK",
+    check=lambda link: check_options(link.settings, {"kind"}),
 )

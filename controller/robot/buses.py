@@ -17,7 +17,7 @@ from controller.base.config import Settings
 from controller.base.schema import fields_of, given_in, known_kind, read_by
 from drivers.base.errors import PluginError
 from drivers.core.families import SERVO_BAUD, Family
-from drivers.core.registry import FAMILIES, SIMULATED
+from drivers.core.registry import FAMILIES, SIMULATED, no_simulator
 
 SIMULATION = ("simulates", "transport", "faults", "wire", "latency_s", "seed")
 """Options of a simulated bus, of whatever family."""
@@ -58,13 +58,18 @@ class BusSettings(Settings):
     def options(self) -> dict[str, Any]:
         """What the driver is told; see :func:`drivers.open_bus`."""
         own = [key for key in type(self).model_fields if key not in BusSettings.model_fields]
-        given = {key: getattr(self, key) for key in (*own, *SIMULATION, "port") if key in self.model_fields_set}
-        return {"baud": self.baud, **given}
+        given = {key: getattr(self, key) for key in (*SIMULATION, "port") if key in self.model_fields_set}
+        told = {key: value for key in own if (value := getattr(self, key)) is not None}
+        return {"baud": self.baud, **given, **told}
 
     @field_validator("kind", "simulates")
     @classmethod
     def _is_known(cls, value: str, info: ValidationInfo) -> str:
-        return value if (info.field_name, value) == ("kind", SIMULATED) else known_kind(FAMILIES, value)
+        if info.field_name == "kind" and value == SIMULATED:
+            return value
+        if info.field_name == "simulates" and value in FAMILIES.kinds() and not FAMILIES.get(value).simulator:
+            raise ValueError(f"{no_simulator(value)}; use a real one")
+        return known_kind(FAMILIES, value)
 
     @model_validator(mode="after")
     def _fits(self) -> BusSettings:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from controller.base.config import load
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.paths import config_dir, find_config
 from controller.links.line.host import load_script
+from controller.robot.calibration import CalibrationFile
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
 from controller.stage.stage import load_stage
@@ -131,6 +133,8 @@ def _check_toml(path: Path) -> list[str]:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
         table = {}  # the reader below says what is wrong
+    if isinstance(table.get("channels"), dict) and "buses" not in table:
+        return _check_calibration(path)
     if "channels" in table or "buses" in table:
         return _check_robot(path, PARAMETERS)
     if "steps" in table or "frames_hz" in table:
@@ -139,6 +143,11 @@ def _check_toml(path: Path) -> list[str]:
     if table and all(isinstance(each, dict) and {"weights", "of"} & set(each) for each in table.values()):
         return _check_expressions(path)
     return _check_stage(path, PARAMETERS)
+
+
+def _check_calibration(path: Path) -> list[str]:
+    found = load(path, CalibrationFile)
+    return [f"calibration {found.name} of robot {found.robot}: {len(found.channels)} channels: good"]
 
 
 def _check_expressions(path: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 from rich.console import Console
@@ -11,6 +12,8 @@ from controller.face.still import Still
 from drivers.base.plugins import Registry
 from surface.export import API, Exporter, export_head, exporters
 from surface.head import Head
+
+log = logging.getLogger(__name__)
 
 EXPORTERS: Registry[Exporter] = Registry(
     Exporter,
@@ -45,5 +48,12 @@ def export_with_progress(
 
 def _foreign() -> list[Exporter]:
     """Exporters that other packages add."""
-    own = {one.kind for one in exporters()}
-    return [one for one in EXPORTERS.all() if one.kind not in own]
+    own = {suffix: one for one in exporters() for suffix in one.suffixes}
+    found = []
+    for one in EXPORTERS.all():
+        taken = [suffix for suffix in one.suffixes if own.setdefault(suffix, one).kind != one.kind]
+        if taken:
+            log.warning("exporter %r is left out: %s is written by another one", one.kind, ", ".join(taken))
+        elif one not in exporters():
+            found.append(one)
+    return found

@@ -44,3 +44,6 @@ def listed() -> Iterator[Listed]:
                 yield Listed(sort, kind, registry.get(kind).title, package)
             except PluginError as error:
                 yield Listed(sort, kind, str(error), package, False, error.hint)
+        for kind, package in registry.shadowed():
+            why = f"{registry.what} {kind!r} of the package {package} is never used: omote has that kind itself"
+            yield Listed(sort, kind, why, package, False, f"pip uninstall {package}, or give it another kind")

@@ -26,12 +26,11 @@ from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
 from controller.tools.watching import Watch
 from drivers import open_bus
-from drivers.core.registry import simulator_of
 from drivers.core.traffic import Decoder
 from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import PortServer, serve
 from drivers.sim.wire.line import Line
-from drivers.sim.wire.simulator import Setting, Simulator
+from drivers.sim.wire.simulator import Setting, Simulator, simulator_of
 
 Where = Path | str | None
 """A path that becomes a link to a pseudo-terminal, or a URL to listen at instead."""
@@ -142,11 +141,12 @@ def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSett
 def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> None:
     """Serve what is on a bus of a robot file (:func:`robot_bus`), set to what its driver will expect."""
     chosen, channels = robot_bus(name, bus)
+    simulator = simulator_of(chosen.family)  # before the driver, which may not be there
     options = {key: value for key, value in chosen.options().items() if key not in SIMULATION}
     driver = open_bus(chosen.family, servo_specs(channels), **{"port": "", **options})
     servos = [(channel.id, channel.model) for channel in channels]
     line = make_line(chosen.family, servos, time.monotonic(), baud=chosen.baud, options=driver.far_end())
-    _serve(line, chosen.baud, how, console, simulator_of(chosen.family))
+    _serve(line, chosen.baud, how, console, simulator)
 
 
 def serve_host(script: str, link: Path | None, console: Console) -> None:

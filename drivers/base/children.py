@@ -20,7 +20,7 @@ def command(module: str, *words: str, bare: bool = False) -> list[str]:
     words : arguments.
     bare : without what ``site`` and its start-up files do, which takes time and may fail.
     """
-    return [sys.executable, "-P", *(["-S"] if bare else []), "-m", module, *words]
+    return [sys.executable or "python3", "-P", *(["-S"] if bare else []), "-m", module, *words]
 
 
 def environment(module: str, *, bare: bool = False) -> dict[str, str]:

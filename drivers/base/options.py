@@ -6,9 +6,10 @@ of a command.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import MISSING, dataclass, field, fields
-from typing import Any, get_type_hints
+from collections.abc import Iterable, Iterator
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from types import UnionType
+from typing import Any, get_args, get_type_hints
 
 from drivers.base.errors import DriverError
 
@@ -22,7 +23,6 @@ class Option:
     help : one sentence for people.
     at_least, at_most : ends of a number, themselves allowed; above : a number below all that are allowed.
     choices : the only texts allowed. longest : characters of a text at most.
-    flag : what the command line calls it, where that is not its name.
     """
 
     help: str = ""
@@ -31,7 +31,6 @@ class Option:
     above: float | None = None
     choices: tuple[str, ...] = ()
     longest: int = 200
-    flag: str = ""
 
 
 REQUIRED: Any = MISSING
@@ -64,7 +63,34 @@ def entries(options: type) -> Iterator[Entry]:
     """The options of a dataclass in order."""
     types = get_type_hints(options)
     for each in fields(options):
-        yield Entry(each.name, types[each.name], each.default, each.metadata.get("option", Option()))
+        default = each.default if each.default_factory is MISSING else each.default_factory()
+        yield Entry(each.name, types[each.name], default, each.metadata.get("option", Option()))
+
+
+def check_options(options: type, reserved: Iterable[str] = ()) -> None:
+    """Whether files and commands can be made to read a dataclass of options.
+
+    Parameters
+    ----------
+    reserved : names that mean something else where the options stand.
+
+    Raises
+    ------
+    ValueError : it is no dataclass, or an option's name or type cannot be used; says which.
+    """
+    if not (isinstance(options, type) and is_dataclass(options)):
+        raise ValueError(f"its options must be a dataclass, not {options!r}")
+    try:
+        found = list(entries(options))
+    except NameError as error:
+        raise ValueError(f"a type in {options.__name__} cannot be read: {error}") from error
+    for entry in found:
+        if entry.name in {*reserved} or entry.name.startswith(("_", "model_")):
+            raise ValueError(f"{options.__name__}.{entry.name}: the name is taken")
+        kinds = set(get_args(entry.type)) - {type(None)} if isinstance(entry.type, UnionType) else {entry.type}
+        if not kinds <= {bool, int, float, str, list[str]} or len(kinds) != 1:
+            allowed = "bool, int, float, str or list[str], or one of them or None"
+            raise ValueError(f"{options.__name__}.{entry.name}: its type must be {allowed}, not {entry.type}")
 
 
 def parse_ids(text: str, most: int = 252) -> list[int]:
@@ -78,7 +104,7 @@ def parse_ids(text: str, most: int = 252) -> list[int]:
     ids: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
-        if not first.isdigit() or (dash and not last.isdigit()):
+        if not _is_number(first) or (dash and not _is_number(last)):
             raise DriverError(f"--ids {text}: {part.strip()!r} is no id", hint=hint)
         if int(last or first) > most:
             raise DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
@@ -86,3 +112,7 @@ def parse_ids(text: str, most: int = 252) -> list[int]:
     if not ids or len(set(ids)) != len(ids):
         raise DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
     return ids
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdigit()

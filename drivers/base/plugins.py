@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import difflib
 import logging
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import reduce
 from importlib import import_module
 from importlib.util import find_spec
@@ -56,8 +56,8 @@ class Registry(Generic[P]):
     version : of what plug-ins of this sort must keep; one made for another version is refused.
     builtin : gives the built-in kinds and the module that holds each.
     attribute : what a definition is called in its module.
-    also : kinds that messages name besides.
-    error : what is raised.
+    reserved : kinds that no package may add.
+    check : raises PluginError for a definition of another package that this sort cannot use.
 
     Notes
     -----
@@ -74,28 +74,27 @@ class Registry(Generic[P]):
         builtin: Callable[[], Mapping[str, str]],
         attribute: str,
         *,
-        also: Iterable[str] = (),
-        error: type[PluginError] = PluginError,
+        reserved: Iterable[str] = (),
+        check: Callable[[P], None] = lambda plugin: None,
     ) -> None:
         self._sort, self.what, self.group, self.version = sort, what, group, version
-        self._builtin, self._attribute, self._also, self._error = builtin, attribute, tuple(also), error
+        self._builtin, self._attribute, self._reserved, self._check_own = builtin, attribute, tuple(reserved), check
         self._loaded: dict[str, P] = {}
-        self._failed: dict[str, PluginError] = {}
+        self._told: set[str] = set()
 
     def kinds(self) -> list[str]:
         """Every kind that is installed, whether or not it can be loaded, in order."""
-        return sorted({*self._builtin(), *self._foreign()})
+        return sorted({*self._builtin(), *self._foreign()} - set(self._reserved))
 
     def all(self) -> list[P]:
-        """Every plug-in that can be loaded, in the order of their kinds."""
+        """Every plug-in that can be loaded: the built-in ones in the order of their kinds, then the others."""
         found = []
-        for kind in self.kinds():
+        own = self._builtin()
+        for kind in sorted(self.kinds(), key=lambda kind: (kind not in own, kind)):
             try:
                 found.append(self.get(kind))
             except PluginError as error:
-                if kind not in self._failed:
-                    log.warning("%s", error)
-                self._failed[kind] = error
+                self._tell(str(error))
         return found
 
     def get(self, kind: str) -> P:
@@ -115,78 +114,121 @@ class Registry(Generic[P]):
 
         Raises
         ------
-        PluginError : a package that it needs is not installed, or there is nothing of that name.
+        PluginError : a package that it needs is not installed, its module cannot be loaded, or there is nothing of
+            that name.
         """
         module, _, name = reference.partition(":")
+        mine = f"{self.what} {plugin.kind!r}"
         try:
-            return reduce(getattr, name.split("."), import_module(module))
+            found = import_module(module)
         except ModuleNotFoundError as error:
-            missing = error.name or module
-            raise self._error(
-                f"{self.what} {plugin.kind!r} needs the package {missing.partition('.')[0]!r}, which is not installed",
-                hint=f"pip install {_quoted(plugin.install) or missing.partition('.')[0]}",
+            missing = (error.name or module).partition(".")[0]
+            raise PluginError(
+                f"{mine} needs the package {missing!r}, which is not installed",
+                hint=f"pip install {_quoted(plugin.install) or missing}",
             ) from error
+        except (Exception, SystemExit) as error:  # whatever a foreign module does
+            raise PluginError(
+                f"{mine}: {module} cannot be loaded: {type(error).__name__}: {error}",
+                hint="update the package that it comes from",
+            ) from error
+        try:
+            return reduce(getattr, name.split("."), found)
         except AttributeError as error:
-            raise self._error(
-                f"{self.what} {plugin.kind!r} names {reference}, and there is nothing of that name",
+            raise PluginError(
+                f"{mine} names {reference}, and there is nothing of that name",
                 hint="update the package that it comes from",
             ) from error
 
     def package_of(self, kind: str) -> str:
-        """Name and version of the package a kind comes from; empty for a built-in one."""
-        entry = None if kind in self._builtin() else self._foreign().get(kind)
-        return f"{entry.dist.name} {entry.dist.version}" if entry is not None and entry.dist is not None else ""
+        """Names and versions of the packages a kind comes from; empty for a built-in one."""
+        entries = [] if kind in self._builtin() else self._foreign().get(kind, [])
+        return ", ".join(f"{entry.dist.name} {entry.dist.version}" for entry in entries if entry.dist is not None)
+
+    def shadowed(self) -> Iterator[tuple[str, str]]:
+        """Kinds that packages add in vain, for omote has them itself, and the name of the package."""
+        taken = {*self._builtin(), *self._reserved}
+        for kind, entries in sorted(self._foreign().items()):
+            if kind in taken:
+                yield from ((kind, _package(entry)) for entry in entries)
 
     def forget(self) -> None:
-        """Look for everything anew, as after another package was installed."""
+        """Look for everything again, as after another package was installed."""
         self._loaded.clear()
-        self._failed.clear()
+        self._told.clear()
 
     def _own(self, module: str) -> P:
         plugin: P = getattr(import_module(module), self._attribute)
         return plugin
 
-    def _foreign(self) -> dict[str, EntryPoint]:
-        from importlib.metadata import entry_points  # start-up: built-in kinds are found without it
+    def _foreign(self) -> dict[str, list[EntryPoint]]:
+        """Entry points of this group by name; what cannot be read of a package is told once and left out."""
+        from importlib.metadata import distributions  # start-up: built-in kinds are found without it
 
-        return {entry.name: entry for entry in entry_points(group=self.group)}
+        found: dict[str, dict[tuple[str, str], EntryPoint]] = {}
+        for package in distributions():
+            try:
+                entries = [entry for entry in package.entry_points if entry.group == self.group]
+                for entry in entries:
+                    found.setdefault(entry.name, {}).setdefault((package.name, entry.value), entry)
+            except Exception as error:  # noqa: BLE001  a package with a damaged list breaks nothing but itself
+                self._tell(f"the entry points of {package} cannot be read: {type(error).__name__}: {error}")
+        return {name: [*entries.values()] for name, entries in found.items()}
 
     def _foreign_one(self, kind: str) -> P:
-        entry = self._foreign().get(kind)
-        if entry is None:
+        entries = self._foreign().get(kind, []) if kind not in self._reserved else []
+        if not entries:
             raise self._unknown(kind)
-        package = entry.dist.name if entry.dist is not None else entry.module
+        packages = sorted({_package(entry) for entry in entries})
+        if len(entries) > 1:
+            raise PluginError(
+                f"{self.what} {kind!r} is in more than one package: {', '.join(packages)}",
+                hint=f"pip uninstall {packages[-1]}",
+            )
+        mine = f"{self.what} {kind!r} of the package {packages[0]}"
         try:
-            plugin = entry.load()
+            plugin = entries[0].load()
         except (Exception, SystemExit) as error:  # whatever a foreign module does, it must break nothing but itself
-            raise self._error(
-                f"{self.what} {kind!r} of the package {package} cannot be loaded: {type(error).__name__}: {error}",
-                hint=f"pip install --upgrade {package}",
+            raise PluginError(
+                f"{mine} cannot be loaded: {type(error).__name__}: {error}",
+                hint=f"pip install --upgrade {packages[0]}",
             ) from error
-        self._check(plugin, kind, package)
-        return plugin
+        self._check(plugin, kind, mine, packages[0])
+        found: P = plugin
+        return found
 
-    def _check(self, plugin: Any, kind: str, package: str) -> None:
-        hint = f"pip install --upgrade {package}, or ask whoever made it"
+    def _check(self, plugin: Any, kind: str, mine: str, package: str) -> None:
         made_for = getattr(plugin, "api", None)
-        if made_for != self.version:
-            raise self._error(
-                f"{self.what} {kind!r} of the package {package} is made for version {made_for} of {self.group}; "
-                f"this omote has version {self.version}",
-                hint=hint,
+        if made_for is not None and made_for != self.version:
+            newer = isinstance(made_for, int) and made_for > self.version
+            raise PluginError(
+                f"{mine} is made for version {made_for} of {self.group}; this omote has version {self.version}",
+                hint="pip install --upgrade omote" if newer else f"pip install --upgrade {package}, or ask its maker",
             )
+        hint = f"pip install --upgrade {package}, or ask its maker"
         if not isinstance(plugin, self._sort) or plugin.kind != kind:
-            raise self._error(
-                f"{self.what} {kind!r} of the package {package}: its entry point must name a {self._sort.__name__} "
-                f"of that kind, not {plugin!r}",
-                hint=hint,
+            raise PluginError(
+                f"{mine}: its entry point must name a {self._sort.__name__} of that kind, not {plugin!r}", hint=hint
             )
+        try:
+            self._check_own(plugin)
+        except Exception as error:
+            raise PluginError(f"{mine} cannot be used: {error}", hint=hint) from error
+
+    def _tell(self, message: str) -> None:
+        if message not in self._told:
+            self._told.add(message)
+            log.warning("%s", message)
 
     def _unknown(self, kind: str) -> PluginError:
-        known = sorted({*self.kinds(), *self._also})
+        known = self.kinds()
         close = difflib.get_close_matches(kind, known, n=1)
         guess = f", did you mean {close[0]!r}?" if close else ""
-        return self._error(f"unknown {self.what} {kind!r}{guess}", hint=f"use one of: {', '.join(known)}")
+        return PluginError(f"unknown {self.what} {kind!r}{guess}", hint=f"use one of: {', '.join(known)}")
+
+
+def _package(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist is not None else entry.value
 
 
 def _quoted(requirement: str) -> str:

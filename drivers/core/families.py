@@ -13,6 +13,11 @@ from drivers.base.options import option
 API = 1
 """Version of what a family must keep: this module, ``drivers.core.wirebus`` and ``drivers.sim.wire.simulator``."""
 
+RESERVED = (
+    "name", "kind", "port", "baud", "rate_hz", "simulates", "transport", "faults", "wire", "latency_s", "seed",
+)  # fmt: skip
+"""Keys of every bus in a robot file: no family's settings may have them."""
+
 SERVO_BAUD, BOARD_BAUD = 1_000_000, 115_200
 """Rates that servos and boards leave the factory with."""
 
@@ -27,8 +32,8 @@ class Family:
     kind : what robot files call it. title : what people call it, as "Pololu Maestro boards".
     driver : ``"module:name"`` of a :class:`drivers.core.wirebus.WireBus`, or of a function that gives one for a
         sequence of servos where the family needs more than one.
-    settings : dataclass of what the driver can be told besides ``port`` and ``baud``, see :mod:`drivers.base.options`;
-        a method ``check(self, rate_hz)``, where it has one, raises ValueError where values do not go together.
+    settings : dataclass of what the driver can be told besides :data:`RESERVED`, see :mod:`drivers.base.options`; a
+        method ``check(self, rate_hz)``, where it has one, raises ValueError where values do not go together.
     check_model : ``"module:name"`` of a function that raises DriverError for a model that it does not drive.
     simulator : ``"module:name"`` of a :class:`drivers.sim.wire.simulator.Simulator`; empty: none.
     baud : rate of the port where a file gives none.

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import os
 import select
+import selectors
 import signal
 import sys
 import time
@@ -132,8 +133,8 @@ def _unready(path: str, why: str) -> Exception:
     from drivers.base.errors import DriverError  # start-up: the process itself loads it when it is ready
 
     return DriverError(
-        f"nobody stands by to let the servos on {path} go should this program be killed: {why}",
-        hint="mend that and start again, or set watchdog_ms = 0 to drive them without",
+        f"no process waits to switch the servos on {path} off if this program is killed: {why}",
+        hint="the servos are driven without one; mend that and start again, or set watchdog_ms = 0 if it is meant",
         port=path,
     )
 
@@ -142,14 +143,20 @@ def _line(pipe: Any, deadline_s: float) -> str | None:
     """One line; less where it ends before, None where the time is over first."""
     data = b""
     while not data.endswith(b"\n"):
-        ready, _, _ = select.select([pipe], [], [], max(deadline_s - time.monotonic(), 0.0))
-        if not ready:
+        if not _readable(pipe, deadline_s):
             return None
         part = os.read(pipe.fileno(), 1)
         if not part:
             break
         data += part
     return data.decode(errors="replace").strip()
+
+
+def _readable(pipe: Any, deadline_s: float) -> bool:
+    """Whether there is something to read by then, in a program with any number of open files."""
+    with selectors.DefaultSelector() as waiting:
+        waiting.register(pipe, selectors.EVENT_READ)
+        return bool(waiting.select(max(deadline_s - time.monotonic(), 0.0)))
 
 
 def _close(pipe: Any) -> None:
@@ -233,7 +240,8 @@ def rehearse(path: str, baud: int, frames: Iterable[str]) -> None:
         SerialPort(path, baud)
         return
     try:
-        let_go(os.ttyname(near), baud, frames, repeats=1)
+        if not let_go(os.ttyname(near), baud, frames, repeats=1) and sys.platform == "linux":
+            raise RuntimeError("cannot open a pseudo-terminal")  # other systems may refuse its rate
     finally:
         os.close(near)
         os.close(far)

@@ -10,8 +10,9 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from drivers.base.errors import DriverError, PluginError
+from drivers.base.options import check_options
 from drivers.base.plugins import Registry, folders_with
-from drivers.core.families import API, Family
+from drivers.core.families import API, RESERVED, Family
 
 if TYPE_CHECKING:  # start-up: they bring numpy, which listing the kinds does without
     from drivers.base.bus import Bus, ServoSpec
@@ -26,7 +27,8 @@ FAMILIES: Registry[Family] = Registry(
     API,
     lambda: folders_with("drivers", "family"),
     "FAMILY",
-    also=(SIMULATED,),
+    reserved=(SIMULATED, "robot", "host"),  # the last two are commands of omote simulate
+    check=lambda family: check_options(family.settings, RESERVED),
 )
 
 
@@ -68,10 +70,22 @@ def driver_of(kind: str, servos: Sequence[ServoSpec]) -> type[WireBus]:
     ------
     DriverError : unknown kind, a package is not installed, or an unknown model.
     """
-    family = FAMILIES.get(kind)
+    family = _family(kind)
     driver = FAMILIES.load(family, family.driver)
     chosen: type[WireBus] = driver if isinstance(driver, type) else driver(servos)
     return chosen
+
+
+def _family(kind: str) -> Family:
+    """A family by its kind; where there is none, ``"simulated"`` is named among those there are."""
+    try:
+        return FAMILIES.get(kind)
+    except PluginError as error:
+        if kind in FAMILIES.kinds():
+            raise
+        raise PluginError(
+            str(error), hint=f"use one of: {', '.join(sorted([*FAMILIES.kinds(), SIMULATED]))}"
+        ) from error
 
 
 def check_model(kind: str, model: str, simulates: str = "dynamixel") -> None:
@@ -85,20 +99,14 @@ def check_model(kind: str, model: str, simulates: str = "dynamixel") -> None:
     FAMILIES.load(family, family.check_model)(model)
 
 
-def simulator_of(kind: str) -> Any:
-    """The :class:`drivers.sim.wire.simulator.Simulator` of a family.
-
-    Raises
-    ------
-    DriverError : unknown kind, or a family that has none.
-    """
+def _simulated(kind: str, servos: Sequence[ServoSpec]) -> Any:
+    """The driver of a family over a simulated far end; PluginError where the family has none."""
     family = FAMILIES.get(kind)
     if not family.simulator:
-        raise PluginError(f"bus kind {kind!r} has no simulator", hint=f"use a real bus: kind = {kind!r} and its port")
-    return FAMILIES.load(family, family.simulator)
-
-
-def _simulated(kind: str, servos: Sequence[ServoSpec]) -> Any:
-    simulator_of(kind)  # what has none cannot be stood in for
-    family = FAMILIES.get(kind)
+        raise no_simulator(kind)
     return FAMILIES.load(family, "drivers.sim.serving.standin:simulated")(driver_of(kind, servos), kind)
+
+
+def no_simulator(kind: str) -> PluginError:
+    """What is said of a family that nothing stands in for."""
+    return PluginError(f"bus kind {kind!r} has no simulator", hint=f'use a real one: kind = "{kind}", and its port')

@@ -174,8 +174,8 @@ class Protocol1Bus(WireBus):
             return
         self._look_s = now_s
         if not self._keeper.watching:
-            why = f"who stood by to let the servos on {self.path} go, should this program be killed, has ended itself"
-            self._tell_unkept(why, "stop and start again, which starts another")
+            why = f"the process that switches the servos on {self.path} off if this program is killed has ended"
+            self._tell_unkept(why, "stop and start again to start another")
 
     def _tell_unkept(self, why: str, hint: str) -> None:
         """Say once that the servos hold on when this program is killed."""

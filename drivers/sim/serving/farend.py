@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from drivers.core.registry import simulator_of
 from drivers.sim.wire.line import Line
-from drivers.sim.wire.simulator import Servos, Setting
+from drivers.sim.wire.simulator import Servos, Setting, simulator_of
 
 
 def make_line(
@@ -17,14 +16,13 @@ def make_line(
 
     Parameters
     ----------
-    family : a kind of bus; servos with control tables know their protocol themselves.
+    family : a kind of bus; the models of Dynamixel and Feetech servos decide their protocol.
     servos : id and model of each. now_s : time.
-    baud : rate at which servos with control tables listen. seed : of random faults.
+    baud : rate of the wire. seed : of random faults.
     options : what the family's driver gives as ``far_end()``.
 
     Raises
     ------
     DriverError : unknown family or model, or servos that cannot share a wire.
     """
-    line: Line = simulator_of(family).far_end(servos, options, Setting(now_s=now_s, baud=baud, seed=seed))
-    return line
+    return simulator_of(family).far_end(servos, options, Setting(now_s=now_s, baud=baud, seed=seed))

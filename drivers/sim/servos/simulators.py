@@ -15,6 +15,7 @@ from drivers.sim.servos.legacy import LegacyChain
 from drivers.sim.servos.mixed import MixedChain
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.simulator import Servos, Setting, Simulator
+from drivers.tables.models import check_dynamixel, check_feetech
 
 
 def make_servos(servos: Iterable[object], model: str | int, baud: int, now_s: float) -> list[SimulatedServo]:
@@ -45,7 +46,7 @@ class DynamixelOptions:
 
     ids: str = option("Ids of the servos: 1-24 or 1,3,7-9.", "1-24")
     model: str = option("Model of the servos.", "xl330-m288")
-    baud: int = option("Baud rate the servos listen at.", 1_000_000)
+    baud: int = option("Baud rate the servos listen at.", 1_000_000, at_least=300)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +55,7 @@ class FeetechOptions:
 
     ids: str = option("Ids of the servos: 1-24 or 1,3,7-9.", "1-6")
     model: str = option("Model of the servos.", "sts3215")
-    baud: int = option("Baud rate the servos listen at.", 1_000_000)
+    baud: int = option("Baud rate the servos listen at.", 1_000_000, at_least=300)
 
 
 def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Chain:
@@ -62,7 +63,13 @@ def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Ch
     return make_chain(made, setting.now_s, setting.seed)
 
 
-def _alone(options: DynamixelOptions | FeetechOptions, setting: Setting) -> Chain:
+def _dynamixel(options: DynamixelOptions, setting: Setting) -> Chain:
+    check_dynamixel(options.model)
+    return _far_end([(servo, options.model) for servo in parse_ids(options.ids)], {}, setting)
+
+
+def _feetech(options: FeetechOptions, setting: Setting) -> Chain:
+    check_feetech(options.model)
     return _far_end([(servo, options.model) for servo in parse_ids(options.ids)], {}, setting)
 
 
@@ -73,18 +80,19 @@ def _decoder(line: Line) -> Decoder:
 
 DYNAMIXEL = Simulator(
     far_end=_far_end,
-    alone=_alone,
+    alone=_dynamixel,
     options=DynamixelOptions,
     decoder=_decoder,
-    help="""Serve simulated Dynamixel servos until interrupted; prints `ready PATH`. AX
-    and MX models speak Protocol 1.0.
+    help="""Serve simulated Dynamixel servos until interrupted; prints `ready PATH`.
+
+    AX and MX models speak Protocol 1.0.
 
     Example: omote simulate dynamixel --ids 1-24 --model xl330-m288 --link /tmp/head
     """,
 )
 FEETECH = Simulator(
     far_end=_far_end,
-    alone=_alone,
+    alone=_feetech,
     options=FeetechOptions,
     decoder=_decoder,
     help="""Serve simulated Feetech STS or SCS servos until interrupted; prints `ready PATH`.

@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from drivers.base.options import option
+from drivers.base.errors import PluginError
+from drivers.base.options import check_options, entries, option
 from drivers.core.families import BOARD_BAUD
+from drivers.core.registry import FAMILIES, no_simulator
 from drivers.core.traffic import Decoder, TextDecoder
 from drivers.sim.wire.line import Line
 
@@ -22,13 +24,36 @@ class Setting:
     Attributes
     ----------
     now_s : time. baud : rate of the wire. seed : of random faults.
-    names : names of all parameters, for far ends that speak of them.
+    names : names of all parameters, for what is served alone and speaks of them; empty for a driver's far end.
     """
 
     now_s: float
     baud: int
     seed: int = 0
     names: tuple[str, ...] = ()
+
+
+def simulator_of(kind: str) -> Simulator:
+    """What stands in for a family.
+
+    Raises
+    ------
+    PluginError : unknown kind, a family that has none, or one that names something else.
+    """
+    family = FAMILIES.get(kind)
+    if not family.simulator:
+        raise no_simulator(kind)
+    found = FAMILIES.load(family, family.simulator)
+    update = "update the package that it comes from"
+    if not isinstance(found, Simulator):
+        raise PluginError(f"bus kind {kind!r} names {family.simulator}, which is no Simulator", hint=update)
+    try:
+        check_options(found.options)
+    except ValueError as error:
+        raise PluginError(f"the simulator of bus kind {kind!r} cannot be used: {error}", hint=update) from error
+    if "baud" not in {entry.name for entry in entries(found.options)}:
+        raise PluginError(f"the simulator of bus kind {kind!r} has no option baud", hint=update)
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +72,8 @@ class Simulator:
     far_end : makes what a driver of the family expects at the other end of its wire, from the ids and models of its
         servos and from what the driver gives as ``far_end()``, plain values that can travel to another process.
     alone : makes what ``omote simulate KIND`` serves, from an instance of ``options``.
-    options : dataclass of the command's options (:mod:`drivers.base.options`), ``--baud`` and those of serving aside.
+    options : dataclass of the command's options (:mod:`drivers.base.options`), the rate ``baud`` among them; those of
+        serving come besides.
     help : the command's help; its last line is an example.
     decoder : makes what shows the traffic of a far end in words.
     """

@@ -17,6 +17,9 @@ from surface.base.errors import HeadFileError
 Made = TypeVar("Made")
 VERSION = 1
 OWN = "omote/"  # names of what stands in every such file beside its arrays
+_DAMAGE = (
+    ValueError, TypeError, OverflowError, EOFError, KeyError, IndexError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 FORMAT, CHECK = f"{OWN}format", f"{OWN}checksum/"
 
 
@@ -58,7 +61,7 @@ def read_beside(path: Path, make: Callable[[Beside], Made], hint: str) -> Made |
         _check_version(path, every)
         checks = {name.removeprefix(CHECK): int(array[0]) for name, array in every.items() if name.startswith(CHECK)}
         return make(Beside(path, {k: v for k, v in every.items() if not k.startswith(OWN)}, checks))
-    except (OSError, ValueError, EOFError, KeyError, IndexError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, *_DAMAGE) as error:
         raise HeadFileError(f"{path}: {error}", hint=hint) from error
 
 
