@@ -15,7 +15,8 @@ from controller.robot.buses import BusSettings, takers
 from controller.takes.reader import TAKES, suffixes
 from drivers.base.options import entries
 from drivers.base.plugins import Registry
-from drivers.core.registry import FAMILIES, SIMULATED, simulator_of
+from drivers.core.registry import FAMILIES, SIMULATED
+from drivers.sim.wire.simulator import simulator_of
 from surface.export import SUFFIXES
 
 Page = Callable[[str], str]

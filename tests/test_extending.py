@@ -42,20 +42,6 @@ robots = ["robot.toml"]
 kind = "jsonudp"
 listen = "127.0.0.1:{port}"
 """
-CONTRACT = """
-import math
-
-import pytest
-
-from drivers.base.bus import ServoSpec
-from drivers.sim.serving.virtual import VirtualBus
-from tests.drivers.contract import BusContract
-
-SERVOS = tuple(ServoSpec(i, f"servo{i}", "rc-180", -0.6, 0.9, 8.0, 200.0, reverse=i == 2) for i in (1, 2, 7))
-
-
-"""
-
 Omote = Callable[..., subprocess.CompletedProcess[str]]
 
 
@@ -101,14 +87,15 @@ def test_the_examples_are_short(page: str) -> None:
     for name, text in FILE.findall(page):
         folder = name.partition("/")[0]
         lines[folder] = lines.get(folder, 0) + sum(bool(line.strip()) for line in text.splitlines())
-    assert {folder for folder in lines if folder != "pyproject.toml"} == {"omote_puppet8", "omote_jsonudp"}
+    folders = {folder for folder in lines if folder != "pyproject.toml"}
+    assert folders == {"omote_puppet8", "omote_jsonudp", "omote_track", "omote_xyz"}
     assert all(count < MOST_LINES for count in lines.values()), lines
 
 
 def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, root: Path, tmp_path: Path) -> None:
     block = page.partition("## Proving a driver")[2].partition("```python\n")[2].partition("```")[0]
     test = tmp_path / "test_puppet8.py"
-    test.write_text(CONTRACT + block, encoding="utf-8")
+    test.write_text(block, encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-c", os.devnull, str(test)],
         cwd=root, env=environment(site, root), capture_output=True, text=True, timeout=120,
@@ -119,11 +106,11 @@ def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, ro
 
 def test_every_list_has_them(omote: Omote) -> None:
     said = omote("plugins").stdout
-    for word in ("puppet8", "Puppet8 boards", "jsonudp", "omote-example 0.1.0"):
+    for word in ("puppet8", "Puppet8 boards", "jsonudp", "track", "xyz", "omote-example 0.1.0"):
         assert word in said
     assert "puppet8" in omote("simulate", "--help").stdout
     help_text = omote("simulate", "puppet8", "--help").stdout
-    assert "--baud" in help_text and "Example: omote simulate puppet8" in help_text
+    assert "57600" in help_text and "Example: omote simulate puppet8" in help_text
 
 
 def test_robot_files_and_stages_are_checked_by_their_own_options(omote: Omote, tmp_path: Path) -> None:
@@ -169,3 +156,14 @@ def test_a_stage_runs_with_both(site: Path, root: Path, tmp_path: Path) -> None:
     assert link["accepted"] > 0 and link["refused"]["JSONDecodeError"] > 0
     (bus,) = report["buses"]
     assert bus["bus"]["writes"] > 0 and bus["bus"]["errors"] == {}
+
+
+def test_a_take_and_an_exported_head_go_through_them(omote: Omote, tmp_path: Path) -> None:
+    (tmp_path / "a.track").write_text("jawOpen headYaw\n0 0 0\n0.5 1 0.2\n1.0 0 0\n")
+    assert "take a.track: 3 frames, 1.0 s" in omote("check", "a.track").stdout
+    (tmp_path / "a.track").write_text("jawOpen\n0 x\n")
+    said = omote("check", "a.track")
+    assert said.returncode == 1 and "a.track: is no table" in said.stderr and "a line of names" in said.stderr
+    assert omote("export", "head.xyz", "--set", "jawOpen=0.5").returncode == 0
+    assert len((tmp_path / "head.xyz").read_text().splitlines()) > 30_000
+    assert ".xyz" in omote("export", "head.stl").stderr

@@ -130,6 +130,7 @@ def _simulate_family(kind: str) -> Callable[..., None]:
     """The command that serves what stands in for a family."""
     from controller.base.schema import from_words  # start-up: the command line shows its help without it
     from controller.tools.simulating import serve_alone
+    from drivers.core.registry import FAMILIES
     from drivers.sim.wire.simulator import simulator_of
 
     simulator = simulator_of(kind)
@@ -138,16 +139,17 @@ def _simulate_family(kind: str) -> Callable[..., None]:
         serve_alone(kind, from_words(simulator.options, given), how, console)
 
     command.__doc__ = simulator.help
-    return _served(command, [_parameter(entry) for entry in entries(simulator.options)])
+    usual = {"baud": FAMILIES.get(kind).baud}
+    return _served(command, [_parameter(entry, usual.get(entry.name)) for entry in entries(simulator.options)])
 
 
-def _parameter(entry: Entry) -> inspect.Parameter:
-    """An option of a simulator as an option of the command."""
+def _parameter(entry: Entry, usual: Any) -> inspect.Parameter:
+    """An option of a simulator as an option of the command; ``usual`` stands for its default where it is given."""
     limits, name = entry.option, entry.name.replace("_", "-")
     flag = f"--{name}/--no-{name}" if entry.default is True else f"--{name}"
     shown = typer.Option(flag, min=limits.at_least, max=limits.at_most, help=limits.help)
     kind, empty = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.empty
-    default = empty if entry.default is REQUIRED else entry.default
+    default = usual or (empty if entry.default is REQUIRED else entry.default)
     return inspect.Parameter(entry.name, kind, default=default, annotation=Annotated[entry.type, shown])
 
 

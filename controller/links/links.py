@@ -48,7 +48,8 @@ class LinkSettings(Settings):
     def _fits(self) -> LinkSettings:
         check = getattr(self.own, "check", None)
         if check is not None:
-            check()
+            with LINKS.blaming(self.kind):
+                check()
         return self
 
 
@@ -76,7 +77,9 @@ def open_links(choices: Sequence[LinkSettings], around: Around) -> list[Link]:
     found = []
     for choice in choices:
         kind = LINKS.get(choice.kind)
-        link: Link = LINKS.load(kind, kind.open)(choice.own, around)
+        start = LINKS.load(kind, kind.open)
+        with LINKS.blaming(kind.kind):
+            link: Link = start(choice.own, around)
         found.append(link)
     return found
 

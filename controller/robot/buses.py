@@ -80,7 +80,8 @@ class BusSettings(Settings):
         settings = FAMILIES.get(self.family).settings
         check = getattr(settings, "check", None)
         if check is not None:
-            check(given_in(self, settings), self.rate_hz)
+            with FAMILIES.blaming(self.family):
+                check(given_in(self, settings), self.rate_hz)
         return self
 
     def _check_port(self) -> None:

@@ -43,9 +43,23 @@ class TakeReader:
     install: str = ""
 
 
-TAKES: Registry[TakeReader] = Registry(
-    TakeReader, "take", "omote.takes", API, lambda: modules_in("controller.takes.readers"), "TAKE"
-)
+def _own() -> dict[str, str]:
+    return modules_in("controller.takes.readers")
+
+
+def _check(reader: TakeReader) -> None:
+    """ValueError for suffixes that are none, or that files of a built-in kind have."""
+    own = _own()
+    others = [] if reader.kind in own else [TAKES.get(kind) for kind in own]
+    taken = {suffix: other.kind for other in others for suffix in other.suffixes}
+    for suffix in reader.suffixes:
+        if not suffix.startswith(".") or suffix != suffix.lower():
+            raise ValueError(f"suffixes must begin with a dot and be in small letters, not {suffix!r}")
+        if suffix in taken:
+            raise ValueError(f"{suffix} is read by the built-in kind {taken[suffix]!r}")
+
+
+TAKES: Registry[TakeReader] = Registry(TakeReader, "take", "omote.takes", API, _own, "TAKE", check=_check)
 
 
 def suffixes() -> list[str]:
@@ -77,7 +91,11 @@ def load_take(path: Path, parameters: Parameters) -> Take:
     TakeError : the file cannot be read or is wrong. PluginError : a package that it needs is not installed.
     """
     reader = reader_of(path)
-    take: Take = TAKES.load(reader, reader.read)(path, parameters)
+    read = TAKES.load(reader, reader.read)
+    with TAKES.blaming(reader.kind):
+        take = read(path, parameters)
+    if not isinstance(take, Take):
+        raise TakeError(f"{path}: take kind {reader.kind!r} gave no take, but {take!r}", hint="update its package")
     return take
 
 

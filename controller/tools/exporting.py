@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 from rich.console import Console
@@ -13,7 +12,14 @@ from drivers.base.plugins import Registry
 from surface.export import API, Exporter, export_head, exporters
 from surface.head import Head
 
-log = logging.getLogger(__name__)
+
+def _check(exporter: Exporter) -> None:
+    """ValueError for a suffix that a built-in exporter has."""
+    for one in exporters():
+        clash = sorted({*one.suffixes} & {*exporter.suffixes}) if one.kind != exporter.kind else []
+        if clash:
+            raise ValueError(f"{', '.join(clash)} is written by the built-in kind {one.kind!r}")
+
 
 EXPORTERS: Registry[Exporter] = Registry(
     Exporter,
@@ -22,6 +28,7 @@ EXPORTERS: Registry[Exporter] = Registry(
     API,
     lambda: {one.kind: f"surface.export.{one.kind}" for one in exporters()},
     "EXPORTER",
+    check=_check,
 )
 
 
@@ -41,19 +48,20 @@ def export_with_progress(
     pose = {name: float(v) for name, v in zip(PARAMETERS.names, still.values, strict=True) if v}
     with console.status("exporting"):
         loaded = Head.load(still.head, still.identity)
-        written = export_head(loaded, out, {n: v for n, v in pose.items() if n in loaded.parameters}, _foreign())
+        foreign = _foreign()
+        kind = next((one.kind for one in foreign if out.suffix.lower() in one.suffixes), "")
+        with EXPORTERS.blaming(kind):
+            written = export_head(loaded, out, {n: v for n, v in pose.items() if n in loaded.parameters}, foreign)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
 
 
 def _foreign() -> list[Exporter]:
-    """Exporters that other packages add."""
-    own = {suffix: one for one in exporters() for suffix in one.suffixes}
+    """Exporters that other packages add; of two that want one suffix the first."""
+    own, taken = {one.kind for one in exporters()}, set[str]()
     found = []
     for one in EXPORTERS.all():
-        taken = [suffix for suffix in one.suffixes if own.setdefault(suffix, one).kind != one.kind]
-        if taken:
-            log.warning("exporter %r is left out: %s is written by another one", one.kind, ", ".join(taken))
-        elif one not in exporters():
+        if one.kind not in own and not taken & {*one.suffixes}:
+            taken |= {*one.suffixes}
             found.append(one)
     return found

@@ -11,11 +11,12 @@ from __future__ import annotations
 import difflib
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import reduce
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, get_origin, get_type_hints
 
 from drivers.base.errors import PluginError
 
@@ -106,7 +107,7 @@ class Registry(Generic[P]):
         """
         if kind not in self._loaded:
             module = self._builtin().get(kind)
-            self._loaded[kind] = self._foreign_one(kind) if module is None else self._own(module)
+            self._loaded[kind] = self._foreign_one(kind) if module is None else self._own(kind, module)
         return self._loaded[kind]
 
     def load(self, plugin: P, reference: str) -> Any:
@@ -122,22 +123,29 @@ class Registry(Generic[P]):
         try:
             found = import_module(module)
         except ModuleNotFoundError as error:
-            missing = (error.name or module).partition(".")[0]
-            raise PluginError(
-                f"{mine} needs the package {missing!r}, which is not installed",
-                hint=f"pip install {_quoted(plugin.install) or missing}",
-            ) from error
+            raise self._missing(mine, plugin, error.name or module) from error
         except (Exception, SystemExit) as error:  # whatever a foreign module does
-            raise PluginError(
-                f"{mine}: {module} cannot be loaded: {type(error).__name__}: {error}",
-                hint="update the package that it comes from",
-            ) from error
+            raise PluginError(f"{mine}: {module} cannot be loaded: {_why(error)}", hint=_UPDATE) from error
         try:
             return reduce(getattr, name.split("."), found)
         except AttributeError as error:
+            raise PluginError(f"{mine} names {reference}, and there is nothing of that name", hint=_UPDATE) from error
+
+    @contextmanager
+    def blaming(self, kind: str) -> Iterator[None]:
+        """Around what calls a plug-in: an error that another package did not mean to raise names the package.
+
+        Errors that say what to do (with a ``hint``) and ValueError, which a check may raise, go through as they are.
+        """
+        try:
+            yield
+        except Exception as error:
+            package = "" if isinstance(error, ValueError) or hasattr(error, "hint") else self.package_of(kind)
+            if not package:
+                raise
             raise PluginError(
-                f"{mine} names {reference}, and there is nothing of that name",
-                hint="update the package that it comes from",
+                f"{self.what} {kind!r} of the package {package} failed: {_why(error)}",
+                hint="update that package, or tell its maker; OMOTE_DEBUG=1 shows where it was",
             ) from error
 
     def package_of(self, kind: str) -> str:
@@ -157,9 +165,26 @@ class Registry(Generic[P]):
         self._loaded.clear()
         self._told.clear()
 
-    def _own(self, module: str) -> P:
-        plugin: P = getattr(import_module(module), self._attribute)
-        return plugin
+    def _missing(self, mine: str, plugin: P, name: str) -> PluginError:
+        """What is said of a module that is not there, by whether its package is."""
+        package = name.partition(".")[0]
+        if package != name and find_spec(package) is not None:
+            return PluginError(f"{mine}: there is no module {name}", hint=_UPDATE)
+        return PluginError(
+            f"{mine} needs the package {package!r}, which is not installed",
+            hint=f"pip install {_quoted(plugin.install) or package}",
+        )
+
+    def _own(self, kind: str, module: str) -> P:
+        """A plug-in in a folder of omote's own."""
+        mine = f"{self.what} {kind!r} in {module}"
+        try:
+            plugin = getattr(import_module(module), self._attribute)
+        except Exception as error:
+            raise PluginError(f"{mine} cannot be loaded: {_why(error)}", hint=f"mend {module}") from error
+        self._check(plugin, kind, mine, f"mend {module}")
+        found: P = plugin
+        return found
 
     def _foreign(self) -> dict[str, list[EntryPoint]]:
         """Entry points of this group by name; what cannot be read of a package is told once and left out."""
@@ -190,27 +215,26 @@ class Registry(Generic[P]):
             plugin = entries[0].load()
         except (Exception, SystemExit) as error:  # whatever a foreign module does, it must break nothing but itself
             raise PluginError(
-                f"{mine} cannot be loaded: {type(error).__name__}: {error}",
-                hint=f"pip install --upgrade {packages[0]}",
+                f"{mine} cannot be loaded: {_why(error)}", hint=f"pip install --upgrade {packages[0]}"
             ) from error
-        self._check(plugin, kind, mine, packages[0])
+        self._check(plugin, kind, mine, f"pip install --upgrade {packages[0]}, or ask its maker")
         found: P = plugin
         return found
 
-    def _check(self, plugin: Any, kind: str, mine: str, package: str) -> None:
+    def _check(self, plugin: Any, kind: str, mine: str, hint: str) -> None:
         made_for = getattr(plugin, "api", None)
         if made_for is not None and made_for != self.version:
             newer = isinstance(made_for, int) and made_for > self.version
             raise PluginError(
                 f"{mine} is made for version {made_for} of {self.group}; this omote has version {self.version}",
-                hint="pip install --upgrade omote" if newer else f"pip install --upgrade {package}, or ask its maker",
+                hint="pip install --upgrade omote" if newer else hint,
             )
-        hint = f"pip install --upgrade {package}, or ask its maker"
-        if not isinstance(plugin, self._sort) or plugin.kind != kind:
-            raise PluginError(
-                f"{mine}: its entry point must name a {self._sort.__name__} of that kind, not {plugin!r}", hint=hint
-            )
+        if not isinstance(plugin, self._sort):
+            raise PluginError(f"{mine} must be a {self._sort.__name__}, not {plugin!r}", hint=hint)
+        if plugin.kind != kind:
+            raise PluginError(f"{mine} says that its kind is {plugin.kind!r}; both must be the same", hint=hint)
         try:
+            _check_types(plugin)
             self._check_own(plugin)
         except Exception as error:
             raise PluginError(f"{mine} cannot be used: {error}", hint=hint) from error
@@ -225,6 +249,27 @@ class Registry(Generic[P]):
         close = difflib.get_close_matches(kind, known, n=1)
         guess = f", did you mean {close[0]!r}?" if close else ""
         return PluginError(f"unknown {self.what} {kind!r}{guess}", hint=f"use one of: {', '.join(known)}")
+
+
+_UPDATE = "update the package that it comes from, or mend it"
+
+
+def _check_types(plugin: Any) -> None:
+    """ValueError for a field of a definition that is not of its type; those that are plain types are looked at."""
+    for name, kind in get_type_hints(type(plugin)).items():
+        value = getattr(plugin, name)
+        if get_origin(kind) is tuple:
+            if not isinstance(value, tuple) or not all(isinstance(each, str) for each in value):
+                raise ValueError(f"{name} must be a tuple of texts, not {value!r}")
+        elif kind in (str, int, bool, type) and not isinstance(value, kind):
+            raise ValueError(f"{name} must be {kind.__name__}, not {value!r}")
+
+
+def _why(error: BaseException) -> str:
+    """An error in words, with the file and line of one in the source."""
+    where = f" in {error.filename}, line {error.lineno}" if isinstance(error, SyntaxError) else ""
+    said = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{type(error).__name__}{where}: {said}"
 
 
 def _package(entry: EntryPoint) -> str:

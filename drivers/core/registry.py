@@ -59,7 +59,8 @@ def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynami
         driver = driver_of(kind, servos)
         if options.pop("faults", ()):
             raise DriverError("faults can only be given to a simulated bus", hint='set kind = "simulated"')
-    bus: Bus = driver(servos, **options)
+    with FAMILIES.blaming(simulates if kind == SIMULATED else kind):
+        bus: Bus = driver(servos, **options)
     return bus
 
 
@@ -96,7 +97,9 @@ def check_model(kind: str, model: str, simulates: str = "dynamixel") -> None:
     DriverError : it does not; the hint lists names that look like it.
     """
     family = FAMILIES.get(simulates if kind == SIMULATED else kind)
-    FAMILIES.load(family, family.check_model)(model)
+    check = FAMILIES.load(family, family.check_model)
+    with FAMILIES.blaming(family.kind):
+        check(model)
 
 
 def _simulated(kind: str, servos: Sequence[ServoSpec]) -> Any:

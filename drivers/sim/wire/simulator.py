@@ -72,8 +72,8 @@ class Simulator:
     far_end : makes what a driver of the family expects at the other end of its wire, from the ids and models of its
         servos and from what the driver gives as ``far_end()``, plain values that can travel to another process.
     alone : makes what ``omote simulate KIND`` serves, from an instance of ``options``.
-    options : dataclass of the command's options (:mod:`drivers.base.options`), the rate ``baud`` among them; those of
-        serving come besides.
+    options : dataclass of the command's options (:mod:`drivers.base.options`), the rate ``baud`` among them, which is
+        the family's where none is given; those of serving come besides.
     help : the command's help; its last line is an example.
     decoder : makes what shows the traffic of a far end in words.
     """

@@ -55,7 +55,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
 def test_built_in_and_foreign_ones_stand_side_by_side(install: Install) -> None:
     registry = install(good=GOOD)
     assert registry.kinds() == ["good", "own"]
-    assert [plugin.kind for plugin in registry.all()] == ["good", "own"]
+    assert [plugin.kind for plugin in registry.all()] == ["own", "good"]  # the built-in ones first
     assert (registry.package_of("good"), registry.package_of("own")) == ("somebody 0.3", "")
     assert registry.load(registry.get("good"), "json:dumps")([1]) == "[1]"
 
@@ -69,10 +69,11 @@ def test_a_built_in_kind_cannot_be_replaced(install: Install) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (HEAD + "THING = Trial(api=2, kind='bad')", "made for version 2 of omote.trials; this omote has version 1"),
-        (HEAD + "THING = Trial(api=1, kind='worse')", "must name a Trial of that kind"),
+        (HEAD + "THING = Trial(api=0, kind='bad')", "made for version 0 of omote.trials; this omote has version 1"),
+        (HEAD + "THING = Trial(api=1, kind='worse')", "says that its kind is 'worse'"),
+        (HEAD + "THING = Trial(api=1, kind='bad', work=3)", "work must be str, not 3"),
         (HEAD + "THING = Trial(api=1, kind='bad', colour='red')", "TypeError"),
-        ("THING = 3", "must name a Trial of that kind, not 3"),
+        ("THING = 3", "must be a Trial, not 3"),
         ("THING = 1 / 0", "ZeroDivisionError"),
         ("import no_such_package", "No module named 'no_such_package'"),
         ("", "has no attribute 'THING'"),
@@ -86,12 +87,50 @@ def test_one_that_is_wrong_is_told_and_left_out(
     registry = install(bad=text, good=GOOD)
     with caplog.at_level(logging.WARNING):
         for _ in range(2):
-            assert [plugin.kind for plugin in registry.all()] == ["good", "own"]
+            assert [plugin.kind for plugin in registry.all()] == ["own", "good"]
     assert len(caplog.records) == 1  # once, however often it is looked for
     with pytest.raises(PluginError) as caught:
         registry.get("bad")
     assert message in str(caught.value) and "somebody" in str(caught.value)
     assert caught.value.hint.startswith("pip install --upgrade somebody")
+
+
+def test_one_made_for_a_newer_omote_asks_for_that(install: Install) -> None:
+    with pytest.raises(PluginError, match="made for version 2") as caught:
+        install(bad=HEAD + "THING = Trial(api=2, kind='bad')").get("bad")
+    assert caught.value.hint == "pip install --upgrade omote"
+
+
+def test_a_kind_in_two_packages_is_refused_by_both_names(install: Install, tmp_path: Path) -> None:
+    registry = install(good=GOOD)
+    another = tmp_path / "another-1.dist-info"
+    another.mkdir()
+    (another / "METADATA").write_text("Metadata-Version: 2.1\nName: another\nVersion: 1\n")
+    (another / "entry_points.txt").write_text(f"[{GROUP}]\ngood = trial_of_good:THING\nother = trial_of_good:THING\n")
+    with pytest.raises(PluginError, match="in more than one package: another, somebody"):
+        registry.get("good")
+    assert [*registry.shadowed()] == [("other", "another")]
+    with pytest.raises(PluginError, match="unknown trial 'other'"):
+        registry.get("other")
+
+
+def test_a_damaged_list_of_entry_points_takes_nothing_from_others(install: Install, tmp_path: Path) -> None:
+    registry = install(good=GOOD)
+    broken = tmp_path / "broken-1.dist-info"
+    broken.mkdir()
+    (broken / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
+    (broken / "entry_points.txt").write_text(f"[{GROUP}]\nno equals sign\n")
+    assert registry.kinds() == ["good", "own"]
+
+
+def test_an_error_of_another_package_names_it_and_ours_goes_through(install: Install) -> None:
+    registry = install(good=GOOD)
+    with pytest.raises(PluginError, match=r"of the package somebody 0\.3 failed: KeyError"), registry.blaming("good"):
+        raise KeyError("x")
+    for kind, error in (("own", KeyError("x")), ("good", ValueError("x")), ("good", PluginError("x"))):
+        with pytest.raises(type(error)) as caught, registry.blaming(kind):
+            raise error
+        assert caught.value is error
 
 
 def test_an_unknown_kind_names_the_known_ones(install: Install) -> None:
@@ -106,6 +145,8 @@ def test_an_unknown_kind_names_the_known_ones(install: Install) -> None:
         (Trial(api=1, kind="x"), "no_vendor.deep:thing", "needs the package 'no_vendor'", "pip install no_vendor"),
         (Trial(api=1, kind="x", install="omote[can]"), "no_vendor:thing", "needs the pack", 'pip install "omote[can]"'),
         (Trial(api=1, kind="x"), "json:nothing", "names json:nothing", "update the package"),
+        (Trial(api=1, kind="x"), "json.nowhere:thing", "there is no module json.nowhere", "update the package"),
+        (Trial(api=1, kind="x"), "tests.drivers.base.no:x", "there is no module tests.drivers.base.no", "update"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_loaded_is_told_with_what_to_install(

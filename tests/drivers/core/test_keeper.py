@@ -211,7 +211,7 @@ def test_a_bus_without_its_keeper_says_so_once_and_goes_on(
             for _ in range(2):
                 bus.start()
                 bus.stop()
-        assert [record.levelno for record in caplog.records if "should this program" in record.message] == [
+        assert [record.levelno for record in caplog.records if "if this program is killed" in record.message] == [
             logging.WARNING
         ]
         assert "watchdog_ms = 0" in caplog.text
@@ -233,7 +233,7 @@ def test_a_keeper_that_ends_while_the_bus_runs_is_told_and_replaced(
             return "unkept" in bus.report().errors
 
         wait_until(told)
-        assert "has ended itself; stop and start again" in caplog.text
+        assert "has ended; stop and start again" in caplog.text
         bus.stop()
         bus.start()
         assert bus._keeper is not first
