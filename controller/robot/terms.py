@@ -108,9 +108,10 @@ def bend(at: Floats, gives: Floats, curve: Curve) -> tuple[Floats, Floats]:
 def _monotone_slopes(width: Floats, rise: Floats) -> Floats:
     """Slopes (j,) at the points: weighted harmonic means, zero where the curve turns (Fritsch and Butland 1984)."""
     a, b = width[:-1] + 2 * width[1:], 2 * width[:-1] + width[1:]
-    same = rise[:-1] * rise[1:] > 0
+    product = rise[:-1] * rise[1:]
+    same = product > 0
     inner = np.zeros(len(rise) - 1)
-    inner[same] = (a + b)[same] / (a[same] / rise[:-1][same] + b[same] / rise[1:][same])
+    inner[same] = ((a + b) * product)[same] / (a * rise[1:] + b * rise[:-1])[same]  # no tiny rise is divided by
     ends = [_end_slope(*width[:2], *rise[:2]), _end_slope(*width[:-3:-1], *rise[:-3:-1])]
     return np.concatenate([ends[:1], inner, ends[1:]])
 

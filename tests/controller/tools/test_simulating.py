@@ -30,7 +30,7 @@ def served(*words: str) -> Iterator[str]:
         assert word == "ready"
         yield path
         process.send_signal(signal.SIGINT)
-        assert process.wait(10) == 0
+        assert process.wait(60) == 0
     finally:
         process.kill()
         process.communicate()
