@@ -16,13 +16,10 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from controller.base.clock import Clock
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
-from controller.base.parameters import PARAMETERS, Parameters
+from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.signals import ENDINGS, let_interrupts_through
 from controller.body.insight import InsightWriter, insight_size
 from controller.body.sources import Sources, Voice
@@ -40,8 +37,6 @@ from controller.takes.reader import layer_of, load_take
 from controller.takes.recording import SUFFIX, Face, Recorder, Replay
 from drivers.base.priority import take_priority, take_turns_quickly
 from drivers.base.shutdown import Closers, with_those_before
-
-Floats = NDArray[np.float64]
 
 _POLL_S = 0.1
 

@@ -157,7 +157,7 @@ class Registry(Generic[P]):
             raise self._unknown(kind)
         package = entry.dist.name if entry.dist is not None else entry.module
         try:
-            plugin = entry.load()
+            plugin: P = entry.load()
         except (Exception, SystemExit) as error:  # whatever a foreign module does, it must break nothing but itself
             raise self._error(
                 f"{self.what} {kind!r} of the package {package} cannot be loaded: {type(error).__name__}: {error}",
