@@ -51,18 +51,3 @@ def test_an_interrupt_ends_what_was_started_in_the_background(tmp_path: Path) ->
         finally:
             process.kill()
     assert not link.is_symlink()
-
-
-@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="terminals that close are POSIX")
-def test_nohup_keeps_a_run_alive_when_its_terminal_closes() -> None:
-    from controller.base.signals import stop_flag
-
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        with stop_flag() as flag:
-            signal.raise_signal(signal.SIGHUP)
-            assert not flag.is_set()
-            signal.raise_signal(signal.SIGTERM)
-            assert flag.is_set()
-    finally:
-        signal.signal(signal.SIGHUP, before)
