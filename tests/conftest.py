@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
+SETTINGS = (
+    "FORCE_COLOR",
+    "NO_COLOR",
+    "CLICOLOR",
+    "CLICOLOR_FORCE",
+    "COLUMNS",
+    "LINES",
+    "TTY_COMPATIBLE",
+    "TTY_INTERACTIVE",
+)
+"""By these a user tells programs how to write; a test that is about one of them sets it."""
+
+
+def pytest_configure() -> None:
+    """Make what programs here find the same for every user, before anything of omote is imported."""
+    for name in SETTINGS:
+        os.environ.pop(name, None)
+    os.environ["TERM"] = "xterm-256color"
+    # a shell starts what runs in the background with Ctrl-C ignored, and nohup ignores the terminal's end
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
 
 
 @pytest.fixture(scope="session")

@@ -22,6 +22,8 @@ from controller.base.errors import ConfigError, ParameterError
 from controller.base.paths import config_dir
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 REGIONS = ("brows", "lids", "eyes", "cheeks", "nose", "jaw", "mouth", "tongue", "head")
 """Regions of the face, in the order reports list them."""

@@ -12,6 +12,11 @@ ENDINGS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasat
 """Signals that ask a process to end: from a service manager, and from a terminal that was closed."""
 
 
+def endings() -> tuple[signal.Signals, ...]:
+    """Those of :data:`ENDINGS` that end this process: under nohup it does not mind that its terminal was closed."""
+    return tuple(n for n in ENDINGS if n == signal.SIGTERM or signal.getsignal(n) is not signal.SIG_IGN)
+
+
 @contextmanager
 def interrupts_held() -> Iterator[None]:
     """Keep SIGINT waiting, also for a process started meanwhile, which lets it through when it is ready."""
@@ -34,9 +39,9 @@ def let_interrupts_through() -> None:
 
 @contextmanager
 def stop_flag() -> Iterator[threading.Event]:
-    """An event that SIGINT or any of :data:`ENDINGS` sets; a second SIGINT interrupts at once. Main thread only."""
+    """An event that SIGINT or any of :func:`endings` sets; a second SIGINT interrupts at once. Main thread only."""
     flag = threading.Event()
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *ENDINGS)}
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *endings())}
 
     def note(number: int, _frame: object) -> None:
         if flag.is_set() and number == signal.SIGINT:

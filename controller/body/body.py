@@ -16,14 +16,11 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from controller.base.clock import Clock
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
-from controller.base.parameters import PARAMETERS, Parameters
-from controller.base.signals import ENDINGS, let_interrupts_through
+from controller.base.parameters import PARAMETERS, Floats, Parameters
+from controller.base.signals import endings, let_interrupts_through
 from controller.body.insight import InsightWriter, insight_size
 from controller.body.sources import Sources, Voice
 from controller.body.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
@@ -40,8 +37,6 @@ from controller.takes.reader import layer_of, load_take
 from controller.takes.recording import SUFFIX, Face, Recorder, Replay
 from drivers.base.priority import take_priority, take_turns_quickly
 from drivers.base.shutdown import Closers, with_those_before
-
-Floats = NDArray[np.float64]
 
 _POLL_S = 0.1
 
@@ -233,7 +228,7 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
     stop = threading.Event()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
     let_interrupts_through()
-    for ending in ENDINGS:
+    for ending in endings():
         signal.signal(ending, lambda *_: stop.set())
     try:
         _serve(orders, pipe, stop)

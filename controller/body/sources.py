@@ -9,13 +9,16 @@ import threading
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from controller.base.errors import TakeError
 from controller.robot.following import Puppet
 from controller.takes.listening import HOP_S, Listener
 from controller.takes.livelink import TakePlayer
 from controller.takes.recording import Face
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer  # a name of the type checker's only
 
 _CHUNK = 4096
 
@@ -63,15 +66,16 @@ class PipeStream(io.RawIOBase):
         """It is."""
         return True
 
-    def readinto(self, buffer) -> int:  # type: ignore[no-untyped-def]
+    def readinto(self, buffer: WriteableBuffer) -> int:
         """Wait for some bytes; 0 at the end."""
         if not self._left:
             try:
                 self._left = self._pipe.recv_bytes()
             except (EOFError, OSError):
                 return 0
-        count = min(len(buffer), len(self._left))
-        buffer[:count], self._left = self._left[:count], self._left[count:]
+        room = memoryview(buffer)
+        count = min(len(room), len(self._left))
+        room[:count], self._left = self._left[:count], self._left[count:]
         return count
 
 

@@ -7,6 +7,7 @@ the simulated parts start at once.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from typing import TYPE_CHECKING
 
@@ -60,6 +61,8 @@ def _escape(text: str) -> str:
 
 def main() -> None:
     """Entry point of the ``omote`` command; nothing is imported before Ctrl-C would end it quietly."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in the background so
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         from controller.base.errors import OMOTE_ERRORS  # start-up: Ctrl-C ends it quietly from main() on
 

@@ -15,12 +15,12 @@ from rich.table import Table
 
 from controller.base.errors import ControllerError
 from controller.base.files import replacing
+from controller.cli.console import console
+from controller.tools.tables import show_table
 
 if TYPE_CHECKING:
     from controller.tools.benching import Tables  # start-up: --help does without it
     from surface.bench.bench import Measure  # start-up: --help does without it
-
-console = Console(highlight=False)
 PICTURES = (".png", ".svg", ".jpg", ".webp")
 
 
@@ -90,7 +90,7 @@ def bench(
         else:
             tables = _head(what, head, seconds, bar, file, updates, level)
     for title, rows in tables:
-        console.print(measure_table(title, rows))
+        show_table(measure_table(title, rows), console)
 
 
 @contextmanager
@@ -109,16 +109,16 @@ def _bus(seconds: float, face: bool, as_json: bool) -> None:
     from controller.tools.benching_bus import bench_bus, to_json  # start-up: --help does without it
 
     says = Console(stderr=True)  # lines and no moving bar: drawing one would disturb what is measured
-    tables = bench_bus(max(seconds, 1.0), lambda text: says.print(f"measuring {text}"), face=face)
+    tables = bench_bus(max(seconds, 1.0), lambda text: says.print(f"measuring {text}", soft_wrap=True), face=face)
     if as_json:
-        console.print_json(to_json(tables))
+        console.out(to_json(tables), highlight=False)
         return
     for title, lines in tables:
         table = Table("measure", "", "", "reach", "", title=title, title_justify="left")
         for line in lines:
             mark = {None: "", True: "kept", False: "missed"}[line.kept]
             table.add_row(line.name, f"{line.value:.2f}", line.unit, line.reach, mark)
-        console.print(table)
+        show_table(table, console)
 
 
 def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None, vertices: int) -> Tables:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
 from controller.cli import simulate as cli_simulate
-
-console = Console(highlight=False)
+from controller.cli.console import console
+from controller.tools.tables import show_table
 
 
 def register(app: typer.Typer) -> None:
@@ -32,14 +31,17 @@ def ports() -> None:
 
     found = list_ports()
     if not found:
-        console.print("No serial port found. Plug the adapter in, or try: omote simulate dynamixel --link /tmp/head")
+        console.print(
+            "No serial port found. Plug the adapter in, or try: omote simulate dynamixel --link /tmp/head",
+            soft_wrap=True,
+        )
         return
     table = Table("port", "usb", "serial number", "description", "usable", "latency timer")
     for record in found:
         latency = "" if record.latency_s is None else f"{record.latency_s * 1000:g} ms"
         usable = "yes" if record.usable else "[red]no[/]"
         table.add_row(record.path, record.vid_pid, record.serial_number, record.description, usable, latency)
-    console.print(table)
+    show_table(table, console)
     for record in found:
         if record.hint:
             console.print(f"{record.device}: {record.hint}", soft_wrap=True)
@@ -72,9 +74,12 @@ def scan(
         for found in scan_port(port, plan, tell):
             table.add_row(*found.row)
     if table.row_count:
-        console.print(table)
+        show_table(table, console)
     else:
-        console.print(f"No servo answered on {port}. Check its power, the wiring and the adapter's direction switch.")
+        console.print(
+            f"No servo answered on {port}. Check its power, the wiring and the adapter's direction switch.",
+            soft_wrap=True,
+        )
 
 
 def set_id(
@@ -96,7 +101,7 @@ def set_id(
     from drivers.tools.rename import set_id as change  # start-up: --help does without it
 
     info = change(port, baud, protocol, old, new, release=release)
-    console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}")
+    console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}", soft_wrap=True)
 
 
 def monitor(

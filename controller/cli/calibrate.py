@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from controller.base.errors import ConfigError
 from controller.base.paths import find_config
+from controller.cli.console import console
 
 if TYPE_CHECKING:
     from controller.robot.settings import ChannelSettings, RobotSettings  # start-up: --help does without it
-
-console = Console(highlight=False)
 
 
 def register(app: typer.Typer) -> None:
@@ -54,7 +52,9 @@ def calibrate(
         written = run_calibration(stack, settings, channels, name, target, margin, console)
     if written:
         console.print(f"wrote {target}", soft_wrap=True)
-        console.print(f'The robot file takes it with: calibration = "{name if out is None else target}"')
+        console.print(
+            f'The robot file takes it with: calibration = "{name if out is None else target}"', soft_wrap=True
+        )
 
 
 def _chosen(robot: RobotSettings, names: list[str] | None) -> Sequence[ChannelSettings]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-console = Console(highlight=False)
+from controller.cli.console import console
 
 
 def register(app: typer.Typer) -> None:
@@ -30,4 +29,4 @@ def check(
     from controller.tools.checking import check_anything  # start-up: --help does without it
 
     for line in check_anything(file):
-        console.print(line)
+        console.print(line, soft_wrap=True)

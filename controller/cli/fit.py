@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from controller.base.errors import ConfigError
-
-console = Console(highlight=False)
+from controller.cli.console import console
 
 
 def register(app: typer.Typer) -> None:

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-console = Console(highlight=False)
+from controller.cli.console import console
 
 
 def register(app: typer.Typer) -> None:

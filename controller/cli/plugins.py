@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import typer
-from rich.console import Console
 
-console = Console(highlight=False)
+from controller.cli.console import console
 
 
 def register(app: typer.Typer) -> None:
@@ -22,6 +21,7 @@ def plugins() -> None:
     from rich.table import Table
 
     from controller.tools.plugins import listed  # start-up: --help does without it
+    from controller.tools.tables import show_table  # start-up: the same
 
     table, broken = Table(box=None, pad_edge=False), []
     for head in ("sort", "kind", "what it is", "from"):
@@ -29,6 +29,6 @@ def plugins() -> None:
     for each in listed():
         table.add_row(each.sort, each.kind, escape(each.title) if each.works else "[red]cannot be loaded", each.package)
         broken += [] if each.works else [each]
-    console.print(table)
+    show_table(table, console)
     for each in broken:
         console.print(f"{escape(each.title)}\n[bold]try:[/] {escape(each.hint)}", soft_wrap=True)

@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
+from controller.cli.console import console
 from controller.stage.identity import parse_identity
 from controller.tools.report import rows
+from controller.tools.tables import show_table
 
 if TYPE_CHECKING:
     from controller.body.sources import Voice  # start-up: --help does without it
-
-console = Console(highlight=False)
 
 Seconds = Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write what was measured to this JSON file.")]
@@ -198,7 +197,7 @@ def show_report(report: dict[str, Any]) -> None:
     table = Table("measured", "value", title=f"omote {report['stage']}", title_justify="left")
     for name, value in rows(report):
         table.add_row(name, value)
-    console.print(table)
+    show_table(table, console)
     for path in report.get("written", []):
         console.print(f"wrote {path}", soft_wrap=True)
 
@@ -206,9 +205,9 @@ def show_report(report: dict[str, Any]) -> None:
 def show_plan(plan: list[dict[str, str]]) -> None:
     """Print what a stage would send, a channel a row."""
     if not plan:
-        console.print("This stage has no robot; nothing would be sent.")
+        console.print("This stage has no robot; nothing would be sent.", soft_wrap=True)
         return
     table = Table(*plan[0], title="dry run: no port was opened", title_justify="left")
     for row in plan:
         table.add_row(*row.values())
-    console.print(table)
+    show_table(table, console)

@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
-from rich.console import Console
 from typer.core import TyperGroup
 
 from controller.base.errors import ConfigError
+from controller.cli.console import console
 from drivers.base.errors import PluginError
 from drivers.base.options import REQUIRED, Entry, entries
 
 if TYPE_CHECKING:
     from controller.tools.simulating import Serving  # start-up: --help does without it
 
-console = Console(highlight=False)
 log = logging.getLogger(__name__)
 
 

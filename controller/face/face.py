@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 
 from controller.base.clock import Clock, Samples
 from controller.base.mailboxes import Mailbox
-from controller.base.parameters import Parameters
+from controller.base.parameters import Floats, Parameters
 from controller.stage.stage import FaceSettings
 
 if TYPE_CHECKING:
     from surface.head import Head  # start-up: the body gets its orders first
     from surface.view.pictures.offscreen import Offscreen  # start-up: the body gets its orders first
 
-Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 

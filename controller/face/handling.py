@@ -49,7 +49,8 @@ class Screen:
         clip[0] = (2 * pixel[0] / self.size[0] - 1) * clip[3]
         clip[1] = (1 - 2 * pixel[1] / self.size[1]) * clip[3]
         found = np.linalg.solve(self._matrix, clip)
-        return found[:3] / found[3]
+        point: Floats = found[:3] / found[3]
+        return point
 
     @property
     def _matrix(self) -> Floats:

@@ -14,12 +14,11 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.base.parameters import Floats, Parameters, did_you_mean
+from controller.base.parameters import Flags, Floats, Indices, Parameters, did_you_mean
 
 Mode = Literal["set", "add", "max"]
-Indices = NDArray[np.intp] | Sequence[int] | slice
+Which = Indices | Sequence[int] | slice
 
 _SHORTEST_S = 1e-9
 
@@ -73,7 +72,7 @@ class Layer:
         self._fade_out, self._block = table.fade_out_s[row], table.block[row]
         self._fresh = np.zeros(len(self.values), dtype=bool)
 
-    def write(self, indices: Indices, values: Floats | Sequence[float] | float, now_s: float) -> None:
+    def write(self, indices: Which, values: Floats | Sequence[float] | float, now_s: float) -> None:
         """Hold some parameters at ``values`` from ``now_s`` on; what is not finite changes nothing."""
         given = np.asarray(values, dtype=np.float64)
         if not np.isfinite(given).all():
@@ -82,7 +81,7 @@ class Layer:
         self._stamp[indices] = now_s
         self.held[indices] = True
 
-    def write_masked(self, values: Floats, mask: NDArray[np.bool_], now_s: float) -> None:
+    def write_masked(self, values: Floats, mask: Flags, now_s: float) -> None:
         """Hold the parameters of ``mask`` : (P,) bool at ``values`` : (P,); all others are released."""
         np.isfinite(values, out=self._fresh)
         self._fresh &= mask
@@ -90,7 +89,7 @@ class Layer:
         np.copyto(self._stamp, now_s, where=self._fresh)
         np.copyto(self.held, mask)
 
-    def release(self, indices: Indices = slice(None), *, fade_s: float | None = None) -> None:
+    def release(self, indices: Which = slice(None), *, fade_s: float | None = None) -> None:
         """Give parameters back to the layers below, over ``fade_s`` or the layer's own fade."""
         self.held[indices] = False
         self._fade_out[:] = self.settings.fade_out_s if fade_s is None else fade_s
@@ -119,7 +118,7 @@ class _Table:
         )
         self._rate, self.block = np.zeros(shape), np.ones((len(settings), 1))
 
-    def advance(self, now_s: float, dt: float) -> NDArray[np.bool_]:
+    def advance(self, now_s: float, dt: float) -> Flags:
         """Let fades and time-outs pass; (n,) which layers have any say."""
         np.greater(self.stamp, now_s - self._timeout_s, out=self._fresh)
         self.held &= self._fresh
@@ -132,7 +131,8 @@ class _Table:
         np.multiply(self.level, self._weight * self.block, out=self.applied)
         self.applied *= self.share
         np.multiply(self.values, self.gain, out=self.given)
-        return np.logical_or.reduce(self.level != 0.0, axis=1)
+        shown: Flags = np.logical_or.reduce(self.level != 0.0, axis=1)
+        return shown
 
 
 class Mixer:
@@ -223,7 +223,7 @@ def by_priority(layers: Sequence[LayerSettings]) -> list[LayerSettings]:
     return sorted(layers, key=lambda layer: layer.priority)
 
 
-def _only_finite(indices: Indices, values: Floats, count: int) -> tuple[NDArray[np.intp], Floats]:
+def _only_finite(indices: Which, values: Floats, count: int) -> tuple[Indices, Floats]:
     """The finite part of ``values`` and the positions it belongs to."""
     positions = np.arange(count)[indices]
     spread = np.broadcast_to(values, positions.shape)

@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 
 from numba import boolean, float64, njit, void
-from numpy.typing import NDArray
 
 import surface.base.jit  # noqa: F401  first of all: it keeps numba from importing scipy, which takes longer than all the rest
-from controller.base.parameters import Floats
+from controller.base.parameters import Flags, Floats
 
 _TINY = 1e-12
 _ROW = float64[::1]
@@ -28,7 +27,7 @@ def _braking_speed(dt: float, left: float, accel: float, response: float) -> flo
 
 
 @njit([void(float64, _ROW, _ROW, _ROW, boolean[::1], _ROW, _ROW, _ROW, _ROW, _ROW)], cache=True, nogil=True)
-def move(dt: float, target: Floats, position: Floats, velocity: Floats, limited: NDArray, speed: Floats, accel: Floats,
+def move(dt: float, target: Floats, position: Floats, velocity: Floats, limited: Flags, speed: Floats, accel: Floats,
          response: Floats, low: Floats, high: Floats) -> None:  # fmt: skip
     """Move ``position`` and ``velocity`` towards ``target`` for ``dt`` s, in place; all are (n,).
 

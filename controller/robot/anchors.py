@@ -8,7 +8,7 @@ at the anchor and at a few points close to it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,11 +51,13 @@ class Skin:
 
     def displacement(self, shapes: Floats) -> Floats:
         """(m, 3) mm for shapes (s,)."""
-        return np.einsum("mcsl,sl->mc", self.moves, steps(shapes))
+        moved: Floats = np.einsum("mcsl,sl->mc", self.moves, steps(shapes))
+        return moved
 
     def full(self, shape: int) -> Floats:
         """(m, 3) mm that one shape moves the points by at 1."""
-        return self.moves[:, :, shape].sum(axis=2)
+        moved: Floats = self.moves[:, :, shape].sum(axis=2)
+        return moved
 
 
 def first(skin: Skin, count: int) -> Skin:
@@ -91,7 +93,7 @@ def sample_skin(head: Head, part: str, uv: Floats) -> Skin:
     return Skin(part, uv, rest, moves, np.asarray(basis @ np.asarray(jaw, np.float64)))
 
 
-def _way(name: str, at) -> Floats:  # type: ignore[no-untyped-def]
+def _way(name: str, at: Callable[[dict[str, float]], Floats]) -> Floats:
     """(levels, m, 3) where one shape alone brings the points. mouthClose works on an open jaw only."""
     base = {"mouthClose": "jawOpen"}.get(name)
     if name == "tongueOut":
@@ -149,7 +151,8 @@ def servo_field(anchors: Sequence[AnchorSettings], at: Skin, points: Skin) -> Fl
 def _spread(points: Skin, centre: Floats, jaw: float, reach_mm: float) -> Floats:
     """(m,) share of a pull, 1 at the anchor; skin on the other jaw does not come along."""
     squared = ((points.rest - centre) ** 2).sum(axis=1) / reach_mm**2
-    return np.clip(1.0 - squared, 0.0, None) ** 2 * (1.0 - np.abs(points.jaw - jaw)).clip(0.0, 1.0)
+    share: Floats = np.clip(1.0 - squared, 0.0, None) ** 2 * (1.0 - np.abs(points.jaw - jaw)).clip(0.0, 1.0)
+    return share
 
 
 @dataclass(frozen=True)
@@ -179,7 +182,8 @@ class Rows:
 
     def along(self, points: Floats) -> Floats:
         """(r, ...) components along the pulls of (m, 3, ...) displacements."""
-        return np.einsum("rc,rc...->r...", self.way, points[self.point])
+        components: Floats = np.einsum("rc,rc...->r...", self.way, points[self.point])
+        return components
 
     @property
     def share(self) -> Floats:

@@ -14,10 +14,9 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.base.clock import Clock, Samples
-from controller.base.parameters import Parameters
+from controller.base.parameters import Floats, Parameters
 from controller.robot.buses import BusSettings
 from controller.robot.channels import build_table, limiter_of, play, servo_specs
 from controller.robot.following import Following, regions_of
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-Floats = NDArray[np.float64]
 Newest = Callable[[], tuple[Floats, int]]
 
 _RETRY_NS = 1_000_000_000

@@ -11,16 +11,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.base.parameters import Parameters
+from controller.base.parameters import Floats, Indices, Parameters
 from controller.motion.motion import MotionLimiter
 from controller.robot.settings import ChannelSettings
 from controller.robot.terms import bend
 from drivers.base.bus import ServoSpec
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class Anchors(Protocol):

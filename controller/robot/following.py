@@ -6,16 +6,13 @@ import threading
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.base.parameters import REGIONS, Floats, Parameters
+from controller.base.parameters import REGIONS, Flags, Floats, Parameters
 from controller.layers.commands import StatusValue
 from controller.robot.channels import ChannelTable
 from controller.robot.mirror import Mirror
 from controller.takes.recording import Face
 from drivers.base.bus import BusState
-
-Flags = NDArray[np.bool_]
 
 
 class Following:

@@ -14,13 +14,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.base.parameters import Flags, Floats, Indices
 from controller.robot.channels import ChannelTable
 from controller.robot.rules import LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 _NEAR_RAD = 1e-3
 
@@ -42,7 +39,8 @@ class Moment:
     @property
     def position(self) -> Floats:
         """(n,) rad, where the servos were last told to be."""
-        return self.angles[1]
+        angles: Floats = self.angles[1]
+        return angles
 
 
 @dataclass
@@ -172,7 +170,8 @@ class Timing:
         """(k,) relative limit: 1 falls to the extreme, stays, and rises to 1 again."""
         fallen = np.clip(self._phase / self._fall, 0.0, 1.0)
         risen = np.clip((self._phase - self._until[:, 1]) / self._recover, 0.0, 1.0)
-        return 1.0 - (1.0 - self._extreme) * (fallen - risen)
+        level: Floats = 1.0 - (1.0 - self._extreme) * (fallen - risen)
+        return level
 
 
 class Load:

@@ -16,12 +16,11 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from controller.base.config import Settings
+from controller.base.parameters import Floats
 
-Floats = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Curve = Literal["straight", "smooth"]
 

@@ -11,6 +11,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.robot.anchors import Skin, head_order, sample_skin, shapes_of
 from surface.head import Head
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix  # start-up: only reshaping needs it
 
 _RIDGE = 1e-3
 _SPARSITY = 0.02
@@ -189,7 +193,7 @@ class Reshaper:
         return Reshape(self.part, kept, moves[kept])
 
 
-def _differences(points: Floats, jaw: NDArray):  # type: ignore[no-untyped-def]
+def _differences(points: Floats, jaw: NDArray[np.floating]) -> csr_matrix:
     """(n, n) sparse: each control point minus the mean of its nearest ones, never across the mouth."""
     from scipy.sparse import coo_matrix, identity  # start-up: only reshaping needs it
     from scipy.spatial import cKDTree  # start-up: only reshaping needs it

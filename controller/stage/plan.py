@@ -12,7 +12,7 @@ from controller.layers.commands import CommandState
 from controller.links.line.host import load_script
 from controller.links.line.script import Script
 from controller.links.line.show import Show
-from controller.robot.anchors import load_anchors
+from controller.robot.anchors import AnchorMap, load_anchors
 from controller.robot.channels import build_table
 from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.stage.rehearsal import Feed, Rehearsal
@@ -47,7 +47,7 @@ def rehearse(
     return rows, report
 
 
-def _anchors(stage: Stage, robot: RobotSettings, parameters: Parameters):  # type: ignore[no-untyped-def]
+def _anchors(stage: Stage, robot: RobotSettings, parameters: Parameters) -> AnchorMap | None:
     if all(channel.anchor is None for channel in robot.channels):
         return None
 

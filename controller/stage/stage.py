@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -196,7 +196,7 @@ def _files(faults: list[str], kind: str, names: list[str], path: Path) -> tuple[
     return tuple(file for file in found if file is not None)
 
 
-def _collect(faults: list[str], key: str, read):  # type: ignore[no-untyped-def]
+def _collect(faults: list[str], key: str, read: Callable[..., object]) -> Any:
     """Run ``read``; a configuration error becomes a fault of ``key``, so that all are seen at once."""
     try:
         return read()

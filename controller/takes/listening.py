@@ -157,7 +157,8 @@ def samples(data: bytes, width: int, channels: int) -> Floats:
     raw = np.frombuffer(data[:whole], dtype=np.dtype(_KINDS[width])).astype(np.float64)
     if width == 1:
         raw -= 128.0
-    return raw.reshape(-1, channels).mean(axis=1) / 2.0 ** (8 * width - 1)
+    mixed: Floats = raw.reshape(-1, channels).mean(axis=1) / 2.0 ** (8 * width - 1)
+    return mixed
 
 
 def _open(stream: IO[bytes]) -> wave.Wave_read:

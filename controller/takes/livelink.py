@@ -242,7 +242,8 @@ def _timecode(path: Path, number: int, text: str) -> float:
 def _unwrap(times: Floats) -> Floats:
     """Seconds from the first row; a fall by more than half a day is midnight."""
     days = np.cumsum(np.diff(times, prepend=times[0]) < -_DAY_S / 2)
-    return times + _DAY_S * days - times[0]
+    seconds: Floats = times + _DAY_S * days - times[0]
+    return seconds
 
 
 def _by_parameter(

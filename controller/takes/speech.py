@@ -72,8 +72,9 @@ def _mix(t: float, starts: Floats, ends: Floats, weights: Floats, hold: Floats) 
     total = dominance.sum()
     if total <= 0.0:
         return np.zeros(weights.shape[1])
-    mixed = dominance @ weights[near.start : near.stop] / total
-    return mixed * min(1.0, _dominance(t, starts[0], ends[-1], 1.0))
+    mixed: Floats = dominance @ weights[near.start : near.stop] / total
+    mixed *= min(1.0, _dominance(t, starts[0], ends[-1], 1.0))
+    return mixed
 
 
 def _dominance(t: float, start: float, end: float, room: float) -> float:

@@ -22,8 +22,6 @@ from controller.tools.keys import Keyboard
 from drivers import open_bus
 from drivers.base.bus import Bus
 
-Floats = NDArray[np.float64]
-
 PERIOD_S = 0.03
 STALE_S = 0.5
 """An older angle counts as unknown; a single read that was missed does not matter."""

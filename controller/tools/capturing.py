@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from controller.base.parameters import Floats
 from controller.robot.calibration import Captured
 from controller.robot.settings import ChannelSettings
-
-Floats = NDArray[np.float64]
 
 STEP_DEG = 0.5
 """How far an arrow key moves a servo that holds."""

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from controller.tools.tables import show_table
 from surface.base.errors import ViewError
 from surface.fit.api import fit_head
 from surface.fit.identities import add_identities
@@ -41,11 +42,14 @@ def fit_with_progress(
 
         report = fit_head(mesh, out, name=name, progress=tell, options=options, report_dir=report_dir)
     shaded = _shade(out, console)
-    console.print(report_table(report))
+    show_table(report_table(report), console)
     for line in remarks(report):
         console.print(line, soft_wrap=True, markup=False)
     if not shaded:
-        console.print("no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture")
+        console.print(
+            "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture",
+            soft_wrap=True,
+        )
     console.print(f"wrote {out}", soft_wrap=True)
 
 

@@ -163,7 +163,9 @@ def serve_host(script: str, link: Path | None, console: Console) -> None:
         host = RobotHost(port, loaded, PARAMETERS)
         host.run(lambda: not flag.is_set())
         counts = host.report()
-    console.print(f"{counts['sent']} lines sent, {counts['accepted']} accepted, {counts['refused']} refused")
+    console.print(
+        f"{counts['sent']} lines sent, {counts['accepted']} accepted, {counts['refused']} refused", soft_wrap=True
+    )
 
 
 def _until_stopped(serve: Callable[[socket.socket], None]) -> None:

@@ -67,9 +67,11 @@ class Affect:
         distance = np.linalg.norm(self.points[:, : len(point)] - point, axis=1)
         nearest = int(np.argmin(distance))
         if distance[nearest] < _NEAR:
-            return np.eye(len(distance))[nearest]
-        weights = distance**-_POWER
-        return weights / weights.sum()
+            only: Floats = np.eye(len(distance))[nearest]
+            return only
+        weights: Floats = distance**-_POWER
+        weights /= weights.sum()
+        return weights
 
     def expand(self, valence: float, arousal: float, dominance: float | None = None) -> Floats:
         """(P,) parameters of a mood."""
@@ -79,7 +81,8 @@ class Affect:
         """(3,) valence, arousal and dominance of a face that shows expressions at intensities 0..1."""
         shown = np.array([max(levels.get(name, 0.0), 0.0) for name in self.names])
         total = max(shown.sum(), 1.0)
-        return shown @ self.points / total
+        read: Floats = shown @ self.points / total
+        return read
 
 
 def _is_point(at: object) -> bool:

@@ -114,7 +114,8 @@ class Facs:
 
     def read(self, values: Floats) -> Floats:
         """(n,) levels 0..1 that show ``values`` : (P,) best, with few units."""
-        return self._solver.solve(np.asarray(values, dtype=np.float64)) * self._read
+        levels: Floats = self._solver.solve(np.asarray(values, dtype=np.float64)) * self._read
+        return levels
 
     def formula(self, levels: Floats) -> str:
         """Levels (n,) as a formula with letters; both sides as one where they agree, nothing below 0.05."""

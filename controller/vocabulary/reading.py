@@ -93,4 +93,5 @@ class _Levels:
 
     def solve(self, values: Floats) -> Floats:
         """(n,) levels that give ``values`` : (P,) best."""
-        return self._solver.solve(values) / self._size
+        levels: Floats = self._solver.solve(values) / self._size
+        return levels

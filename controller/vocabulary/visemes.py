@@ -60,7 +60,8 @@ class Visemes:
     @property
     def mask(self) -> np.ndarray:
         """(P,) bool, the parameters that any viseme moves or that speech holds back."""
-        return (self.matrix != 0.0).any(axis=1) | (self.through < 1.0)
+        moved: np.ndarray = (self.matrix != 0.0).any(axis=1) | (self.through < 1.0)
+        return moved
 
     def weights(self, name: str) -> Floats:
         """(n,) weights of a viseme by name, or of a phoneme with or without stress digit.
@@ -71,7 +72,8 @@ class Visemes:
         """
         name = self.aliases.get(name, name)
         if name in self.names:
-            return np.eye(len(self.names))[self.names.index(name)]
+            only: Floats = np.eye(len(self.names))[self.names.index(name)]
+            return only
         found = self.phonemes.get(name.upper().rstrip("012"))
         if found is None:
             known = [*self.names, *self.phonemes]

@@ -179,12 +179,11 @@ class Registry(Generic[P]):
         """A plug-in in a folder of omote's own."""
         mine = f"{self.what} {kind!r} in {module}"
         try:
-            plugin = getattr(import_module(module), self._attribute)
+            plugin: P = getattr(import_module(module), self._attribute)
         except Exception as error:
             raise PluginError(f"{mine} cannot be loaded: {_why(error)}", hint=f"mend {module}") from error
         self._check(plugin, kind, mine, f"mend {module}")
-        found: P = plugin
-        return found
+        return plugin
 
     def _foreign(self) -> dict[str, list[EntryPoint]]:
         """Entry points of this group by name; what cannot be read of a package is told once and left out."""
@@ -212,14 +211,13 @@ class Registry(Generic[P]):
             )
         mine = f"{self.what} {kind!r} of the package {packages[0]}"
         try:
-            plugin = entries[0].load()
+            plugin: P = entries[0].load()
         except (Exception, SystemExit) as error:  # whatever a foreign module does, it must break nothing but itself
             raise PluginError(
                 f"{mine} cannot be loaded: {_why(error)}", hint=f"pip install --upgrade {packages[0]}"
             ) from error
         self._check(plugin, kind, mine, f"pip install --upgrade {packages[0]}, or ask its maker")
-        found: P = plugin
-        return found
+        return plugin
 
     def _check(self, plugin: Any, kind: str, mine: str, hint: str) -> None:
         made_for = getattr(plugin, "api", None)

@@ -95,7 +95,8 @@ class PulseScale:
         """(n,) whole steps of ``1 / per_us`` us for angles (n,) rad, never beyond the servos' limits."""
         steps = np.rint(self.pulses(angle_rad) * per_us)
         low, high = np.ceil(self.low_us * per_us), np.floor(self.high_us * per_us)
-        return np.minimum(np.maximum(steps, low), high).astype(np.intp)
+        kept: Indices = np.minimum(np.maximum(steps, low), high).astype(np.intp)
+        return kept
 
     def radians(self, pulse_us: Floats) -> Floats:
         """(n,) rad for pulses (n,) us; NaN for 0, which is no pulse."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from drivers.base.errors import DriverError
 from drivers.packets import packet as v2
 from drivers.packets import packet1 as v1
-from drivers.tables.tables import ControlTable, load_table
+from drivers.tables.tables import ControlTable, Item, load_table
 
 TO, FROM = "->", "<-"
 ARROWS = {True: TO, False: FROM, None: "--"}
@@ -88,7 +88,7 @@ class PacketDecoder(Decoder):
         first, last = items[0].name, items[-1].name
         return first if first == last else f"{first} .. {last}"
 
-    def _items(self, servo: int, address: int, size: int) -> list:
+    def _items(self, servo: int, address: int, size: int) -> list[Item]:
         table = self.tables.get(servo, self._default)
         if table is None:
             return []

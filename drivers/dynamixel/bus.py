@@ -27,7 +27,7 @@ from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
 from drivers.dynamixel.startup import Policy
 from drivers.dynamixel.telemetry import Telemetry
-from drivers.tables.tables import load_table, model_name, model_number
+from drivers.tables.tables import ControlTable, load_table, model_name, model_number
 
 log = logging.getLogger(__name__)
 
@@ -168,7 +168,7 @@ class DynamixelBus(WireBus):
     def _switch_off(self) -> None:
         startup.switch_off(self._registers, self.ids)
 
-    def _tables(self, tables: list) -> None:
+    def _tables(self, tables: list[ControlTable]) -> None:
         self._registers.tables = dict(zip(self.ids, tables, strict=True))
         self.scale = Scale(self.servos, tables)
 

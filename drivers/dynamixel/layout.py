@@ -83,7 +83,7 @@ class Layout:
     def speeds(self, raw: NDArray[np.integer]) -> Floats:
         """Signed steps per time of the velocity register, ``(k,) -> (k,) float64``."""
         if self.signed_magnitude:
-            return np.where(raw & MAGNITUDE_BIT, -1.0, 1.0) * (raw & (MAGNITUDE_BIT - 1))
+            return np.asarray(np.where(raw & MAGNITUDE_BIT, -1.0, 1.0) * (raw & (MAGNITUDE_BIT - 1)), np.float64)
         return raw.astype(np.float64)
 
 

@@ -32,7 +32,7 @@ _FRAME = 259
 """More than any packet has."""
 
 
-class Packets1(Exchanges, protocol1_packet_handler.Protocol1PacketHandler):
+class Packets1(Exchanges, protocol1_packet_handler.Protocol1PacketHandler):  # type: ignore[misc]  # without types
     """The SDK's Protocol 1.0 packet handler with its faults overridden, and group transactions of our own."""
 
     longest = 143  # the receive buffer of AX and RX

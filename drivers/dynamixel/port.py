@@ -23,7 +23,7 @@ DOZE_LATE_S = 0.0005
 """How long after the last byte was due that goes on."""
 
 
-class Port(port_handler.PortHandler):
+class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
     """The SDK's port handler on an exclusive, blocking :class:`~drivers.port.serialport.SerialPort`.
 
     Parameters

@@ -59,7 +59,7 @@ class Exchange(NamedTuple):
     joint_lost: bool = False
 
 
-class Packets(protocol2_packet_handler.Protocol2PacketHandler):
+class Packets(protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[misc]  # without types
     """The SDK's Protocol 2.0 packet handler with its faults overridden, and group transactions of our own."""
 
     # ------------------------------------------------------------------ what the SDK calls by its own names

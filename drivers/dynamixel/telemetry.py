@@ -330,7 +330,7 @@ class Telemetry:
 
     def _remembering(self, ids: Sequence[int], names: Collection[str], raw: NDArray[np.void]) -> Flags:
         """Who still has its pointers: without them all reads as 0, and a position of 0 must not be believed."""
-        known = raw[_VITAL[0]] != 0
+        known: Flags = raw[_VITAL[0]] != 0
         for name in _VITAL[1:]:
             if name in names and not known.all():
                 known |= raw[name] != 0

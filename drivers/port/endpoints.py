@@ -157,8 +157,8 @@ class UrlEnd:
 
     def take(self) -> bytes:
         """What has arrived."""
-        data, self._first = self._first, b""
-        data += self.device.read(min(self.device.in_waiting, _CHUNK))
+        data = self._first + bytes(self.device.read(min(self.device.in_waiting, _CHUNK)))
+        self._first = b""
         if not data:
             raise BlockingIOError
         return data

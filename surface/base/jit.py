@@ -40,12 +40,12 @@ PACKAGE = Path(__file__).parents[1]
 IMPORT = re.compile(r"^from[ ]+(\.*)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n#]*)", re.MULTILINE)
 
 
-def kernel(function: Callable) -> Any:
+def kernel(function: Callable[..., Any]) -> Any:
     """Compile at the first call for each set of argument types, cache on disk, release the GIL."""
     return _watching(njit(cache=True, nogil=True)(function))
 
 
-def inlined(function: Callable) -> Any:
+def inlined(function: Callable[..., Any]) -> Any:
     """As :func:`kernel`, and its code is put into the caller's."""
     return _watching(njit(cache=True, nogil=True, inline="always")(function))
 

@@ -233,7 +233,7 @@ def _shared_read(weights: np.ndarray, pool: ThreadPoolExecutor) -> Callable[[], 
     return call
 
 
-def shaker(deformation: Deformation, ids: np.ndarray) -> Callable[[], object]:
+def shaker(deformation: Deformation[DCPSurface], ids: np.ndarray) -> Callable[[], object]:
     """A call that moves the points there and back in turn."""
     here = deformation.points[ids].copy()
     places = (here + 0.01 * np.ptp(deformation.points, axis=0).max(), here)

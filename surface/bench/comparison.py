@@ -168,12 +168,14 @@ def _lattice(n: int) -> Floats:
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
     keep = i + j <= n
     share = np.stack([i[keep], j[keep], n - i[keep] - j[keep]], axis=1) / n
-    return share[share.max(axis=1) < 1]
+    inner: Floats = share[share.max(axis=1) < 1]
+    return inner
 
 
 def _common(side: np.ndarray) -> np.ndarray:
     """(t,) the limit that a triangle's corners on slits ask for."""
-    return np.bitwise_or.reduce(side, axis=1)
+    limits: np.ndarray = np.bitwise_or.reduce(side, axis=1)
+    return limits
 
 
 def draw(variants: list[Variant], path: str | Path, *, height: int = 900) -> None:

@@ -70,7 +70,7 @@ def drift(
     return Drift(**count, error=error, normal_error=normal_error)
 
 
-def _reshape(deformation: Deformation, rng: np.random.Generator, count: dict[str, int]) -> None:
+def _reshape(deformation: Deformation[DCPSurface], rng: np.random.Generator, count: dict[str, int]) -> None:
     """Change one weight, and the knots of one point by a little."""
     basis = deformation.table.basis
     ids = rng.integers(0, basis.n, 1)
@@ -88,7 +88,7 @@ def _shaken(knots: Floats, rng: np.random.Generator) -> Floats:
     return np.sort(np.where(inner, 0.9 * knots + 0.1 * rng.uniform(knots[0], knots[-1], len(knots)), knots))
 
 
-def _move(deformation: Deformation, rng: np.random.Generator, count: int, size: int, length: float) -> None:
+def _move(deformation: Deformation[DCPSurface], rng: np.random.Generator, count: int, size: int, length: float) -> None:
     """Make ``count`` calls of ``move`` with ``size`` points each, without Python between them."""
     if not count:
         return
@@ -110,7 +110,7 @@ def _play(table, ids, steps, most, limit, bias, gap, sign):
         place_bound(table, ids[k], steps[k], True, most, limit, bias, gap, sign)
 
 
-def _errors(deformation: Deformation, size: float) -> tuple[float, float]:
+def _errors(deformation: Deformation[DCPSurface], size: float) -> tuple[float, float]:
     """Greatest distances of vertices, as a part of ``size``, and of normals from those of a new surface."""
     mesh, surface = deformation.mesh, deformation.surface
     points, su, sv = surface.derivatives(mesh.uv, mesh.side)

@@ -28,8 +28,8 @@ def one_thread() -> AbstractContextManager[object]:
     """Keep numpy's matrix products to one thread where threadpoolctl is installed; else they use what they find."""
     if importlib.util.find_spec("threadpoolctl") is None:
         return nullcontext()
-    limits = importlib.import_module("threadpoolctl").threadpool_limits
-    return limits(1)
+    limits: AbstractContextManager[object] = importlib.import_module("threadpoolctl").threadpool_limits(1)
+    return limits
 
 
 def sparse_matrix(surface: DCPSurface, mesh: Mesh) -> Evaluator:

@@ -4,7 +4,7 @@ A compiled function looks at every array it is given, which takes longer than a 
 table of addresses, made anew whenever one of them is replaced.
 """
 
-# mypy: allow-untyped-defs, disable-error-code="import-untyped, call-arg"
+# mypy: allow-untyped-defs, disable-error-code="import-untyped, call-arg, attr-defined"
 from __future__ import annotations
 
 import numpy as np

@@ -148,7 +148,7 @@ class StencilTable:
         scratch = [(np.zeros_like(state.local), np.zeros_like(state.spare)) for _ in range(state.threads)]
         return [*cuts, len(total)], scratch
 
-    def _inputs(self, state: State) -> tuple:
+    def _inputs(self, state: State) -> tuple[object, ...]:
         x = self.lists
         return (
             state.points, self.origin, x.cell_start, x.tile_start, x.rows, x.room, x.at, x.ids_at, x.ids, x.value,

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Array
 from surface.base.errors import ExportError
 from surface.export.exporter import Exporter
 from surface.export.png import png_bytes
@@ -172,12 +173,12 @@ class Document:
         rows = np.ascontiguousarray(rows, np.float32)
         return self._add(rows, FLOAT, kind, ARRAY_BUFFER, _bounds(rows) if bounds else {})
 
-    def _add(self, array: NDArray, component: int, kind: str, target: int, more: dict[str, Any] | None = None) -> int:
+    def _add(self, array: Array, component: int, kind: str, target: int, more: dict[str, Any] | None = None) -> int:
         entry = {"bufferView": self._view(array, target), "componentType": component, "count": len(array), "type": kind}
         self._accessors.append(entry | (more or {}))
         return len(self._accessors) - 1
 
-    def _view(self, array: NDArray, target: int | None) -> int:
+    def _view(self, array: Array, target: int | None) -> int:
         self._pad()
         view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": array.nbytes}
         self._views.append(view | ({} if target is None else {"target": target}))

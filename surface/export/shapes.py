@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats32
 from surface.head import Head
 from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
 
-Floats32 = NDArray[np.float32]
 LEAST_MM = 0.002  # displacements smaller than this are none
 # shapes that only mean something over another one: written is what they add to it
 OVER = {"mouthClose": {"jawOpen": 1.0}, "tongueOut": {"jawOpen": TONGUE_NEEDS}}
@@ -96,4 +96,5 @@ def _in_square(uv: Floats32) -> Floats32:
     low, high = uv.min(axis=0), uv.max(axis=0)
     if low.min() >= 0 and high.max() <= 1:
         return uv.copy()
-    return ((uv - low) / max(float((high - low).max()), 1e-9)).astype(np.float32)
+    scaled: Floats32 = ((uv - low) / max(float((high - low).max()), 1e-9)).astype(np.float32)
+    return scaled

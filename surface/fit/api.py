@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
@@ -37,7 +37,6 @@ from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig, optical_axis
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 # the pose that decides how finely a part is cut into triangles
 LIVELY = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}

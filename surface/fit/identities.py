@@ -9,11 +9,12 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
 from surface.fit.points.net import Net
@@ -32,7 +33,6 @@ from surface.readers.npzmesh import DAMAGED
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-Floats = NDArray[np.float64]
 TABLE = Path(__file__).with_name("identities.toml")
 LEAST_MM = 0.01
 LID_V, ROWS = 0.03, 9  # how far a lid reaches outside the hole in the skin, in v; where it is looked at
@@ -49,7 +49,7 @@ class Wanted:
     vertices: int
     longest: float
     landmarks: NDArray[np.int64]
-    measures: dict[str, dict]
+    measures: dict[str, dict[str, Any]]
     identities: dict[str, dict[str, float]]
 
 
@@ -99,7 +99,8 @@ def read_modes(path: Path, mesh: FitMesh, mesh_path: str | Path) -> Floats:
     if not np.isfinite(deltas).all():
         mode = int(np.flatnonzero(~np.isfinite(deltas).all(axis=(1, 2)))[0])
         raise FitError(f"{path}: deltas[{mode}] holds something that is not a finite number")
-    return deltas * (np.ptp(mesh.vertices) / np.ptp(own))
+    scaled: Floats = deltas * (np.ptp(mesh.vertices) / np.ptp(own))
+    return scaled
 
 
 def symmetric(vertices: Floats, modes: Floats) -> Floats:
@@ -125,7 +126,7 @@ def mixes(vertices: Floats, modes: Floats, wanted: Wanted) -> list[Floats]:
     return out
 
 
-def measure(landmarks: Floats, measures: dict[str, dict]) -> dict[str, float]:
+def measure(landmarks: Floats, measures: dict[str, dict[str, Any]]) -> dict[str, float]:
     """Every measure of landmarks (68, 3), or by how much displacements of them change it."""
     out = {}
     for name, m in measures.items():
@@ -247,7 +248,8 @@ def _followed(points: Floats, rest: Floats, shifts: Floats) -> Floats:
     distance, nearest = cKDTree(rest).query(points, k=NEAR)
     weight = 1.0 / (distance + 0.5)
     weight /= weight.sum(axis=1, keepdims=True)
-    return np.einsum("nj,knjc->knc", weight, shifts[:, nearest])
+    followed: Floats = np.einsum("nj,knjc->knc", weight, shifts[:, nearest])
+    return followed
 
 
 def _jaw_shift(head: HeadData, moves: dict[str, Floats]) -> Floats:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import FitError, ViewError
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import Errors, FitReport, face_bounds
@@ -20,7 +21,6 @@ from surface.fit.result import FitResult, FittedPart
 from surface.fit.source.chart import TILE
 from surface.head import Head
 
-Floats = NDArray[np.float64]
 FORMAT, VERSION = "omote fit report", 1
 FULL_MM = 1.0  # error at the end of the colour scale
 SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0.75, 0.24, 0.04], [0.55, 0.02, 0.02]])

@@ -12,9 +12,9 @@ import heapq
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.mesh.borders import border_edges
 
-Floats = NDArray[np.float64]
 Ids = NDArray[np.integer]
 _LEAST_COS = 0.3  # a triangle turned by more than this counts as flipped
 _BORDER = 4.0  # weight of a border's line, beside a plane's

@@ -39,7 +39,8 @@ class Slit:
     def holds(self, uv: Floats) -> np.ndarray:
         """(m,) bool: which of ``uv (m, 2)`` lie on the open segment."""
         across, along = (uv[:, 1], uv[:, 0]) if self.axis == "u" else (uv[:, 0], uv[:, 1])
-        return (across == self.at) & (along > self.start) & (along < self.end)
+        held: np.ndarray = (across == self.at) & (along > self.start) & (along < self.end)
+        return held
 
 
 @dataclass(frozen=True)
@@ -130,8 +131,8 @@ def _check_loop(loop: ArrayLike, index: int) -> Floats:
         raise ValueError(f"loops[{index}]: shape {ring.shape}, expected (k, 2)")
     if not np.isfinite(ring).all():
         raise ValueError(f"loops[{index}]: must be finite")
-    ring = ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)]
-    if len(ring) < 3:
-        raise ValueError(f"loops[{index}]: {len(ring)} distinct points, needs at least 3")
-    ring.flags.writeable = False
-    return ring
+    kept: Floats = ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)]
+    if len(kept) < 3:
+        raise ValueError(f"loops[{index}]: {len(kept)} distinct points, needs at least 3")
+    kept.flags.writeable = False
+    return kept

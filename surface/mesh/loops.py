@@ -111,7 +111,8 @@ def corners(loop: Floats, scale: tuple[float, float], angle: float = 40.0) -> np
     ring = loop * np.asarray(scale)
     into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
     cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-    return np.abs(np.arctan2(cross, (into * out).sum(axis=1))) > np.radians(angle)
+    sharp: np.ndarray = np.abs(np.arctan2(cross, (into * out).sum(axis=1))) > np.radians(angle)
+    return sharp
 
 
 def resample(loop: Floats, scale: tuple[float, float], step: float) -> tuple[Floats, np.ndarray]:

@@ -45,7 +45,8 @@ class Lattice:
         unit = 1 << self.depth
         root = np.minimum(x >> self.depth, len(lines) - 2)
         part = (x - root * unit) / unit
-        return np.where(part == 1.0, lines[root + 1], lines[root] + part * (lines[root + 1] - lines[root]))
+        places: Floats = np.where(part == 1.0, lines[root + 1], lines[root] + part * (lines[root + 1] - lines[root]))
+        return places
 
     def key(self, x: Ints, y: Ints) -> Ints:
         """(m,) one integer per lattice point."""
@@ -105,7 +106,8 @@ def grow(lattice: Lattice, split: SplitTest, progress: Progress = silent) -> tup
 def children(cells: Ints) -> Ints:
     """(4 n, 2): the four quarters of every cell."""
     quarters = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-    return (2 * cells[:, None, :] + quarters).reshape(-1, 2)
+    out: Ints = (2 * cells[:, None, :] + quarters).reshape(-1, 2)
+    return out
 
 
 def codes(lattice: Lattice, level: int, cells: Ints) -> Ints:
@@ -130,7 +132,8 @@ def contains(sorted_codes: Ints, code: Ints) -> np.ndarray:
     if not len(sorted_codes):
         return np.zeros(len(code), dtype=bool)
     at = np.minimum(np.searchsorted(sorted_codes, code), len(sorted_codes) - 1)
-    return sorted_codes[at] == code
+    held: np.ndarray = sorted_codes[at] == code
+    return held
 
 
 def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:

@@ -175,4 +175,5 @@ def _off_line(a: Floats, middle: Floats, b: Floats) -> Floats:
     along, offset = b - a, middle - a
     length = np.maximum((along * along).sum(axis=1), 1e-300)
     part = np.clip((offset * along).sum(axis=1) / length, 0, 1)
-    return np.linalg.norm(offset - part[:, None] * along, axis=1)
+    distance: Floats = np.linalg.norm(offset - part[:, None] * along, axis=1)
+    return distance

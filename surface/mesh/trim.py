@@ -206,7 +206,8 @@ def _leaving(flat: Flat, domain: Domain, vertex: int) -> Floats:
     t, s = _cross(start - a, along) / safe, _cross(start - a, b - a) / safe
     hit = (det != 0) & (t >= 0) & (t <= 1) & (s >= 0) & (s < 1)
     edge, segment = np.nonzero(hit)
-    return a[edge, 0] + t[edge, segment][:, None] * (b - a)[edge, 0]
+    points: Floats = a[edge, 0] + t[edge, segment][:, None] * (b - a)[edge, 0]
+    return points
 
 
 def _insert(flat: Flat, point: Floats, triangle: int, share: Floats) -> Flat:

@@ -18,6 +18,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Array
 from surface.base.errors import FitError
 
 MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
@@ -108,9 +109,10 @@ class Gltf:
         found = self.items(key)
         if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(found):
             raise self.bad(where, f"points at {key}[{str(index)[:20]}], but there are {len(found)}")
-        if not isinstance(found[index], dict):
+        one: dict[str, Any] = found[index]
+        if not isinstance(one, dict):
             raise self.bad(f"{key}[{index}]", "is no object")
-        return found[index]
+        return one
 
     def floats(self, index: Any, width: int, where: str) -> NDArray[np.float64]:
         """(n, width) float64 of an accessor; finite."""
@@ -134,7 +136,7 @@ class Gltf:
             raise self.bad(where, f"holds {raw.dtype}, not unsigned numbers")
         return raw.astype(np.int64)
 
-    def _accessor(self, index: Any, width: int, where: str) -> NDArray:
+    def _accessor(self, index: Any, width: int, where: str) -> Array:
         accessor, name = self.item("accessors", index, where), f"accessors[{index}] ({where})"
         if WIDTHS.get(str(accessor.get("type"))) != width:
             raise self.bad(name, f"is of type {str(accessor.get('type'))[:20]!r}, which has not {width} numbers")
@@ -154,7 +156,7 @@ class Gltf:
             raise self.bad(f"{name}.componentType", f"{code} is unknown")
         return np.dtype(TYPES[code]).newbyteorder("<")
 
-    def _view(self, table: dict[str, Any], kind: np.dtype, count: int, width: int, name: str) -> NDArray:
+    def _view(self, table: dict[str, Any], kind: np.dtype, count: int, width: int, name: str) -> Array:
         """(count, width) elements out of a buffer view, which may be interleaved."""
         index = table["bufferView"]
         view = self.item("bufferViews", index, name)
@@ -178,7 +180,7 @@ class Gltf:
             raise self.bad(f"{where}.{key}", f"is {found}")
         return found
 
-    def _sparse(self, accessor: dict[str, Any], out: NDArray, name: str) -> NDArray:
+    def _sparse(self, accessor: dict[str, Any], out: Array, name: str) -> Array:
         """The elements that a sparse accessor replaces."""
         sparse, where = self.value(accessor, "sparse", dict, name), f"{name}.sparse"
         count = self._length(sparse, "count", where)

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.readers.gltf import Gltf
 from surface.readers.meshdata import MeshData, check_size
 
-Floats = NDArray[np.float64]
 WELD = 1e-6  # of the mesh's size: vertices nearer than this are one
 MODES = {4: "triangles", 5: "strip", 6: "fan"}
 
@@ -150,7 +150,7 @@ def _primitive(
     return _Primitive(title, place.move(vertices), corners, uv, moves)
 
 
-def _same_count(file: Gltf, where: str, key: str, got: NDArray, vertices: Floats) -> None:
+def _same_count(file: Gltf, where: str, key: str, got: NDArray[np.floating], vertices: Floats) -> None:
     if len(got) != len(vertices):
         raise file.bad(f"{where}.{key}", f"has {len(got)} elements for {len(vertices)} vertices")
 
@@ -168,7 +168,8 @@ class _Placing:
 
     def turn(self, rows: Floats) -> Floats:
         """Displacements (n, 3)."""
-        return np.einsum("...ij,...j->...i", self.matrix[..., :3, :3], rows)
+        turned: Floats = np.einsum("...ij,...j->...i", self.matrix[..., :3, :3], rows)
+        return turned
 
     def move(self, points: Floats) -> Floats:
         """Points (n, 3)."""

@@ -13,8 +13,8 @@ from zipfile import BadZipFile
 from zlib import error as ZlibError
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Array
 from surface.base.errors import FitError
 from surface.readers.meshdata import MOST_MOVES, MOST_VERTICES, MeshData, check_size
 
@@ -54,11 +54,11 @@ def read_npz(path: Path) -> MeshData:
     )  # fmt: skip
 
 
-def _text(name: NDArray | bytes | str) -> str:
+def _text(name: Array | bytes | str) -> str:
     return name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
 
 
-def _arrays(path: Path) -> dict[str, NDArray]:
+def _arrays(path: Path) -> dict[str, Array]:
     if not path.is_file():
         raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
     try:

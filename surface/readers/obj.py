@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.readers.gltf import read_bytes
 from surface.readers.meshdata import MeshData, check_size
 
-Floats = NDArray[np.float64]
 Corner = tuple[int, int]
 NEUTRAL = ("neutral", "basis", "base", "rest")
 

@@ -75,7 +75,7 @@ def _surface(place: Place, where: str, row: Any) -> NamedSurface:
     if not isinstance(row, dict):
         raise place.at(where).error(f"must be a table, not {row!r:.40}")
     points = _list(place, row, where, "points")
-    columns: dict[str, list] = {"position": [], "weight": [], "knots_u": [], "knots_v": []}
+    columns: dict[str, list[Any]] = {"position": [], "weight": [], "knots_u": [], "knots_v": []}
     for i, point in enumerate(points):
         for key, value in _point(place, f"{where}.points[{i}]", point).items():
             columns[key].append(value)
@@ -87,7 +87,7 @@ def _surface(place: Place, where: str, row: Any) -> NamedSurface:
     return NamedSurface(str(row.get("name", where)), surface, _domain(place, f"{where}.domain", row.get("domain")))
 
 
-def _closed_keys(row: dict) -> list[str]:
+def _closed_keys(row: dict[str, Any]) -> list[str]:
     return [key for key in ("closed_u", "closed_v") if row.get(key) is not None]
 
 
@@ -135,14 +135,14 @@ def _slit(place: Place, where: str, row: Any) -> Slit:
     return Slit(str(row["axis"]), at, start, end)
 
 
-def _list(place: Place, table: dict, where: str, key: str) -> list:
+def _list(place: Place, table: dict[str, Any], where: str, key: str) -> list[Any]:
     path = f"{where}.{key}" if where else key
     if key not in table:
         raise place.at(path).error("is missing")
     return _items(place, table[key], path)
 
 
-def _items(place: Place, value: Any, where: str) -> list:
+def _items(place: Place, value: Any, where: str) -> list[Any]:
     if not isinstance(value, list):
         raise place.at(where).error(f"must be a list, not {value!r:.40}")
     return value

@@ -82,7 +82,7 @@ def pad_knots(knots: object, name: str, n: int) -> tuple[Floats, Ints]:
     return padded, degrees
 
 
-def _stack(rows: list, name: str) -> tuple[Floats, Ints]:
+def _stack(rows: list[ArrayLike], name: str) -> tuple[Floats, Ints]:
     """Rows of different lengths into one padded array."""
     flat = [_row(row, f"{name}[{i}]") for i, row in enumerate(rows)]
     lengths = np.array([len(row) for row in flat], dtype=np.int64)

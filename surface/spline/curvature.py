@@ -39,4 +39,5 @@ def curvatures(surface: ControlPoints, uv: ArrayLike, side: ArrayLike | None = N
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    return (a * b).sum(axis=1)
+    products: Floats = (a * b).sum(axis=1)
+    return products

@@ -121,4 +121,5 @@ class Wave:
 
     def at(self, time_s: float) -> Floats:
         """(P,) values at a time; none rests between two calls at different times."""
-        return self._middle - self._swing * np.cos(self._rate * time_s + self._phase)
+        values: Floats = self._middle - self._swing * np.cos(self._rate * time_s + self._phase)
+        return values

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 from surface.fit.points.strokes import arc_length
 from surface.head.model.data import Contact, PartData
 from surface.head.model.meshes import make_surface
 
-Floats = NDArray[np.float64]
 COLUMNS, ROWS, FADE_ROWS = 21, 10, 5
 FINE_U, FINE_V = 61, 49  # places looked at, along and across an opening
 NAMES = ("left_lids", "right_lids", "lips")

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.points.strokes import evenly
 from surface.fit.source.chart import TILE, Chart
 from surface.fit.source.mesh import FitMesh, triangles
 
-Floats = NDArray[np.float64]
 GRID = (19, 31)  # samples along u and v
 RAYS = (41, 91)  # that they are found with
 U_RANGE = (np.radians(7.0), np.radians(173.0))
@@ -64,7 +64,8 @@ def split_teeth(mesh: FitMesh, faces: NDArray[np.int64]) -> list[NDArray[np.int6
 
 def _centre(mesh: FitMesh, faces: NDArray[np.int64]) -> Floats:
     points = mesh.vertices[np.unique(mesh.faces[faces][mesh.faces[faces] >= 0])]
-    return 0.5 * (points.min(axis=0) + points.max(axis=0))
+    centre: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return centre
 
 
 def _sample(mesh: FitMesh, faces: NDArray[np.int64], upper: bool, middle: Floats) -> Floats:
@@ -107,4 +108,5 @@ def _reach(tri: Floats, origin: Floats, rays: Floats) -> Floats:
     t = (q * e2).sum(axis=1) * inverse
     hit = (a > -1e-6) & (b > -1e-6) & (a + b < 1 + 1e-6) & (t > 1e-6)
     distance = np.where(hit, t, np.inf).min(axis=1)
-    return np.where(np.isfinite(distance), distance, np.median(distance[np.isfinite(distance)]))
+    filled: Floats = np.where(np.isfinite(distance), distance, np.median(distance[np.isfinite(distance)]))
+    return filled

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.features.rigging import rigid_fit
 from surface.fit.points.recipe import PartRecipe
@@ -24,7 +25,6 @@ from surface.fit.source.mesh import FitMesh, triangles
 from surface.fit.source.relax import open_flat_holes
 from surface.mesh.tessellate import MOST_ROOTS
 
-Floats = NDArray[np.float64]
 WORDS = {  # in the name of an object or material -> material of the part; the first that fits
     "lash": "lash", "brow": "brow", "hair": "brow", "beard": "brow", "teeth": "teeth", "tooth": "teeth",
     "tongue": "tongue", "gum": "gums", "mouth": "mouth", "cavity": "mouth", "oral": "mouth",
@@ -105,7 +105,7 @@ def _kind(name: str) -> str:
     return next((m for word, m in WORDS.items() if word in name.lower()), "skin")
 
 
-def _presence(mesh: FitMesh, label: NDArray, sizes: Floats, scale: float) -> Floats:
+def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats:
     """How much of a face each piece is: its area, times the shapes that move it."""
     used = mesh.faces >= 0
     piece = np.zeros(len(mesh.vertices), np.int64)
@@ -121,7 +121,7 @@ def _vertices(mesh: FitMesh, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
     return used[used >= 0]
 
 
-def _find_eyes(mesh: FitMesh, label: NDArray, scale: float) -> tuple[tuple[Floats, float], set[int]]:
+def _find_eyes(mesh: FitMesh, label: Ints, scale: float) -> tuple[tuple[Floats, float], set[int]]:
     """The two largest balls that mirror each other, and every piece inside or on them."""
     height, middle = float(np.ptp(mesh.vertices[:, 1])), _middle_x(mesh)
     balls = {}
@@ -156,7 +156,7 @@ def _ball(points: Floats, height: float) -> tuple[Floats, float] | None:
     return (centre, radius) if fits and extent[:2].min() > 1.5 * radius else None
 
 
-def _within(mesh: FitMesh, label: NDArray, eyes: Floats, radius: float) -> set[int]:
+def _within(mesh: FitMesh, label: Ints, eyes: Floats, radius: float) -> set[int]:
     """Pieces that lie in a ball a little larger than the eye, unless they are said to be skin or hair: cornea, iris."""
     near = (np.linalg.norm(mesh.vertices[:, None] - eyes, axis=2) < 1.3 * radius).any(axis=1)
     inside = {int(k) for k in np.unique(label) if near[_vertices(mesh, label == k)].all()}
@@ -208,7 +208,7 @@ def _part(
 
 
 def _others(
-    mesh: FitMesh, label: NDArray, pieces: list[int], skin_area: float, scale: float, notes: list[str]
+    mesh: FitMesh, label: Ints, pieces: list[int], skin_area: float, scale: float, notes: list[str]
 ) -> list[tuple[PartRecipe, list[Island]]]:  # fmt: skip
     """All further pieces, one part for each object or material that they belong to."""
     out: list[tuple[PartRecipe, list[Island]]] = []
@@ -226,7 +226,7 @@ def _others(
     return out
 
 
-def _by_material(mesh: FitMesh, label: NDArray, pieces: list[int], scale: float) -> dict[tuple[str, str], list[int]]:
+def _by_material(mesh: FitMesh, label: Ints, pieces: list[int], scale: float) -> dict[tuple[str, str], list[int]]:
     """Pieces by the object they belong to and the material it says; a row of small unnamed ones is teeth."""
     out: dict[tuple[str, str], list[int]] = {}
     small: dict[str, list[int]] = {}

@@ -8,13 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 from surface.fit.points.refine import Fitted
 from surface.fit.points.solve import basis
 
-Floats = NDArray[np.float64]
 DEGREES = (3, 2)
 END_LASH = 0.045  # how far from the strip's ends the first and the last lash stand
 TIP = 0.003  # half the width of a lash's tip, in the strip's length: a finer one would be cut into pieces
@@ -49,7 +48,8 @@ class Skin:
         step = 1e-4
         u, v = (self.at(uv + d) - self.at(uv - d) for d in (np.array([step, 0.0]), np.array([0.0, step])))
         n = np.cross(u, v)
-        return n / np.maximum(np.linalg.norm(n, axis=2, keepdims=True), 1e-12)
+        normals: Floats = n / np.maximum(np.linalg.norm(n, axis=2, keepdims=True), 1e-12)
+        return normals
 
 
 def fit_strip(rows: Floats, n_u: int, n_v: int, loops: list[Floats]) -> Strip:
@@ -102,7 +102,8 @@ def _comb(hairs: int, *, lean: float, thick: float) -> Floats:
         shift = lean * (2 * s - 1) * 4 + 0.6 * (rng.random() - 0.5) / hairs
         tops += [(s - half, root), (s + shift - TIP, tip), (s + shift + TIP, tip), (s + half, root)]
     line = np.array([(0.0, 0.0), *tops, (1.0, 0.0)])
-    return np.clip(line, 0.0, 1.0)
+    kept: Floats = np.clip(line, 0.0, 1.0)
+    return kept
 
 
 def brow_strip(skin: Skin, uv: Floats, *, hairs: int) -> Strip:
@@ -124,4 +125,5 @@ def _ragged(hairs: int) -> Floats:
         top += [(x - 0.35 / hairs, 0.66 + 0.06 * rng.random()), (x + lean, reach)]
         bottom += [(x, 0.06 + 0.12 * rng.random()), (x + 0.5 / hairs, 0.2 + 0.08 * rng.random())]
     line = np.array([(0.0, 0.35), *top, (1.0, 0.5), *bottom[::-1]])
-    return np.clip(line, 0.0, 1.0)
+    kept: Floats = np.clip(line, 0.0, 1.0)
+    return kept

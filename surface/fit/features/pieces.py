@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.features.crowns import crown_chart, split_teeth
 from surface.fit.features.hair import Skin, Strip, brow_strip, lash_strip
 from surface.fit.features.rigging import lid_share, make_groups, tongue_groups
@@ -19,7 +20,6 @@ from surface.fit.source.chart import TILE, Chart
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Jaw, PartData
 
-Floats = NDArray[np.float64]
 STILL = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
 LASH_ROOT = (0.0145, 0.0188)  # how far outside the hole in the skin lower and upper lashes stand, in v: where lids meet
 LASH_MM, LOWER_LASH_MM = 8.0, 3.2

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, Jaw, Rule
 from surface.head.model.parameters import TONGUE_NEEDS
 from surface.head.posing.rig import jaw_path
 
-Floats = NDArray[np.float64]
 LEAST_MM = 0.004  # displacements smaller than this are dropped
 LEAST_GROUP_MM = 0.25  # a part in which a shape moves nothing further than this does not take part in it
 DROOP = "tongueDroop"
@@ -34,7 +34,8 @@ def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: NDArray[np.int
 
 
 def _total(mesh: FitMesh, indices: list[int]) -> Floats:
-    return mesh.deltas[indices].sum(axis=0)
+    total: Floats = mesh.deltas[indices].sum(axis=0)
+    return total
 
 
 def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.points.strokes import arc_length, evenly, smooth_line, uv_of
 from surface.fit.source.chart import Chart
@@ -20,7 +21,6 @@ from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, PartData, Rule
 from surface.head.model.meshes import make_surface
 
-Floats = NDArray[np.float64]
 PREFIX = "wrinkle"  # of their groups' names
 DEEPENED = 1.5
 STEPS = np.arange(-2.0, 3.0)
@@ -66,7 +66,7 @@ def add_wrinkles(
     knots = [_knots(f, surface) for f in furrows]
     face = _with_points(face, surface, np.concatenate([k[0] for k in knots]), np.concatenate([k[1] for k in knots]))
     first = np.cumsum([surface.n, *(len(k[0]) for k in knots)])
-    groups: dict[str, list[tuple[NDArray, Floats]]] = {}
+    groups: dict[str, list[tuple[Ints, Floats]]] = {}
     for f, a, b in zip(furrows, first, first[1:], strict=False):
         groups.setdefault(f.group, []).append(_sunk(f, make_surface(face), np.arange(a, b)))
     made = [

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 
-Floats = NDArray[np.float64]
 IRIS = 0.49  # radius of the iris (limbus), in eyeball radii: 11.8 mm across at 24 mm
 CORNEA = 0.65  # radius of the cornea's sphere, in eyeball radii: 7.8 mm at 12 mm (Gullstrand)
 LIMBUS_V = 0.5  # v of the limbus; the pole is at v = 0

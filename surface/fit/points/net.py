@@ -68,7 +68,7 @@ def _cut(net: Net, cut: Cut) -> Net:
     return rest.joined(above).joined(below)
 
 
-def _take(net: Net, chosen: NDArray) -> Net:
+def _take(net: Net, chosen: NDArray[np.bool_]) -> Net:
     return Net(*(a[chosen] for a in vars(net).values()))
 
 

@@ -7,13 +7,17 @@ counts only points that reach a sample.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.source.chart import TILE, Chart
 
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix  # takes a moment to import
+
 MULTIPLES = (1.0, 2.0, 4.2, 6.0, 8.0)  # of the points of the head's own net
 FAIR = 1e-5  # pull of every point towards its neighbours' middle, beside a sample's weight
 
@@ -56,7 +60,7 @@ def _side_for(uv: Floats, wanted: float, guess: float) -> int:
     return max(round(spans), 4)
 
 
-def _rows(uv: Floats, spans: int):  # type: ignore[no-untyped-def]
+def _rows(uv: Floats, spans: int) -> csr_matrix:
     """(m, (spans + 3)^2) sparse: the bicubic B-splines of a uniform net at the samples."""
     from scipy.interpolate import BSpline  # takes a moment to import
     from scipy.sparse import csr_matrix
@@ -72,7 +76,7 @@ def _rows(uv: Floats, spans: int):  # type: ignore[no-untyped-def]
     return csr_matrix((value.ravel(), column.ravel(), np.arange(0, 16 * len(uv) + 1, 16)), shape=(len(uv), n * n))
 
 
-def _solve(rows, used: NDArray, weight: Floats, targets: Floats) -> Floats:  # type: ignore[no-untyped-def]
+def _solve(rows: csr_matrix, used: NDArray[np.integer], weight: Floats, targets: Floats) -> Floats:
     """The net's surface at the samples, (m, 3)."""
     from scipy.sparse import diags, identity
     from scipy.sparse.linalg import splu
@@ -83,10 +87,11 @@ def _solve(rows, used: NDArray, weight: Floats, targets: Floats) -> Floats:  # t
     strength = FAIR * weight.sum() / len(used)
     pulled = strength * (fair.T @ fair + 1e-9 * identity(len(used)))
     normal = (own.T @ diags(weight) @ own + pulled).tocsc()
-    return own @ splu(normal).solve(np.ascontiguousarray(own.T @ (weight[:, None] * targets)))
+    solved: Floats = own @ splu(normal).solve(np.ascontiguousarray(own.T @ (weight[:, None] * targets)))
+    return solved
 
 
-def _laplacian(side: int):  # type: ignore[no-untyped-def]
+def _laplacian(side: int) -> csr_matrix:
     from scipy.sparse import diags, identity, kron
 
     second = diags([1.0, -2.0, 1.0], [-1, 0, 1], shape=(side, side))

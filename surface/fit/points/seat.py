@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.points.eyeball import surface_height
 from surface.fit.source.mesh import FitMesh
 
-Floats = NDArray[np.float64]
 LID_MM = (0.1, 1.2)  # a lid that lies on the eyeball is this far above it: its inner edge, its skin
 LOOSE_MM = 1.6  # what stands further above it at rest may come off it; what lies nearer stays as near in every shape
 AHEAD = np.array([0.0, 0.0, 1.0])
@@ -73,7 +73,8 @@ def _above(points: Floats, ball: Eyeball, gaze: Floats) -> Floats:
     offset, _ = _from_eye(points, ball)
     length = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
     own = gaze[(points[:, 0] < 0).astype(int)]
-    return length - ball.radius * surface_height(offset / length[:, None], own)
+    height: Floats = length - ball.radius * surface_height(offset / length[:, None], own)
+    return height
 
 
 def _lay(points: Floats, ball: Eyeball, gaze: Floats, least: Floats, most: Floats) -> Floats:
@@ -82,7 +83,8 @@ def _lay(points: Floats, ball: Eyeball, gaze: Floats, least: Floats, most: Float
     offset, centre = _from_eye(points, ball)
     above = _above(points, ball, gaze)
     move = (np.clip(above, least, most) - above) * _smooth(offset[:, 2], *FRONT_MM)
-    return centre + offset * (1.0 + move / np.maximum(np.linalg.norm(offset, axis=1), 1e-9))[:, None]
+    laid: Floats = centre + offset * (1.0 + move / np.maximum(np.linalg.norm(offset, axis=1), 1e-9))[:, None]
+    return laid
 
 
 def _warp(points: Floats, old: Eyeball, new: Eyeball) -> Floats:

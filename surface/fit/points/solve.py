@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 from surface.fit.points.gram import add_normal
 from surface.fit.points.net import Net
@@ -80,4 +81,5 @@ def solve(
     f = fairness(net)
     normal = system.matrix + (fair * strength * (f.T @ f)).toarray()
     normal[np.diag_indices(n)] += 1e-7 * strength
-    return cho_solve(cho_factor(normal, check_finite=False), system.right, check_finite=False)
+    solved: Floats = cho_solve(cho_factor(normal, check_finite=False), system.right, check_finite=False)
+    return solved

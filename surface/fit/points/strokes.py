@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
 
-Floats = NDArray[np.float64]
 PIECES = 6  # points per vertex of a smooth line
 
 
@@ -56,7 +56,8 @@ def uv_of(chart: Chart, mesh: FitMesh, points: Floats) -> Floats:
     samples = chart.mix @ mesh.vertices
     distance, nearest = cKDTree(samples).query(points, k=6)
     weight = 1.0 / (distance**2 + 0.05)
-    return (weight[..., None] * chart.uv[nearest]).sum(axis=1) / weight.sum(axis=1, keepdims=True)
+    uv: Floats = (weight[..., None] * chart.uv[nearest]).sum(axis=1) / weight.sum(axis=1, keepdims=True)
+    return uv
 
 
 def vertex_row(chart: Chart, vertex: int) -> int:

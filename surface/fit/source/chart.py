@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.source.islands import Island, boundary_loops, directed_edges
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.slopes import Slopes, face_slopes, join_slopes
@@ -177,4 +178,5 @@ def _areas(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.
     """Area of quads (f, 4) by their diagonals; a triangle's last corner is its third."""
     last = np.where(faces[:, 3] < 0, faces[:, 2], faces[:, 3])
     a, b, c = (points[faces[:, i]] for i in range(3))
-    return 0.5 * np.linalg.norm(np.cross(c - a, points[last] - b), axis=1)
+    areas: Floats = 0.5 * np.linalg.norm(np.cross(c - a, points[last] - b), axis=1)
+    return areas

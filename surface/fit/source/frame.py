@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import FitError
 
-Floats = NDArray[np.float64]
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 GUESSED: tuple[str, ...] = ("mm", "cm", "m")
 GUESSED_BY_EYES = (*GUESSED, "in")  # heads differ less in their eyes than in how much neck comes with them
@@ -106,7 +105,8 @@ def _axis(option: str, name: str) -> Floats:
     if name not in AXES:
         raise FitError(f"{option} {name}: is not one of {', '.join(AXES)}", hint=f"{option} y")
     index, sign = AXES[name]
-    return sign * np.eye(3)[index]
+    axis: Floats = sign * np.eye(3)[index]
+    return axis
 
 
 def _shape_axes(vertices: Floats, shapes: dict[str, Floats]) -> tuple[Floats | None, Floats | None]:
@@ -147,4 +147,5 @@ def _nearest_axis(direction: Floats) -> Floats | None:
     if not np.linalg.norm(direction) > 0:
         return None
     index = int(np.argmax(np.abs(direction)))
-    return np.sign(direction[index]) * np.eye(3)[index]
+    axis: Floats = np.sign(direction[index]) * np.eye(3)[index]
+    return axis

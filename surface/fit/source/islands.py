@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.mesh import FitMesh
 
 WELD = 1e5  # texture coordinates that agree to this many parts of the unit square are one
@@ -48,7 +49,7 @@ def find_islands(mesh: FitMesh, faces: NDArray[np.int64] | None = None) -> list[
     return [_island(corner[of_face == i], vertex, uv) for i in order if (of_face == i).any()]
 
 
-def _weld(mesh: FitMesh, chosen: NDArray[np.int64]) -> tuple[NDArray, NDArray, NDArray]:
+def _weld(mesh: FitMesh, chosen: NDArray[np.int64]) -> tuple[Ints, Ints, Floats]:
     """Corner points that share vertex and (rounded) texture coordinate become one."""
     f, fu = mesh.faces[chosen], mesh.face_uv[chosen]
     used = f >= 0

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.chart import NARROW, TILE
 from surface.fit.source.islands import Island, boundary_loops, directed_edges
 from surface.fit.source.mesh import FitMesh
 
-Floats = NDArray[np.float64]
 LARGE = 0.03  # of an island's area: what runs the other way round in (u, v) and is smaller is a fold, not a half
 TILT = 0.35  # rad; holes that lie steeper than this are no slits along u
 FLAT = 0.05  # sine of a slope below which a surface has no up
@@ -59,7 +59,7 @@ def _neighbours(island: Island) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return face[order[twice]], face[order[twice + 1]]
 
 
-def _join_small(label: NDArray, large: NDArray, one: NDArray, two: NDArray) -> NDArray:
+def _join_small(label: Ints, large: Bools, one: Ints, two: Ints) -> Ints:
     """Give faces of small clusters the label of a large neighbour, ring by ring."""
     out = label.copy()
     while True:

@@ -104,7 +104,7 @@ def _edge_error(mesh: FitMesh, where: str, a: int, b: int, face: int, why: str, 
     return FitError(f"{where}: not a manifold: the edge between vertices {a} and {b}{part} {why}", hint=hint)
 
 
-def _check_indices(where: str, key: str, index: NDArray, n: int) -> None:
+def _check_indices(where: str, key: str, index: NDArray[np.integer], n: int) -> None:
     bad = np.argwhere((index >= n) | (index < -1) | ((index < 0) & (np.arange(4) < 3)))
     if len(bad):
         raise FitError(f"{where}: {key}[{bad[0, 0]}] points at {index[tuple(bad[0])]}, but there are {n}")

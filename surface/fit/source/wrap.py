@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.source.chart import BORDER_WEIGHT, CLUTTER_WEIGHT, Chart
 from surface.fit.source.islands import Island
 from surface.fit.source.mesh import FitMesh, triangles
@@ -20,7 +21,6 @@ from surface.fit.source.mesh import FitMesh, triangles
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-Floats = NDArray[np.float64]
 STATIONS, FAN, AROUND = 20, 18, 41  # rays along the line, over its tip, around it
 OVERLAP = 0.125  # of the way around, on either side, is sampled twice, so that slopes match where the skin is sewn
 ROOT, TIP_SHARE = 0.12, 0.22  # of the length: where the line begins, and how far before the tip it ends

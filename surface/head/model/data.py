@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from surface.base.arrays import Array, Floats
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class PartData:
     groups: list[Group]
     jaw: Floats
     lids: Floats
-    mesh: dict[str, NDArray] = field(default_factory=dict)
+    mesh: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -164,6 +165,6 @@ class HeadData:
     jaw: Jaw
     parts: list[PartData]
     seams: list[Seam]
-    paint: list[dict]
+    paint: list[dict[str, Any]]
     contacts: list[Contact] = field(default_factory=list)
     rules: list[Rule] = field(default_factory=list)

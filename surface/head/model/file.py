@@ -12,6 +12,7 @@ from zlib import error as ZlibError
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Array
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.meshes import KEYS
@@ -54,7 +55,7 @@ class Source:
             raise self.bad(self.toml_path, "format", f"is {version!r}, this omote reads {VERSION}")
         return table
 
-    def _npz(self) -> dict[str, NDArray]:
+    def _npz(self) -> dict[str, Array]:
         try:
             with self.npz_path.open("rb") as f, np.load(f, allow_pickle=False) as z:
                 return {k: z[k] for k in z.files}
@@ -79,13 +80,13 @@ class Source:
             raise self.bad(self.toml_path, f"{where}{key}", "holds something that is not a number") from e
         return self._checked(self.toml_path, f"{where}{key}", a, shape)
 
-    def array(self, key: str, shape: tuple[int, ...]) -> NDArray:
+    def array(self, key: str, shape: tuple[int, ...]) -> Array:
         """An array of head.npz of the given shape (-1: any length)."""
         if key not in self.arrays:
             raise self.bad(self.npz_path, key, "missing")
         return self._checked(self.npz_path, key, self.arrays[key], shape)
 
-    def _checked(self, path: Path, key: str, a: NDArray, shape: tuple[int, ...]) -> NDArray:
+    def _checked(self, path: Path, key: str, a: Array, shape: tuple[int, ...]) -> Array:
         if a.ndim != len(shape) or any(w not in (-1, g) for g, w in zip(a.shape, shape, strict=True)):
             raise self.bad(path, key, f"has shape {a.shape}, expected {shape}".replace("-1", "any"))
         if a.dtype.kind not in "fiu" or not np.isfinite(a).all():
@@ -156,7 +157,7 @@ def _budget(src: Source, t: dict[str, Any], where: str) -> tuple[int, float, int
     return int(cell), chord, int(depth)
 
 
-def _groups(src: Source, t: dict[str, Any], name: str, n: int, a: dict[str, NDArray], where: str) -> list[Group]:
+def _groups(src: Source, t: dict[str, Any], name: str, n: int, a: dict[str, Array], where: str) -> list[Group]:
     names = src.value(t, "groups", list, where)
     ids = _split(src, f"{name}/group_ends", a["group_ids"], a["group_ends"])
     moves = _split(src, f"{name}/group_ends", a["group_moves"], a["group_ends"])
@@ -167,7 +168,7 @@ def _groups(src: Source, t: dict[str, Any], name: str, n: int, a: dict[str, NDAr
     return [Group(str(g), i, m) for g, i, m in zip(names, ids, moves, strict=True)]
 
 
-def _split(src: Source, key: str, a: NDArray, ends: NDArray) -> list[NDArray]:
+def _split(src: Source, key: str, a: Array, ends: Array) -> list[Array]:
     if len(ends) and (ends[-1] != len(a) or (np.diff(ends) < 0).any() or ends[0] < 0):
         raise src.bad(src.npz_path, key, f"does not match an array of {len(a)} rows")
     return np.split(a, ends[:-1]) if len(ends) else []
@@ -246,9 +247,9 @@ def save_data(folder: str | Path, head: HeadData) -> None:
             path.unlink(missing_ok=True)
 
 
-def _arrays(head: HeadData) -> dict[str, NDArray]:
+def _arrays(head: HeadData) -> dict[str, Array]:
     """Everything that goes into head.npz."""
-    arrays: dict[str, NDArray] = {}
+    arrays: dict[str, Array] = {}
     for p in head.parts:
         arrays |= {f"{p.name}/{k}": v for k, v in _part_arrays(p).items()}
     for i, s in enumerate(head.seams):
@@ -256,7 +257,7 @@ def _arrays(head: HeadData) -> dict[str, NDArray]:
     return arrays | {f"contacts/{i}": c.places.astype(np.float32) for i, c in enumerate(head.contacts)}
 
 
-def _part_arrays(p: PartData) -> dict[str, NDArray]:
+def _part_arrays(p: PartData) -> dict[str, Array]:
     return {
         "points": p.points, "weights": p.weights, "knots_u": p.knots_u, "knots_v": p.knots_v,
         "degrees": p.degrees.astype(np.int8),

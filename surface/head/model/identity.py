@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.beside import Beside, beside, read_beside, write_beside
 from surface.head.model.data import Group, HeadData, PartData
 
 FILE = "identities.npz"
-Floats = NDArray[np.float64]
-Arrays = Mapping[str, NDArray]
+Arrays = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -77,13 +77,13 @@ def _identities(kept: Beside) -> dict[str, Identity]:
     return {n: Identity(n, _groups(z, k, n), _changes(z, k), eyes[k], jaw[k], fit) for k, n in enumerate(names)}
 
 
-def _indices(a: NDArray) -> NDArray[np.int32]:
+def _indices(a: Array) -> NDArray[np.int32]:
     if a.ndim != 1 or a.dtype.kind not in "iu" or a.min(initial=0) < 0:
         raise ValueError("an array of control points holds something else")
     return a.astype(np.int32)
 
 
-def _finite(a: NDArray, shape: tuple[int, ...]) -> Floats:
+def _finite(a: Array, shape: tuple[int, ...]) -> Floats:
     if a.shape != shape or not np.isfinite(a).all():
         raise ValueError(f"an array has shape {a.shape}, expected {shape}, or is not finite")
     return a.astype(np.float64)
@@ -112,7 +112,7 @@ def _changes(z: Arrays, k: int) -> dict[str, list[Group]]:
 
 def save_identities(head: str | Path, identities: list[Identity]) -> Path:
     """Keep identities beside a head; returns the file's path."""
-    arrays: dict[str, NDArray] = {
+    arrays: dict[str, Array] = {
         "fit": np.array(identities[0].fit if identities else 0, np.int64),
         "names": np.array([i.name for i in identities]),
         "eyes": np.array([i.eyes for i in identities]).reshape(-1, 2, 3),

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Array
 from surface.dcp import DCPSurface
 from surface.head.model.data import PartData, Seam
 from surface.mesh.domain import Domain
@@ -55,7 +56,7 @@ def domain_of(data: PartData) -> Domain:
     return Domain((u0, u1, v0, v1), data.loops)
 
 
-def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, NDArray]:
+def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
     """Arrays to keep; positions and normals are left out, the surface gives them."""
     return {
         "mesh_uv": mesh.uv,
@@ -69,7 +70,7 @@ def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, NDArray]:
 
 
 def unpack(
-    arrays: dict[str, NDArray], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool
+    arrays: dict[str, Array], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool
 ) -> Mesh | None:
     """The kept mesh, or None if it is absent, made with another budget, or does not fit the surface.
 
@@ -99,7 +100,7 @@ def unpack(
     )  # fmt: skip
 
 
-def _sound(uv: NDArray, triangles: NDArray, start: NDArray, list_start: NDArray, ids: NDArray, n: int) -> bool:
+def _sound(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
     """Do all indices point at something?"""
     if uv.ndim != 2 or triangles.ndim != 2 or not len(triangles) or len(start) != len(list_start):
         return False

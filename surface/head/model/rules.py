@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Rule
 from surface.head.model.parameters import SHAPES
-
-Floats = NDArray[np.float64]
 
 
 class Drivers:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 from surface.deform.lists import LANES
 from surface.head.model.data import Contact, HeadData, PartData
@@ -24,7 +25,6 @@ from surface.head.posing.contact_kernels import (
 )
 from surface.spline.kernels import fill_rows, row_capacity
 
-Floats = NDArray[np.float64]
 MEET = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
 SOFT_MM = 0.1
 PRESS_MM = (0.28, 0.9)  # so deep lips and lids may overlap: triangles cut about that off the edges of both sides
@@ -266,7 +266,8 @@ def tiled(
 def _nearest(points: Floats, others: Floats) -> Floats:
     """(n,) distance of each of points (n, 3) from the nearest of others (m, 3)."""
     square = (points**2).sum(axis=1)[:, None] - 2.0 * points @ others.T + (others**2).sum(axis=1)
-    return np.sqrt(np.maximum(square.min(axis=1), 0.0))
+    distance: Floats = np.sqrt(np.maximum(square.min(axis=1), 0.0))
+    return distance
 
 
 def _inverse(
@@ -286,7 +287,7 @@ def _inverse(
 
 def meeting_rows(contact: Contact) -> int:
     """How many rows from the rim on can meet the other side."""
-    return round(MEET * contact.places.shape[2])
+    return round(MEET * int(contact.places.shape[2]))
 
 
 def _spread(contact: Contact) -> Floats:

@@ -6,11 +6,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Floats32
 from surface.base.jit import kernel
 from surface.spline.lanes import fma, load, store3, zero
 
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 # The cornea stands out of the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65

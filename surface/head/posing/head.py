@@ -157,7 +157,7 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
     return made
 
 
-def _eye_directions(part: PartData, head: HeadData, vertices: NDArray) -> dict[str, NDArray[np.float32]]:
+def _eye_directions(part: PartData, head: HeadData, vertices: NDArray[np.floating]) -> dict[str, NDArray[np.float32]]:
     """``eye_local`` (m, 3): where a vertex of an eyeball lies in the eye's own frame, in radii, +z the pupil."""
     if part.follows not in ("left_eye", "right_eye"):
         return {}

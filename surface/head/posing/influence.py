@@ -13,12 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Floats32
 from surface.deform.lists import LANES, Lists, build_lists
 from surface.head.posing.head import Head
 from surface.head.posing.part import HeadPart, SkinPart
 from surface.head.posing.seams import Zipper
 
-Floats = NDArray[np.float64]
 Row = tuple[NDArray[np.int64], Floats]
 _RIGID_POINTS = 4
 
@@ -118,7 +118,7 @@ def _share(part: HeadPart) -> NDArray[np.float32]:
     return share
 
 
-def _zip(zipper: Zipper, first: Sequence[Row], second: list[Row], one: NDArray, two: NDArray) -> None:
+def _zip(zipper: Zipper, first: Sequence[Row], second: list[Row], one: Floats32, two: Floats32) -> None:
     """Sums and shares of a seam's vertices in the second part, from those of the first."""
     if not len(zipper.ids):
         return

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Floats32
 from surface.base.jit import kernel
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 
 @kernel

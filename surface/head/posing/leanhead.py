@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.deform.deformation import Deformation
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.parameters import Pose, read_pose, rotation
@@ -22,9 +23,6 @@ from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
 from surface.head.posing.seams import Zipper
 from surface.mesh.mesh import Mesh
 
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
-Ids = NDArray[np.int64]
 Ranges = list[tuple[int, int]]
 
 
@@ -40,18 +38,18 @@ class LeanPart:
     changed : ranges [start, stop) of these that the last pose touched.
     """
 
-    def __init__(self, part: HeadPart, triangles: NDArray[np.integer], kept: Ids, first: int) -> None:
+    def __init__(self, part: HeadPart, triangles: NDArray[np.integer], kept: Ints, first: int) -> None:
         self.part, self.kept = part, kept
         self.first, self.last = first, first + len(kept)
         self.triangles = np.searchsorted(kept, triangles).astype(np.int32)
         self.changed: Ranges = [(0, len(kept))]
 
     @property
-    def own(self) -> Ids:
+    def own(self) -> Ints:
         """Those of ``kept`` that the part's surface has; seams have added the others."""
         return self.kept[: int(np.searchsorted(self.kept, len(self.part.mesh.uv)))]
 
-    def rows(self, ids: NDArray[np.integer]) -> Ids:
+    def rows(self, ids: NDArray[np.integer]) -> Ints:
         """Where vertices ``ids (k,)`` of the part stand among the lean head's; all of them must be kept."""
         return self.first + np.searchsorted(self.kept, ids)
 
@@ -73,7 +71,7 @@ class LeanHead:
     parts : who has which of them.
     """
 
-    def __init__(self, head: Head, parts: Sequence[HeadPart], level: str, wanted: Mapping[str, Ids]) -> None:
+    def __init__(self, head: Head, parts: Sequence[HeadPart], level: str, wanted: Mapping[str, Ints]) -> None:
         self._pivot = head.data.neck.pivot
         triangles = {part.name: part.lean.get(level, part.triangles) for part in parts}
         kept, self.parts, first = _kept(head, triangles, wanted), [], 0
@@ -258,7 +256,7 @@ class _Seams:
 _NO_SHARE = np.zeros(0, np.float32)
 
 
-def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ids]) -> dict[str, Ids]:
+def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
     """Which vertices are drawn or asked for, by part, with those that seams put them between."""
     kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
     for zipper in reversed(head.zippers):  # what an earlier one gives, a later one may take
@@ -268,7 +266,7 @@ def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapp
     return kept
 
 
-def thinned(mesh: Mesh, ids: Ids) -> Mesh:
+def thinned(mesh: Mesh, ids: Ints) -> Mesh:
     """Of a mesh only vertices ``ids (k,)``, rising, and the cells that have any; no triangles."""
     cells, cell = np.unique(mesh.cell[ids], return_inverse=True)
     lists = [mesh.points_of(c) for c in cells.tolist()]

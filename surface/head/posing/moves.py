@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.head.model.data import Group, PartData
 from surface.head.posing.kernels import add_moves
 
-Floats = NDArray[np.float64]
 GAP = 16  # points that a group does not move, between two that it moves, are carried along up to this number
 
 

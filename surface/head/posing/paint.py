@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import HeadFileError
 from surface.head.posing.kernels import nearest_on_line
 
-Floats = NDArray[np.float64]
 BASE: dict[str, tuple[float, ...]] = {
     "albedo": (0.60, 0.37, 0.28),
     "occlusion": (1.0,),
@@ -70,7 +70,8 @@ def _field(layer: dict[str, Any], uv: Floats) -> Floats:
         inside = np.any([_inside(uv, line) for line in lines], axis=0)
         distance = np.where(inside, 0.0, distance)
     t = np.clip((distance - width) / max(feather, 1e-9), 0.0, 1.0)
-    return 1.0 - t * t * (3.0 - 2.0 * t)
+    cover: Floats = 1.0 - t * t * (3.0 - 2.0 * t)
+    return cover
 
 
 def _distance(uv: Floats, line: Floats, closed: bool) -> Floats:

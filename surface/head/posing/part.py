@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Floats32
 from surface.dcp import DCPSurface
 from surface.deform.deformation import Deformation
 from surface.head.model.data import HeadData, PartData
@@ -17,9 +18,6 @@ from surface.head.posing.kernels import carry, turn_head
 from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
 from surface.mesh.borders import border_edges
 from surface.mesh.mesh import Mesh
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 
 class Turn:

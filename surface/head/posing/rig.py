@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.head.model.data import HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.parameters import SHAPES, Pose, rotation
@@ -13,7 +13,6 @@ from surface.head.posing.contact import LID_MM, Feeler, Follower, Lining
 from surface.head.posing.kernels import keep_on_eyeball, mix_rows, swing_jaw
 from surface.head.posing.moves import Moves
 
-Floats = NDArray[np.float64]
 LINING_GRID = (72, 36)  # places looked at all over what lines the lids, along u and v
 LINED = 1.4  # in radii: so near to an eye what lines its lids is kept out of it
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
@@ -178,7 +177,8 @@ def _undo_share(part: PartData) -> Floats:
     for g in part.groups:
         if g.name == "mouthClose":
             close[g.ids] = g.moves
-    return np.clip(np.linalg.norm(close, axis=1) / 20.0, 0.0, 1.0)
+    share: Floats = np.clip(np.linalg.norm(close, axis=1) / 20.0, 0.0, 1.0)
+    return share
 
 
 def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:

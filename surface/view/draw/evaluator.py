@@ -69,7 +69,8 @@ class CpuEvaluator:
         return sum(buffers.upload() for buffers in parts)
 
     def positions(self, part: ViewPart, ids: np.ndarray) -> np.ndarray:
-        return part.vertices[ids]
+        positions: np.ndarray = part.vertices[ids]
+        return positions
 
     def rotation(self) -> np.ndarray:
         return np.asarray(getattr(self._head.parts[0], "turn", _AHEAD))
@@ -191,7 +192,8 @@ def turned(points: np.ndarray, share: np.ndarray, turn: np.ndarray, pivot: np.nd
     axis = turn / max(angle, 1e-12)
     c, s = np.cos(share * angle)[:, None], np.sin(share * angle)[:, None]
     own = points - pivot
-    return pivot + c * own + s * np.cross(axis, own) + (1.0 - c) * (own @ axis)[:, None] * axis
+    turned: np.ndarray = pivot + c * own + s * np.cross(axis, own) + (1.0 - c) * (own @ axis)[:, None] * axis
+    return turned
 
 
 def choose(ctx: moderngl.Context, head: ViewHead, wanted: str) -> Evaluator:

@@ -118,4 +118,5 @@ def _looks(part: HeadPart) -> np.ndarray:
         return _STRIP_MM * strip_uv(part)
     if part.material != "skin":
         return np.zeros((len(part.vertices), 0))
-    return _COLOUR_MM * np.sqrt(attribute(part, "albedo", (0.5, 0.5, 0.5))[:, :3])
+    looks: np.ndarray = _COLOUR_MM * np.sqrt(attribute(part, "albedo", (0.5, 0.5, 0.5))[:, :3])
+    return looks

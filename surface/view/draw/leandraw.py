@@ -44,7 +44,8 @@ class LeanEvaluator:
         key = part.name, id(ids)
         if key not in self._rows:
             self._rows[key] = ids, self._of[part.name].rows(ids)
-        return self.lean.vertices[self._rows[key][1]]
+        positions: np.ndarray = self.lean.vertices[self._rows[key][1]]
+        return positions
 
     def rotation(self) -> np.ndarray:
         return self.lean.turn

@@ -231,4 +231,5 @@ def _tiling_noise(random: np.random.Generator, falloff: float) -> np.ndarray:
     radius = np.hypot(frequency[:, None], frequency[None, :])
     shape = np.where(radius > 2.0, np.maximum(radius, 1.0) ** -falloff, 0.0)
     noise = np.fft.ifft2(np.fft.fft2(random.standard_normal((_DETAIL_SIZE, _DETAIL_SIZE))) * shape).real
-    return (noise - noise.mean()) / noise.std()
+    even: np.ndarray = (noise - noise.mean()) / noise.std()
+    return even

@@ -109,7 +109,8 @@ def thinness(part: ViewPart) -> np.ndarray:
     facing = (away * normals[:, None]).sum(axis=2) < -0.4
     inside = (there * normals[:, None]).sum(axis=2) < -0.5 * distance
     depth = np.where(facing & inside, distance, _THICK_MM).min(axis=1)
-    return (1.0 - depth[:, None] / _THICK_MM).astype(np.float32)
+    thin: np.ndarray = (1.0 - depth[:, None] / _THICK_MM).astype(np.float32)
+    return thin
 
 
 def _bake_all(

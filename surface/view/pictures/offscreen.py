@@ -85,7 +85,7 @@ class Offscreen:
     def go_live(self) -> None:
         """Make ready what only moving pictures need, which the first :meth:`draw` would do otherwise."""
         self._pace.begin_live()
-        self.ctx.__enter__()
+        self._enter()
         if self._pace.hurried:
             self.renderer.hurry()
         self._fit_target()
@@ -105,11 +105,15 @@ class Offscreen:
         self._frame(values, camera)
         return self.read()
 
+    def _enter(self) -> None:
+        """Make the context current; another may have been since."""
+        self.ctx.__enter__()  # type: ignore[no-untyped-call]  # moderngl says no types here
+
     def _frame(self, values: np.ndarray, camera: Camera | None) -> None:
         """Pose and draw."""
         self.renderer.pose(values)
         started = time.perf_counter()
-        self.ctx.__enter__()  # another context may have been current since
+        self._enter()
         self.target.complete()
         if self._pace.hurried:  # smoothing has just waited for all that was painted: there is no more than one frame
             self.renderer.hurry()
@@ -131,12 +135,12 @@ class Offscreen:
 
     def read(self) -> np.ndarray:
         """The picture last drawn, (height, width, 3) uint8, top row first."""
-        self.ctx.__enter__()
+        self._enter()
         return self.target.read()
 
     def finish(self) -> None:
         """Wait until the last frame is drawn."""
-        self.ctx.__enter__()
+        self._enter()
         self.target.complete()
         self.ctx.finish()
 
@@ -145,7 +149,7 @@ class Offscreen:
         if self._closed:
             return
         self._closed = True
-        self.ctx.__enter__()
+        self._enter()
         self.renderer.release()
         self.target.release()
         self.ctx.release()

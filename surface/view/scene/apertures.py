@@ -125,7 +125,8 @@ def leading_edge(
 
 def _height(path: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Height (m,) of the line along `path`, which runs towards greater x, at every vertex's x."""
-    return np.interp(vertices[:, 0], vertices[path, 0], vertices[path, 1])
+    height: np.ndarray = np.interp(vertices[:, 0], vertices[path, 0], vertices[path, 1])
+    return height
 
 
 def nearest_loop(loops: list[np.ndarray], vertices: np.ndarray, point: np.ndarray, reach: float) -> np.ndarray | None:

@@ -32,7 +32,7 @@ def project(points: Any, matrix: Any, near: Any, pixels: Any) -> bool:
         over = one / (depth if depth != 0.0 else one)  # none is drawn where it is 0, but dividing would end the loop
         pixels[i, 0] = (a * x + b * y + c * z + d) * over
         pixels[i, 1] = (e * x + f * y + g * z + h) * over
-    return least >= near
+    return bool(least >= near)
 
 
 @kernel

@@ -140,7 +140,7 @@ PRESETS: dict[str, Callable[[], Camera]] = {
 @lru_cache(maxsize=8)
 def _matrix(camera: Camera, aspect: float) -> np.ndarray:
     """See :meth:`Camera.matrix`."""
-    matrix = camera.projection(aspect) @ camera.view()
+    matrix: np.ndarray = camera.projection(aspect) @ camera.view()
     matrix.flags.writeable = False
     return matrix
 

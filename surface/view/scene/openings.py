@@ -58,7 +58,8 @@ Read = Callable[[ViewPart, np.ndarray], np.ndarray]
 
 def from_vertices(part: ViewPart, ids: np.ndarray) -> np.ndarray:
     """Positions (k, 3) of vertices `ids` (k,) as the part holds them."""
-    return part.vertices[ids]
+    positions: np.ndarray = part.vertices[ids]
+    return positions
 
 
 class Openings:

@@ -23,3 +23,16 @@ def test_a_second_interrupt_is_not_held_back() -> None:
     with pytest.raises(KeyboardInterrupt), stop_flag():
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="terminals that close are POSIX")
+def test_nohup_keeps_a_run_alive_when_its_terminal_closes() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stop_flag() as flag:
+            signal.raise_signal(signal.SIGHUP)
+            assert not flag.is_set()
+            signal.raise_signal(signal.SIGTERM)
+            assert flag.is_set()
+    finally:
+        signal.signal(signal.SIGHUP, before)

@@ -45,7 +45,7 @@ if __name__ == "__main__":
     print(WaitingBody().process.pid, flush=True)  # os._exit writes nothing out
     os._exit(0)
 """
-    main = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=30)
+    main = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=120)
     assert main.returncode == 0 and int(main.stdout) > 0  # its standard output closes when both have ended
 
 
@@ -66,7 +66,7 @@ if __name__ == "__main__":
     with WaitingBody() as waiting:
         print(Path(f"/proc/{waiting.process.pid}/status").read_text())
 """
-    said = subprocess.check_output([sys.executable, "-c", program], text=True, timeout=30)
+    said = subprocess.check_output([sys.executable, "-c", program], text=True, timeout=120)
     held = next(int(line.split()[1], 16) for line in said.splitlines() if line.startswith("SigBlk"))
     assert held >> signal.SIGINT - 1 & 1
 

@@ -116,8 +116,9 @@ def test_a_process_of_its_own_ends_with_that_code_and_says_it_on_stderr() -> Non
     assert result.stderr.startswith("error: ")
 
 
+@pytest.mark.parametrize("background", [(), ("sh", "-c", 'trap "" INT; exec "$@"', "sh")], ids=["", "background"])
 @pytest.mark.parametrize("module", ["controller.base.errors", "rich.console", "controller.cli.run"])
-def test_an_interrupt_while_the_command_line_loads_says_nothing(module: str) -> None:
+def test_an_interrupt_while_the_command_line_loads_says_nothing(module: str, background: tuple[str, ...]) -> None:
     program = """
 import signal, sys
 from controller.cli.app import main
@@ -130,7 +131,7 @@ class Finder:
 sys.meta_path.insert(0, Finder())
 main()
 """
-    command = [sys.executable, "-c", program, module]
+    command = [*background, sys.executable, "-c", program, module]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
 

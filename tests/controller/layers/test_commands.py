@@ -151,7 +151,7 @@ def test_hostile_sources_in_many_threads_keep_every_limit() -> None:
     path = np.array([face.run(0.01).copy() for _ in range(800)])
     stop.set()
     for thread in threads:
-        thread.join(5)
+        thread.join(30)
     speed = np.diff(path, axis=0) / 0.01
     assert np.all(path >= P.low) and np.all(path <= P.high)
     assert np.all(np.abs(speed) <= P.max_speed * (1 + 1e-9))

@@ -66,7 +66,7 @@ def test_noise_of_a_silent_room_moves_nothing() -> None:
 def test_a_stream_moves_the_speech_layer_until_it_ends() -> None:
     state, out = CommandState(P), P.neutral()
     listener = Listener(io.BytesIO(wav(tone(200, 0.3))), state).start()
-    assert listener.join(5.0)
+    assert listener.join(30.0)
     assert listener.hops == 30
     now = int(1e18)  # long after
     assert state.mixer["speech"].holding > 0
@@ -93,7 +93,7 @@ def test_a_pipe_of_unknown_length_is_heard_as_it_comes() -> None:
     sender.start()
     with os.fdopen(reading, "rb") as stream:
         listener = Listener(stream, CommandState(P)).start()
-        assert listener.join(5.0)
+        assert listener.join(30.0)
     sender.join()
     assert listener.hops == 20
 

@@ -38,7 +38,10 @@ def served(*words: str) -> Iterator[str]:
 
 def test_any_program_can_open_the_servos(tmp_path: Path) -> None:
     link = tmp_path / "head"
-    with served("dynamixel", "--ids", "1", "--link", str(link)), serial.Serial(str(link), 1_000_000, timeout=2) as port:
+    with (
+        served("dynamixel", "--ids", "1", "--link", str(link)),
+        serial.Serial(str(link), 1_000_000, timeout=10) as port,
+    ):
         port.write(bytes.fromhex("FFFFFD00010300 01194E"))  # ping, from the e-Manual
         reply = port.read(14)
         assert reply[:9] == bytes.fromhex("FFFFFD000107005500")
@@ -59,7 +62,7 @@ def test_any_program_can_open_the_servos(tmp_path: Path) -> None:
 )
 def test_every_family_answers(tmp_path: Path, words: tuple[str, ...], asked: str, answer: str) -> None:
     link = tmp_path / "port"
-    with served(*words, "--link", str(link)), serial.Serial(str(link), 1_000_000, timeout=2) as port:
+    with served(*words, "--link", str(link)), serial.Serial(str(link), 1_000_000, timeout=10) as port:
         port.write(bytes.fromhex(asked))
         assert port.read(len(answer) // 2) == bytes.fromhex(answer)
 
@@ -76,7 +79,7 @@ def test_every_family_answers(tmp_path: Path, words: tuple[str, ...], asked: str
 )
 def test_every_shipped_robot_is_served_on_tcp(robot: str, asked: str, answer: bytes) -> None:
     with served("robot", robot, "--tcp", "127.0.0.1:0") as ready:
-        client = serial.serial_for_url(ready, baudrate=115_200, timeout=2)
+        client = serial.serial_for_url(ready, baudrate=115_200, timeout=10)
         client.write(bytes.fromhex(asked))
         assert client.read(len(answer)) == answer
         client.close()
@@ -91,7 +94,7 @@ def test_a_port_is_a_terminal_or_an_address() -> None:
 
 def test_the_host_plays_its_script_to_whoever_opens_it(tmp_path: Path) -> None:
     link = tmp_path / "robot"
-    with served("host", "tour", "--link", str(link)), serial.Serial(str(link), 115_200, timeout=5) as port:
+    with served("host", "tour", "--link", str(link)), serial.Serial(str(link), 115_200, timeout=10) as port:
         line = port.readline()
     assert b"HELLO" in line
 
@@ -110,7 +113,7 @@ def test_boards_take_their_time_on_the_wire_and_faults_at_a_socket(tmp_path: Pat
     link, control = tmp_path / "board", tmp_path / "board.ctl"
     with (
         served("ssc32", "--link", str(link), "--baud", "2400", "--wire", "--control", str(control)),
-        serial.Serial(str(link), 2400, timeout=2) as port,
+        serial.Serial(str(link), 2400, timeout=10) as port,
         socket.socket(socket.AF_UNIX) as commands,
     ):
         began = time.monotonic()

@@ -56,7 +56,7 @@ def _switch_on(bus: SimulatedBus, model: str) -> None:
 
     v2 = packet.encode_instruction(1, 3, bytes((64, 0, 1)))
     v1 = packet1.encode(1, 3, bytes((40, 1)))
-    with serial.Serial(bus.path, 1_000_000, timeout=1) as port:
+    with serial.Serial(bus.path, 1_000_000, timeout=10) as port:
         port.write(v1 if model.startswith("sts") else v2)
         assert port.read(6)
 

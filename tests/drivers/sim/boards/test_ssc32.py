@@ -90,12 +90,12 @@ def test_served_to_a_serial_program(tmp_path: Path):
     )
     thread.start()
     try:
-        assert ready.wait(5)
-        with serial.Serial(paths[0], 115_200, timeout=5) as port:
+        assert ready.wait(30)
+        with serial.Serial(paths[0], 115_200, timeout=10) as port:
             port.write(b"#7P1230\rQP7\r")
             assert port.read(1) == bytes((123,))
     finally:
         os.close(writing)
-        thread.join(5)
+        thread.join(30)
         os.close(reading)
     assert os.listdir(tmp_path) == []

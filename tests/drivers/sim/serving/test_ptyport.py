@@ -33,7 +33,7 @@ def test_clients_come_and_go():
     port = PtyPort()
     try:
         for byte in (b"\x0a", b"\x0d"):
-            with serial.Serial(port.path, 1_000_000, timeout=1, exclusive=True) as client:
+            with serial.Serial(port.path, 1_000_000, timeout=10, exclusive=True) as client:
                 client.write(byte)
                 assert port.read() == byte
                 port.write(byte)

@@ -35,7 +35,7 @@ def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
     )
     thread.start()
     try:
-        assert ready.wait(5)
+        assert ready.wait(30)
         client = os.open(paths[0], os.O_RDWR | os.O_NOCTTY)
         os.write(client, encode_instruction(0xFE, I.PING))
         received = b""
@@ -45,7 +45,7 @@ def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
         os.close(client)
     finally:
         os.close(writing)
-        thread.join(5)
+        thread.join(30)
         os.close(reading)
     assert [(r.id, r.error, r.params[:2]) for r in StatusReader().feed(received)] == [
         (3, 0, b"\xfc\x03"),
@@ -111,18 +111,18 @@ def test_another_program_sets_faults_through_the_socket(tmp_path: Path):
     )
     thread.start()
     try:
-        assert ready.wait(5)
+        assert ready.wait(30)
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
             client.connect(str(path))
             client.settimeout(5)
             client.sendall(b"fault alert:1\n")
             assert client.recv(99) == b"ok\n"
-            with serial.Serial(paths[0], 1_000_000, timeout=5) as port:
+            with serial.Serial(paths[0], 1_000_000, timeout=10) as port:
                 port.write(encode_instruction(1, I.PING))
                 assert StatusReader().feed(port.read(14))[0].alert
     finally:
         os.close(writing)
-        thread.join(5)
+        thread.join(30)
         os.close(reading)
     assert not path.exists()
 

@@ -54,7 +54,7 @@ def port(bus: SimulatedBus) -> Iterator[PortHandler]:
     handler.closePort()
 
 
-def exchange(path: str, data: bytes, expect: int, wait_s: float = 2.0) -> bytes:
+def exchange(path: str, data: bytes, expect: int, wait_s: float = 10.0) -> bytes:
     """Write bytes to the port as a bare program would and read up to `expect` of what comes back."""
     client = os.open(path, os.O_RDWR | os.O_NOCTTY)
     try:
@@ -68,7 +68,7 @@ def exchange(path: str, data: bytes, expect: int, wait_s: float = 2.0) -> bytes:
         os.close(client)
 
 
-def wait_until(condition, limit_s: float = 5.0) -> None:
+def wait_until(condition, limit_s: float = 20.0) -> None:
     deadline = time.monotonic() + limit_s
     while not condition():
         assert time.monotonic() < deadline, "it did not happen in time"
@@ -144,7 +144,7 @@ def test_sdk_bulk_write_and_read(bus: SimulatedBus, port: PortHandler):
 
 def test_sdk_stuffed_reply(bus: SimulatedBus, port: PortHandler):
     # Indirect data holds FF FF FD 00, which must come stuffed and arrive as it was.
-    client = serial.Serial(bus.path, 1_000_000, timeout=2)
+    client = serial.Serial(bus.path, 1_000_000, timeout=10)
     client.write(encode_instruction(1, I.WRITE, b"\xd0\0" + b"\xff\xff\xfd\0"))
     assert len(client.read(11)) == 11
     client.close()
@@ -166,18 +166,18 @@ def test_a_bare_program_needs_no_settings(bus: SimulatedBus):
 
 
 def test_pieces_noise_and_a_second_program(bus: SimulatedBus):
-    with serial.Serial(bus.path, 1_000_000, timeout=2) as client:
+    with serial.Serial(bus.path, 1_000_000, timeout=10) as client:
         client.write(b"\xff\xff\x00noise" + PING_1[:5])
         time.sleep(0.02)
         client.write(PING_1[5:])
         assert len(client.read(14)) == 14
-    with serial.Serial(bus.path, 1_000_000, timeout=2) as client:
+    with serial.Serial(bus.path, 1_000_000, timeout=10) as client:
         client.write(PING_1)
         assert len(client.read(14)) == 14
 
 
 def test_a_packet_that_never_ends_is_given_up(bus: SimulatedBus):
-    with serial.Serial(bus.path, 1_000_000, timeout=2) as client:
+    with serial.Serial(bus.path, 1_000_000, timeout=10) as client:
         client.write(PING_1[:-1])
         time.sleep(0.25)
         client.write(PING_1)
@@ -214,7 +214,7 @@ def test_unplug_and_replug_under_another_name(bus: SimulatedBus, tmp_path: Path)
     client = serial.Serial(first, 1_000_000, timeout=0.2)
     bus.fault(f"unplug:for=0.1s:as={tmp_path / 'other'}")
     with pytest.raises((serial.SerialException, OSError)):
-        for _ in range(3):
+        for _ in range(50):
             client.write(PING_1)
             client.read(1)
     client.close()
@@ -234,7 +234,7 @@ def test_wire_timing_keeps_a_reply_back():
     with SimulatedBus(range(1, 25), baud=57_600, wire=True) as bus:
         request = encode_instruction(0xFE, I.SYNC_READ, b"\x84\0\4\0" + bytes(range(1, 25)))
         began = time.monotonic()
-        with serial.Serial(bus.path, 57_600, timeout=2) as client:
+        with serial.Serial(bus.path, 57_600, timeout=10) as client:
             client.write(request)
             assert len(client.read(360)) == 360
         assert time.monotonic() - began >= (38 + 360) * 10 / 57_600 + 24 * 500e-6

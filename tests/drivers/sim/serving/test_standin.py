@@ -40,7 +40,7 @@ def test_servos_keep_their_state_over_a_replug() -> None:
 
 def test_faults_reach_the_servos() -> None:
     with (
-        open_bus("simulated", SERVOS, faults=["mute:2"], margin_s=0.1) as bus,
+        open_bus("simulated", SERVOS, faults=["mute:2"], margin_s=0.5) as bus,
         pytest.raises(DriverError, match="id 2"),
     ):
         bus.start()

@@ -297,7 +297,7 @@ def test_dynamixel_sdk_speaks_protocol_1_to_it():
 def test_a_feetech_child_process_answers_bare_bytes():
     with (
         SimulatedBus((1, 2), model="sts3215", process=True) as bus,
-        serial.Serial(bus.path, 1_000_000, timeout=5) as port,
+        serial.Serial(bus.path, 1_000_000, timeout=10) as port,
     ):
         port.write(bytes.fromhex("FF FF FE 06 82 38 02 01 02 3C"))
         assert Reader1().feed(port.read(16)) == [Packet1(1, 0, word(2048)), Packet1(2, 0, word(2048))]
