@@ -143,8 +143,10 @@ def test_nothing_but_the_rooms_and_configs_is_installed(installed: Installed) ->
 
 
 def test_code_and_configs_come_from_the_environment(installed: Installed, root: Path) -> None:
-    code = "import surface, controller, drivers; print(surface.__file__, controller.__file__, drivers.__file__)"
-    for file in installed.run("-c", code).stdout.split():
+    code = (
+        "import surface, controller, drivers; print(surface.__file__, controller.__file__, drivers.__file__, sep='\\n')"
+    )
+    for file in installed.run("-c", code).stdout.splitlines():
         assert Path(file).is_relative_to(installed.packages)
     found = installed.run("-c", "import sys; print(*sys.path)").stdout
     assert str(root) not in found.replace(DEPENDENCIES, "")

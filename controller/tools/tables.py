@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+from rich.cells import cell_len
 from rich.console import Console
 from rich.measure import Measurement
 from rich.padding import Padding
@@ -38,8 +39,8 @@ def _texts(table: Table, console: Console) -> list[list[Text]]:
 
 def _narrowed(table: Table, columns: list[list[Text]], spare: int) -> bool:
     """Give columns the widths that make the table ``-spare`` cells narrower; False where words would be cut."""
-    wide = [max(cell.cell_len for cell in own) for own in columns]
-    least = [max(len(word) for cell in own for word in [*cell.plain.split(), ""]) for own in columns]
+    wide = [max(cell_len(line) for cell in own for line in cell.plain.split("\n")) for own in columns]
+    least = [max(cell_len(word) for cell in own for word in ["", *cell.plain.split()]) for own in columns]
     left = sum(wide) + spare - sum(least)
     if left < 0:
         return False

@@ -8,7 +8,8 @@
 ``place ID TICKS``                moves a limp shaft by hand
 ================================  =====================================================================
 
-Every line is answered by one line: ``ok``, ``ok VALUE`` or ``error WHY``.
+A word with spaces stands in quotes, as in a shell. Every line is answered by one line: ``ok``, ``ok VALUE`` or
+``error WHY``.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shlex
 import socket
 import stat
 import time
@@ -50,7 +52,10 @@ class Commands:
 
     def obey(self, line: str) -> str:
         """Carry out one line; returns its answer and never raises on what the line says."""
-        word, *rest = line.split() or [""]
+        try:
+            word, *rest = shlex.split(line) or [""]
+        except ValueError as error:
+            return f"error {line!r}: {error}"
         command = self._words.get(word)
         if command is None:
             return f"error there is no command {word!r} (there are {', '.join(self._words)})"
@@ -71,7 +76,8 @@ class Commands:
         return ""
 
     def _faults(self, words: list[str], now_s: float) -> str:
-        return " ".join(fault.spec for fault in self._line.faults.active)
+        specs = (fault.spec for fault in self._line.faults.active)
+        return " ".join(shlex.quote(spec) if " " in spec else spec for spec in specs)
 
     def _servos(self, words: list[str], now_s: float) -> str:
         return json.dumps(self._line.describe(now_s))

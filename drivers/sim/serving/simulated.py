@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import socket
 import subprocess
 import threading
@@ -165,7 +166,7 @@ class SimulatedBus:
         """
         for spec in specs:
             parse_fault(spec)
-        self._tell(" ".join(("fault", *specs)))
+        self._tell(shlex.join(("fault", *specs)))
 
     def clear(self, kind: str | None = None) -> None:
         """End the faults of a kind; None: all."""

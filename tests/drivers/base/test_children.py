@@ -20,7 +20,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     inner = tmp_path / "packages" / "neighbour" / "inner.py"
     inner.parent.mkdir(parents=True)
     inner.parent.joinpath("__init__.py").touch()
-    inner.write_text("import sys, stray\nprint(__file__, stray.__file__, *sys.argv[1:])\n")
+    inner.write_text("import sys, stray\nprint(__file__, stray.__file__, *sys.argv[1:], sep='\\n')\n")
     monkeypatch.delitem(sys.modules, "neighbour", raising=False)
     monkeypatch.setattr(sys, "path", [str(inner.parents[1]), str(tmp_path / "strays"), *sys.path])
     for folder in ("strays", "current"):
@@ -40,7 +40,7 @@ def test_a_child_finds_what_its_parent_finds_and_nothing_of_the_current_folder(p
         text=True,
     )
     assert done.stderr == ""
-    assert done.stdout.split() == [str(package), str(package.parents[2] / "strays" / "stray.py"), "a", "b"]
+    assert done.stdout.splitlines() == [str(package), str(package.parents[2] / "strays" / "stray.py"), "a", "b"]
 
 
 def test_the_current_folder_is_named_where_the_parent_looks_there(monkeypatch: pytest.MonkeyPatch) -> None:

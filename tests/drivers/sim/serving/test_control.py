@@ -46,6 +46,7 @@ def test_servos_and_a_hand(chain: SimulatedChain):
         ("", "there is no command ''"),
         ("fly", "there is no command 'fly'"),
         ("fault mute:x", "'x' is not an id"),
+        ("fault 'mute:1", "No closing quotation"),
         ("place 9 5", "no simulated servo has id 9"),
         ("place 1 x", "invalid literal"),
         ("place 1", "not enough values"),

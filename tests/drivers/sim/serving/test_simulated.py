@@ -212,13 +212,13 @@ def test_echo_gives_back_what_was_sent(bus: SimulatedBus):
 def test_unplug_and_replug_under_another_name(bus: SimulatedBus, tmp_path: Path):
     first = bus.path
     client = serial.Serial(first, 1_000_000, timeout=0.2)
-    bus.fault(f"unplug:for=0.1s:as={tmp_path / 'other'}")
+    bus.fault(f"unplug:for=0.1s:as={tmp_path / 'an other'}")
     with pytest.raises((serial.SerialException, OSError)):
         for _ in range(50):
             client.write(PING_1)
             client.read(1)
     client.close()
-    wait_until(lambda: bus.path == str(tmp_path / "other"))
+    wait_until(lambda: bus.path == str(tmp_path / "an other"))
     assert len(exchange(bus.path, PING_1, 14)) == 14
 
 
