@@ -21,12 +21,12 @@ from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
 from drivers.dynamixel import startup
 from drivers.dynamixel.indirect import set_up
-from drivers.dynamixel.layout import Block
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
 from drivers.dynamixel.startup import Policy
 from drivers.dynamixel.telemetry import Telemetry
+from drivers.servos.layout import Block
 from drivers.tables.tables import load_table, model_name, model_number
 
 log = logging.getLogger(__name__)
@@ -113,8 +113,8 @@ class DynamixelBus(WireBus):
             if ids is None:
                 found = self._registers.packets.ping_all(self._port)
             else:
-                replies = {i: self._registers.packets.hello(self._port, i) for i in ids}
-                found = {i: reply.params for i, reply in replies.items() if reply is not None}
+                answers = [self._registers.packets.hello(self._port, i).replies for i in ids]
+                found = {i: reply.params for replies in answers for i, reply in replies.items()}
             return [self._info(servo, params) for servo, params in sorted(found.items())]
 
     def _info(self, servo: int, params: bytes) -> ServoInfo:

@@ -14,10 +14,19 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, CorruptReply, NoReply, PortLost, ServoFault, ServoRefused, WrongModel
+from drivers.base.errors import (
+    BusError,
+    CorruptReply,
+    NoReply,
+    PortLost,
+    ServoFault,
+    ServoRefused,
+    WrongModel,
+    together,
+)
 from drivers.dynamixel.indirect import set_up
-from drivers.dynamixel.layout import NAMES, Block
-from drivers.dynamixel.registers import Registers, together
+from drivers.dynamixel.registers import Registers
+from drivers.servos.layout import NAMES, Block
 from drivers.tables.tables import load_table, model_name, model_number
 
 log = logging.getLogger(__name__)

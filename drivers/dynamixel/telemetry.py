@@ -15,11 +15,13 @@ from drivers.base.telling import Teller
 from drivers.core.scale import Scale, Ticks
 from drivers.dynamixel.frames import Octets, Rows
 from drivers.dynamixel.groups import Group, Question, turns_of
-from drivers.dynamixel.layout import Block, layout_of
+from drivers.dynamixel.layout import layout_of
 from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.sdk import Exchange, group_read
+from drivers.dynamixel.sdk import group_read
 from drivers.dynamixel.sweep import Sweep, sealed
 from drivers.packets.packet import ALERT
+from drivers.servos.exchange import Exchange
+from drivers.servos.layout import Block
 from drivers.tables.tables import TRIPPED
 
 log = logging.getLogger(__name__)

@@ -92,7 +92,7 @@ class Protocol1Bus(WireBus):
     @property
     def is_open(self) -> bool:
         """True while the port is held."""
-        return bool(self._port.is_open)
+        return bool(self._port.link.is_open)
 
     @property
     def path(self) -> str:

@@ -6,7 +6,8 @@ import logging
 from dataclasses import dataclass, field
 
 from drivers.base.errors import ServoRefused
-from drivers.protocol1.registers import TRIES, Registers
+from drivers.protocol1.registers import Registers
+from drivers.servos.registers import TRIES
 
 log = logging.getLogger(__name__)
 

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from drivers.base.bus import ServoSpec
 from drivers.base.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel, together
 from drivers.packets.packet1 import Error1, Packet1
-from drivers.protocol1.registers import TRIES, Registers
+from drivers.protocol1.registers import Registers
 from drivers.protocol1.settings import EEPROM_TRIES, Started, apply_settings, note, write_surely
+from drivers.servos.registers import TRIES
 from drivers.tables.tables import ControlTable, known_models, load_table, model_name
 
 OUT_OF_TURN = 1 / 64

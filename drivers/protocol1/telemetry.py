@@ -14,9 +14,10 @@ from drivers.base.telling import Teller
 from drivers.core.scale import Scale, Ticks
 from drivers.packets.packet import ALERT
 from drivers.packets.packet1 import Packet1
-from drivers.protocol1.exchange import Exchange
-from drivers.protocol1.layout import Block, Group, layout_of
+from drivers.protocol1.layout import Group, layout_of, values_of
 from drivers.protocol1.registers import Registers
+from drivers.servos.exchange import Exchange
+from drivers.servos.layout import Block
 
 log = logging.getLogger(__name__)
 
@@ -228,7 +229,7 @@ class Telemetry:
         if good:
             where = np.array([group.place[servo] for servo in good])
             self._note_flags(replies, where)
-            self._take(group, good, where, block.decode([reply.params for reply in replies.values()]))
+            self._take(group, good, where, values_of(block, [reply.params for reply in replies.values()]))
         return good
 
     def _take(
