@@ -19,12 +19,11 @@ from drivers.base.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError, DriverError, PortLost
 from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
-from drivers.dynamixel import startup
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
-from drivers.dynamixel.startup import Policy
+from drivers.dynamixel.startup import Policy, Startup
 from drivers.dynamixel.telemetry import Telemetry
 from drivers.servos.layout import Block
 from drivers.tables.tables import load_table, model_name, model_number
@@ -133,9 +132,10 @@ class DynamixelBus(WireBus):
 
     def _bring_up(self) -> Floats:
         self._port.suspects.clear()
-        startup.identify(self._registers, self.servos)
+        startup = Startup(self._registers, self.policy)
+        startup.identify(self.servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
-        started = startup.bring_up(self._registers, self.servos, self.policy, indirect=self._may_map)
+        started = startup.bring_up(self.servos, indirect=self._may_map)
         self._report.eeprom_writes += started.eeprom
         self._mapped = started.mapped
         self._mended.clear()
@@ -157,8 +157,9 @@ class DynamixelBus(WireBus):
         """
         chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
         with self._losing():
-            startup.identify(self._registers, chosen)
-            started = startup.bring_up(self._registers, chosen, self.policy, indirect=self._may_map)
+            startup = Startup(self._registers, self.policy)
+            startup.identify(chosen)
+            started = startup.bring_up(chosen, indirect=self._may_map)
             self._report.eeprom_writes += started.eeprom
             self._use_map(self._mapped | started.mapped)
             for servo, ticks in started.ticks.items():
@@ -166,7 +167,7 @@ class DynamixelBus(WireBus):
             self._telemetry.started(list(started.ticks))
 
     def _switch_off(self) -> None:
-        startup.switch_off(self._registers, self.ids)
+        Startup(self._registers, self.policy).switch_off(self.ids)
 
     def _tables(self, tables: list) -> None:
         self._registers.tables = dict(zip(self.ids, tables, strict=True))
@@ -222,7 +223,7 @@ class DynamixelBus(WireBus):
         for servo in self._telemetry.take_tripped():
             try:
                 self._registers.put(servo, "watchdog", 0, tries=1)
-                goal = startup.goals_at_present(self._registers, [servo], {})[servo]
+                goal = Startup(self._registers, self.policy).goals_at_present([servo])[servo]
                 self._registers.put(servo, "goal", goal, tries=1)
                 self._registers.put(servo, "watchdog", self.policy.watchdog_steps, tries=1)
             except PortLost:

@@ -26,9 +26,9 @@ from drivers.port.serialport import SerialPort
 from drivers.protocol1 import startup
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.registers import Registers
-from drivers.protocol1.settings import Started
-from drivers.protocol1.startup import Policy
+from drivers.protocol1.startup import Policy, Startup
 from drivers.protocol1.telemetry import Telemetry
+from drivers.servos.startup import Started
 from drivers.tables.tables import ControlTable, load_table, model_name
 
 log = logging.getLogger(__name__)
@@ -146,12 +146,13 @@ class Protocol1Bus(WireBus):
 
     def _bring_up(self) -> Floats:
         self._port.suspects.clear()
-        started = Started()
-        startup.identify(self._registers, self.servos, started)
+        begin = Startup(self._registers, self.policy)
+        begin.identify(self.servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         self._group()
         self._watch()
-        self._started(startup.bring_up(self._registers, self.servos, self.policy, started))
+        started = begin.bring_up(self.servos)
+        self._started(started)
         return self.scale.radians(np.array([started.ticks[servo] for servo in self.ids]))
 
     def _watch(self) -> None:
@@ -204,9 +205,10 @@ class Protocol1Bus(WireBus):
         """
         chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
         with self._losing():
-            started = Started()
-            startup.identify(self._registers, chosen, started)
-            self._started(startup.bring_up(self._registers, chosen, self.policy, started))
+            begin = Startup(self._registers, self.policy)
+            begin.identify(chosen)
+            started = begin.bring_up(chosen)
+            self._started(started)
             here = np.zeros(len(self.ids))
             for servo, ticks in started.ticks.items():
                 here[self.ids.index(servo)] = ticks
@@ -215,7 +217,7 @@ class Protocol1Bus(WireBus):
                 self._limits.begin_one(self.ids.index(servo), float(here[self.ids.index(servo)]))
 
     def _switch_off(self) -> None:
-        startup.switch_off(self._registers, self.ids)
+        Startup(self._registers, self.policy).switch_off(self.ids)
 
     def _release(self) -> None:
         super()._release()

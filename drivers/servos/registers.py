@@ -8,7 +8,7 @@ from functools import partial
 from typing import ClassVar, Generic, TypeVar
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, CorruptReply, NoReply, ServoRefused, together
+from drivers.base.errors import BusError, CorruptReply, DriverError, NoReply, ServoRefused, together
 from drivers.servos.exchange import Exchange, Exchanges, R
 from drivers.servos.layout import NAMES, item_of
 from drivers.servos.port import Port
@@ -16,6 +16,7 @@ from drivers.tables.tables import ControlTable, Item
 
 TRIES = 4
 T = TypeVar("T")
+E = TypeVar("E", bound=DriverError)
 
 
 class Registers(ABC, Generic[R]):
@@ -191,7 +192,7 @@ class Registers(ABC, Generic[R]):
 
     # ------------------------------------------------------------------ every answer checked
 
-    def error(self, kind: type[BusError], message: str, hint: str, *ids: int) -> BusError:
+    def error(self, kind: type[E], message: str, hint: str, *ids: int) -> E:
         """An error about servos on this port."""
         return kind(message, hint=hint, port=self.port.port_name, servo_ids=ids)
 
