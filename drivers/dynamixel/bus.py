@@ -15,16 +15,15 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from drivers.base.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec
+from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError, DriverError, PortLost
-from drivers.core.scale import Scale
-from drivers.core.wirebus import WireBus
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
 from drivers.dynamixel.startup import Policy, Startup
 from drivers.dynamixel.telemetry import Telemetry
+from drivers.servos.bus import ServoBus
 from drivers.servos.layout import Block
 from drivers.tables.tables import load_table, model_name, model_number
 
@@ -34,7 +33,7 @@ MAP_TRIES = 5
 """How often the pointers of one servo are set again between two starts."""
 
 
-class DynamixelBus(WireBus):
+class DynamixelBus(ServoBus):
     """Dynamixel servos on one serial port. See :class:`~drivers.base.bus.Bus` for the contract.
 
     Parameters
@@ -56,6 +55,10 @@ class DynamixelBus(WireBus):
     ------
     DriverError : unknown model, or an option that does not fit.
     """
+
+    _port: Port
+    _registers: Registers
+    _telemetry: Telemetry
 
     def __init__(
         self,
@@ -83,27 +86,6 @@ class DynamixelBus(WireBus):
         self._goals = np.zeros(len(self.ids), np.int32)
         self._heard_s = 0.0
 
-    # ------------------------------------------------------------------ the port
-
-    @property
-    def is_open(self) -> bool:
-        """True while the port is held."""
-        return bool(self._port.is_open)
-
-    @property
-    def path(self) -> str:
-        """Device path in use."""
-        return self._port.link.path
-
-    def _use_path(self, path: str) -> None:
-        self._port.setPortName(path)
-
-    def _open_link(self) -> None:
-        self._port.openPort()
-
-    def _close_link(self) -> None:
-        self._port.closePort()
-
     # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
@@ -130,9 +112,12 @@ class DynamixelBus(WireBus):
             return info
         return ServoInfo(*info_head(info), volts / 10.0, float(temperature), hardware, bool(torque))
 
+    def _startup(self) -> Startup:
+        return Startup(self._registers, self.policy)
+
     def _bring_up(self) -> Floats:
         self._port.suspects.clear()
-        startup = Startup(self._registers, self.policy)
+        startup = self._startup()
         startup.identify(self.servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         started = startup.bring_up(self.servos, indirect=self._may_map)
@@ -140,9 +125,7 @@ class DynamixelBus(WireBus):
         self._mapped = started.mapped
         self._mended.clear()
         self._telemetry.rebuild(self._mapped)
-        for index, servo in enumerate(self.ids):
-            if servo in started.limits:
-                self.scale.narrow(index, *started.limits[servo])
+        self._narrow(started.limits)
         self._telemetry.started(self.ids)
         self._heard_s = self._clock()
         self._goals = np.array([started.ticks[servo] for servo in self.ids], np.int32)
@@ -157,7 +140,7 @@ class DynamixelBus(WireBus):
         """
         chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
         with self._losing():
-            startup = Startup(self._registers, self.policy)
+            startup = self._startup()
             startup.identify(chosen)
             started = startup.bring_up(chosen, indirect=self._may_map)
             self._report.eeprom_writes += started.eeprom
@@ -166,19 +149,10 @@ class DynamixelBus(WireBus):
                 self._hold(self.ids.index(servo), ticks)
             self._telemetry.started(list(started.ticks))
 
-    def _switch_off(self) -> None:
-        Startup(self._registers, self.policy).switch_off(self.ids)
-
-    def _tables(self, tables: list) -> None:
-        self._registers.tables = dict(zip(self.ids, tables, strict=True))
-        self.scale = Scale(self.servos, tables)
-
     def _hold(self, index: int, ticks: int) -> None:
         """One servo begins again from a position."""
         self._goals[index] = ticks
-        full = np.zeros(len(self.ids))
-        full[index] = ticks
-        self._limits.begin_one(index, float(self.scale.radians(full)[index]))
+        super()._hold(index, ticks)
 
     # ------------------------------------------------------------------ every cycle
 
@@ -223,7 +197,7 @@ class DynamixelBus(WireBus):
         for servo in self._telemetry.take_tripped():
             try:
                 self._registers.put(servo, "watchdog", 0, tries=1)
-                goal = Startup(self._registers, self.policy).goals_at_present([servo])[servo]
+                goal = self._startup().goals_at_present([servo])[servo]
                 self._registers.put(servo, "goal", goal, tries=1)
                 self._registers.put(servo, "watchdog", self.policy.watchdog_steps, tries=1)
             except PortLost:
@@ -233,12 +207,6 @@ class DynamixelBus(WireBus):
                 self._telemetry.retry_tripped(servo)  # its register may read 0 now: it would never be seen again
                 continue
             self._hold(self.ids.index(servo), goal)
-
-    def report(self) -> BusReport:
-        """A copy of the counters."""
-        self._report.stray = self._port.stray
-        self._report.silent = self._telemetry.silent_ids()
-        return super().report()
 
 
 def info_head(info: ServoInfo) -> tuple[int, int, str, int]:
