@@ -21,6 +21,8 @@ S13   goals are sent without waiting for a status packet
 S14   group reads keep what arrived; fast ones are decoded by position, each servo with its own CRC
 ====  ========================================================================================================
 
+What of this is the same in every protocol stands in drivers/servos/exchange.py (S3 to S5, S13) and
+drivers/servos/port.py (S7, S9).
 S15 (``fastBulkRead`` mixes up ids and lengths) is avoided by never using it.
 """
 

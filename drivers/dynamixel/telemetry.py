@@ -38,9 +38,7 @@ class Telemetry(telemetry.Telemetry):
 
     Parameters
     ----------
-    registers : the wire and the control tables.
-    ids : n servo ids in the order of all arrays.
-    report : counters to add to.
+    registers, ids, report : see :class:`~drivers.servos.telemetry.Telemetry`.
     feedback, fast, slow_group : see :class:`~drivers.dynamixel.bus.DynamixelBus`.
     """
 
@@ -90,10 +88,7 @@ class Telemetry(telemetry.Telemetry):
 
     def take_tripped(self) -> list[int]:
         """Servos whose watchdog was found tripped since the last call."""
-        if not self._tripped:
-            return []
-        found, self._tripped = sorted(self._tripped), set()
-        return found
+        return _emptied(self._tripped) if self._tripped else []
 
     def retry_tripped(self, servo: int) -> None:
         """Hand a servo out once more at the next :meth:`take_tripped`."""
@@ -101,10 +96,7 @@ class Telemetry(telemetry.Telemetry):
 
     def take_forgetful(self) -> list[int]:
         """Servos that have lost their pointers since the last call: they have been rebooted, or were without power."""
-        if not self._forgetful:
-            return []
-        found, self._forgetful = sorted(self._forgetful), set()
-        return found
+        return _emptied(self._forgetful) if self._forgetful else []
 
     def send_goals(self, ticks: Ticks) -> None:
         """One sync write per group, all handed over at once. ``(n,)`` steps."""
@@ -288,3 +280,9 @@ class Telemetry(telemetry.Telemetry):
                 self.report.count("watchdog", servo)
                 self._say("watchdog of servo %s tripped", self._registers.label(servo))
         self._tripped.update(found)
+
+
+def _emptied(ids: set[int]) -> list[int]:
+    found = sorted(ids)
+    ids.clear()
+    return found

@@ -25,9 +25,7 @@ class Telemetry(telemetry.Telemetry):
 
     Parameters
     ----------
-    registers : the wire and the control tables.
-    ids : n servo ids in the order of all arrays.
-    report : counters to add to.
+    registers, ids, report : see :class:`~drivers.servos.telemetry.Telemetry`.
     feedback, singles, slow_group : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
 
     Attributes
