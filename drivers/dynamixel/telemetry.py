@@ -106,7 +106,6 @@ class Telemetry(telemetry.Telemetry):
         """Bring back who can be brought back, read everybody, and ask some for one slow value."""
         self._fresh[:] = False
         if self._port.suspects or self._silent:
-            self._welcome()
             self._revive(clock())
         sweep = None if self._port.suspects else self._sweep_of(scale)
         self._ask(self._feedbacks, clock, running, self._fast, sweep)

@@ -87,7 +87,7 @@ class Telemetry(telemetry.Telemetry):
     def cycle(self, clock: Callable[[], float], running: bool) -> None:
         """Bring back who can be brought back, read everybody whose turn it is, and ask some for a slow value."""
         self._fresh[:] = False
-        if self._port.suspects:
+        if self._port.suspects or self._silent:
             self._revive(clock())
         for number, group in enumerate(self._groups):
             self._read(group, self._chosen(number, group), clock)

@@ -101,15 +101,12 @@ class Telemetry(ABC):
 
     # ------------------------------------------------------------------ who answers
 
-    def _welcome(self) -> None:
-        """Silent servos that answered another question, as in ``recover()``, are silent no longer."""
-        for servo in [servo for servo in self._silent if servo not in self._port.suspects]:
-            self._silent.remove(servo)
-            self._returned(servo)
-
     def _revive(self, now: float) -> None:
         """Greet who missed its time: at once the first time, then one silent servo a second."""
         suspects, failed = self._port.suspects, 0
+        for servo in [i for i in self._silent if i not in suspects]:  # it answered another question, as in recover()
+            self._silent.remove(servo)
+            self._returned(servo)
         for servo in [i for i in self.ids if i in suspects and i not in self._silent]:
             if self._packets.revive(self._port, servo):
                 self._missed.discard(servo)

@@ -45,3 +45,10 @@ def test_a_silent_servo_is_left_out_and_comes_back_by_itself(wire: VirtualBus, b
     bus.read()
     assert silent(bus.read()) == [False] * 3
     assert bus.report().silent == ()
+
+
+def test_a_servo_that_was_recovered_is_silent_no_longer(wire: VirtualBus, bus: Bus) -> None:
+    wire.clear()
+    bus.recover([SILENT])
+    assert silent(bus.read()) == [False] * 3
+    assert bus.report().silent == ()
