@@ -37,13 +37,7 @@ class Telemetry(telemetry.Telemetry):
     _registers: Registers
 
     def __init__(
-        self,
-        registers: Registers,
-        ids: Sequence[int],
-        report: BusReport,
-        feedback: str = "full",
-        singles: int = 6,
-        slow_group: int = 4,
+        self, registers: Registers, ids: Sequence[int], report: BusReport, feedback: str, singles: int, slow_group: int
     ) -> None:
         super().__init__(registers, ids, report)
         self._options = (feedback, max(singles, 1), max(slow_group, 0))
