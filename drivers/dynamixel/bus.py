@@ -15,19 +15,17 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from drivers.base.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec
+from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError, DriverError, PortLost
-from drivers.core.scale import Scale
-from drivers.core.wirebus import WireBus
-from drivers.dynamixel import startup
 from drivers.dynamixel.indirect import set_up
-from drivers.dynamixel.layout import Block
 from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
-from drivers.dynamixel.startup import Policy
+from drivers.dynamixel.startup import Policy, Startup
 from drivers.dynamixel.telemetry import Telemetry
-from drivers.tables.tables import ControlTable, load_table, model_name, model_number
+from drivers.servos.bus import ServoBus
+from drivers.servos.layout import Block
+from drivers.tables.tables import load_table, model_name, model_number
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +33,7 @@ MAP_TRIES = 5
 """How often the pointers of one servo are set again between two starts."""
 
 
-class DynamixelBus(WireBus):
+class DynamixelBus(ServoBus):
     """Dynamixel servos on one serial port. See :class:`~drivers.base.bus.Bus` for the contract.
 
     Parameters
@@ -57,6 +55,10 @@ class DynamixelBus(WireBus):
     ------
     DriverError : unknown model, or an option that does not fit.
     """
+
+    _port: Port
+    _registers: Registers
+    _telemetry: Telemetry
 
     def __init__(
         self,
@@ -84,27 +86,6 @@ class DynamixelBus(WireBus):
         self._goals = np.zeros(len(self.ids), np.int32)
         self._heard_s = 0.0
 
-    # ------------------------------------------------------------------ the port
-
-    @property
-    def is_open(self) -> bool:
-        """True while the port is held."""
-        return bool(self._port.is_open)
-
-    @property
-    def path(self) -> str:
-        """Device path in use."""
-        return self._port.link.path
-
-    def _use_path(self, path: str) -> None:
-        self._port.setPortName(path)
-
-    def _open_link(self) -> None:
-        self._port.openPort()
-
-    def _close_link(self) -> None:
-        self._port.closePort()
-
     # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
@@ -113,8 +94,8 @@ class DynamixelBus(WireBus):
             if ids is None:
                 found = self._registers.packets.ping_all(self._port)
             else:
-                replies = {i: self._registers.packets.hello(self._port, i) for i in ids}
-                found = {i: reply.params for i, reply in replies.items() if reply is not None}
+                answers = [self._registers.packets.hello(self._port, i).replies for i in ids]
+                found = {i: reply.params for replies in answers for i, reply in replies.items()}
             return [self._info(servo, params) for servo, params in sorted(found.items())]
 
     def _info(self, servo: int, params: bytes) -> ServoInfo:
@@ -131,18 +112,20 @@ class DynamixelBus(WireBus):
             return info
         return ServoInfo(*info_head(info), volts / 10.0, float(temperature), hardware, bool(torque))
 
+    def _startup(self) -> Startup:
+        return Startup(self._registers, self.policy)
+
     def _bring_up(self) -> Floats:
         self._port.suspects.clear()
-        startup.identify(self._registers, self.servos)
+        startup = self._startup()
+        startup.identify(self.servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
-        started = startup.bring_up(self._registers, self.servos, self.policy, indirect=self._may_map)
+        started = startup.bring_up(self.servos, indirect=self._may_map)
         self._report.eeprom_writes += started.eeprom
         self._mapped = started.mapped
         self._mended.clear()
         self._telemetry.rebuild(self._mapped)
-        for index, servo in enumerate(self.ids):
-            if servo in started.limits:
-                self.scale.narrow(index, *started.limits[servo])
+        self._narrow(started.limits)
         self._telemetry.started(self.ids)
         self._heard_s = self._clock()
         self._goals = np.array([started.ticks[servo] for servo in self.ids], np.int32)
@@ -157,27 +140,19 @@ class DynamixelBus(WireBus):
         """
         chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
         with self._losing():
-            startup.identify(self._registers, chosen)
-            started = startup.bring_up(self._registers, chosen, self.policy, indirect=self._may_map)
+            startup = self._startup()
+            startup.identify(chosen)
+            started = startup.bring_up(chosen, indirect=self._may_map)
             self._report.eeprom_writes += started.eeprom
             self._use_map(self._mapped | started.mapped)
             for servo, ticks in started.ticks.items():
                 self._hold(self.ids.index(servo), ticks)
             self._telemetry.started(list(started.ticks))
 
-    def _switch_off(self) -> None:
-        startup.switch_off(self._registers, self.ids)
-
-    def _tables(self, tables: list[ControlTable]) -> None:
-        self._registers.tables = dict(zip(self.ids, tables, strict=True))
-        self.scale = Scale(self.servos, tables)
-
     def _hold(self, index: int, ticks: int) -> None:
         """One servo begins again from a position."""
         self._goals[index] = ticks
-        full = np.zeros(len(self.ids))
-        full[index] = ticks
-        self._limits.begin_one(index, float(self.scale.radians(full)[index]))
+        super()._hold(index, ticks)
 
     # ------------------------------------------------------------------ every cycle
 
@@ -222,7 +197,7 @@ class DynamixelBus(WireBus):
         for servo in self._telemetry.take_tripped():
             try:
                 self._registers.put(servo, "watchdog", 0, tries=1)
-                goal = startup.goals_at_present(self._registers, [servo], {})[servo]
+                goal = self._startup().goals_at_present([servo])[servo]
                 self._registers.put(servo, "goal", goal, tries=1)
                 self._registers.put(servo, "watchdog", self.policy.watchdog_steps, tries=1)
             except PortLost:
@@ -232,12 +207,6 @@ class DynamixelBus(WireBus):
                 self._telemetry.retry_tripped(servo)  # its register may read 0 now: it would never be seen again
                 continue
             self._hold(self.ids.index(servo), goal)
-
-    def report(self) -> BusReport:
-        """A copy of the counters."""
-        self._report.stray = self._port.stray
-        self._report.silent = self._telemetry.silent_ids()
-        return super().report()
 
 
 def info_head(info: ServoInfo) -> tuple[int, int, str, int]:

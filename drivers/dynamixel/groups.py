@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from drivers.dynamixel.frames import GoalFrame, Run
-from drivers.dynamixel.layout import Block, Layout
+from drivers.dynamixel.layout import Layout
+from drivers.servos.layout import Block
 
 
 class Group:

@@ -12,8 +12,9 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from drivers.dynamixel.layout import INDIRECT, Block, item_of
+from drivers.dynamixel.layout import INDIRECT, item_of
 from drivers.dynamixel.registers import Registers
+from drivers.servos.layout import Block
 from drivers.tables.tables import ControlTable
 
 _TRIES = 2

@@ -4,51 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base.bus import Floats
+from drivers.servos import layout
+from drivers.servos.layout import Block
 from drivers.tables.tables import MAGNITUDE_BIT, ControlTable, Item
-
-
-@dataclass(frozen=True)
-class Block:
-    """Registers that lie together and are read in one go.
-
-    Parameters
-    ----------
-    items : by the name this driver uses for them (``"position"``, ``"velocity"``, ...).
-    """
-
-    items: Mapping[str, Item]
-
-    @cached_property
-    def address(self) -> int:
-        """First address."""
-        return min(item.address for item in self.items.values())
-
-    @cached_property
-    def size(self) -> int:
-        """Bytes to read. Never three: that is the length of a ping's reply (see S4 in sdk.py)."""
-        return max(item.end for item in self.items.values()) - self.address
-
-    @cached_property
-    def dtype(self) -> np.dtype[np.void]:
-        """The block's bytes as a record."""
-        return np.dtype(
-            {
-                "names": list(self.items),
-                "formats": [f"<{'i' if item.signed else 'u'}{item.size}" for item in self.items.values()],
-                "offsets": [item.address - self.address for item in self.items.values()],
-                "itemsize": self.size,
-            }
-        )
-
-    def decode(self, data: NDArray[np.uint8]) -> NDArray[np.void]:
-        """Raw values of k servos from their replies ``(k, size)`` uint8; fields by name, shape ``(k,)``."""
-        return np.ascontiguousarray(data).view(self.dtype)[:, 0]
 
 
 @dataclass(frozen=True)
@@ -87,34 +50,10 @@ class Layout:
         return raw.astype(np.float64)
 
 
-NAMES = {
-    "position": ("Present Position",),
-    "velocity": ("Present Velocity", "Present Speed"),
-    "current": ("Present Current", "Present Load"),
-    "torque": ("Torque Enable",),
-    "hardware": ("Hardware Error Status",),
-    "watchdog": ("Bus Watchdog",),
-    "voltage": ("Present Input Voltage", "Present Voltage"),
-    "temperature": ("Present Temperature",),
-    "goal": ("Goal Position",),
-    "speed_limit": ("Profile Velocity", "Moving Speed"),
-    "accel_limit": ("Profile Acceleration",),
-    "min_ticks": ("Min Position Limit", "CW Angle Limit"),
-    "max_ticks": ("Max Position Limit", "CCW Angle Limit"),
-    "min_voltage": ("Min Voltage Limit",),
-    "mode": ("Operating Mode", "Control Mode"),
-    "drive_mode": ("Drive Mode",),
-    "return_delay": ("Return Delay Time",),
-    "startup": ("Startup Configuration",),
-    "status_level": ("Status Return Level",),
-    "shutdown": ("Shutdown",),
-}
-"""This driver's short names -> the vendor's names of a register, which differ by family."""
-
-
 def item_of(table: ControlTable, name: str) -> Item | None:
-    """Register of a table by this driver's short name; None where the model has none."""
-    return next((table[vendor] for vendor in NAMES[name] if vendor in table), None)
+    """Register of a table by its short name, the load in place of a current that is not measured; None: no such."""
+    item = layout.item_of(table, name)
+    return layout.item_of(table, "load") if item is None and name == "current" else item
 
 
 def _block(table: ControlTable, *names: str) -> Block | None:

@@ -5,12 +5,10 @@ See drivers/dynamixel/sdk.py for the list of faults that the numbers S1 to S14 r
 
 from __future__ import annotations
 
-import threading
-
 from dynamixel_sdk import port_handler
 
-from drivers.base.errors import DriverError
-from drivers.port.serialport import SerialPort, link_to, reply_margin_s
+from drivers.port.serialport import SerialPort
+from drivers.servos import port
 
 NAP_LEAST_S = 0.0005
 """A shorter sleep costs more than it saves."""
@@ -23,20 +21,12 @@ DOZE_LATE_S = 0.0005
 """How long after the last byte was due that goes on."""
 
 
-class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
-    """The SDK's port handler on an exclusive, blocking :class:`~drivers.port.serialport.SerialPort`.
+class Port(port.Port, port_handler.PortHandler):  # type: ignore[misc]  # without types
+    """The SDK's port handler as a :class:`~drivers.servos.port.Port`, which mends S5 to S7 and S9.
 
     Parameters
     ----------
-    path : device path, URL, or a :class:`~drivers.sim.serving.virtual.VirtualLink`.
-    baud : any rate the adapter takes.
-    margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
-
-    Attributes
-    ----------
-    clock, sleep : monotonic seconds, and the way to let them pass.
-    suspects : ids that did not answer when they should have; see :class:`~drivers.dynamixel.sdk.Packets`.
-    stray : replies thrown away.
+    path, baud, margin_s : see :class:`~drivers.servos.port.Port`.
     """
 
     def __init__(
@@ -45,23 +35,14 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         baud: int = 1_000_000,
         margin_s: float | None = None,
     ) -> None:
-        self.link = link_to(path, baud)
-        self.clock, self.sleep = self.link.clock, self.link.sleep
-        self._busy = threading.Lock()
-        super().__init__(self.link.path)
-        self.baudrate = baud
-        self.suspects: set[int] = set()
-        self.stray = 0
-        self.deadline_s = 0.0
-        self._margin_s = margin_s
+        super().__init__(path, baud, margin_s)
         self._held = bytearray()
-        self._free_s = 0.0
-        self._tune()
+        self.is_open, self.ser = False, None
+        self.packet_start_time = self.packet_timeout = 0.0
 
     def _tune(self) -> None:
-        self.margin_s = reply_margin_s(self.link.path) if self._margin_s is None else self._margin_s
-        self.tx_time_per_byte = 10_000.0 / self.baudrate  # milliseconds, the SDK's unit
-        self._byte_s = 10.0 / self.baudrate
+        super()._tune()
+        self.tx_time_per_byte = 1000.0 * self._byte_s  # milliseconds, the SDK's unit
 
     def openPort(self) -> bool:
         """Open exclusively; raises PortMissing, PortBusy or PortPermission instead of returning False."""
@@ -70,12 +51,9 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
     def setupPort(self, cflag_baud: int) -> bool:
         """As ``openPort``, at a rate."""
         self.link.baud = self.baudrate = cflag_baud
-        self.link.open()
+        self.is_open = super().openPort()
         self.ser = self.link.serial
-        self.is_open, self.is_using = True, False
-        self.suspects.clear()
         self._held.clear()
-        self._tune()
         return True
 
     def setBaudRate(self, baudrate: int) -> bool:
@@ -84,13 +62,8 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
 
     def closePort(self) -> None:
         """Close; never raises."""
-        self.link.close()
-        self.is_open = self.is_using = False
-
-    def setPortName(self, port_name: str) -> None:
-        """Another device path for the next opening."""
-        super().setPortName(port_name)
-        self.link.path = port_name
+        super().closePort()
+        self.is_open = False
 
     def clearPort(self) -> None:
         """Throw away all input (S3)."""
@@ -115,15 +88,6 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         """Send; returns the count sent."""
         self.transmit(bytes(packet))
         return len(packet)
-
-    def transmit(self, packet: bytes) -> None:
-        """Hand bytes to the system, and keep count of when the last of them will have left."""
-        self._free_s = max(self.clock(), self._free_s) + len(packet) * self._byte_s
-        self.link.write(packet)
-
-    def expect(self, size: int) -> None:
-        """Deadline for ``size`` bytes of reply to what was sent: time on the wire, both ways, plus margin (S7)."""
-        self.deadline_s = max(self.clock(), self._free_s) + size * self._byte_s + self.margin_s
 
     def more(self, missing: int) -> bytes:
         """What comes next of a reply that lacks so many bytes: asleep while the wire carries them, lightly at the end.
@@ -158,25 +122,3 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
     def getCurrentTime(self) -> float:
         """Milliseconds on the monotonic clock (S8)."""
         return self.clock() * 1000.0
-
-    @property
-    def is_using(self) -> bool:
-        """True in the middle of a transaction. Setting it begins or ends one (S5, S9).
-
-        Raises
-        ------
-        DriverError : another thread is in the middle of a transaction.
-        """
-        return self._busy.locked()
-
-    @is_using.setter
-    def is_using(self, value: bool) -> None:
-        if not value:
-            if self._busy.locked():
-                self._busy.release()
-        elif not self._busy.acquire(blocking=False):
-            raise DriverError(
-                f"port {self.port_name} is used from two threads at once",
-                hint="let one thread do all reads and writes of a bus",
-                port=self.port_name,
-            )

@@ -21,14 +21,16 @@ S13   goals are sent without waiting for a status packet
 S14   group reads keep what arrived; fast ones are decoded by position, each servo with its own CRC
 ====  ========================================================================================================
 
+What of this is the same in every protocol stands in drivers/servos/exchange.py (S3 to S5, S13) and
+drivers/servos/port.py (S7, S9).
 S15 (``fastBulkRead`` mixes up ids and lengths) is avoided by never using it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from dynamixel_sdk import protocol2_packet_handler, robotis_def
 
@@ -36,31 +38,23 @@ from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Quick, Rows, Run
 from drivers.dynamixel.port import Port
 from drivers.packets import packet
 from drivers.packets.packet import Instruction, StatusPacket, StatusReader, encode_instruction
+from drivers.servos import exchange
+from drivers.servos.exchange import Exchange, settled
 
 PING_DATA = 3
 PING_SLOT_MS = 3.0
 _LATE_CHUNKS = 16
 
 
-class Exchange(NamedTuple):
-    """What came back for one instruction.
-
-    Attributes
-    ----------
-    replies : by servo id; only those with the right id, length and CRC.
-    missing : ids that were asked and are not in ``replies``.
-    corrupt : True when damaged bytes arrived too, so that a missing reply may have been one of them.
-    joint_lost : True when nobody answered a fast read, whoever answered the plain one after it.
-    """
-
-    replies: dict[int, StatusPacket]
-    missing: tuple[int, ...]
-    corrupt: bool
-    joint_lost: bool = False
+Got = Exchange[StatusPacket]
+"""What came back for one question, in this protocol's packets."""
 
 
-class Packets(protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[misc]  # without types
+class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[misc]
     """The SDK's Protocol 2.0 packet handler with its faults overridden, and group transactions of our own."""
+
+    status_size = STATUS_SIZE
+    greeting = Instruction.PING
 
     # ------------------------------------------------------------------ what the SDK calls by its own names
 
@@ -122,42 +116,25 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[
 
     # ------------------------------------------------------------------ exchanges the driver uses
 
-    def send(self, port: Port, frame: bytes) -> None:
-        """Clear the input and send one packet; the port stays in use until the reply was taken."""
-        port.is_using = True
-        try:
-            port.clearPort()
-            port.transmit(frame)
-        except BaseException:
-            port.is_using = False
-            raise
+    def encode(self, servo: int, code: int, params: bytes = b"") -> bytes:
+        """The packet of an instruction."""
+        return encode_instruction(servo, code, params)
 
-    def tell(self, port: Port, frame: bytes) -> None:
-        """Send a packet, or several, that nobody answers (S13)."""
-        port.is_using = True
-        try:
-            port.transmit(frame)
-        finally:
-            port.is_using = False
+    def number(self, value: int) -> bytes:
+        """An address or a length: two bytes."""
+        return value.to_bytes(2, "little")
 
-    def ask(self, port: Port, servo: int, instruction: int, params: bytes, length: int) -> Exchange:
-        """One instruction to one servo and its reply of ``length`` data bytes.
+    def make_reader(self) -> StatusReader:
+        """Finds replies in what arrives."""
+        return StatusReader()
 
-        A servo that missed its time before must first answer a ping: its replies come in order, so whatever
-        it still owed has arrived by then. Never ask for three bytes: that is the length of a ping's reply.
-        """
-        if servo in port.suspects and instruction != Instruction.PING and not self.revive(port, servo):
-            return Exchange({}, (servo,), False)
-        frame = encode_instruction(servo, instruction, params)
-        return self.exchange(port, frame, {servo: length})
+    def is_refusal(self, reply: StatusPacket) -> bool:
+        """Whether a reply says no, so that it may be without the data asked for."""
+        return bool(reply.error & 0x7F)
 
-    def hello(self, port: Port, servo: int) -> StatusPacket | None:
-        """A servo's answer to a ping (``params``: model number low, high, firmware), or None."""
-        return self.ask(port, servo, Instruction.PING, b"", PING_DATA).replies.get(servo)
-
-    def revive(self, port: Port, servo: int) -> bool:
-        """Ping a servo that missed its time; True when it is in step again (S4)."""
-        return self.hello(port, servo) is not None
+    def hello(self, port: Any, servo: int) -> Got:
+        """A servo's answer to a ping (``params``: model number low, high, firmware)."""
+        return self.ask(port, servo, Instruction.PING, b"", PING_DATA)
 
     def ping_all(self, port: Port) -> dict[int, bytes]:
         """Three bytes (model low, high, firmware) of everybody who answers a broadcast ping, by id.
@@ -177,22 +154,13 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[
             port.is_using = False
         return found
 
-    def read_group(self, port: Port, ids: Sequence[int], address: int, length: int, *, fast: bool = False) -> Exchange:
-        """One sync read, or fast sync read, keeping every reply that arrived (S7, S10, S14).
-
-        Servos in ``port.suspects`` are not asked and count as missing until :meth:`revive` brought them back.
-        """
-        left_out = tuple(servo for servo in ids if servo in port.suspects) if port.suspects else ()
-        asked = tuple(servo for servo in ids if servo not in left_out)
-        if not asked:
-            return Exchange({}, left_out, False)
-        group = group_read((Run(asked, address, length),), fast)
+    def read_asked(self, port: Any, ids: tuple[int, ...], address: int, size: int, manner: str) -> Got:
+        """One ``"sync"`` read, or a ``"fast"`` one, keeping every reply that arrived (S7, S10, S14)."""
+        group = group_read((Run(ids, address, size),), manner == "fast")
         got = self.read_rows(port, group)
-        if isinstance(got, Exchange):
-            return got._replace(missing=got.missing + left_out)
-        return Exchange(_replies(group.runs, got), left_out, False)
+        return got if isinstance(got, Exchange) else Exchange(_replies(group.runs, got), (), False)
 
-    def read_rows(self, port: Port, group: GroupRead, sweep: Quick | None = None) -> list[Rows] | Exchange:
+    def read_rows(self, port: Port, group: GroupRead, sweep: Quick | None = None) -> list[Rows] | Got:
         """Ask a group that was made before. None of it may be in ``port.suspects``.
 
         Parameters
@@ -210,80 +178,33 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[
             port.expect(group.size)
             if sweep is not None:
                 sweep.prepare()
-            data = self._fill(port, group.size)
+            data = self.fill(port, group.size)
             taken = sweep is not None and sweep.take(data, port.clock())
             rows = [] if taken else group.decode(data)
             if rows is not None:
                 port.suspects.difference_update(group.wanted)
                 return rows
             if not group.fast:
-                return self._collect(port, group.wanted, data)
+                return self.sort(port, group.wanted, data)
             got = self._salvage(port, group, data)
         finally:
             port.is_using = False
         return self._read_behind(port, group, got)
 
-    def write_group(self, port: Port, address: int, length: int, rows: bytes) -> None:
-        """One sync write that nobody answers (S11, S13).
-
-        Parameters
-        ----------
-        address, length : the register.
-        rows : for each servo its id and ``length`` bytes, one behind the other.
-
-        Raises
-        ------
-        ValueError : ``rows`` does not hold whole rows.
-        """
-        if not rows or len(rows) % (length + 1):
-            raise ValueError(f"rows: {len(rows)} bytes are not whole rows of 1 + {length}")
-        head = bytes((address & 0xFF, address >> 8, length & 0xFF, length >> 8))
-        self.tell(port, encode_instruction(packet.BROADCAST_ID, Instruction.SYNC_WRITE, head + rows))
-
-    def exchange(self, port: Port, frame: bytes, wanted: Mapping[int, int]) -> Exchange:
-        """Send a packet and collect the replies to it.
-
-        Parameters
-        ----------
-        wanted : data bytes expected, by servo id, in the order of the replies.
-        """
-        size = len(wanted) * STATUS_SIZE + sum(wanted.values())
-        port.suspects.update(wanted)
-        self.send(port, frame)
-        try:
-            port.expect(size)
-            return self._collect(port, wanted, self._fill(port, size))
-        finally:
-            port.is_using = False
-
-    def _fill(self, port: Port, size: int) -> bytes:
+    def fill(self, port: Any, size: int) -> bytes:
         """Received bytes, at least ``size`` of them unless the deadline passes.
 
         Once the first have come, the others are known to take their time on the wire: sleeping through it costs
         one awakening instead of one for every few bytes.
         """
-        data = more = port.link.read(port.deadline_s)
+        data: bytes = port.link.read(port.deadline_s)
+        more = data
         while more and len(data) < size:
             more = port.more(size - len(data))
             data += more
         return data
 
-    def _collect(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange:
-        """The replies in ``data`` and in what still comes, whatever lies between them."""
-        reader, box, late = StatusReader(), _Sorter(wanted), 0
-        box.take(reader.feed(data))
-        while len(box.replies) < len(wanted) and late < _LATE_CHUNKS:
-            data = port.link.read(port.deadline_s)
-            if not data:
-                box.take(reader.flush())
-                break
-            late += port.isPacketTimeout()
-            box.take(reader.feed(data))
-        port.stray += box.stray
-        corrupt = bool(reader.broken_frames or reader.noise_bytes or box.twice)
-        return _settle(port, wanted, box.unique(), corrupt)
-
-    def _salvage(self, port: Port, group: GroupRead, data: bytes) -> Exchange:
+    def _salvage(self, port: Port, group: GroupRead, data: bytes) -> Got:
         """What can be read of a joint reply that is cut short, damaged, or has something before it."""
         devices, raw = list(group.wanted.items()), bytearray(data)
         replies = packet.decode_fast(bytes(raw), devices)
@@ -292,9 +213,9 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[
             raw += data
             if data:
                 replies = packet.decode_fast(bytes(raw), devices)
-        return _settle(port, group.wanted, {reply.id: reply for reply in replies}, len(raw) >= group.size)
+        return settled(port, group.wanted, {reply.id: reply for reply in replies}, len(raw) >= group.size)
 
-    def _read_behind(self, port: Port, group: GroupRead, got: Exchange) -> Exchange:
+    def _read_behind(self, port: Port, group: GroupRead, got: Got) -> Got:
         """Ask those behind the first silent servo plainly: it cut them off from the joint reply (S14).
 
         What they might still send of that is no packet, so it cannot be taken for an answer.
@@ -308,43 +229,6 @@ class Packets(protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[
         if not isinstance(more, Exchange):
             more = Exchange(_replies(runs, more), (), False)
         return Exchange(got.replies | more.replies, got.missing[:1] + more.missing, got.corrupt or more.corrupt, lost)
-
-
-class _Sorter:
-    """Sorts replies into those asked for and strays; two under one id are both worth nothing.
-
-    Parameters
-    ----------
-    wanted : data bytes expected, by servo id.
-    """
-
-    def __init__(self, wanted: Mapping[int, int]) -> None:
-        self._wanted = wanted
-        self.replies: dict[int, StatusPacket] = {}
-        self.twice: set[int] = set()
-        self.stray = 0
-
-    def take(self, arrived: list[StatusPacket]) -> None:
-        """Sort some more."""
-        for reply in arrived:
-            length = self._wanted.get(reply.id)
-            refused = bool(reply.error & 0x7F) and not reply.params
-            if length is None or (len(reply.params) != length and not refused):
-                self.stray += 1
-            elif self.replies.setdefault(reply.id, reply) is not reply:
-                self.twice.add(reply.id)
-                self.stray += 2
-
-    def unique(self) -> dict[int, StatusPacket]:
-        """Replies that came once."""
-        return {servo: reply for servo, reply in self.replies.items() if servo not in self.twice}
-
-
-def _settle(port: Port, wanted: Mapping[int, int], replies: dict[int, StatusPacket], corrupt: bool) -> Exchange:
-    """Who answered is in step; the others stay suspects."""
-    missing = tuple(servo for servo in wanted if servo not in replies)
-    port.suspects.difference_update(replies)
-    return Exchange(replies, missing, corrupt and bool(missing))
 
 
 @lru_cache(maxsize=256)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from drivers.base.bus import BusState, Floats
 from drivers.dynamixel.frames import GroupRead
 from drivers.dynamixel.groups import Question
+from drivers.servos.telemetry import sealed
 
 
 class Sweep:
@@ -110,9 +111,3 @@ def _fields(question: Question, joint: bool) -> NDArray[np.int64]:
             kind = SIGN_MAGNITUDE
         fields[row] = item.address - block.address + (2 if joint else 1), item.size, kind
     return np.repeat(fields[np.newaxis], len(question.ids), axis=0)
-
-
-def sealed(array: NDArray[Any]) -> NDArray[Any]:
-    """The array itself, read-only from now on."""
-    array.flags.writeable = False
-    return array

@@ -5,47 +5,45 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base.bus import BusReport, BusState, Flags
-from drivers.base.telling import Teller
 from drivers.core.scale import Scale, Ticks
-from drivers.dynamixel.frames import Octets, Rows
+from drivers.dynamixel.frames import Rows
 from drivers.dynamixel.groups import Group, Question, turns_of
-from drivers.dynamixel.layout import Block, layout_of
+from drivers.dynamixel.layout import layout_of
+from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.sdk import Exchange, group_read
-from drivers.dynamixel.sweep import Sweep, sealed
-from drivers.packets.packet import ALERT
+from drivers.dynamixel.sdk import Got, Packets, group_read
+from drivers.dynamixel.sweep import Sweep
+from drivers.servos import telemetry
+from drivers.servos.exchange import Exchange
+from drivers.servos.layout import Block
 from drivers.tables.tables import TRIPPED
 
 log = logging.getLogger(__name__)
 
-PROBE_S = 1.0
-"""How often one silent servo is asked whether it is back."""
 SLOW_S = 0.5
 """Every slow value of every servo is asked for within this time."""
-FAILED_PINGS = 3
-"""Pings without an answer that one cycle may wait for."""
 JOINT_FAILURES = 2
 """Fast reads in a row that nobody answers before plain ones are used."""
 _VITAL = ("temperature", "hardware", "torque", "watchdog")
 _SLOW = frozenset({"hardware", "voltage", "temperature"})
 
 
-class Telemetry:
+class Telemetry(telemetry.Telemetry):
     """Reads the servos of a bus and remembers what they said.
 
     Parameters
     ----------
-    registers : the wire and the control tables.
-    ids : n servo ids in the order of all arrays.
-    report : counters to add to.
+    registers, ids, report : see :class:`~drivers.servos.telemetry.Telemetry`.
     feedback, fast, slow_group : see :class:`~drivers.dynamixel.bus.DynamixelBus`.
     """
+
+    _packets: Packets
+    _port: Port
 
     def __init__(
         self,
@@ -56,23 +54,8 @@ class Telemetry:
         fast: bool = True,
         slow_group: int = 4,
     ) -> None:
-        self._registers, self._packets, self._port = registers, registers.packets, registers.port
-        self.ids = tuple(ids)
-        self.report = report
+        super().__init__(registers, ids, report)
         self._feedback, self._may_be_fast, self._slow_group = feedback, fast, max(slow_group, 0)
-        n = len(self.ids)
-        self._known = np.full((6, n), np.nan)
-        self._ticks, self._speed, self._current, self._seen_s, self._volts, self._celsius = self._known
-        self._octets = np.zeros((4, n), np.uint8)
-        self._error, self._hardware = self._octets[:2]
-        self._torque, self._fresh = self._octets[2:].view(bool)
-        self._alarmed = False
-        self._slow_state: tuple[NDArray[Any], ...] | None = None
-        self._place = {servo: index for index, servo in enumerate(self.ids)}
-        self._missed: set[int] = set()
-        self._say = Teller(log, self._port.link.clock)
-        self._silent: deque[int] = deque()
-        self._probe_s = -np.inf
         self._tripped: set[int] = set()
         self._forgetful: set[int] = set()
         self.rebuild()
@@ -96,29 +79,16 @@ class Telemetry:
         self._fast = self._may_be_fast and all(table.fast_read for table in tables.values())
         self._joint_failures = 0
         self._sweep: Sweep | None = None
-        self._ticks[:] = np.nan  # the servos may have been moved since
-        self._seen_s[:] = -np.inf
-        for known in (self._missed, self._silent, self._tripped, self._forgetful):
-            known.clear()
+        self._forget()
+        self._tripped.clear()
+        self._forgetful.clear()
         self._urgent: deque[Question] = deque()
         self._turns = turns_of(self._groups, self._slow_group)
         self._turn, self._turn_s = 0, -np.inf
 
-    def started(self, ids: Sequence[int]) -> None:
-        """Torque of these servos was read back as on."""
-        self._slow_state = None
-        self._torque[[self._place[servo] for servo in ids]] = True
-
-    def silent_ids(self) -> tuple[int, ...]:
-        """Servos that are only probed now and then."""
-        return tuple(sorted(self._silent))
-
     def take_tripped(self) -> list[int]:
         """Servos whose watchdog was found tripped since the last call."""
-        if not self._tripped:
-            return []
-        found, self._tripped = sorted(self._tripped), set()
-        return found
+        return _emptied(self._tripped) if self._tripped else []
 
     def retry_tripped(self, servo: int) -> None:
         """Hand a servo out once more at the next :meth:`take_tripped`."""
@@ -126,10 +96,7 @@ class Telemetry:
 
     def take_forgetful(self) -> list[int]:
         """Servos that have lost their pointers since the last call: they have been rebooted, or were without power."""
-        if not self._forgetful:
-            return []
-        found, self._forgetful = sorted(self._forgetful), set()
-        return found
+        return _emptied(self._forgetful) if self._forgetful else []
 
     def send_goals(self, ticks: Ticks) -> None:
         """One sync write per group, all handed over at once. ``(n,)`` steps."""
@@ -162,75 +129,7 @@ class Telemetry:
         blocks = [(group, group.layout.watchdog) for group in self._groups]
         self._ask([Question(group, block, group.ids) for group, block in blocks if block], clock, True)
 
-    def state(self, scale: Scale, now: float) -> BusState:
-        """Everything known, in SI units."""
-        silent = np.isin(self.ids, self._silent) if self._silent else np.zeros(len(self.ids), bool)
-        error, volts, celsius, hardware, torque = self._told()
-        position, velocity, current, age = sealed(scale.measured(self._known, now))
-        return BusState(
-            time_s=now,
-            position_rad=position,
-            velocity_rad_s=velocity,
-            current_a=current,
-            fresh=sealed(self._fresh.copy()),
-            age_s=age,
-            error=error,
-            silent=sealed(silent),
-            voltage_v=volts,
-            temperature_c=celsius,
-            hardware_error=hardware,
-            torque=torque,
-        )
-
-    def _told(self) -> tuple[NDArray[Any], ...]:
-        """Error, supply, temperature, hardware error and torque, read-only; new arrays only where something changed."""
-        if self._slow_state is None:
-            slow = (self._error, self._volts, self._celsius, self._hardware, self._torque)
-            self._slow_state = tuple(sealed(array.copy()) for array in slow)
-        return self._slow_state
-
-    # ------------------------------------------------------------------ who answers
-
-    def _revive(self, now: float) -> None:
-        """Ping who missed its time: at once the first time, then one silent servo a second."""
-        suspects, failed = self._port.suspects, 0
-        for servo in [i for i in self._silent if i not in suspects]:  # it answered another question, as in recover()
-            self._silent.remove(servo)
-            self._returned(servo)
-        for servo in [i for i in self.ids if i in suspects and i not in self._silent]:
-            if self._packets.revive(self._port, servo):
-                self._missed.discard(servo)
-                continue
-            self._silent.append(servo)
-            self._say("servo %s stopped answering", self._registers.label(servo))
-            failed += 1
-            if failed == FAILED_PINGS:
-                return
-        if failed:
-            self._probe_s = now + PROBE_S
-        if self._silent and now >= self._probe_s:
-            self._probe(now)
-
-    def _probe(self, now: float) -> None:
-        self._probe_s = now + PROBE_S
-        while self._silent:
-            servo = self._silent[0]
-            if not self._packets.revive(self._port, servo):
-                self._silent.rotate(-1)
-                return
-            self._silent.popleft()
-            self._returned(servo)
-
-    def _returned(self, servo: int) -> None:
-        self._missed.discard(servo)
-        self._look_at(servo)  # it may have lost its supply, and its torque with it
-        self._say("servo %s answers again", self._registers.label(servo))
-
-    def _note_missing(self, missing: Sequence[int], corrupt: bool) -> None:
-        for servo in missing:
-            if servo not in self._missed:
-                self._missed.add(servo)
-                self.report.count("corrupt" if corrupt else "no_reply", servo)
+    # ------------------------------------------------------------------ whose turn it is
 
     def _look_at(self, servo: int) -> None:
         """Ask one servo for its error and torque next, before the turn of the others."""
@@ -266,7 +165,7 @@ class Telemetry:
         suspects = self._port.suspects
         asked = [question.without(suspects) for question in questions] if suspects else questions
         asked = [question for question in asked if question.ids]
-        got: list[Rows] | Exchange = Exchange({}, (), False)
+        got: list[Rows] | Got = Exchange({}, (), False)
         if asked:
             read = group_read(tuple([q.run for q in asked]), fast) if sweep is None else sweep.read
             got = self._packets.read_rows(self._port, read, sweep)
@@ -283,7 +182,7 @@ class Telemetry:
         for question, rows in zip(asked, got, strict=True):
             self._take(question, rows, now, running)
 
-    def _good(self, asked: list[Question], got: Exchange) -> tuple[list[Question], list[Rows]]:
+    def _good(self, asked: list[Question], got: Got) -> tuple[list[Question], list[Rows]]:
         """Replies that carry data, sorted as if only they had been asked for; the others count as refusals."""
         questions, rows = [], []
         for question in asked:
@@ -298,7 +197,7 @@ class Telemetry:
                 rows.append(Rows(np.array([reply.error for reply in good], np.uint8), data))
         return questions, rows
 
-    def _note_joint(self, got: Exchange, fast: bool) -> None:
+    def _note_joint(self, got: Got, fast: bool) -> None:
         """Use plain reads when nobody answers fast ones, though they answer."""
         self._joint_failures = self._joint_failures + 1 if fast and got.joint_lost and got.replies else 0
         if self._joint_failures >= JOINT_FAILURES:
@@ -371,25 +270,6 @@ class Telemetry:
             if name in names:
                 store[where] = raw[name] * group.scales[name][slots]
 
-    def _note_errors(self, ids: Sequence[int], where: NDArray[np.intp], errors: Octets) -> None:
-        rising = errors & ~self._error[where] & ALERT
-        self._error[where] = errors
-        self._alarmed, self._slow_state = bool(self._error.any()), None
-        if rising.any():
-            for servo in [servo for servo, new in zip(ids, rising, strict=True) if new]:
-                self.report.count("alert", servo)
-                self._say("servo %s reports a hardware error", self._registers.label(servo))
-                self._look_at(servo)
-
-    def _note_torque(self, ids: Sequence[int], where: NDArray[np.intp], now_on: Flags, running: bool) -> None:
-        let_go = self._torque[where] & ~now_on
-        self._torque[where], self._slow_state = now_on, None
-        if not running or not let_go.any():
-            return
-        for servo in [servo for servo, gone in zip(ids, let_go, strict=True) if gone]:
-            self.report.count("torque_lost", servo)
-            self._say("servo %s let go: its torque is off", self._registers.label(servo))
-
     def _note_watchdogs(self, ids: Sequence[int], tripped: Flags) -> None:
         if not tripped.any():
             return
@@ -399,3 +279,9 @@ class Telemetry:
                 self.report.count("watchdog", servo)
                 self._say("watchdog of servo %s tripped", self._registers.label(servo))
         self._tripped.update(found)
+
+
+def _emptied(ids: set[int]) -> list[int]:
+    found = sorted(ids)
+    ids.clear()
+    return found

@@ -8,7 +8,7 @@ from typing import Any
 from drivers.base.bus import ServoSpec
 from drivers.protocol1.bus import Protocol1Bus
 from drivers.protocol1.exchange import Exchanges
-from drivers.protocol1.port import Port
+from drivers.servos.port import Port
 from drivers.tables.models import check_feetech
 
 
@@ -18,7 +18,7 @@ class FeetechBus(Protocol1Bus):
     Parameters
     ----------
     servos, options : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
-    port, baud, margin_s : see :class:`~drivers.protocol1.port.Port`.
+    port, baud, margin_s : see :class:`~drivers.servos.port.Port`.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Drivers of servos with Protocol 1.0 framing: what Dynamixel AX and MX and Feetech STS and SCS have in common.
 
-In: goals in rad. Out: sync writes, and states read as each family can. Imports base to core.
+In: goals in rad. Out: sync writes, and states read as each family can. Imports base to servos.
 
 A reply tells who sent it and how long it is, and nothing else: not which question it answers, and not even that it
 is a reply. So nothing here relies on more than a rule of lengths, kept by every question:

@@ -16,19 +16,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from drivers.base.bus import BusReport, BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
+from drivers.base.bus import BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
 from drivers.base.errors import DriverError, PortLost
 from drivers.core.keeper import Keeper
-from drivers.core.scale import Scale
-from drivers.core.wirebus import WireBus
 from drivers.packets.packet1 import Packet1
 from drivers.port.serialport import SerialPort
 from drivers.protocol1 import startup
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.registers import Registers
-from drivers.protocol1.settings import Started
-from drivers.protocol1.startup import Policy
+from drivers.protocol1.startup import Policy, Startup
 from drivers.protocol1.telemetry import Telemetry
+from drivers.servos.bus import ServoBus
+from drivers.servos.startup import Started
 from drivers.tables.tables import ControlTable, load_table, model_name
 
 log = logging.getLogger(__name__)
@@ -38,7 +37,7 @@ LOOK_S = 1.0
 """How often a running bus looks whether its keeper is still there."""
 
 
-class Protocol1Bus(WireBus):
+class Protocol1Bus(ServoBus):
     """Servos with Protocol 1.0 framing on one serial port. See :class:`~drivers.base.bus.Bus` for the contract.
 
     Parameters
@@ -60,6 +59,9 @@ class Protocol1Bus(WireBus):
     ------
     DriverError : unknown model, or an option that does not fit.
     """
+
+    _registers: Registers
+    _telemetry: Telemetry
 
     MODELS: ClassVar[tuple[str, ...]]
     """A model of each series that the family has, for what a servo says of itself."""
@@ -86,27 +88,6 @@ class Protocol1Bus(WireBus):
         self._tables([load_table(servo.model) for servo in self.servos])
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, singles, slow_group)
         self._group()
-
-    # ------------------------------------------------------------------ the port
-
-    @property
-    def is_open(self) -> bool:
-        """True while the port is held."""
-        return bool(self._port.is_open)
-
-    @property
-    def path(self) -> str:
-        """Device path in use."""
-        return str(self._port.link.path)
-
-    def _use_path(self, path: str) -> None:
-        self._port.setPortName(path)
-
-    def _open_link(self) -> None:
-        self._port.openPort()
-
-    def _close_link(self) -> None:
-        self._port.closePort()
 
     # ------------------------------------------------------------------ looking, starting, stopping
 
@@ -144,14 +125,18 @@ class Protocol1Bus(WireBus):
             return configured
         return load_table(number)
 
+    def _startup(self) -> Startup:
+        return Startup(self._registers, self.policy)
+
     def _bring_up(self) -> Floats:
         self._port.suspects.clear()
-        started = Started()
-        startup.identify(self._registers, self.servos, started)
+        begin = self._startup()
+        begin.identify(self.servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         self._group()
         self._watch()
-        self._started(startup.bring_up(self._registers, self.servos, self.policy, started))
+        started = begin.bring_up(self.servos)
+        self._started(started)
         return self.scale.radians(np.array([started.ticks[servo] for servo in self.ids]))
 
     def _watch(self) -> None:
@@ -191,8 +176,7 @@ class Protocol1Bus(WireBus):
 
     def _started(self, started: Started) -> None:
         self._report.eeprom_writes += started.eeprom
-        for servo, limits in started.limits.items():
-            self.scale.narrow(self.ids.index(servo), *limits)
+        self._narrow(started.limits)
         self._telemetry.started(list(started.ticks))
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
@@ -204,26 +188,16 @@ class Protocol1Bus(WireBus):
         """
         chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
         with self._losing():
-            started = Started()
-            startup.identify(self._registers, chosen, started)
-            self._started(startup.bring_up(self._registers, chosen, self.policy, started))
-            here = np.zeros(len(self.ids))
+            begin = self._startup()
+            begin.identify(chosen)
+            started = begin.bring_up(chosen)
+            self._started(started)
             for servo, ticks in started.ticks.items():
-                here[self.ids.index(servo)] = ticks
-            here = self.scale.radians(here)
-            for servo in started.ticks:
-                self._limits.begin_one(self.ids.index(servo), float(here[self.ids.index(servo)]))
-
-    def _switch_off(self) -> None:
-        startup.switch_off(self._registers, self.ids)
+                self._hold(self.ids.index(servo), ticks)
 
     def _release(self) -> None:
         super()._release()
         self._dismiss()
-
-    def _tables(self, tables: list[ControlTable]) -> None:
-        self._registers.tables = dict(zip(self.ids, tables, strict=True))
-        self.scale = Scale(self.servos, tables)
 
     def _group(self) -> None:
         self._telemetry.rebuild({servo.id: startup.speed_steps(servo, self._registers) for servo in self.servos})
@@ -249,12 +223,6 @@ class Protocol1Bus(WireBus):
     def moving(self) -> Flags:
         """(n,) whether each servo said it was moving when last read; False where its model does not say."""
         return frozen(self._telemetry.moving, bool)
-
-    def report(self) -> BusReport:
-        """A copy of the counters."""
-        self._report.stray = self._port.stray
-        self._report.silent = self._telemetry.silent_ids()
-        return super().report()
 
 
 def _outlives_us(link: object) -> bool:

@@ -2,59 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base.bus import Floats
 from drivers.core.scale import Ticks
-from drivers.protocol1.registers import item_of
-from drivers.tables.tables import ControlTable, Item
+from drivers.servos.layout import Block, block_of, format_of, item_of
+from drivers.tables.tables import ControlTable
 
 
-@dataclass(frozen=True)
-class Block:
-    """Registers that lie together and are read in one go.
-
-    Parameters
-    ----------
-    items : by short name.
-    """
-
-    items: Mapping[str, Item]
-
-    @cached_property
-    def address(self) -> int:
-        """First address."""
-        return min(item.address for item in self.items.values())
-
-    @cached_property
-    def size(self) -> int:
-        """Bytes to read; neither a question's two nor a hello's (see the package)."""
-        return max(item.end for item in self.items.values()) - self.address
-
-    @cached_property
-    def _dtype(self) -> np.dtype[np.void]:
-        return np.dtype(
-            {
-                "names": list(self.items),
-                "formats": [_format(item) for item in self.items.values()],
-                "offsets": [item.address - self.address for item in self.items.values()],
-                "itemsize": self.size,
-            }
-        )
-
-    def decode(self, data: Sequence[bytes]) -> dict[str, NDArray[np.int64]]:
-        """Values of k servos from their k replies of ``size`` bytes: by short name, ``(k,)``, signs applied."""
-        raw = np.frombuffer(b"".join(data), dtype=self._dtype)
-        return {name: _signed(raw[name].astype(np.int64), item.sign_bit) for name, item in self.items.items()}
-
-
-def _format(item: Item) -> str:
-    return f"{'>' if item.big_endian else '<'}{'i' if item.signed else 'u'}{item.size}"
+def values_of(block: Block, replies: Sequence[bytes]) -> dict[str, NDArray[np.int64]]:
+    """Values of k servos from their k replies of ``block.size`` bytes: by short name, ``(k,)``, signs applied."""
+    raw = np.frombuffer(b"".join(replies), dtype=block.dtype)
+    return {name: _signed(raw[name].astype(np.int64), item.sign_bit) for name, item in block.items.items()}
 
 
 def _signed(raw: NDArray[np.int64], sign_bit: int | None) -> NDArray[np.int64]:
@@ -107,13 +70,8 @@ def layout_of(table: ControlTable, feedback: str = "full") -> Layout:
     if feedback != "full":
         slow.append(full[2:7])
         full = full[:2]
-    blocks = tuple(block_of(table, names) for names in slow)
-    return Layout(block_of(table, ("goal", "time", "speed")), block_of(table, full), blocks, table.group_read)
-
-
-def block_of(table: ControlTable, names: Sequence[str]) -> Block:
-    """The registers of these short names that a model has."""
-    return Block({name: item for name in names if (item := item_of(table, name)) is not None})
+    blocks = tuple(block_of(table, *names) for names in slow)
+    return Layout(block_of(table, "goal", "time", "speed"), block_of(table, *full), blocks, table.group_read)
 
 
 class Group:
@@ -141,7 +99,7 @@ class Group:
         names = {name for block in (layout.feedback, *layout.slow) for name in block.items}
         self._scales = {name: np.array([_scale(table, name) for table in tables]) for name in names}
         goal = layout.goal
-        fields = [("id", "u1"), *((name, _format(item)) for name, item in goal.items.items())]
+        fields = [("id", "u1"), *((name, format_of(item)) for name, item in goal.items.items())]
         self._rows = np.zeros(len(self.ids), dtype=fields)
         self._rows["id"] = self.ids
         self._rows["speed"] = speeds

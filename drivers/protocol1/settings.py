@@ -2,37 +2,20 @@
 
 from __future__ import annotations
 
-import logging
-from dataclasses import dataclass, field
+from typing import Any
 
 from drivers.base.errors import ServoRefused
-from drivers.protocol1.registers import TRIES, Registers
-
-log = logging.getLogger(__name__)
+from drivers.servos.registers import TRIES, Registers
+from drivers.servos.startup import Startup
 
 MULTI_TURN = 0x10
 """Feetech's Phase: present positions leave the turn."""
 EEPROM_TRIES = 10
 
 
-@dataclass
-class Started:
-    """What start-up found and did.
-
-    Attributes
-    ----------
-    ticks : present position by id, read after torque came on.
-    limits : lowest and highest step by id that the servo's own registers allow.
-    eeprom : one line for every permanent register written.
-    """
-
-    ticks: dict[int, int] = field(default_factory=dict)
-    limits: dict[int, tuple[int, int]] = field(default_factory=dict)
-    eeprom: list[str] = field(default_factory=list)
-
-
-def apply_settings(registers: Registers, servo: int, held: bool, started: Started) -> None:
+def apply_settings(startup: Startup, servo: int, held: bool) -> None:
     """Permanent registers this driver relies on: read, and written only where they differ, with torque off."""
+    registers = startup.registers
     wanted = _wanted(registers, servo)
     if not held:  # a delayed answer only costs time, so a servo that holds is left alone
         wanted["return_delay"] = 0
@@ -42,14 +25,14 @@ def apply_settings(registers: Registers, servo: int, held: bool, started: Starte
     if differing:
         name, value = next(iter(differing.items()))
         if held:
-            raise _locked(registers, servo, name, present[name], value)
+            raise startup.locked(servo, name, present[name], value)
         write_surely(registers, servo, "torque", 0, TRIES)
     try:
         for name, value in differing.items():
             if feetech:
                 write_surely(registers, servo, "lock", 0, TRIES)
             write_surely(registers, servo, name, value, EEPROM_TRIES)
-            note(registers, servo, name, present[name], value, started)
+            startup.note(servo, name, present[name], value)
     finally:
         if feetech:  # unlocked, its id and limits could be changed by a bad packet
             registers.tell(servo, "lock", 1)
@@ -57,7 +40,7 @@ def apply_settings(registers: Registers, servo: int, held: bool, started: Starte
         write_surely(registers, servo, "lock", 1, TRIES)
 
 
-def _wanted(registers: Registers, servo: int) -> dict[str, int]:
+def _wanted(registers: Registers[Any], servo: int) -> dict[str, int]:
     """Values of permanent registers by short name."""
     table = registers.tables[servo]
     last = table.ticks_per_turn - 1
@@ -75,22 +58,7 @@ def _wanted(registers: Registers, servo: int) -> dict[str, int]:
     return wanted
 
 
-def _locked(registers: Registers, servo: int, name: str, old: int, new: int) -> ServoRefused:
-    return ServoRefused(
-        f"servo {registers.label(servo)} holds with torque, and {_vendor(registers, servo, name)} must change "
-        f"from {old} to {new}",
-        hint='support the head, then start with takeover="release"',
-        port=registers.port.link.path,
-        servo_ids=(servo,),
-    )
-
-
-def _vendor(registers: Registers, servo: int, name: str) -> str:
-    item = registers.item(servo, name)
-    return name if item is None else item.name
-
-
-def write_surely(registers: Registers, servo: int, name: str, value: int, tries: int) -> None:
+def write_surely(registers: Registers[Any], servo: int, name: str, value: int, tries: int) -> None:
     """Write until it reads back, without relying on acknowledgements, which a servo may have been told not to send.
 
     Raises
@@ -101,17 +69,6 @@ def write_surely(registers: Registers, servo: int, name: str, value: int, tries:
         registers.tell(servo, name, value)
         if registers.get(servo, name, tries) == value:  # it is deaf for a while after a permanent write
             return
-    what = f"{_vendor(registers, servo, name)} = {value}"
-    raise ServoRefused(
-        f"servo {registers.label(servo)} did not take {what}",
-        hint="switch its power off and on: a locked servo opens only then",
-        port=registers.port.link.path,
-        servo_ids=(servo,),
-    )
-
-
-def note(registers: Registers, servo: int, name: str, old: int, new: int, started: Started) -> None:
-    """Tell that a permanent register was written."""
-    line = f"servo {registers.label(servo)}: {_vendor(registers, servo, name)} {old} -> {new}"
-    started.eeprom.append(line)
-    log.info("permanent setting written: %s", line)
+    message = f"servo {registers.label(servo)} did not take {registers.called(servo, name)} = {value}"
+    hint = "switch its power off and on: a locked servo opens only then"
+    raise registers.error(ServoRefused, message, hint, servo)

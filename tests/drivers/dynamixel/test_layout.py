@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 import drivers.core.kernels  # noqa: F401  compiled code is loaded here and not within an example's deadline
 from drivers.base.bus import ServoSpec
 from drivers.core.scale import Scale
-from drivers.dynamixel.layout import NAMES, Block, item_of, layout_of
+from drivers.dynamixel.layout import item_of, layout_of
+from drivers.servos.layout import Block
 from drivers.tables.tables import load_table
 
 MODELS = ("xl330-m288", "xm430-w350", "xl430-w250", "xl320", "mx-28")
@@ -118,8 +119,3 @@ def test_speeds_with_a_direction_bit() -> None:
 def test_a_load_in_per_cent_is_no_current() -> None:
     assert np.isnan(layout_of(load_table("xl430-w250")).scales["current"])
     assert layout_of(load_table("xl330-m288")).scales["current"] == 0.001
-
-
-def test_every_short_name_is_a_register_of_some_model() -> None:
-    tables = [load_table(model) for model in MODELS]
-    assert [name for name in NAMES if all(item_of(table, name) is None for table in tables)] == []

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.base.errors import CorruptReply, NoReply, ServoRefused
+from drivers.base.errors import CorruptReply, NoReply, ServoRefused, together
 from drivers.dynamixel.port import Port
-from drivers.dynamixel.registers import Registers, together
+from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
 from drivers.sim import SimulatedBus
 from drivers.tables.tables import load_table

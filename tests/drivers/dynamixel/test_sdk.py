@@ -305,7 +305,7 @@ def test_s14_fast_reads_keep_every_servo_whose_own_bytes_are_right(wire: Wire, o
     values = {3: 166, 7: 2079, 4: 1023}
     port, packets = ours
     wire.answer = lambda packet: [fast_reply(values)]
-    got = packets.read_group(port, [3, 7, 4], POSITION, 4, fast=True)
+    got = packets.read_group(port, [3, 7, 4], POSITION, 4, "fast")
     assert {servo: reply.params for servo, reply in got.replies.items()} == {i: four(v) for i, v in values.items()}
     assert wire.heard == bytes.fromhex("fffffd00fe0a008a84000400030704 20f2")
 
@@ -318,7 +318,7 @@ def test_s14_fast_reads_keep_every_servo_whose_own_bytes_are_right(wire: Wire, o
         theirs[0].ser.close()
         port.openPort()
         port.margin_s = 0.05
-        got = packets.read_group(port, [3, 7, 4], POSITION, 4, fast=True)
+        got = packets.read_group(port, [3, 7, 4], POSITION, 4, "fast")
         assert set(got.replies) == left
         assert set(got.missing) == {3, 7, 4} - left
         port.closePort()
@@ -329,7 +329,7 @@ def test_fast_replies_are_not_unstuffed(wire: Wire, ours: tuple) -> None:
     values = {1: struct.unpack("<i", b"\xff\xff\xfd\x00")[0], 2: struct.unpack("<i", b"\xff\xff\xfd\xfd")[0]}
     wire.answer = lambda packet: [fast_reply(values)]
     port, packets = ours
-    got = packets.read_group(port, [1, 2], POSITION, 4, fast=True)
+    got = packets.read_group(port, [1, 2], POSITION, 4, "fast")
     assert {servo: reply.params for servo, reply in got.replies.items()} == {i: four(v) for i, v in values.items()}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import Bus
-from drivers.dynamixel.telemetry import PROBE_S
+from drivers.servos.telemetry import PROBE_S
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import SERVOS, pause, read_until, settle
 

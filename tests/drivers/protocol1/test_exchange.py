@@ -13,8 +13,9 @@ from drivers.packets.packet1 import Error1, Instruction1, Packet1, Reader1, enco
 from drivers.protocol1 import HELLO, WINDOW
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.layout import layout_of
-from drivers.protocol1.port import Port
-from drivers.protocol1.registers import NAMES, item_of, window
+from drivers.protocol1.registers import window
+from drivers.servos.layout import NAMES, item_of
+from drivers.servos.port import Port
 from drivers.sim.serving.virtual import VirtualClock
 from drivers.tables.tables import load_table
 
@@ -31,6 +32,7 @@ class FarEnd:
         self.packets: list[Packet1] = []
         self.path, self.baud, self.is_open = "virtual", 1_000_000, False
         self.clock = VirtualClock(1.0)
+        self.sleep = self.clock.sleep
         self._reader = Reader1()
         self._coming: deque[tuple[float, bytes]] = deque()
 

@@ -17,7 +17,8 @@ import pytest
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState
 from drivers.base.errors import NoReply, PortBusy, PortLost, PortMissing, ServoFault
-from drivers.protocol1.exchange import Exchange, Exchanges
+from drivers.protocol1.exchange import Exchanges
+from drivers.servos.exchange import Exchange
 from drivers.sim import SimulatedBus
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers import contract

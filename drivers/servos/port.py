@@ -1,4 +1,4 @@
-"""A serial port for servos with Protocol 1.0 framing that need no maker's package."""
+"""A serial port with the state of a conversation: who owes an answer, when the wire is free, who is talking."""
 
 from __future__ import annotations
 
@@ -11,45 +11,53 @@ BITS_PER_BYTE = 10
 
 
 class Port:
-    """An exclusive, blocking :class:`~drivers.port.serialport.SerialPort` with the state of a conversation.
+    """An exclusive, blocking :class:`~drivers.port.serialport.SerialPort` for questions and answers.
+
+    Methods have the names that dynamixel-sdk gives them.
 
     Parameters
     ----------
     path : device path, URL, or a :class:`~drivers.sim.serving.virtual.VirtualLink`.
     baud : any rate the adapter takes.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
+
+    Attributes
+    ----------
+    clock, sleep : monotonic seconds, and the way to let them pass.
+    port_name : device path.
+    suspects : ids that did not answer when they should have; see :class:`~drivers.servos.exchange.Exchanges`.
+    stray : replies thrown away.
     """
 
     def __init__(self, path: str | SerialPort, baud: int = 1_000_000, margin_s: float | None = None) -> None:
         self.link = link_to(path, baud)
-        self.baudrate = baud
+        self.clock, self.sleep = self.link.clock, self.link.sleep
+        self.port_name, self.baudrate = self.link.path, baud
         self.suspects: set[int] = set()
         self.stray = 0
         self.deadline_s = self._free_s = 0.0
         self._margin_s = margin_s
-        self.margin_s = reply_margin_s(self.link.path) if margin_s is None else margin_s
         self._busy = threading.Lock()
+        self._tune()
+
+    def _tune(self) -> None:
+        self.margin_s = reply_margin_s(self.link.path) if self._margin_s is None else self._margin_s
 
     @property
-    def port_name(self) -> str:
-        """Device path."""
-        return self.link.path
+    def _byte_s(self) -> float:
+        return BITS_PER_BYTE / self.baudrate
 
-    def setPortName(self, path: str) -> None:
+    def setPortName(self, port_name: str) -> None:
         """Another device path for the next opening."""
-        self.link.path = path
+        self.port_name = self.link.path = port_name
 
-    @property
-    def is_open(self) -> bool:
-        """True while the device is held."""
-        return self.link.is_open
-
-    def openPort(self) -> None:
-        """Open exclusively; raises PortMissing, PortBusy or PortPermission."""
+    def openPort(self) -> bool:
+        """Open exclusively; raises PortMissing, PortBusy or PortPermission instead of returning False."""
         self.link.open()
         self.suspects.clear()
         self.is_using = False
-        self.margin_s = reply_margin_s(self.link.path) if self._margin_s is None else self._margin_s
+        self._tune()
+        return True
 
     def closePort(self) -> None:
         """Close; never raises."""
@@ -62,13 +70,12 @@ class Port:
 
     def transmit(self, packet: bytes) -> None:
         """Hand bytes to the system, and keep count of when the last of them will have left."""
-        self._free_s = max(self.link.clock(), self._free_s) + len(packet) * BITS_PER_BYTE / self.baudrate
+        self._free_s = max(self.clock(), self._free_s) + len(packet) * self._byte_s
         self.link.write(packet)
 
     def expect(self, size: int) -> None:
-        """Deadline for so many bytes of reply to what was sent: time on the wire, both ways, plus the margin."""
-        begin_s = max(self.link.clock(), self._free_s)
-        self.deadline_s = begin_s + size * BITS_PER_BYTE / self.baudrate + self.margin_s
+        """Deadline for ``size`` bytes of reply to what was sent: time on the wire, both ways, plus the margin."""
+        self.deadline_s = max(self.clock(), self._free_s) + size * self._byte_s + self.margin_s
 
     @property
     def is_using(self) -> bool:

@@ -1,0 +1,237 @@
+"""Named registers of the servos on one port, read and written with every answer checked, in any protocol."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import ClassVar, Generic, TypeVar
+
+from drivers.base.bus import ServoSpec
+from drivers.base.errors import BusError, CorruptReply, DriverError, NoReply, ServoRefused, together
+from drivers.servos.exchange import Exchange, Exchanges, R
+from drivers.servos.layout import NAMES, item_of
+from drivers.servos.port import Port
+from drivers.tables.tables import ControlTable, Item
+
+TRIES = 4
+T = TypeVar("T")
+E = TypeVar("E", bound=DriverError)
+
+
+class Registers(ABC, Generic[R]):
+    """Registers by servo id and short name (see ``layout.NAMES``). The hooks of a protocol are listed first.
+
+    Parameters
+    ----------
+    packets, port : the wire.
+    servos : by id, for messages.
+
+    Attributes
+    ----------
+    tables : control table by id.
+    greeting : how messages call the question of :meth:`hello`.
+    """
+
+    greeting: ClassVar[str]
+
+    def __init__(self, packets: Exchanges[R], port: Port, servos: Iterable[ServoSpec]) -> None:
+        self.packets, self.port = packets, port
+        self.names = {servo.id: servo.name for servo in servos}
+        self.tables: dict[int, ControlTable] = {}
+
+    # ------------------------------------------------------------------ hooks
+
+    @abstractmethod
+    def refusal(self, reply: R) -> str:
+        """Why a servo refused what it was asked; empty where it did not."""
+
+    def span(self, table: ControlTable, item: Item) -> tuple[int, int, str]:
+        """(address, size, manner) of the read that learns a register, see ``Exchanges.read_group``; no manner: one
+        servo after the other."""
+        return item.address, item.size, "sync"
+
+    def title(self, item: Item, name: str) -> str:
+        """How messages call a register."""
+        return item.name
+
+    def is_damaged(self, reply: R) -> bool:
+        """Whether a servo says that the question reached it damaged, so that it must be asked again."""
+        return False
+
+    def note(self, servo: int, reply: R) -> None:
+        """Keep what a reply says beside its data."""
+
+    # ------------------------------------------------------------------ what a servo has
+
+    def label(self, servo: int) -> str:
+        """How messages call a servo: ``"jaw" (id 3)``."""
+        return f'"{self.names[servo]}" (id {servo})' if servo in self.names else f"id {servo}"
+
+    def item(self, servo: int, name: str) -> Item | None:
+        """Register of a servo; None where its model has none."""
+        return item_of(self.tables[servo], name)
+
+    def having(self, ids: Iterable[int], name: str) -> list[int]:
+        """Those of the ids whose model has a register."""
+        return [servo for servo in ids if self.item(servo, name) is not None]
+
+    def called(self, servo: int, name: str) -> str:
+        """How messages call a register of a servo."""
+        return self.title(self._known(servo, name), name)
+
+    # ------------------------------------------------------------------ one servo
+
+    def hello(self, servo: int, tries: int = TRIES) -> R:
+        """A servo's answer to a greeting.
+
+        Raises
+        ------
+        NoReply, CorruptReply
+        """
+        return self._insist(servo, self.greeting, partial(self.packets.hello, self.port, servo), tries)
+
+    def get(self, servo: int, name: str, tries: int = TRIES) -> int:
+        """One register.
+
+        Raises
+        ------
+        NoReply, CorruptReply, ServoRefused
+        """
+        item = self._known(servo, name)
+        at, size, _ = self.span(self.tables[servo], item)
+        ask = partial(self.packets.read, self.port, servo, at, size)
+        reply = self._insist(servo, f"reading {self.title(item, name)}", ask, tries)
+        return item.decode(reply.params[item.address - at :])
+
+    def put(self, servo: int, name: str, value: int, tries: int = TRIES) -> None:
+        """Write one register and wait for the servo to agree.
+
+        Raises
+        ------
+        NoReply, CorruptReply, ServoRefused
+        """
+        item = self._known(servo, name)
+        ask = partial(self.packets.write, self.port, servo, item.address, item.encode(value))
+        self._insist(servo, f"writing {self.title(item, name)} = {value}", ask, tries)
+
+    def tell(self, servo: int, name: str, value: int) -> None:
+        """Write one register by a sync write of one, which is never answered: an answer that nobody waited for
+        would collide with the next question."""
+        self.put_all({servo: value}, name)
+
+    # ------------------------------------------------------------------ many servos
+
+    def get_all(self, ids: Sequence[int], name: str) -> dict[int, int]:
+        """One register of many servos: in groups where they can, then each missing one by itself.
+
+        Returns
+        -------
+        dict : by id; ids whose model lacks the register are left out.
+
+        Raises
+        ------
+        NoReply, CorruptReply : some did not answer; ``servo_ids`` are all of them.
+        """
+        values: dict[int, int] = {}
+        for (at, size, manner), group in self._spans(ids, name).items():
+            got = self.packets.read_group(self.port, group, at, size, manner)
+            for servo, reply in got.replies.items():
+                if len(reply.params) == size:
+                    self.note(servo, reply)
+                    item = self._known(servo, name)
+                    values[servo] = item.decode(reply.params[item.address - at :])
+        missing = [servo for servo in self.having(ids, name) if servo not in values]
+        return values | self.each(missing, lambda servo: self.get(servo, name))
+
+    def put_all(self, values: Mapping[int, int], name: str) -> None:
+        """Write one register of many servos with one packet per address; nobody answers."""
+        for frame in self.frames(values, name):
+            self.packets.tell(self.port, frame)
+
+    def frames(self, values: Mapping[int, int], name: str) -> list[bytes]:
+        """The sync writes of :meth:`put_all`."""
+        groups: dict[tuple[int, int], bytes] = {}
+        for servo in self.having(values, name):
+            item = self._known(servo, name)
+            row = bytes((servo,)) + item.encode(values[servo])
+            groups[item.address, item.size] = groups.get((item.address, item.size), b"") + row
+        return [frame for key, rows in groups.items() for frame in self.packets.group_frames(*key, rows)]
+
+    def set_all(self, values: Mapping[int, int], name: str) -> None:
+        """Write one register of many servos and make sure that each has it.
+
+        Raises
+        ------
+        NoReply, CorruptReply, ServoRefused
+        """
+        self.put_all(values, name)
+        has = self.get_all(list(values), name)
+        self.each(
+            [servo for servo, value in has.items() if value != values[servo]],
+            lambda servo: self.put(servo, name, values[servo]),
+        )
+
+    def each(self, ids: Iterable[int], do: Callable[[int], T]) -> dict[int, T]:
+        """Do something with every servo, each by itself, and tell about all that failed.
+
+        Raises
+        ------
+        BusError : of the kind of the first failure, naming every id that failed.
+        """
+        done: dict[int, T] = {}
+        failed: dict[int, BusError] = {}
+        for servo in ids:
+            try:
+                done[servo] = do(servo)
+            except BusError as error:
+                failed[servo] = error
+        if failed:
+            raise together(failed)
+        return done
+
+    # ------------------------------------------------------------------ every answer checked
+
+    def error(self, kind: type[E], message: str, hint: str, *ids: int) -> E:
+        """An error about servos on this port."""
+        return kind(message, hint=hint, port=self.port.port_name, servo_ids=ids)
+
+    def _spans(self, ids: Iterable[int], name: str) -> dict[tuple[int, int, str], list[int]]:
+        groups: dict[tuple[int, int, str], list[int]] = {}
+        for servo in self.having(ids, name):
+            span = self.span(self.tables[servo], self._known(servo, name))
+            if span[2]:
+                groups.setdefault(span, []).append(servo)
+        return groups
+
+    def _known(self, servo: int, name: str) -> Item:
+        item = self.item(servo, name)
+        if item is None:
+            raise ServoRefused(f"{self.tables[servo].model} has no {NAMES[name][0]}", servo_ids=(servo,))
+        return item
+
+    def _insist(self, servo: int, doing: str, ask: Callable[[], Exchange[R]], tries: int) -> R:
+        corrupt = False
+        for _ in range(tries):
+            got = ask()
+            reply = got.replies.get(servo)
+            if reply is not None and not self.is_damaged(reply):
+                self.note(servo, reply)
+                return self._agreed(servo, doing, reply)
+            corrupt |= got.corrupt or reply is not None
+        raise self._silent(servo, doing, corrupt)
+
+    def _agreed(self, servo: int, doing: str, reply: R) -> R:
+        reason = self.refusal(reply)
+        if not reason:
+            return reply
+        message = f"servo {self.label(servo)} on {self.port.port_name} refused {doing}: {reason}"
+        raise self.error(ServoRefused, message, "`omote scan` shows its state", servo)
+
+    def _silent(self, servo: int, doing: str, corrupt: bool) -> BusError:
+        where = f"servo {self.label(servo)} on {self.port.port_name} at {self.port.baudrate} baud"
+        if corrupt:
+            hint = "two servos may have this id, or the baud rate is wrong: connect one alone, try `omote scan`"
+            return self.error(CorruptReply, f"{where} gave a damaged answer to {doing}", hint, servo)
+        hint = "check its power and cable; `omote scan` looks at every id and baud rate"
+        return self.error(NoReply, f"{where} did not answer {doing}", hint, servo)
