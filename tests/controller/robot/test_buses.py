@@ -10,10 +10,11 @@ from pydantic import ValidationError
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
-from controller.robot.buses import read_bus, takers
+from controller.robot.buses import BusSettings, read_bus, takers
 from controller.robot.robot import load_robot
 from drivers import kinds, open_bus
 from drivers.base.bus import ServoSpec
+from drivers.core.families import RESERVED
 
 FAMILIES = kinds()
 OPTIONS = takers()
@@ -36,6 +37,10 @@ def fault(**table: Any) -> str:
 def test_every_option_has_a_value_here_and_every_family_its_options() -> None:
     assert set(VALUES) == set(OPTIONS)
     assert {family for families in OPTIONS.values() for family in families} == set(FAMILIES)
+
+
+def test_no_family_may_take_a_key_that_every_bus_has() -> None:
+    assert set(RESERVED) == set(BusSettings.model_fields)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
