@@ -18,7 +18,7 @@ from surface.base.errors import ExportError
 from surface.export.exporter import API, Exporter
 from surface.head import Head
 
-__all__ = ["API", "SUFFIXES", "Exporter", "export_head", "exporters", "listing"]
+__all__ = ["API", "SUFFIXES", "Exporter", "export_head", "exporters"]
 
 SUFFIXES: tuple[str, ...]  # of the exporters of this folder
 
@@ -64,15 +64,10 @@ def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
     return tuple(found), tuple(missing)
 
 
-def listing(extra: Iterable[Exporter] = ()) -> str:
-    """One line an exporter: its suffixes and what the file will hold."""
-    return "\n".join(f"{', '.join(one.suffixes)}: {one.title}" for one in exporters(extra))
-
-
 def export_head(
     head: Head, path: str | Path, pose: Mapping[str, float] | None = None, extra: Iterable[Exporter] = ()
 ) -> list[Path]:
-    """Write a head to a file that other programs open; the suffix says which kind (:func:`listing` has all of them).
+    """Write a head to a file that other programs open; the suffix says which kind (:func:`exporters` has all of them).
 
     Parameters
     ----------
