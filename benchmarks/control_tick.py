@@ -22,10 +22,10 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.parameters import Floats
 from controller.base.paths import find_config
 from controller.layers.commands import CommandState
-from controller.layers.layers import default_layers
 from controller.layers.mixer import LayerSettings
+from controller.layers.settings import default_layers
 from controller.robot.robot import load_robot
-from controller.stage.rehearsal import Line
+from controller.stage.offline import Line
 
 LAYERS = (*default_layers(), LayerSettings("show", 45, "max"), LayerSettings("twitch", 55, "add", weight=0.2))
 DT = 0.01

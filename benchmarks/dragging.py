@@ -14,7 +14,7 @@ from rich.console import Console
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.anchors import skin_points
-from controller.stage.dragging import Dragger, Reshaper
+from controller.stage.inverse import PointSolver, SculptSolver
 from surface.head import Head
 
 FRAMES = 400
@@ -27,7 +27,7 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=68, help="points of the skin that are tracked")
     count, console = parser.parse_args().points, Console(highlight=False)
     head = Head.load(find_config("heads", "ict"))
-    dragger = Dragger(head, skin_points(head, "face", count, 3), P)
+    dragger = PointSolver(head, skin_points(head, "face", count, 3), P)
     at = [head.parameters.index(name) for name in MOVES]
     rng = np.random.default_rng(0)
     took, missed = np.zeros(FRAMES), np.zeros(FRAMES)
@@ -42,7 +42,7 @@ def main() -> None:
     median, late = np.percentile(took[5:], [50, 99])
     console.print(f"{count} tracked points, 52 parameters: median {median:.2f} ms, p99 {late:.2f} ms (reach 2 ms)")
     console.print(f"worst value off by {missed.max():.2f}")
-    reshaper = Reshaper(head)
+    reshaper = SculptSolver(head)
     uv = skin_points(head, "face", 5, 8)
     began = time.perf_counter_ns()
     shape = reshaper.solve(uv, rng.normal(0, 3, (5, 3)))

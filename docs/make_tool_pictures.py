@@ -12,16 +12,16 @@ from rich.console import Console
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.robot.robot import load_robot
-from controller.tools.capturing import Capturing
+from controller.tools.calibrate_screen import CalibrationScreen
 
 CHANNELS = 8
 
 
-def screen() -> Capturing:
+def screen() -> CalibrationScreen:
     """Some channels captured, one marked, the extremes being followed."""
     channels = load_robot(find_config("robots", "head24"), PARAMETERS).channels[:CHANNELS]
     low, high = np.array([channel.limit_deg for channel in channels]).T
-    state = Capturing(channels)
+    state = CalibrationScreen(channels)
     rest = 0.1 * (low + high)
     state.see(rest)
     state.press("N")

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from drivers.sim import SimulatedBus
-from tests.drivers.core.test_keeper import PROGRAM, torque_after_kill
+from tests.drivers.core.test_dead_man_switch import PROGRAM, torque_after_kill
 
 ROOMS = ("controller", "surface", "drivers")
 LIMIT_S = 240.0  # kernels that the checkout has not compiled are compiled here

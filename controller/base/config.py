@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from controller.base.errors import ConfigError
 from controller.base.formats import NEWER
-from controller.base.salvage import Rest
+from controller.base.partial_config import PartialConfig
 
 Model = TypeVar("Model", bound="Settings")
 
@@ -57,7 +57,7 @@ def check(table: dict[str, Any], model: type[Model], path: Path,
         read = model.model_validate(table)
     except ValidationError as error:
         faults = [describe(fault, model) for fault in error.errors()]
-        rest = Rest(table, model, error)
+        rest = PartialConfig(table, model, error)
         if cross_check is not None and rest.read is not None:
             faults += rest.tell(cross_check(rest.read))
         raise config_error(path, faults) from error

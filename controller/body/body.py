@@ -21,15 +21,15 @@ from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.signals import endings, let_interrupts_through
-from controller.body.insight import InsightWriter, insight_size
+from controller.body.messages import Begin, BodyOrders, Failed, Finished, Hold, Neutral, Ready, Report, Show
+from controller.body.panel_state import PanelStateWriter, panel_state_size
 from controller.body.sources import Sources, Voice
-from controller.body.wire import Begin, BodyOrders, Calm, Failed, Finished, Hold, Ready, Report, Show
 from controller.links.kind import Around, Link
 from controller.links.line.host import load_script
 from controller.links.line.show import Shows
 from controller.links.links import open_links
 from controller.robot.busloop import BusLoop
-from controller.robot.following import Puppet, Reflection
+from controller.robot.following import FollowMode, MeasuredFace
 from controller.robot.settings import RobotSettings
 from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import Take, TakePlayer
@@ -79,14 +79,14 @@ class Body:
         self.replay = replay
         self.links: list[Link] = []
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
-        self.reflection = self._reflection(parameters)
+        self.reflection = self._measured_face(parameters)
         self.state.watch = self.reflection
         self.state.shows = Shows(
             lambda name: load_script(name, parameters, stage.vocabulary, beside=stage.path), self.state
         )
         if stage.settings.show is not None:
             self.state.shows.start(stage.settings.show)
-        self.puppet = Puppet(self.reflection, parameters) if mirror and self.reflection is not None else None
+        self.puppet = FollowMode(self.reflection, parameters) if mirror and self.reflection is not None else None
         self.live = take is None and replay is None
         if self.live:
             take, layer, voice = _own(stage, parameters, voice)
@@ -99,11 +99,11 @@ class Body:
         self._error: Exception | None = None
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
 
-    def _reflection(self, parameters: Parameters) -> Reflection | None:
+    def _measured_face(self, parameters: Parameters) -> MeasuredFace | None:
         buses = self.buses
         if not buses:
             return None
-        return Reflection(
+        return MeasuredFace(
             [b.table for b in buses], [b.measured for b in buses], parameters, [b.following for b in buses]
         )
 
@@ -245,13 +245,13 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     parameters = PARAMETERS
     stage = load_stage(orders.stage, parameters)
     mailbox = _reached(orders.mailbox, len(parameters.names))
-    insights = None if orders.insight is None else _reached(orders.insight, insight_size(parameters))
+    insights = None if orders.insight is None else _reached(orders.insight, panel_state_size(parameters))
     body = _body(orders, stage, mailbox, parameters)
     take_turns_quickly()  # before torque: what collects garbage later finds little to look at
     body.start()
     try:
         _tell(pipe, Ready())
-        _wait(body, pipe, stop, _insight(insights, body))
+        _wait(body, pipe, stop, _panel_state(insights, body))
     finally:
         body.stop()
     _tell(pipe, Report(body.report()))
@@ -274,18 +274,18 @@ def _body(orders: BodyOrders, stage: Stage, mailbox: Mailbox, parameters: Parame
     return Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path), record=record)
 
 
-def _insight(insights: Mailbox | None, body: Body) -> Callable[[], None]:
+def _panel_state(insights: Mailbox | None, body: Body) -> Callable[[], None]:
     """What tells main, now and then, more than the values."""
     if insights is None:
         return lambda: None
-    return InsightWriter(insights, body.state, body.reflection).publish
+    return PanelStateWriter(insights, body.state, body.reflection).publish
 
 
 def _wait(body: Body, pipe: Connection, stop: threading.Event, publish: Callable[[], None]) -> None:
     """Serve main until it says stop or is gone, a signal comes, or a bus gave up."""
     told = False
     while not stop.is_set():
-        if pipe.poll(_POLL_S) and not _obey(body, pipe):
+        if pipe.poll(_POLL_S) and not _handle(body, pipe):
             return
         publish()
         if body.finished and not told:
@@ -294,14 +294,14 @@ def _wait(body: Body, pipe: Connection, stop: threading.Event, publish: Callable
         body.check()
 
 
-def _obey(body: Body, pipe: Connection) -> bool:
+def _handle(body: Body, pipe: Connection) -> bool:
     """Do what main or its panel wants; False when it said stop or is gone."""
     try:
-        wish = pipe.recv()
+        request = pipe.recv()
     except (EOFError, OSError):
         return False
     state, now = body.state, time.monotonic_ns()
-    match wish:
+    match request:
         case Begin():
             take_turns_quickly()
             take_priority()  # the links' threads too: one put off while it holds the interpreter puts off the servos
@@ -312,7 +312,7 @@ def _obey(body: Body, pipe: Connection) -> bool:
             state.set_parameters([index], [value], now)
         case Show(name, intensity):
             state.expression(name, intensity, None, now)
-        case Calm(seconds):
+        case Neutral(seconds):
             state.neutral(seconds, now)
         case _:
             return False

@@ -12,10 +12,10 @@ from multiprocessing.connection import Connection
 from typing import IO, TYPE_CHECKING
 
 from controller.base.errors import TakeError
-from controller.robot.following import Puppet
-from controller.takes.listening import HOP_S, Listener
+from controller.robot.following import FollowMode
 from controller.takes.livelink import TakePlayer
 from controller.takes.recording import Face
+from controller.takes.voice import HOP_S, VoiceListener
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer  # a name of the type checker's only
@@ -120,14 +120,14 @@ class Sources:
         self,
         state: Face,
         player: TakePlayer | None = None,
-        puppet: Puppet | None = None,
+        puppet: FollowMode | None = None,
         voice: Voice | None = None,
         *,
         beside: bool = False,
     ) -> None:
         self._beside = beside
-        self._state, self._player, self._puppet, self._voice = state, player, puppet, voice
-        self._listener: Listener | None = None
+        self._state, self._player, self._follow, self._voice = state, player, puppet, voice
+        self._voice_listener: VoiceListener | None = None
         self._stopped = False
         self.error: Exception | None = None
         self.heard = False
@@ -147,29 +147,33 @@ class Sources:
     def stop(self) -> None:
         """Listen no more; a stream that is silent is left to end by itself."""
         self._stopped = True
-        if self._listener is not None:
-            self._listener.stop()
+        if self._voice_listener is not None:
+            self._voice_listener.stop()
 
     def tick(self, now_ns: int, begun: bool) -> None:
         """Give the layers what is due; takes wait until ``begun``."""
         if self._player is not None and begun:
             self._player.tick(now_ns)
-        if self._puppet is not None:
-            self._puppet.tick(self._state, now_ns)
+        if self._follow is not None:
+            self._follow.tick(self._state, now_ns)
         if self._state.shows is not None and begun:
             self._state.shows.tick(now_ns)
 
     def report(self) -> dict[str, object]:
         """How far a take was played and a voice was heard (s); None without."""
-        heard = None if self._voice is None else {"heard_s": self._listener.hops * HOP_S if self._listener else 0.0}
+        heard = (
+            None
+            if self._voice is None
+            else {"heard_s": self._voice_listener.hops * HOP_S if self._voice_listener else 0.0}
+        )
         return {"take": self._take(), "voice": heard}
 
     def _listen(self, voice: Voice) -> None:
         try:
             with voice.open() as stream:
-                self._listener = Listener(stream, self._state, raw_hz=voice.raw_hz)
+                self._voice_listener = VoiceListener(stream, self._state, raw_hz=voice.raw_hz)
                 if not self._stopped:
-                    self._listener.run()
+                    self._voice_listener.run()
         except Exception as error:  # noqa: BLE001  the body has to hear of it
             self.error = error
         self.heard = True

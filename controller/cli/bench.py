@@ -19,7 +19,7 @@ from controller.cli.console import console
 from controller.tools.tables import show_table
 
 if TYPE_CHECKING:
-    from controller.tools.benching import Tables  # start-up: --help does without it
+    from controller.tools.bench_surface import Tables  # start-up: --help does without it
     from surface.bench.bench import Measure  # start-up: --help does without it
 PICTURES = (".png", ".svg", ".jpg", ".webp")
 
@@ -106,7 +106,7 @@ def _opened(picture: Path | None) -> Iterator[Path | None]:
 
 
 def _bus(seconds: float, face: bool, as_json: bool) -> None:
-    from controller.tools.benching_bus import bench_bus, to_json  # start-up: --help does without it
+    from controller.tools.bench_bus import bench_bus, to_json  # start-up: --help does without it
 
     says = Console(stderr=True)  # lines and no moving bar: drawing one would disturb what is measured
     tables = bench_bus(max(seconds, 1.0), lambda text: says.print(f"measuring {text}", soft_wrap=True), face=face)
@@ -122,7 +122,11 @@ def _bus(seconds: float, face: bool, as_json: bool) -> None:
 
 
 def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None, vertices: int) -> Tables:
-    from controller.tools.benching import bench_growth, bench_large, bench_surface  # start-up: --help does without it
+    from controller.tools.bench_surface import (  # start-up: --help does without it
+        bench_growth,
+        bench_large,
+        bench_surface,
+    )
 
     tables = bench_surface(seconds, bar.tell, vertices)
     if large:
@@ -133,7 +137,11 @@ def _surface(seconds: float, bar: Bar, large: bool, growth: Path | None, vertice
 
 
 def _head(what: Subject, head: str, seconds: float, bar: Bar, out: Path | None, updates: int, level: int) -> Tables:
-    from controller.tools.benching import bench_drift, bench_head, bench_quadtree  # start-up: --help does without it
+    from controller.tools.bench_surface import (  # start-up: --help does without it
+        bench_drift,
+        bench_head,
+        bench_quadtree,
+    )
 
     if what is Subject.head:
         return bench_head(head, seconds, bar.tell)

@@ -61,7 +61,7 @@ def scan(
 
     Example: omote scan /dev/ttyUSB0 --baud 1000000
     """
-    from controller.tools.scanning import STEPS, plan_scan, scan_port  # start-up: --help does without it
+    from controller.tools.scan import STEPS, plan_scan, scan_port  # start-up: --help does without it
 
     plan = plan_scan(baud, protocol or (2, 1))
     table = Table("baud", "prot.", "id", "model", "fw", "supply", "temp.", "error", "torque")
@@ -124,9 +124,9 @@ def monitor(
     Example: omote monitor /dev/ttyUSB0 --baud 57600
     """
     from controller.base.signals import stop_flag  # start-up: --help does without it
-    from controller.body.run import Deadline  # start-up: --help does without it
-    from controller.tools.monitoring import ask  # start-up: --help does without it
-    from controller.tools.monitoring import listen as only_listen  # start-up: --help does without it
+    from controller.body.process import Deadline  # start-up: --help does without it
+    from controller.tools.monitor import ask  # start-up: --help does without it
+    from controller.tools.monitor import listen as only_listen  # start-up: --help does without it
 
     deadline = Deadline(seconds)
     with stop_flag() as flag:

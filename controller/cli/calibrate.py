@@ -42,7 +42,7 @@ def calibrate(
     from controller.base.parameters import PARAMETERS  # start-up: --help does without it
     from controller.robot.calibration import calibration_path  # start-up: --help does without it
     from controller.robot.robot import load_robot  # start-up: --help does without it
-    from controller.tools.calibrating import run_calibration  # start-up: --help does without it
+    from controller.tools.calibrate import run_calibration  # start-up: --help does without it
 
     path = find_config("robots", robot)
     settings = load_robot(path, PARAMETERS)

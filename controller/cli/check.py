@@ -26,7 +26,7 @@ def check(
 
     Example: omote check configs/robots/head24.toml
     """
-    from controller.tools.checking import check_anything  # start-up: --help does without it
+    from controller.tools.check import check_anything  # start-up: --help does without it
 
     for line in check_anything(file):
         console.print(line, soft_wrap=True)

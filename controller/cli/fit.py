@@ -43,7 +43,7 @@ def fit(
 
     Example: omote fit me.glb -o heads/me --report report
     """
-    from controller.tools.fitting import add_with_progress, fit_with_progress  # start-up: --help does without it
+    from controller.tools.fit import add_with_progress, fit_with_progress  # start-up: --help does without it
     from surface.fit.source.load import LoadOptions  # start-up: --help does without it
 
     if keep and identities is None:
@@ -76,6 +76,6 @@ def export(
 
     Example: omote export head.glb
     """
-    from controller.tools.exporting import export_with_progress  # start-up: --help does without it
+    from controller.tools.export import export_with_progress  # start-up: --help does without it
 
     export_with_progress(head, out, settings or [], expression or [], identity, console)

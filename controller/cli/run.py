@@ -62,7 +62,7 @@ def demo(
 
     Example: omote demo --seconds 5 --headless
     """
-    from controller.tools.session import has_display  # start-up: --help does without it
+    from controller.tools.stage_run import has_display  # start-up: --help does without it
 
     windowed = has_display() and not headless
     pictures, report = (None, None) if windowed else (out, out / "report.json")
@@ -98,7 +98,7 @@ def run(
     Example: omote run everything --headless --seconds 20 --report r.json
     """
     if dry_run:
-        _rehearse(stage, None, seconds, report)
+        _dry_run(stage, None, seconds, report)
         return
     from controller.body.sources import Voice  # start-up: --help does without it
 
@@ -137,7 +137,7 @@ def play(
         heard = Voice("-", voice_hz, alone=True)
         _run(stage, None, seconds, headless, no_face, pictures, report, voice=heard, record=record)
     elif dry_run:
-        _rehearse(stage, take, seconds, report)
+        _dry_run(stage, take, seconds, report)
     else:
         _run(stage, take, seconds, headless, no_face, pictures, report, record=record)
 
@@ -157,14 +157,14 @@ def _run(
     identity: dict[str, float] | None = None,
     picture: dict[str, object] | None = None,
 ) -> None:
-    from controller.body.waiting import WaitingBody, uncollected  # start-up: --help does without it
+    from controller.body.preload import PreloadedBody, uncollected  # start-up: --help does without it
 
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: its threads would spin where others have work
-    with console.status("starting") as status, WaitingBody() as waiting, uncollected():
+    with console.status("starting") as status, PreloadedBody() as waiting, uncollected():
         from controller.stage.stage import with_picture  # start-up: --help does without it
-        from controller.tools.session import Session, has_display, write_report  # start-up: --help does without it
+        from controller.tools.stage_run import StageRun, has_display, write_report  # start-up: --help does without it
 
-        session = Session.load(
+        session = StageRun.load(
             stage, take, status.update,
             mirror=mirror, voice=voice, record=record, identity=identity, waiting=waiting,
         )  # fmt: skip
@@ -181,11 +181,11 @@ def _run(
     show_report(measured)
 
 
-def _rehearse(stage: str, take: Path | None, seconds: float | None, report: Path | None) -> None:
-    from controller.tools.session import Session, write_report  # start-up: --help does without it
+def _dry_run(stage: str, take: Path | None, seconds: float | None, report: Path | None) -> None:
+    from controller.tools.stage_run import StageRun, write_report  # start-up: --help does without it
 
     with console.status("rehearsing"):
-        rows, sent = Session.load(stage, take).plan(seconds)
+        rows, sent = StageRun.load(stage, take).plan(seconds)
     show_plan(rows)
     if report is not None:
         write_report({"stage": stage, "dry_run": True, "buses": sent}, report)

@@ -17,7 +17,7 @@ from drivers.base.errors import PluginError
 from drivers.base.options import REQUIRED, Entry, entries
 
 if TYPE_CHECKING:
-    from controller.tools.simulating import Serving  # start-up: --help does without it
+    from controller.tools.simulate import Serving  # start-up: --help does without it
 
 log = logging.getLogger(__name__)
 
@@ -95,7 +95,7 @@ def _serving(
     watch: Look = False,
 ) -> Serving:
     """Where and how to serve: a link to a pseudo-terminal, or a TCP address."""
-    from controller.tools.simulating import Serving  # start-up: --help does without it
+    from controller.tools.simulate import Serving  # start-up: --help does without it
 
     if link is not None and tcp is not None:
         raise ConfigError("--link and --tcp do not go together", hint="run it twice for two ports")
@@ -128,7 +128,7 @@ def _options(command: Callable[..., Any]) -> list[inspect.Parameter]:
 def _simulate_family(kind: str) -> Callable[..., None]:
     """The command that serves what stands in for a family."""
     from controller.base.schema import from_words  # start-up: the command line shows its help without it
-    from controller.tools.simulating import serve_alone
+    from controller.tools.simulate import serve_alone
     from drivers.core.registry import FAMILIES
     from drivers.sim.wire.simulator import simulator_of
 
@@ -162,7 +162,7 @@ def simulate_robot(
 
     Example: omote simulate robot head24 --link /tmp/head
     """
-    from controller.tools.simulating import serve_robot  # start-up: --help does without it
+    from controller.tools.simulate import serve_robot  # start-up: --help does without it
 
     serve_robot(robot, bus, how, console)
 
@@ -175,6 +175,6 @@ def simulate_host(
 
     Example: omote simulate host tour --link /tmp/robot
     """
-    from controller.tools.simulating import serve_host  # start-up: --help does without it
+    from controller.tools.simulate import serve_host  # start-up: --help does without it
 
     serve_host(script, link, console)

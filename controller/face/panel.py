@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.parameters import REGIONS, Parameters
-from controller.body.insight import Insight
-from controller.body.wire import Calm, Hold, Show
+from controller.body.messages import Hold, Neutral, Show
+from controller.body.panel_state import PanelState
 from controller.vocabulary.vocabulary import Vocabulary
 
-Wish = Hold | Show | Calm
+PanelRequest = Hold | Show | Neutral
 
 _BUTTONS_A_ROW = 3
 _CALM_S = 0.6
@@ -29,7 +29,7 @@ class Panel:
     ----------
     parameters : the vocabulary.
     newest : gives the newest parameters, (p,) float64.
-    tell : passes a wish to the body.
+    tell : passes a request to the body.
     insight : who holds each parameter and what the servos show; nothing is said of it without.
     """
 
@@ -37,10 +37,10 @@ class Panel:
         self,
         parameters: Parameters,
         newest: Callable[[], NDArray[np.float64]],
-        tell: Callable[[Wish], None],
-        insight: Insight | None = None,
+        tell: Callable[[PanelRequest], None],
+        insight: PanelState | None = None,
     ) -> None:
-        self._insight = insight
+        self._panel_state = insight
         self._parameters = parameters
         self._newest = newest
         self._tell = tell
@@ -55,8 +55,8 @@ class Panel:
 
         imgui.set_next_window_pos(imgui.ImVec2(12, 12), imgui.Cond_.first_use_ever)
         imgui.set_next_window_size(imgui.ImVec2(320, 640), imgui.Cond_.first_use_ever)
-        if self._insight is not None:
-            self._insight.refresh()
+        if self._panel_state is not None:
+            self._panel_state.refresh()
         if imgui.begin("omote")[0]:
             self._top(imgui)
             for region, members in self._members.items():
@@ -69,7 +69,7 @@ class Panel:
         imgui.same_line()
         if imgui.small_button("release all"):
             self._held.clear()
-            self._tell(Calm(_CALM_S))
+            self._tell(Neutral(_CALM_S))
         _, self._intensity = imgui.slider_float("intensity", self._intensity, 0.0, 1.0)
         gap = imgui.get_style().item_spacing.x
         width = (imgui.get_content_region_avail().x + gap) / _BUTTONS_A_ROW - gap
@@ -81,17 +81,17 @@ class Panel:
 
     def _away(self, region: str) -> str:
         """How far the servos of a region are from where they were wanted, for its title."""
-        away = None if self._insight is None else self._insight.away_deg(region)
+        away = None if self._panel_state is None else self._panel_state.away_deg(region)
         return "" if away is None else f"   servos {away:.1f} deg away"
 
     def _holder(self, imgui: Any, index: int) -> None:
         """Which layer holds a parameter, and what the servos show of it."""
-        if self._insight is None:
+        if self._panel_state is None:
             return
-        measured = self._insight.measured(index)
+        measured = self._panel_state.measured(index)
         shown = "" if measured is None else f"  servos {measured:.2f}"
         imgui.same_line()
-        imgui.text_disabled(f"{self._insight.holder(index)}{shown}")
+        imgui.text_disabled(f"{self._panel_state.holder(index)}{shown}")
 
     def _sliders(self, imgui: Any, members: NDArray[np.intp]) -> None:
         values = self._newest()

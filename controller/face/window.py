@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.parameters import PARAMETERS
-from controller.body.run import BodyProcess
+from controller.body.process import BodyProcess
 from controller.face.face import FrameLog, HeadValues
-from controller.face.hand import Hand
+from controller.face.mouse import MouseEditing
 from controller.face.panel import Panel
 from controller.stage.stage import FaceSettings
 from surface.head import Head
@@ -42,7 +42,9 @@ class WindowFace:
         copy: Callable[[], Head] | None = None,
     ) -> None:
         self._head = head
-        self._hand = None if copy is None or settings.kiosk else Hand(head, copy, lambda: values.full, body.tell)
+        self._mouse = (
+            None if copy is None or settings.kiosk else MouseEditing(head, copy, lambda: values.full, body.tell)
+        )
         self._settings = settings
         self._values = values
         self._panel = Panel(PARAMETERS, lambda: values.full, body.tell, getattr(body, "insight", None))
@@ -84,8 +86,8 @@ class WindowFace:
 
     def _gui(self, viewpoint: Viewpoint) -> None:
         self._panel()
-        if self._hand is not None:
-            self._hand(viewpoint.camera)
+        if self._mouse is not None:
+            self._mouse(viewpoint.camera)
 
     def report(self) -> dict[str, object]:
         """What was drawn; see :meth:`controller.face.face.FrameLog.report`."""

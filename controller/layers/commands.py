@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters
-from controller.layers.acting import Actor
+from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
-from controller.layers.layers import default_layers
-from controller.layers.life import Life, LifeSettings
+from controller.layers.idle import IdleMotion, IdleSettings
 from controller.layers.mixer import LayerSettings, Mixer
+from controller.layers.settings import default_layers
 from controller.motion.motion import MotionLimiter
 from controller.vocabulary.vocabulary import Vocabulary
 
@@ -95,7 +95,7 @@ class CommandSink(Protocol):
 
 
 class Watch(Protocol):
-    """What looks at the servos; see :class:`controller.robot.following.Reflection`."""
+    """What looks at the servos; see :class:`controller.robot.following.MeasuredFace`."""
 
     def measured(self, out: Floats) -> bool:
         """Copy the parameters that the servos show to ``out`` : (P,); False when none is known."""
@@ -111,7 +111,7 @@ class CommandState:
     ----------
     parameters : the registry.
     vocabulary : the named expressions; the shipped ones without.
-    layers : the layers; the shipped ones without. Must have those of :data:`controller.layers.layers.NEEDED`.
+    layers : the layers; the shipped ones without. Must have those of :data:`controller.layers.settings.NEEDED`.
     life : the figures of idle life; the natural ones without. seed : the same seed lives the same life.
     period_s : length of a tick.
 
@@ -130,7 +130,7 @@ class CommandState:
         vocabulary: Vocabulary | None = None,
         layers: Sequence[LayerSettings] | None = None,
         *,
-        life: LifeSettings | None = None,
+        life: IdleSettings | None = None,
         seed: int = 0,
         period_s: float = 0.01,
     ) -> None:
@@ -138,9 +138,9 @@ class CommandState:
         self.vocabulary = vocabulary or Vocabulary.load(parameters)
         self.mixer = Mixer(parameters, default_layers() if layers is None else layers)
         self.limiter = MotionLimiter.of(parameters, period_s)
-        self._actor = Actor(self.vocabulary["neutral"])
+        self._player = ExpressionPlayer(self.vocabulary["neutral"])
         self._gaze = Gaze(parameters)
-        self._life = Life(parameters, life or LifeSettings.named("natural", parameters), seed)
+        self._life = IdleMotion(parameters, life or IdleSettings.named("natural", parameters), seed)
         self._mixed, self._present = parameters.neutral(), parameters.neutral()
         self._expression, self._looking = self.mixer["expression"], self.mixer["gaze"]
         self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
@@ -169,15 +169,15 @@ class CommandState:
             return self._stamp_ns
 
     def _write_layers(self, now_s: float) -> None:
-        self._expression.write_masked(self._actor.update(now_s), self._everything, now_s)
+        self._expression.write_masked(self._player.update(now_s), self._everything, now_s)
         self._live(now_s)
-        self._looking.hold_back(self._actor.gaze_block)
-        self._speech.hold_back(self._actor.mouth_block)
+        self._looking.hold_back(self._player.gaze_block)
+        self._speech.hold_back(self._player.mouth_block)
         if self._gaze.active:
             self._looking.write(self._gaze.indices, self._gaze.update(self._present, self._life), now_s)
 
     def _live(self, now_s: float) -> None:
-        life, actor = self._life, self._actor
+        life, actor = self._life, self._player
         if life.liveliness > 0.0:
             life.update(now_s, looking=self._gaze.active, blink_block=actor.blink_block, gaze_block=actor.gaze_block)
             self._idle.write_masked(life.values, self._everything, now_s)
@@ -203,7 +203,7 @@ class CommandState:
         """See :class:`CommandSink`. Raises ParameterError for an unknown name."""
         expression = self.vocabulary[name]
         with self._lock:
-            self._actor.play(expression, intensity, duration_s, self._time(stamp_ns))
+            self._player.play(expression, intensity, duration_s, self._time(stamp_ns))
             self._note(stamp_ns)
 
     def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
@@ -231,7 +231,7 @@ class CommandState:
         with self._lock:
             self._manual.release(fade_s=seconds)
             self._stop_looking(seconds)
-            self._actor.rest(seconds, self._time(stamp_ns))
+            self._player.rest(seconds, self._time(stamp_ns))
             self._note(stamp_ns)
 
     def live(self, amount: float, stamp_ns: int) -> None:
@@ -312,8 +312,8 @@ class CommandState:
         with self._lock:
             yaw, pitch = self._gaze.direction_deg
             return {
-                "expression": self._actor.name,
-                "intensity": round(self._actor.intensity, 3),
+                "expression": self._player.name,
+                "intensity": round(self._player.intensity, 3),
                 "gaze": f"{yaw:.1f},{pitch:.1f}" if self._gaze.active else "off",
                 "life": self._life.liveliness,
                 "manual": self._manual.holding,

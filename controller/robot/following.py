@@ -70,7 +70,7 @@ def regions_of(table: ChannelTable, parameters: Parameters) -> list[str]:
     return [parameters.regions[int(np.argmax(np.abs(row)))] for row in table.linear]
 
 
-class Reflection:
+class MeasuredFace:
     """The face that the servos were measured to make, whatever it was that moved them; asked from any thread.
 
     Parameters
@@ -133,7 +133,7 @@ class Reflection:
         return found | {f"away_{region}_deg": round(value, 2) for region, value in away.items()}
 
 
-class Puppet:
+class FollowMode:
     """A limp head that is moved by hand: what is measured goes to the capture layer, and the face follows.
 
     Parameters
@@ -141,11 +141,11 @@ class Puppet:
     reflection : reads the head.
     """
 
-    def __init__(self, reflection: Reflection, parameters: Parameters) -> None:
-        self._reflection = reflection
+    def __init__(self, reflection: MeasuredFace, parameters: Parameters) -> None:
+        self._measured_face = reflection
         self._values, self._mask = parameters.neutral(), np.zeros(len(parameters), dtype=bool)
 
     def tick(self, state: Face, now_ns: int) -> None:
         """Write the face that the servos make now."""
-        if self._reflection.read(self._values, self._mask):
+        if self._measured_face.read(self._values, self._mask):
             state.capture(self._values, self._mask, now_ns, now_ns)

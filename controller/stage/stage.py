@@ -14,9 +14,9 @@ from controller.base.errors import ConfigError, TakeError
 from controller.base.parameters import Parameters
 from controller.base.paths import find_config
 from controller.layers.commands import CommandState
-from controller.layers.layers import load_layers
-from controller.layers.life import LifeSettings
+from controller.layers.idle import IdleSettings
 from controller.layers.mixer import LayerSettings
+from controller.layers.settings import load_layers
 from controller.links.line.host import load_script
 from controller.links.links import LinkTable
 from controller.robot.robot import load_robot
@@ -83,7 +83,7 @@ class Stage:
     vocabularies: tuple[Path, ...]
     vocabulary: Vocabulary
     layers: tuple[LayerSettings, ...]
-    life: LifeSettings
+    life: IdleSettings
     groups: tuple[tuple[Path, float], ...] = ()
 
     def file(self, name: str) -> Path:
@@ -119,7 +119,7 @@ def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tupl
     ------
     SurfaceError : the head cannot be read. ConfigError : a group does not fit it.
     """
-    from controller.stage.dragging import load_group, wear  # start-up: as Head
+    from controller.stage.inverse import load_group, wear  # start-up: as Head
     from surface.head import Head  # start-up: the body reads stages and draws nothing
 
     head = Head.load(folder, identity)
@@ -173,7 +173,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     groups = _files(faults, "groups", list(settings.groups), path)
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
     layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
-    life = _collect(faults, "life", lambda: LifeSettings.named(settings.life, parameters))
+    life = _collect(faults, "life", lambda: IdleSettings.named(settings.life, parameters))
     scripts = [("show", settings.show)] + [
         (f"links[{i}].script", link.simulated) for i, link in enumerate(settings.links)
     ]

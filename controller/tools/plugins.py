@@ -8,7 +8,7 @@ from typing import Any
 
 from controller.links.kind import LINKS
 from controller.takes.reader import TAKES
-from controller.tools.exporting import EXPORTERS
+from controller.tools.export import EXPORTERS
 from drivers.base.errors import PluginError
 from drivers.base.plugins import Registry
 from drivers.core.registry import FAMILIES

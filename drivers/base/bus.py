@@ -178,7 +178,7 @@ class Bus(ABC):
 
     ``with bus:`` opens the port and, on every way out, stops the servos and closes it. A program that is killed
     (SIGKILL) can stop nothing: servos with a bus watchdog stop by themselves then; for those without one
-    ``drivers/core/keeper.py`` says what is done, and pulses of hobby servos go on.
+    ``drivers/core/dead_man_switch.py`` says what is done, and pulses of hobby servos go on.
 
     Parameters
     ----------

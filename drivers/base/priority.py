@@ -62,7 +62,7 @@ def take_priority() -> bool:
 
 
 def take_short_turns() -> bool:
-    """Let the calling thread run often and briefly, not seldom and long; False where the system has no such wish.
+    """Let the calling thread run often and briefly, not seldom and long; False where the system has no such request.
 
     Linux 6.12 and later serves a thread that wakes up ahead of one in the middle of a longer turn (EEVDF, a slice asked
     for by ``sched_setattr``); older ones take no notice.
@@ -71,8 +71,8 @@ def take_short_turns() -> bool:
     if sys.platform != "linux" or number is None:
         return False
     nice = os.getpriority(os.PRIO_PROCESS, 0)
-    wish = _ATTRIBUTES.pack(_ATTRIBUTES.size, os.SCHED_OTHER, 0, nice, 0, _TURN_NS, 0, 0)
-    return bool(ctypes.CDLL(None).syscall(number, 0, wish, 0) == 0)
+    request = _ATTRIBUTES.pack(_ATTRIBUTES.size, os.SCHED_OTHER, 0, nice, 0, _TURN_NS, 0, 0)
+    return bool(ctypes.CDLL(None).syscall(number, 0, request, 0) == 0)
 
 
 def give_priority_back() -> None:

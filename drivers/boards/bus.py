@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec, frozen
 from drivers.base.errors import BusError, NoReply, PortLost
-from drivers.base.telling import Teller
+from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.core.wirebus import WireBus
 from drivers.port.serialport import SerialPort, link_to, reply_margin_s
 
@@ -66,7 +66,7 @@ class BoardBus(WireBus):
         self._on = np.zeros(n, dtype=bool)
         self._silent = False
         self._mute: list[int] = []  # servos that a board answers nothing about, longest not asked first
-        self._say = Teller(log, clock)
+        self._say = RateLimitedLogger(log, clock)
 
     # ------------------------------------------------------------------ hooks
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivers.base.bus import BusReport, Floats, ServoSpec
-from drivers.core.guard import BURST_S, SpeedGuard
+from drivers.core.speed_limit import BURST_S, SpeedLimiter
 
 
 class TargetLimits:
@@ -27,7 +27,7 @@ class TargetLimits:
         self.target: Floats = np.zeros(len(servos))
         self._low = np.array([servo.min_rad for servo in servos], dtype=np.float64)
         self._high = np.array([servo.max_rad for servo in servos], dtype=np.float64)
-        self._guard = SpeedGuard(np.array([servo.max_speed_rad_s for servo in servos]))
+        self._guard = SpeedLimiter(np.array([servo.max_speed_rad_s for servo in servos]))
         self._report = report
         from drivers.core.kernels import limit_targets  # compiled: only who drives servos pays for it
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import DriverError, NoReply, ServoRefused
+from drivers.boards.ordered_replies import OrderedReplies
 from drivers.boards.pulses import PulseBus
-from drivers.boards.unmarked import Conversation
 from drivers.maestro import protocol as m
 
 log = logging.getLogger(__name__)
@@ -60,7 +60,7 @@ class MaestroBus(PulseBus):
         self._board, self._device, self._crc = board, device, crc
         self._code = m.Encoder(device, crc)
         probe = self._code.command(m.SCRIPT_STATUS)
-        self._talk = Conversation(self._port, probe, lambda data: data in (b"\0", b"\1"), lambda: self._margin_s)
+        self._talk = OrderedReplies(self._port, probe, lambda data: data in (b"\0", b"\1"), lambda: self._margin_s)
 
     def far_end(self) -> dict[str, Any]:
         """What a simulated board has to be set to."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from drivers.base.bus import BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
 from drivers.base.errors import DriverError, PortLost
-from drivers.core.keeper import Keeper
+from drivers.core.dead_man_switch import DeadManSwitch
 from drivers.packets.packet1 import Packet1
 from drivers.port.serialport import SerialPort
 from drivers.protocol1 import startup
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 LAST_ID = 252
 LOOK_S = 1.0
-"""How often a running bus looks whether its keeper is still there."""
+"""How often a running bus looks whether its switch is still there."""
 
 
 class Protocol1Bus(ServoBus):
@@ -49,9 +49,9 @@ class Protocol1Bus(ServoBus):
     singles : of servos that must be read one by one, how many are read a cycle, in turn.
     slow_group : servos asked for one slow value (torque) each cycle; 0 asks only those that raise an alert.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
-    watchdog_ms : these servos have none; 0 says that they may hold on when this program is killed, any other time
-        keeps a small process beside it that lets them go then (:mod:`drivers.core.keeper`); that there is none, or
-        no longer, is told once, and counted as ``unkept``.
+    watchdog_ms : these servos have none. 0: they may hold their position when this program is killed. Any other time
+        starts a small process that switches them off then (:mod:`drivers.core.dead_man_switch`); where that process
+        is missing, it is reported once and counted as ``unkept``.
     clock : monotonic seconds.
     policy : fields of :class:`~drivers.protocol1.startup.Policy`, such as ``torque_limit``.
 
@@ -82,7 +82,7 @@ class Protocol1Bus(ServoBus):
         super().__init__(servos, clock=clock)
         self.policy = Policy(**policy)
         self._port, self._keep = port, watchdog_ms > 0 and os.name == "posix"
-        self._keeper: Keeper | None = None
+        self._switch: DeadManSwitch | None = None
         self._unkept, self._look_s = False, 0.0
         self._registers = Registers(packets, port, self.servos)
         self._tables([load_table(servo.model) for servo in self.servos])
@@ -143,22 +143,22 @@ class Protocol1Bus(ServoBus):
         """Have the servos let go when this program is killed."""
         if not self._keep or hasattr(self, "simulation") or not _outlives_us(self._port.link):
             return
-        if self._keeper is not None and self._keeper.watching:
+        if self._switch is not None and self._switch.watching:
             return
         self._dismiss()
         frames = self._registers.frames(dict.fromkeys(self.ids, 0), "torque")
         try:
-            self._keeper = Keeper(self.path, self._port.baudrate, frames)
+            self._switch = DeadManSwitch(self.path, self._port.baudrate, frames)
             self._unkept = False
         except DriverError as error:
             self._tell_unkept(str(error), error.hint)
 
     def _settle(self, now_s: float) -> None:
-        """Look now and then whether the keeper is still there."""
-        if self._keeper is None or now_s - self._look_s < LOOK_S:
+        """Look now and then whether the switch is still there."""
+        if self._switch is None or now_s - self._look_s < LOOK_S:
             return
         self._look_s = now_s
-        if not self._keeper.watching:
+        if not self._switch.watching:
             why = f"the process that switches the servos on {self.path} off if this program is killed has ended"
             self._tell_unkept(why, "stop and start again to start another")
 
@@ -170,9 +170,9 @@ class Protocol1Bus(ServoBus):
             log.warning("%s; %s", why, hint)
 
     def _dismiss(self) -> None:
-        keeper, self._keeper = self._keeper, None
-        if keeper is not None:
-            keeper.dismiss()
+        switch, self._switch = self._switch, None
+        if switch is not None:
+            switch.dismiss()
 
     def _started(self, started: Started) -> None:
         self._report.eeprom_writes += started.eeprom

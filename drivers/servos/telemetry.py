@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base.bus import BusReport, BusState, Flags
-from drivers.base.telling import Teller
+from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.core.scale import Scale
 from drivers.packets.packet import ALERT
 from drivers.servos.registers import Registers
@@ -48,7 +48,7 @@ class Telemetry(ABC):
         self._slow_state: tuple[NDArray[Any], ...] | None = None
         self._place = {servo: index for index, servo in enumerate(self.ids)}
         self._missed: set[int] = set()
-        self._say = Teller(log, self._port.clock)
+        self._say = RateLimitedLogger(log, self._port.clock)
         self._silent: deque[int] = deque()
         self._probe_s = -np.inf
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import NoReply
-from drivers.boards.unmarked import Conversation
+from drivers.boards.ordered_replies import OrderedReplies
 from drivers.text.bus import TextBus
 
 CHANNELS = 32
@@ -35,7 +35,7 @@ class Ssc32Bus(TextBus):
 
     def __init__(self, servos: Iterable[ServoSpec], *, port: str, **options: Any) -> None:
         super().__init__(servos, port=port, template=MOVE, end=END, off=OFF, **options)
-        self._talk = Conversation(self._port, b"VER\r", _is_version, lambda: self._margin_s)
+        self._talk = OrderedReplies(self._port, b"VER\r", _is_version, lambda: self._margin_s)
 
     def far_end(self) -> dict[str, Any]:
         """A simulated board needs no settings."""

@@ -15,10 +15,10 @@ from surface.fit.features.joins import find_seams
 from surface.fit.features.pieces import Body, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.wrinkles import deepened
+from surface.fit.points.lid_seating import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.points.recipe import PartRecipe, Recipe, recipe_for
 from surface.fit.points.refine import fit_chart
 from surface.fit.points.report import FitReport, PartReport, measure
-from surface.fit.points.seat import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
 from surface.fit.result import FitResult, FittedPart
@@ -109,7 +109,7 @@ def _fit_parts(
     steps = _Steps([p for p, _ in plan.parts], progress)
     for part, islands in plan.parts:
         chart = part_chart(mesh, part, islands)
-        fitted = fit_chart(mesh if part.follows == "skin" else _still(mesh), chart, part.wish, steps.of(part))
+        fitted = fit_chart(mesh if part.follows == "skin" else _still(mesh), chart, part.request, steps.of(part))
         parts.append(skin_part(part, chart, fitted, body))
         reports.append(measure(part.name, chart, fitted, mesh.names))
         fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))
@@ -176,14 +176,14 @@ class _Steps:
 
     def __init__(self, parts: list[PartRecipe], progress: Progress) -> None:
         self._progress = progress
-        self._total = float(sum(p.wish.points for p in parts) or 1)
+        self._total = float(sum(p.request.points for p in parts) or 1)
         self._before = 0.0
 
     def of(self, part: PartRecipe) -> Callable[[float], None]:
         """Progress of one part, 0..1."""
         start = self._before
-        self._before += part.wish.points / self._total
-        return lambda done: self._progress(part.name, min(1.0, start + done * part.wish.points / self._total))
+        self._before += part.request.points / self._total
+        return lambda done: self._progress(part.name, min(1.0, start + done * part.request.points / self._total))
 
 
 def _with_mesh(part: PartData, head: HeadData) -> PartData:

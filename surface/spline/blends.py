@@ -37,7 +37,7 @@ def ratio(a, b):
 
 
 @kernel
-def climb(knots, i, p, x, j, top, work):
+def cox_de_boor(knots, i, p, x, j, top, work):
     """Fill ``work[0 .. p - top]`` with point i's blending functions of degree ``top`` (Cox-de Boor)."""
     for k in range(p + 2):
         work[k] = 0.0
@@ -79,7 +79,7 @@ def blend(knots, i, p, x, left, work):
         return 0.0
     if p == 3:
         return cubic(knots, i, x, j)[0]
-    climb(knots, i, p, x, j, p, work)
+    cox_de_boor(knots, i, p, x, j, p, work)
     return work[0]
 
 
@@ -93,7 +93,7 @@ def blend1(knots, i, p, x, left, work):
         return cubic(knots, i, x, j)
     if p == 0:
         return 1.0, 0.0
-    climb(knots, i, p, x, j, p - 1, work)
+    cox_de_boor(knots, i, p, x, j, p - 1, work)
     low = ratio(work[0], knots[i, p] - knots[i, 0])
     high = ratio(work[1], knots[i, p + 1] - knots[i, 1])
     return (x - knots[i, 0]) * low + (knots[i, p + 1] - x) * high, p * (low - high)
@@ -108,7 +108,7 @@ def blend2(knots, i, p, x, left, work):
     if p < 2:
         value, slope = blend1(knots, i, p, x, left, work)
         return value, slope, 0.0
-    climb(knots, i, p, x, j, p - 2, work)
+    cox_de_boor(knots, i, p, x, j, p - 2, work)
     t0, t1, t2 = knots[i, 0], knots[i, 1], knots[i, 2]
     s0, s1, s2 = knots[i, p - 1], knots[i, p], knots[i, p + 1]
     a, b, c = ratio(work[0], s0 - t0), ratio(work[1], s1 - t1), ratio(work[2], s2 - t2)

@@ -235,7 +235,7 @@ def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, 
 
 
 @kernel
-def sum_bends(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
+def sum_second_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
     """Add the second derivatives of b w (P, 1) into ``acc (12,)``: uu, uv, vv."""
     acc[:] = 0.0
     for q in range(ids.shape[0]):
@@ -262,7 +262,7 @@ def quotient(acc, out):
 
 @kernel
 def second_quotient(acc, bends, out):
-    """S_uu, S_uv and S_vv into ``out[3:]`` from ``out[:3]`` and the sums of :func:`sum_bends`."""
+    """S_uu, S_uv and S_vv into ``out[3:]`` from ``out[:3]`` and the sums of :func:`sum_second_derivatives`."""
     w, wu, wv, wuu, wuv, wvv = acc[3], acc[7], acc[11], bends[3], bends[7], bends[11]
     for c in range(3):
         p, du, dv = out[0, c], out[1, c], out[2, c]
@@ -288,7 +288,7 @@ def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, s
             if out.shape[1] == 6:
                 cell = bin_of(part[s, 0], part[s, 1], grid, shape)
                 near = bins[start[cell] : start[cell + 1]]
-                sum_bends(
+                sum_second_derivatives(
                     knots_u, knots_v, pu, pv, points, weights, near, part[s, 0], part[s, 1], sides[s], work, bends
                 )  # fmt: skip
                 second_quotient(acc[s], bends, out[first + s])

@@ -268,7 +268,7 @@ def _inside(a: Sheet, b: Sheet) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fan(normals: np.ndarray) -> np.ndarray:
-    """(5, m, 3) unit vectors: normals, and four that lean away from each."""
+    """(5, m, 3) unit vectors: normals, and four that decimated away from each."""
     n = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     side = np.cross(n, np.where(np.abs(n[:, :1]) < 0.7, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)

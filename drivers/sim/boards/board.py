@@ -31,7 +31,7 @@ class Board(Line):
         self.faults.add(faults, now_s)
 
     @abstractmethod
-    def obey(self, packet: Any, now_s: float) -> list[tuple[int, bytes]]:
+    def answer(self, packet: Any, now_s: float) -> list[tuple[int, bytes]]:
         """Do a packet; returns what is answered, each with the channel it is about (0: none)."""
 
     @abstractmethod
@@ -42,7 +42,7 @@ class Board(Line):
         """What a packet does, and what is heard of the answers; nothing while the board is deaf."""
         if self._deaf:
             return []
-        answers = [self._spoilt(channel, data) for channel, data in self.obey(packet, now_s)]
+        answers = [self._spoilt(channel, data) for channel, data in self.answer(packet, now_s)]
         return [answer for answer in answers if answer is not None]
 
     def fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:

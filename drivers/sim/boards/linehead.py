@@ -91,7 +91,7 @@ class LineHead(Board):
         """Bytes of a line on the wire."""
         return len(packet) + 1
 
-    def obey(self, packet: bytes, now_s: float) -> list[tuple[int, bytes]]:
+    def answer(self, packet: bytes, now_s: float) -> list[tuple[int, bytes]]:
         """Answer a line."""
         self._let_go_after_silence(now_s)
         self._heard_s = now_s

@@ -199,7 +199,7 @@ class Maestro(Board):
         """Bytes of a command on the wire."""
         return packet.size
 
-    def obey(self, packet: Command, now_s: float) -> list[tuple[int, bytes]]:
+    def answer(self, packet: Command, now_s: float) -> list[tuple[int, bytes]]:
         """Do a command. An error sends every channel home and is kept until it is read."""
         error = packet.error
         if self._count == 6 and packet.code in _MINI_ONLY:

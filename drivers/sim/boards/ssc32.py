@@ -86,7 +86,7 @@ class Ssc32(Board):
         """Bytes of a line on the wire."""
         return len(packet) + 1
 
-    def obey(self, packet: str, now_s: float) -> list[tuple[int, bytes]]:
+    def answer(self, packet: str, now_s: float) -> list[tuple[int, bytes]]:
         """Do what a line says."""
         if packet == "Q":
             return [(0, b"+" if any(channel.moving(now_s) for channel in self.channels) else b".")]

@@ -131,7 +131,7 @@ class TextBoard(Board):
         """Bytes of it on the wire."""
         return packet.size
 
-    def obey(self, packet: Said, now_s: float) -> list[tuple[int, bytes]]:
+    def answer(self, packet: Said, now_s: float) -> list[tuple[int, bytes]]:
         """Do what was said."""
         if packet.what == "frame":
             return []

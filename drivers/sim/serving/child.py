@@ -39,7 +39,7 @@ def build(settings: dict[str, Any]) -> PortServer:
         baud=settings["baud"],
         wire=settings["wire"],
         latency_s=settings["latency_s"],
-        on_line=Commands(line).obey,
+        on_line=Commands(line).handle,
     )
     try:
         line.faults.add(settings["faults"], now_s)

@@ -50,7 +50,7 @@ class Commands:
             "place": self._place,
         }
 
-    def obey(self, line: str) -> str:
+    def handle(self, line: str) -> str:
         """Carry out one line; returns its answer and never raises on what the line says."""
         try:
             word, *rest = shlex.split(line) or [""]
@@ -108,7 +108,7 @@ class ControlSocket:
     Parameters
     ----------
     path : where it listens; a socket that nobody serves any more is replaced.
-    obey : answers one line.
+    handle : answers one line.
 
     Raises
     ------
@@ -116,32 +116,32 @@ class ControlSocket:
     PortError : it cannot be made.
     """
 
-    def __init__(self, path: str | os.PathLike[str], obey: Callable[[str], str]) -> None:
-        self.path, self._obey = Path(path), obey
+    def __init__(self, path: str | os.PathLike[str], handle: Callable[[str], str]) -> None:
+        self.path, self._handle = Path(path), handle
         self._clients: dict[int, tuple[socket.socket, Lines]] = {}
         _remove_dead(self.path)
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._voice_listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            self._listener.bind(str(self.path))
-            self._listener.listen()
+            self._voice_listener.bind(str(self.path))
+            self._voice_listener.listen()
         except OSError as error:
-            self._listener.close()
+            self._voice_listener.close()
             raise PortError(
                 f"cannot make the control socket {self.path}: {error}", hint=f"mkdir -p {self.path.parent}"
             ) from error
-        self._listener.setblocking(False)
+        self._voice_listener.setblocking(False)
 
     @property
     def descriptors(self) -> list[int]:
         """What to wait on."""
-        return [self._listener.fileno(), *self._clients]
+        return [self._voice_listener.fileno(), *self._clients]
 
     def serve(self, ready: list[int]) -> None:
         """Take what has come at the descriptors that are ready."""
         for descriptor in ready:
-            if descriptor == self._listener.fileno():
+            if descriptor == self._voice_listener.fileno():
                 with contextlib.suppress(BlockingIOError):
-                    client, _ = self._listener.accept()
+                    client, _ = self._voice_listener.accept()
                     client.setblocking(False)
                     self._clients[client.fileno()] = (client, Lines())
             elif descriptor in self._clients:
@@ -152,8 +152,8 @@ class ControlSocket:
         for client, _ in self._clients.values():
             client.close()
         self._clients.clear()
-        if self._listener.fileno() >= 0:
-            self._listener.close()
+        if self._voice_listener.fileno() >= 0:
+            self._voice_listener.close()
             self.path.unlink(missing_ok=True)
 
     def _take(self, descriptor: int) -> None:
@@ -161,7 +161,7 @@ class ControlSocket:
         try:
             data = client.recv(MAX_LINE)
             for line in lines.feed(data):
-                client.send(self._obey(line).encode() + b"\n")
+                client.send(self._handle(line).encode() + b"\n")
         except OSError:
             data = b""
         if not data:

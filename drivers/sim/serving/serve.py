@@ -65,7 +65,7 @@ class PortServer:
     ) -> None:
         self.chain, self.baud = chain, baud
         self.tap: Callable[[bool, bytes], None] | None = None
-        self._socket = ControlSocket(commands, Commands(chain).obey) if commands else None
+        self._socket = ControlSocket(commands, Commands(chain).handle) if commands else None
         try:
             self.port = make_port(link)
         except BaseException:

@@ -204,7 +204,7 @@ class SimulatedBus:
             baud=self.baud,
             wire=self._wire,
             latency_s=self._latency_s,
-            on_line=self._obey,
+            on_line=self._handle,
         )
         try:
             line.faults.add(self._faults, now_s)
@@ -217,8 +217,8 @@ class SimulatedBus:
         self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
         self._thread.start()
 
-    def _obey(self, line: str) -> None:
-        self._commands.obey(line)
+    def _handle(self, line: str) -> None:
+        self._commands.handle(line)
         self._obeyed.set()
 
     # ------------------------------------------------------------ in a child process

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from surface.fit.features.contacts import find_contacts
-from surface.fit.features.mends import add_mends
+from surface.fit.features.correctives import add_correctives
 from surface.fit.features.rigging import DROOP, DROOP_RULE
 from surface.fit.features.wrinkles import add_wrinkles
 from surface.fit.points.recipe import Recipe
@@ -30,7 +30,7 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     names = tuple(p.name for p in head.parts)
     contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names)
     parts = [wrinkled if p is face else p for p in head.parts]
-    head = add_mends(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.mends)
+    head = add_correctives(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.mends)
     for _ in range(SETTLINGS):
         head = _settled(head)
     return head

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.features.rigging import rigid_fit
+from surface.fit.points.lid_seating import fit_sphere
 from surface.fit.points.recipe import PartRecipe
-from surface.fit.points.refine import Wish
-from surface.fit.points.seat import fit_sphere
+from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
 from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island, find_islands
@@ -199,11 +199,11 @@ def _part(
     mesh: FitMesh,
 ) -> tuple[PartRecipe, list[Island]]:  # fmt: skip
     face = name == "face"
-    wish = Wish(points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, finest=FINEST,
+    request = FitRequest(points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, finest=FINEST,
                 growth=GROWTH if face else 1.25)  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth
-    recipe = PartRecipe(name, material, "skin", [], wish, budget, doubt_slivers=True)
+    recipe = PartRecipe(name, material, "skin", [], request, budget, doubt_slivers=True)
     return recipe, [open_flat_holes(i) for i in lay_out(mesh, islands)]
 
 

@@ -59,8 +59,8 @@ def teeth_part(mesh: FitMesh, part: PartRecipe, body: Body) -> tuple[PartData, P
     low, high = part.vertices[0]
     teeth = split_teeth(mesh, np.flatnonzero((first >= low) & (first < high)))
     chart, crowns = crown_chart(mesh, teeth, part.follows != "jaw")
-    wish = replace(part.wish, points=part.wish.points * len(teeth), coarse=0.4, deepest=2, neutral_mm=0.08)
-    fitted = fit_chart(crowns, chart, wish)
+    request = replace(part.request, points=part.request.points * len(teeth), coarse=0.4, deepest=2, neutral_mm=0.08)
+    fitted = fit_chart(crowns, chart, request)
     return skin_part(part, chart, fitted, body), measure(part.name, chart, fitted, ())
 
 

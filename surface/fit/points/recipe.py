@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.fit.points.refine import Wish
-from surface.fit.points.seat import Eyeball, fit_sphere
+from surface.fit.points.lid_seating import Eyeball, fit_sphere
+from surface.fit.points.refine import FitRequest
 from surface.fit.source.mesh import FitMesh
 
 RECIPES = Path(__file__).parent / "recipes"
@@ -29,7 +29,7 @@ class PartRecipe:
     material: str
     follows: str
     vertices: list[tuple[int, int]]
-    wish: Wish
+    request: FitRequest
     budget: tuple[int, float, int]
     tiled: bool = False
     wrapped: bool = False
@@ -113,8 +113,8 @@ def _read(table: dict[str, Any]) -> Recipe:
 
 
 def _part(t: dict[str, Any]) -> PartRecipe:
-    wish = {k: t[k] for k in ("points", "coarse", "neutral_mm", "shape_mm", "fair", "deepest") if k in t}
+    request = {k: t[k] for k in ("points", "coarse", "neutral_mm", "shape_mm", "fair", "deepest") if k in t}
     return PartRecipe(
         t["name"], t["material"], t.get("follows", "skin"), [tuple(r) for r in t["vertices"]],
-        Wish(**wish), tuple(t["budget"]), wrapped=t.get("wrapped", False),
+        FitRequest(**request), tuple(t["budget"]), wrapped=t.get("wrapped", False),
     )  # fmt: skip

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Wish:
+class FitRequest:
     """What a chart is fitted to.
 
     Attributes
@@ -57,21 +57,23 @@ class Fitted:
     shape_error: NDArray[np.float64]
 
 
-def fit_chart(mesh: FitMesh, chart: Chart, wish: Wish, tell: Callable[[float], None] = lambda _: None) -> Fitted:
+def fit_chart(
+    mesh: FitMesh, chart: Chart, request: FitRequest, tell: Callable[[float], None] = lambda _: None
+) -> Fitted:
     """Control points for neutral and shapes of one chart; ``tell`` hears the fraction done."""
     targets = _targets(mesh, chart.mix)
     slopes = None
     if chart.slopes is not None:
         slopes = chart.slopes, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
-    net = net_at(coarse_places(chart.uv, wish.coarse), wish.coarse, chart.cuts, chart.uv)
+    net = net_at(coarse_places(chart.uv, request.coarse), request.coarse, chart.cuts, chart.uv)
     while True:
         b = basis(net, chart.uv)
-        fitted = _measured(net, b, targets, solve(net, b, chart.weight, targets, wish.fair, slopes))
-        tell(min(1.0, len(net) / wish.points))
-        room = wish.points - len(net)
+        fitted = _measured(net, b, targets, solve(net, b, chart.weight, targets, request.fair, slopes))
+        tell(min(1.0, len(net) / request.points))
+        room = request.points - len(net)
         if room <= 0:
             return fitted
-        net, grown = _grow(net, chart, need(chart, fitted, wish), wish, room)
+        net, grown = _grow(net, chart, need(chart, fitted, request), request, room)
         if not grown:
             return fitted
 
@@ -87,20 +89,20 @@ def _measured(net: Net, b: csr_matrix, targets: NDArray[np.float64], x: NDArray[
     return Fitted(net, x3[:, 0].copy(), x3[:, 1:].transpose(1, 0, 2).copy(), off[:, 0], off[:, 1:].T)
 
 
-def need(chart: Chart, fitted: Fitted, wish: Wish) -> NDArray[np.float64]:
+def need(chart: Chart, fitted: Fitted, request: FitRequest) -> NDArray[np.float64]:
     """(m,) how far each sample is off, 1 = just good enough; the worse of neutral and the worst shape."""
     worst = fitted.shape_error.max(axis=0) if len(fitted.shape_error) else np.zeros_like(fitted.error)
-    return np.minimum(chart.weight, 1.0) * np.maximum(fitted.error / wish.neutral_mm, worst / wish.shape_mm)
+    return np.minimum(chart.weight, 1.0) * np.maximum(fitted.error / request.neutral_mm, worst / request.shape_mm)
 
 
-def _grow(net: Net, chart: Chart, error: NDArray[np.float64], wish: Wish, room: int) -> tuple[Net, bool]:
+def _grow(net: Net, chart: Chart, error: NDArray[np.float64], request: FitRequest, room: int) -> tuple[Net, bool]:
     """Add the most wanted points, at most a share of what stands."""
-    caps = level_caps(wish.finest * chart.spacing, wish.coarse, wish.deepest)
-    places = wanted_places(net, chart.uv, caps, error, wish.coarse)
-    quota = min(room, max(12, int(len(net) * (wish.growth - 1))))
+    caps = level_caps(request.finest * chart.spacing, request.coarse, request.deepest)
+    places = wanted_places(net, chart.uv, caps, error, request.coarse)
+    quota = min(room, max(12, int(len(net) * (request.growth - 1))))
     standing = {tuple(p) for p in net.place.tolist()}
     fresh = np.array([p for p in places.tolist() if tuple(p) not in standing], np.int64).reshape(-1, 4)
-    added = net_at(fresh[: 2 * quota], wish.coarse, chart.cuts, chart.uv)
+    added = net_at(fresh[: 2 * quota], request.coarse, chart.cuts, chart.uv)
     rank = {tuple(p): k for k, p in enumerate(fresh.tolist())}
     chosen = np.argsort([rank[tuple(p)] for p in added.place.tolist()], kind="stable")[:quota]
     return net.joined(Net(*(a[chosen] for a in vars(added).values()))), len(chosen) > 0

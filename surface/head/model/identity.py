@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
-from surface.head.model.beside import Beside, beside, read_beside, write_beside
 from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.sidecar import Sidecar, beside, read_sidecar, write_sidecar
 
 FILE = "identities.npz"
 Arrays = Mapping[str, Array]
@@ -65,10 +65,10 @@ def load_identities(head: str | Path) -> dict[str, Identity]:
     HeadFileError : the file is damaged or of a newer version.
     """
     hint = "make it again: omote fit MESH -o FOLDER --keep --identities FILE"
-    return read_beside(identities_path(head), _identities, hint) or {}
+    return read_sidecar(identities_path(head), _identities, hint) or {}
 
 
-def _identities(kept: Beside) -> dict[str, Identity]:
+def _identities(kept: Sidecar) -> dict[str, Identity]:
     """By name, as a file has them."""
     z = kept.arrays
     names = [str(n) for n in z["names"]]
@@ -124,7 +124,7 @@ def save_identities(head: str | Path, identities: list[Identity]) -> Path:
         for part, changes in identity.changes.items():
             for g in changes:
                 arrays |= {f"{k}/change_ids/{part}/{g.name}": g.ids, f"{k}/change_moves/{part}/{g.name}": g.moves}
-    return write_beside(identities_path(head), arrays)
+    return write_sidecar(identities_path(head), arrays)
 
 
 def identities_path(head: str | Path) -> Path:

@@ -47,8 +47,8 @@ class Pose:
     shapes : (52,) float64, how far each group is moved; lids already follow the gaze.
     jaw : how far the jaw is open, 0..1; closed : how much of that the lips make up for, 0..1.
     head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
-    pushes : by the name of a contact, what moved at it, mm, as :class:`surface.head.posing.contact.Feeler` tells; the
-        part that has the opening fills it in for those that come after it.
+    pushes : by the name of a contact, what moved at it, mm, from
+        :class:`surface.head.posing.contact.ContactSolver`; the part that has the opening fills it in for later parts.
     """
 
     shapes: NDArray[np.float64]

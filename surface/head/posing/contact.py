@@ -40,7 +40,7 @@ FAR_MM = 18.0  # from every sample: points of large spans that stand there would
 LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
 
 
-class Feeler:
+class ContactSolver:
     """Keeps the two sides of one opening apart, and lids off the eyeball, on the part that has the opening.
 
     Parameters
@@ -186,7 +186,7 @@ class Follower:
         self._with = table.reshape(-1, len(self.ids))
 
     def apply(self, push: Floats, points: Floats) -> None:
-        """Add what :meth:`Feeler.apply` asks of control points (n, 3)."""
+        """Add what :meth:`ContactSolver.apply` asks of control points (n, 3)."""
         for k, asked in enumerate(push.reshape(-1, len(self._with))):
             move_points(self.ids, asked, self._with, self.eye, self.radius, k == 1, points)
 

@@ -15,7 +15,7 @@ from surface.head.model.identity import load_identities, with_identities
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.parameters import NAMES, read_pose, rotation
 from surface.head.model.rules import Drivers
-from surface.head.posing.lean import apply_lean, read_lean
+from surface.head.posing.decimation import apply_decimated, read_decimated
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
 from surface.head.posing.seams import Zipper
@@ -64,7 +64,7 @@ class Head:
             data = with_identities(data, load_identities(path), identity, str(path))
         head = cls(data, str(path))
         apply_shade(head.parts, read_shade(path, head.parts))
-        apply_lean(head.parts, read_lean(path, head.parts))
+        apply_decimated(head.parts, read_decimated(path, head.parts))
         return head
 
     @property

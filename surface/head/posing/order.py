@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.errors import HeadFileError
-from surface.head.model.beside import Beside
+from surface.head.model.sidecar import Sidecar
 from surface.head.posing.part import HeadPart
 
 STEPS = 1 << 14  # of u and v per unit
@@ -32,7 +32,7 @@ def checksums(parts: Iterable[HeadPart]) -> dict[str, int]:
     return {part.name: checksum(part.mesh.triangles, part.mesh.uv) for part in parts}
 
 
-def belonging(kept: Beside, parts: Iterable[HeadPart]) -> dict[str, NDArray[Any]]:
+def belonging(kept: Sidecar, parts: Iterable[HeadPart]) -> dict[str, NDArray[Any]]:
     """The arrays of a file that belong to these parts as they are tessellated.
 
     A part that is tessellated anew when the head is loaded, for another budget, loses its arrays: they were made for

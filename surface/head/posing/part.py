@@ -38,7 +38,7 @@ class HeadPart:
     vertices, normals : (m, 3) float32, current, in head space including the head's rotation.
     changed : vertex ranges [start, stop) that the last pose touched.
     attributes : static per-vertex arrays (m, k) float32 by name.
-    lean : fewer triangles over the same vertices, by level; see :mod:`surface.head.posing.lean`.
+    decimated : fewer triangles over the same vertices, by level; see :mod:`surface.head.posing.decimation`.
     borders : (k, 2) directed edges that only one triangle of the tessellation has.
     surface : the DCP surface at rest. mesh : its tessellation.
     stored : was the tessellation kept in the head's file? Else it was made when the head was loaded.
@@ -54,7 +54,7 @@ class HeadPart:
         self.vertices = np.array(mesh.vertices, np.float32)
         self.normals = np.array(mesh.normals, np.float32)
         self.attributes = dict(attributes)
-        self.lean: dict[str, NDArray[np.int32]] = {}
+        self.decimated: dict[str, NDArray[np.int32]] = {}
         self.borders = border_edges(self.triangles)
         self.changed: list[tuple[int, int]] = [(0, len(self.vertices))]
         self._turn = Turn(np.eye(3), (0.0, 0.0, 0.0))

@@ -9,7 +9,7 @@ from surface.head.model.data import HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers
-from surface.head.posing.contact import LID_MM, Feeler, Follower, Lining
+from surface.head.posing.contact import LID_MM, ContactSolver, Follower, Lining
 from surface.head.posing.kernels import keep_on_eyeball, mix_rows, swing_jaw
 from surface.head.posing.moves import Moves
 
@@ -140,12 +140,12 @@ def optical_axis(gaze: Floats) -> Floats:
     return np.ascontiguousarray(rotation(*gaze)[:, 2])
 
 
-def _contacts(part: PartData, head: HeadData) -> tuple[list[Feeler], list[tuple[str, Follower]]]:
+def _contacts(part: PartData, head: HeadData) -> tuple[list[ContactSolver], list[tuple[str, Follower]]]:
     """What keeps the part's own openings from crossing, and what moves its points with other parts' openings."""
     feelers, followers = [], []
     for contact in head.contacts:
         if contact.part == part.name:
-            feelers.append(Feeler(contact, part, make_surface(part), head))
+            feelers.append(ContactSolver(contact, part, make_surface(part), head))
         elif part.name in contact.followers:
             opening = next(p for p in head.parts if p.name == contact.part)
             follower = Follower(contact, part.points, make_surface(opening), head)

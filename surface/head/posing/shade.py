@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.head.model.beside import beside, read_beside, write_beside
+from surface.head.model.sidecar import beside, read_sidecar, write_sidecar
 from surface.head.posing.order import belonging, checksums
 from surface.head.posing.part import HeadPart
 
@@ -37,7 +37,7 @@ def read_shade(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, ND
     """
     path = shade_path(head)
     hint = f"delete {path}, or make the head again: omote fit"
-    return read_beside(path, lambda kept: {k: _rows(v) for k, v in belonging(kept, parts).items()}, hint) or {}
+    return read_sidecar(path, lambda kept: {k: _rows(v) for k, v in belonging(kept, parts).items()}, hint) or {}
 
 
 def write_shade(head: str | Path, shares: Shares, parts: Iterable[HeadPart] = ()) -> Path:
@@ -45,7 +45,7 @@ def write_shade(head: str | Path, shares: Shares, parts: Iterable[HeadPart] = ()
     packed = {
         name: np.rint(np.clip(np.squeeze(share), 0.0, 1.0) * 255.0).astype(np.uint8) for name, share in shares.items()
     }
-    return write_beside(shade_path(head), packed, checksums(parts))
+    return write_sidecar(shade_path(head), packed, checksums(parts))
 
 
 def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:

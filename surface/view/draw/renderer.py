@@ -24,7 +24,7 @@ from surface.view.scene.theme import THEMES, Colour, Light, Theme
 if TYPE_CHECKING:
     import moderngl
 
-    from surface.view.draw.leandraw import LeanDrawn
+    from surface.view.draw.decimated_draw import DecimatedDrawn
 
 QUALITIES = ("full", "fast")
 _LOW_DEG = -12.0  # from further below, as from behind, the bust is seen to be hollow
@@ -73,7 +73,7 @@ class Renderer:
         self._hurried = False
         self._posed = np.zeros(len(head.parameters))
         self._static: dict[str, materials.Arrays] = {part.name: self._shown(part) for part in parts}
-        self._parts: list[PartBuffers] | list[LeanDrawn] = [self._buffers(part) for part in parts]
+        self._parts: list[PartBuffers] | list[DecimatedDrawn] = [self._buffers(part) for part in parts]
         self._camera: tuple[Camera, float] | None = None
         self._into_bust = False
         #: Grows with every upload: equal revisions, cameras and themes draw equal pictures.
@@ -102,21 +102,24 @@ class Renderer:
         for buffers in self._parts:
             buffers.release()
         old.release()
-        self._parts = self._lean_parts() or [self._buffers(buffers.part) for buffers in self._parts]
+        self._parts = self._decimated_parts() or [self._buffers(buffers.part) for buffers in self._parts]
         self._camera = None
         self._apply_theme()
 
-    def _lean_parts(self) -> list[LeanDrawn]:
-        """The head's lean triangles, evaluated for themselves; none where it has none."""
-        if not any(getattr(part, "lean", None) for part in self.head.parts):
+    def _decimated_parts(self) -> list[DecimatedDrawn]:
+        """The head's decimated triangles, evaluated for themselves; none where it has none."""
+        if not any(getattr(part, "decimated", None) for part in self.head.parts):
             return []
-        from surface.view.draw.leandraw import LeanEvaluator, lean_drawn  # compiled: loaded when first used
+        from surface.view.draw.decimated_draw import (  # compiled: loaded when first used
+            DecimatedEvaluator,
+            decimated_drawn,
+        )
 
-        lean: Any = LeanEvaluator(self.head, self.quality, self.openings, self.evaluator.reason)  # type: ignore[arg-type]
-        lean.pose(self._posed)
-        self.evaluator = lean
-        self.openings.read_by(lean.positions)
-        return lean_drawn(self.ctx, lean.lean, self._programs, lambda part: self._static[part.name])
+        decimated: Any = DecimatedEvaluator(self.head, self.quality, self.openings, self.evaluator.reason)  # type: ignore[arg-type]
+        decimated.pose(self._posed)
+        self.evaluator = decimated
+        self.openings.read_by(decimated.positions)
+        return decimated_drawn(self.ctx, decimated.decimated, self._programs, lambda part: self._static[part.name])
 
     def pose(self, values: np.ndarray) -> None:
         """Move the head to parameter values (P,)."""
@@ -167,7 +170,7 @@ class Renderer:
         """Change the gradient; sRGB colours 0..1."""
         self.theme = replace(self.theme, background_top=top, background_bottom=bottom)
 
-    def _draw_part(self, buffers: PartBuffers | LeanDrawn) -> None:
+    def _draw_part(self, buffers: PartBuffers | DecimatedDrawn) -> None:
         """One part with its material's uniforms and culling."""
         part = buffers.part
         material = materials.of(part.material)

@@ -50,7 +50,7 @@ import json
 
 import numpy as np
 from controller.face.face import HeadValues
-from controller.face.handling import Screen
+from controller.face.point_editing import Screen
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.stage.stage import FaceSettings, load_stage
@@ -64,8 +64,8 @@ told, frames = {}, [0]
 
 
 class Body:
-    def tell(self, wish):
-        told[P.names[wish.index]] = wish.value
+    def tell(self, request):
+        told[P.names[request.index]] = request.value
 
 
 with Mailbox.create(len(P)) as mailbox:

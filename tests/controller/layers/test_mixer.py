@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS as P
-from controller.layers.layers import default_layers
 from controller.layers.mixer import LayerSettings, Mixer
+from controller.layers.settings import default_layers
 
 JAW, SMILE, BROW = P.index("jawOpen"), P.index("mouthSmileLeft"), P.index("browInnerUp")
 

@@ -26,7 +26,7 @@ from controller.robot.channels import build_table
 from controller.robot.mirror import Mirror
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
-from controller.tools.checking import check_anything
+from controller.tools.check import check_anything
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 

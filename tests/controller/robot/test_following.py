@@ -16,10 +16,10 @@ from controller.body.body import Body
 from controller.layers.commands import CommandState
 from controller.links.line.session import LineSession
 from controller.robot.channels import build_table
-from controller.robot.following import Following, Puppet, Reflection, regions_of
+from controller.robot.following import Following, FollowMode, MeasuredFace, regions_of
 from controller.robot.robot import load_robot
 from controller.stage.stage import load_stage
-from controller.tools.session import Session
+from controller.tools.stage_run import StageRun
 from drivers.base.bus import BusState
 from drivers.sim import SimulatedBus
 
@@ -50,7 +50,7 @@ def test_a_puppet_writes_what_its_channels_show_and_leaves_the_rest() -> None:
     face[P.index("jawOpen")] = 0.7
     state, out = CommandState(P), P.neutral()
     angles = table.angles(face)[0]
-    puppet = Puppet(Reflection([table], [lambda: measured(angles, np.ones(len(angles), bool))], P), P)
+    puppet = FollowMode(MeasuredFace([table], [lambda: measured(angles, np.ones(len(angles), bool))], P), P)
     for i in range(100):
         puppet.tick(state, i * 10_000_000)
         state.tick(i * 10_000_000, 0.01, out)
@@ -64,7 +64,7 @@ def test_a_head_that_was_not_read_yet_moves_nothing() -> None:
     state, out = CommandState(P), P.neutral()
     silent = measured(np.full(24, np.nan), np.zeros(24, bool))
     for read in (lambda: None, lambda: silent):
-        Puppet(Reflection([table], [read], P), P).tick(state, 0)
+        FollowMode(MeasuredFace([table], [read], P), P).tick(state, 0)
         state.tick(10_000_000, 0.01, out)
         assert not out.any()
 
@@ -76,7 +76,7 @@ def test_a_driven_head_says_what_it_shows_and_how_far_each_region_is_away() -> N
     there[table.names.index("jawOpen")] += np.radians(8.0)
     state = measured(there, np.ones(24, bool))
     following = Following(table.names, regions_of(table, P))
-    reflection = Reflection([table], [lambda: state], P, [following])
+    reflection = MeasuredFace([table], [lambda: state], P, [following])
     assert reflection.status() == {"away_deg": "unknown"}
     following.note(wanted, state)
     away = reflection.differences()
@@ -121,4 +121,4 @@ def test_a_limp_head_moved_by_hand_moves_the_face(tmp_path: Path, root: Path) ->
 
 def test_a_stage_without_a_robot_has_nothing_to_mirror() -> None:
     with pytest.raises(ConfigError, match="nothing to mirror"):
-        Session.load("serial", mirror=True)
+        StageRun.load("serial", mirror=True)

@@ -11,7 +11,7 @@ import pytest
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS
 from controller.takes.reader import TAKES, load_take, reader_of
-from controller.tools.exporting import EXPORTERS
+from controller.tools.export import EXPORTERS
 from controller.tools.plugins import SORTS, listed
 from drivers import open_bus
 from drivers.base.bus import ServoSpec

@@ -50,7 +50,7 @@ def test_the_current_folder_is_named_where_the_parent_looks_there(monkeypatch: p
 
 def test_a_package_that_was_found_in_another_way_comes_last(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", ["/somewhere"])
-    assert module_path("drivers.core.keeper") == ["/somewhere", str(root)]
+    assert module_path("drivers.core.dead_man_switch") == ["/somewhere", str(root)]
 
 
 def test_a_bare_child_hears_nothing_of_how_python_shall_run(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,7 +62,7 @@ def test_short_turns_are_asked_for_instead(monkeypatch: pytest.MonkeyPatch) -> N
     taken, told = in_thread(turn)
     turns = [line.split(":")[1].strip() for line in told.splitlines() if line.startswith("se.slice")]
     if not taken or not turns:
-        pytest.skip("this kernel has no such wish, or does not show it")
+        pytest.skip("this kernel has no such request, or does not show it")
     assert turns == ["100000"]
 
 

@@ -69,13 +69,13 @@ class TestDynamixelOfBothProtocols(Family):
     STEP_RAD = np.deg2rad(300) / 1024
 
 
-def test_simulated_servos_come_with_the_driver_and_need_no_keeper() -> None:
+def test_simulated_servos_come_with_the_driver_and_need_no_dead_man_switch() -> None:
     servos = servos_of(*("sts3215",) * 3)
     with open_bus("simulated", servos, simulates="feetech", margin_s=0.5) as bus:
         bus.start()
         settle(bus, [0.2, -0.3, 0.5])
         assert [info.model for info in bus.discover([1, 7])] == ["sts3215"] * 2
-        assert bus._keeper is None
+        assert bus._switch is None
 
 
 def test_everybody_is_found_when_nobody_is_named() -> None:

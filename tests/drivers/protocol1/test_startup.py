@@ -321,7 +321,7 @@ def test_17_a_position_outside_one_turn_is_never_a_goal(
 
 @pytest.mark.parametrize(("model", "how"), [("sts3215", "SIGTERM"), ("ax-12a", "SIGKILL")])
 def test_3_every_way_out_switches_all_servos_off(model: str, how: str) -> None:
-    """A keeper sees to it where the program cannot: these servos have no watchdog."""
+    """A switch sees to it where the program cannot: these servos have no watchdog."""
     servos = servos_of(model)
     with SimulatedBus(servos) as wire, program(kind_of(model), servos, wire.path, margin_s=0.5) as child:
         assert child.pid is not None

@@ -132,12 +132,12 @@ def test_a_slit_opens_on_one_side_only() -> None:
 
 def test_without_normals(sheet: tuple[DCPSurface, Mesh]) -> None:
     surface, mesh = sheet
-    full, lean = surface.deformation(mesh), surface.deformation(mesh, normals=False)
-    for deformation in (full, lean):
+    full, decimated = surface.deformation(mesh), surface.deformation(mesh, normals=False)
+    for deformation in (full, decimated):
         deformation.move([10, 20], [[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]])
-    assert np.allclose(full.vertices, lean.vertices, rtol=0, atol=1e-6 * SIZE)
-    assert lean.normals.shape == (0, 3)
-    assert lean.nbytes < 0.45 * full.nbytes
+    assert np.allclose(full.vertices, decimated.vertices, rtol=0, atol=1e-6 * SIZE)
+    assert decimated.normals.shape == (0, 3)
+    assert decimated.nbytes < 0.45 * full.nbytes
 
 
 def test_ids_that_stand_twice_move_twice(sheet: tuple[DCPSurface, Mesh]) -> None:

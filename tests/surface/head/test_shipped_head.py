@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from surface.head import Head
-from surface.head.model.beside import read_beside
-from surface.head.posing.lean import LEVELS
+from surface.head.model.sidecar import read_sidecar
+from surface.head.posing.decimation import LEVELS
 from surface.head.posing.order import checksums
 from surface.head.posing.shade import read_shade
 from surface.view.draw import materials
@@ -33,12 +33,12 @@ def test_every_part_has_its_baked_shade(head: Head, folder: Path) -> None:
     assert skins <= {name.split("/")[0] for name in shares if name.endswith("/visible")}
 
 
-@pytest.mark.parametrize("file", ["occlusion.npz", "lean.npz"])
+@pytest.mark.parametrize("file", ["occlusion.npz", "decimated.npz"])
 def test_files_beside_it_say_which_tessellation_they_are_for(head: Head, folder: Path, file: str) -> None:
-    assert read_beside(folder / file, lambda kept: kept.checks, "") == checksums(head.parts)
+    assert read_sidecar(folder / file, lambda kept: kept.checks, "") == checksums(head.parts)
 
 
 def test_every_part_has_its_lean_triangles(head: Head) -> None:
     for part in head.parts:
-        assert part.lean.keys() == set(LEVELS), part.name
-        assert len(part.triangles) > len(part.lean["full"]) >= len(part.lean["fast"]), part.name
+        assert part.decimated.keys() == set(LEVELS), part.name
+        assert len(part.triangles) > len(part.decimated["full"]) >= len(part.decimated["fast"]), part.name

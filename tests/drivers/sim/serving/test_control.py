@@ -23,18 +23,18 @@ def chain() -> SimulatedChain:
 
 def test_faults_are_set_listed_and_cleared(chain: SimulatedChain):
     commands = Commands(chain)
-    assert commands.obey("fault mute:1 crc:2:every=3") == "ok"
-    assert commands.obey("faults") == "ok mute:1 crc:2:every=3"
-    assert commands.obey("clear mute") == "ok"
+    assert commands.handle("fault mute:1 crc:2:every=3") == "ok"
+    assert commands.handle("faults") == "ok mute:1 crc:2:every=3"
+    assert commands.handle("clear mute") == "ok"
     assert [fault.kind for fault in chain.faults.active] == ["crc"]
-    assert commands.obey("clear") == "ok"
-    assert commands.obey("faults") == "ok"
+    assert commands.handle("clear") == "ok"
+    assert commands.handle("faults") == "ok"
 
 
 def test_servos_and_a_hand(chain: SimulatedChain):
     commands = Commands(chain)
-    assert commands.obey("place 1 1500") == "ok"
-    answer = commands.obey("servos")
+    assert commands.handle("place 1 1500") == "ok"
+    answer = commands.handle("servos")
     first, second = json.loads(answer.removeprefix("ok "))
     assert first == {"id": 1, "model": "xl330-m288", "position": 1500, "goal": 2048, "torque": False, "error": 0}
     assert (second["model"], second["position"]) == ("xl320", 512)
@@ -53,7 +53,7 @@ def test_servos_and_a_hand(chain: SimulatedChain):
     ],
 )
 def test_bad_lines_are_answered_with_the_reason(chain: SimulatedChain, line: str, why: str):
-    answer = Commands(chain).obey(line)
+    answer = Commands(chain).handle(line)
     assert answer.startswith("error ")
     assert why in answer
     assert "\n" not in answer

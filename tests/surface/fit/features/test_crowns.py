@@ -3,7 +3,7 @@
 import numpy as np
 
 from surface.fit.features.crowns import GRID, crown_chart, split_teeth
-from surface.fit.points.refine import Wish, fit_chart
+from surface.fit.points.refine import FitRequest, fit_chart
 from surface.fit.points.solve import basis
 from surface.fit.source.mesh import FitMesh
 
@@ -42,14 +42,14 @@ def test_samples_lie_on_the_tooth_and_the_patch_follows():
     local = crowns.vertices.reshape(3, -1, 3) - centres[:, None]
     off = np.abs(((local / RADII) ** 2).sum(axis=2) - 1)
     assert np.quantile(off, 0.97) < 0.06  # the egg is open at its root, where rays find nothing
-    fit = fit_chart(crowns, chart, Wish(120, coarse=0.4, deepest=1, neutral_mm=0.1))
+    fit = fit_chart(crowns, chart, FitRequest(120, coarse=0.4, deepest=1, neutral_mm=0.1))
     assert np.sqrt((fit.error**2).mean()) < 0.25
 
 
 def test_crowns_face_outwards():
     mesh = two_teeth()
     chart, crowns = crown_chart(mesh, split_teeth(mesh, np.arange(len(mesh.faces)))[:1], upper=True)
-    net = fit_chart(crowns, chart, Wish(40, coarse=0.4, deepest=1))
+    net = fit_chart(crowns, chart, FitRequest(40, coarse=0.4, deepest=1))
     at, d = np.array([[0.5, 0.5]]), 1e-4
     steps = np.array([[d, 0]]), np.array([[0, d]])
     u, v = ((basis(net.net, at + s) - basis(net.net, at - s)) @ net.points for s in steps)
@@ -78,5 +78,5 @@ def test_samples_are_even_and_miss_no_thin_edge():
     edge = np.column_stack([np.tile(np.linspace(-4, 4, 33), 2), np.full(66, -16.0), np.repeat([-0.4, 0.4], 33)])
     assert np.linalg.norm(grid.reshape(-1, 1, 3) - edge, axis=2).min(axis=0).max() < 0.6
     assert -8.0 < grid[..., 1].max() <= -6.0  # the crown ends 10 mm above its tip
-    fit = fit_chart(crowns, chart, Wish(96, coarse=0.4, deepest=2, neutral_mm=0.08))
+    fit = fit_chart(crowns, chart, FitRequest(96, coarse=0.4, deepest=2, neutral_mm=0.08))
     assert np.quantile(fit.error, 0.99) < 0.5

@@ -79,7 +79,7 @@ def test_one_skin_for_face_and_back_gets_points_by_its_area():
     around = {n: np.array([0, 0, 1.0]) * (np.abs(mesh.vertices[:, :1] - x) < 12) for n, x in EYES.items()}
     mesh = mesh.with_shapes(tuple(around), np.stack(list(around.values())))
     (small, _), (large, _) = (make_plan(replace(mesh, vertices=mesh.vertices * [1, k, 1])).parts[0] for k in (1, 6))
-    assert (small.wish.points, large.wish.points) == (POINTS, pytest.approx(1.85 * POINTS, rel=0.05))
+    assert (small.request.points, large.request.points) == (POINTS, pytest.approx(1.85 * POINTS, rel=0.05))
 
 
 def test_what_hardly_moves_is_the_back():

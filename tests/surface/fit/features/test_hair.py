@@ -5,7 +5,7 @@ import pytest
 from slit_sheet import slit_sheet
 
 from surface.fit.features.hair import ROOT_MM, Skin, brow_strip, fit_strip, lash_strip
-from surface.fit.points.refine import Wish, fit_chart
+from surface.fit.points.refine import FitRequest, fit_chart
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
 
@@ -14,7 +14,7 @@ from surface.fit.source.islands import find_islands
 def skin() -> Skin:
     mesh = slit_sheet()
     chart = make_chart(mesh, find_islands(mesh), normalise=False)
-    return Skin(fit_chart(mesh, chart, Wish(250, coarse=0.2)))
+    return Skin(fit_chart(mesh, chart, FitRequest(250, coarse=0.2)))
 
 
 def ends(strip, v: float) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from slit_sheet import ROW, N, slit_sheet
 
-from surface.fit.points.refine import Fitted, Wish, fit_chart
+from surface.fit.points.refine import FitRequest, Fitted, fit_chart
 from surface.fit.points.solve import basis, fairness
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
@@ -14,7 +14,7 @@ from surface.fit.source.islands import find_islands
 def fitted() -> tuple:
     mesh = slit_sheet()
     chart = make_chart(mesh, find_islands(mesh), normalise=False)
-    return mesh, chart, fit_chart(mesh, chart, Wish(500, coarse=0.2, neutral_mm=0.05, shape_mm=0.05))
+    return mesh, chart, fit_chart(mesh, chart, FitRequest(500, coarse=0.2, neutral_mm=0.05, shape_mm=0.05))
 
 
 def rms(e: np.ndarray) -> float:
@@ -30,7 +30,7 @@ def test_neutral_and_shapes_are_met(fitted):
 
 def test_more_points_fit_better(fitted):
     mesh, chart, fine = fitted
-    coarse = fit_chart(mesh, chart, Wish(90, coarse=0.2, neutral_mm=0.05, shape_mm=0.05))
+    coarse = fit_chart(mesh, chart, FitRequest(90, coarse=0.2, neutral_mm=0.05, shape_mm=0.05))
     assert len(coarse.net) < len(fine.net)
     assert rms(coarse.shape_error[0]) > 1.5 * rms(fine.shape_error[0])
 
@@ -57,6 +57,6 @@ def test_fairness_vanishes_for_a_point_cloud_in_one_place(fitted):
 def test_progress_never_falls(fitted):
     mesh, chart, _ = fitted
     heard: list[float] = []
-    result = fit_chart(mesh, chart, Wish(120, coarse=0.25), heard.append)
+    result = fit_chart(mesh, chart, FitRequest(120, coarse=0.25), heard.append)
     assert isinstance(result, Fitted)
     assert heard == sorted(heard) and heard[-1] <= 1.0

@@ -65,9 +65,11 @@ def test_a_sheet_without_height_keeps_its_direction():
 
 def test_slits_lie_along_u_on_a_lopsided_mesh():
     mesh = slit_sheet()
-    lean = mesh.vertices + np.column_stack([0.15 * mesh.vertices[:, 1], 0 * mesh.uv[:, 0], 0.3 * mesh.vertices[:, 0]])
+    decimated = mesh.vertices + np.column_stack(
+        [0.15 * mesh.vertices[:, 1], 0 * mesh.uv[:, 0], 0.3 * mesh.vertices[:, 0]]
+    )
     c, s = np.cos(0.8), np.sin(0.8)
-    turned = replace(mesh, vertices=lean, uv=mesh.uv @ np.array([[c, -s], [s, c]]).T)
+    turned = replace(mesh, vertices=decimated, uv=mesh.uv @ np.array([[c, -s], [s, c]]).T)
     (island,) = lay_out(turned, find_islands(turned))
     slit = island.uv[boundary_loops(island)[1]]
     assert np.ptp(slit[:, 1]) < 0.2 * np.ptp(slit[:, 0])

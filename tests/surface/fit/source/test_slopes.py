@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from slit_sheet import SIZE_MM, N, slit_sheet
 
-from surface.fit.points.refine import Wish, fit_chart
+from surface.fit.points.refine import FitRequest, fit_chart
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.mesh import FitMesh
@@ -67,5 +67,5 @@ def test_a_sliver_in_uv_raises_no_spike():
     worst = []
     for doubt in (True, False):
         chart = make_chart(mesh, find_islands(mesh), normalise=False, doubt_slivers=doubt)
-        worst.append(fit_chart(mesh, chart, Wish(200, coarse=0.2)).error.max())
+        worst.append(fit_chart(mesh, chart, FitRequest(200, coarse=0.2)).error.max())
     assert worst[0] < 1.0 < 3.0 < worst[1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from surface.fit.features.joins import find_seams
-from surface.fit.points.refine import Wish, fit_chart
+from surface.fit.points.refine import FitRequest, fit_chart
 from surface.fit.points.solve import basis
 from surface.fit.source.islands import Island
 from surface.fit.source.mesh import FitMesh
@@ -33,7 +33,7 @@ def body() -> tuple[FitMesh, list[Island]]:
 def wrapped():
     mesh, islands = body()
     chart = wrap_chart(mesh, islands)
-    return mesh, chart, fit_chart(mesh, chart, Wish(160, coarse=0.2))
+    return mesh, chart, fit_chart(mesh, chart, FitRequest(160, coarse=0.2))
 
 
 def test_samples_are_mixes_of_vertices_on_the_skin(wrapped):

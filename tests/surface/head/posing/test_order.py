@@ -12,7 +12,7 @@ from small_head import small_head
 from surface.base.errors import HeadFileError
 from surface.head import Head, HeadData, save_data
 from surface.head.model.meshes import make_surface, pack, tessellate
-from surface.head.posing import lean, shade
+from surface.head.posing import decimation, shade
 from surface.head.posing.order import checksum
 
 
@@ -31,19 +31,19 @@ def with_meshes(turned: bool = False) -> HeadData:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A head with shade and lean triangles of part "a" beside it."""
+    """A head with shade and decimated triangles of part "a" beside it."""
     save_data(tmp_path, with_meshes())
     head = Head.load(tmp_path)
     half = np.full((len(head.part("a").vertices), 1), 0.5)
     shade.write_shade(tmp_path, {"a": half, "a/thin": half}, head.parts)
-    lean.write_lean(tmp_path, head.parts, {"a/fast": head.part("a").triangles[::2]})
+    decimation.write_decimated(tmp_path, head.parts, {"a/fast": head.part("a").triangles[::2]})
     return tmp_path
 
 
 def shaded(head: Head) -> bool:
     """Does part "a" have what stands beside the head?"""
     part = head.part("a")
-    found = ["occlusion" in part.attributes, "thin" in part.attributes, part.lean != {}]
+    found = ["occlusion" in part.attributes, "thin" in part.attributes, part.decimated != {}]
     assert len(set(found)) == 1
     return found[0]
 
@@ -52,10 +52,10 @@ def test_files_are_used_with_the_head_they_were_made_for(folder: Path) -> None:
     assert shaded(Head.load(folder))
 
 
-@pytest.mark.parametrize("file", [shade.FILE, lean.FILE])
+@pytest.mark.parametrize("file", [shade.FILE, decimation.FILE])
 def test_another_order_of_as_many_vertices_is_refused_with_what_to_do(folder: Path, file: str) -> None:
     before = Head.load(folder).part("a")
-    other = lean.FILE if file == shade.FILE else shade.FILE
+    other = decimation.FILE if file == shade.FILE else shade.FILE
     (folder / other).unlink()
     save_data(folder, with_meshes(turned=True))
     with pytest.raises(HeadFileError, match=rf"{file}: was made for another mesh of part 'a'") as caught:
@@ -74,7 +74,7 @@ def test_another_budget_leaves_the_files_out(folder: Path) -> None:
 
 
 def test_older_files_without_checksums_are_read(folder: Path) -> None:
-    for name in (shade.FILE, lean.FILE):
+    for name in (shade.FILE, decimation.FILE):
         with np.load(folder / name) as stored:
             arrays = {k: stored[k] for k in stored.files if not k.startswith("omote/")}
         np.savez_compressed(folder / name, **arrays)

@@ -1,0 +1,249 @@
+"""Points of the face that somebody takes with the mouse: picked on the picture, dragged in the plane of the screen.
+
+Dragging moves parameters; dragging to reshape moves control points of the drawn head, which can be kept as a group
+file. Knows nothing of the window library.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.base.parameters import Floats, Parameters
+from controller.robot.anchors import Skin, head_order, sample_skin, shapes_of, skin_points
+from controller.stage.inverse import PointSolver, Sculpted, SculptSolver, save_group
+from surface.head import Head
+from surface.head.model.parameters import read_pose, rotation
+from surface.view.scene.camera import Camera
+
+PART = "face"
+_POINTS = 900
+_SEED = 11
+_PICK_PIXELS, _HIDING_PIXELS, _HIDDEN_MM = 16.0, 48.0, 40.0
+_SPARSITY = 1.5  # a hand moves few things at a time
+_KEPT, _KEPT_MM, _KEPT_WEIGHT = 24, 30.0, 0.4
+_CHANGED = 0.004
+
+
+@dataclass(frozen=True)
+class Screen:
+    """Where the picture stands: its camera and its size (width, height) in pixels."""
+
+    camera: Camera
+    size: tuple[float, float]
+
+    def project(self, places: Floats) -> Floats:
+        """(m, 3) pixel x, pixel y and depth of places (m, 3) mm."""
+        clip = np.column_stack([places, np.ones(len(places))]) @ self._matrix.T
+        x, y = clip[:, 0] / clip[:, 3], clip[:, 1] / clip[:, 3]
+        return np.column_stack([(x + 1) / 2 * self.size[0], (1 - y) / 2 * self.size[1], clip[:, 3]])
+
+    def place(self, pixel: tuple[float, float], beside: Floats) -> Floats:
+        """(3,) mm: what lies under a pixel, as deep in the picture as the place ``beside`` : (3,)."""
+        clip = self._matrix @ np.append(beside, 1.0)
+        clip[0] = (2 * pixel[0] / self.size[0] - 1) * clip[3]
+        clip[1] = (1 - 2 * pixel[1] / self.size[1]) * clip[3]
+        found = np.linalg.solve(self._matrix, clip)
+        point: Floats = found[:3] / found[3]
+        return point
+
+    @property
+    def _matrix(self) -> Floats:
+        return self.camera.matrix(self.size[0] / self.size[1]).astype(np.float64)
+
+
+class _Model:
+    """What is asked of a head once: some points of its skin, how shapes move them, and how control points do."""
+
+    def __init__(self, head: Head, parameters: Parameters) -> None:
+        part = head.part(PART)
+        self.order = head_order(head.parameters, parameters)
+        self.skin = sample_skin(head, PART, skin_points(head, PART, _POINTS, _SEED))
+        self.basis = part.surface.basis_matrix(self.skin.uv)
+        along_u, along_v = part.surface.derivatives(self.skin.uv)[1:]
+        normals = np.cross(along_u, along_v)
+        self.normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+        if self.normals[np.argmax(self.skin.rest[:, 2]), 2] < 0.0:
+            self.normals = -self.normals
+        self.reshaper = SculptSolver(head, PART)
+        self.pivot = np.array(head.data.neck.pivot)
+
+
+class PointEditor:
+    """Takes points of a head in a picture and drags them.
+
+    What it has to know of the head it asks a copy of it, in a thread of its own, once somebody wants to take a point.
+
+    Parameters
+    ----------
+    head : the head that is drawn; reshaping moves its control points. copy : loads the same head again.
+
+    Attributes
+    ----------
+    ready : whether points can be taken. reshaped : whether control points were moved.
+    """
+
+    def __init__(self, head: Head, copy: Callable[[], Head], parameters: Parameters) -> None:
+        self._head, self._parameters = head, parameters
+        self._rest = head.part(PART).rig.rest.copy()  # type: ignore[attr-defined]
+        self._moves = np.zeros_like(self._rest)
+        self._before = self._moves
+        self._model: _Model | None = None
+        self._held: _PointDrag | _SculptDrag | None = None
+        self._thread = threading.Thread(target=self._prepare, args=(copy,), name="handles", daemon=True)
+
+    @property
+    def ready(self) -> bool:
+        """Whether points can be taken."""
+        return self._model is not None
+
+    @property
+    def holding(self) -> bool:
+        """Whether a point is held."""
+        return self._held is not None
+
+    @property
+    def reshaped(self) -> bool:
+        """Whether control points were moved."""
+        return bool(self._moves.any())
+
+    def prepare(self) -> None:
+        """Begin to get ready; may be called again."""
+        if self._thread.ident is None:
+            self._thread.start()
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until points can be taken; False if they cannot by then."""
+        self.prepare()
+        self._thread.join(seconds)
+        return self.ready
+
+    def take(self, pixel: tuple[float, float], screen: Screen, values: Floats, *, reshape: bool = False) -> bool:
+        """Take the point of the skin under a pixel; False when there is none.
+
+        Parameters
+        ----------
+        values : (P,) what the face shows. reshape : move control points instead of parameters.
+        """
+        model = self._model
+        if model is None:
+            return False
+        places, turn = self._places(model, values)
+        shown = screen.project(places)
+        towards = np.einsum("mc,mc->m", model.normals @ turn.T, np.array(screen.camera.eye) - places) > 0.0
+        away = np.hypot(shown[:, 0] - pixel[0], shown[:, 1] - pixel[1]) + np.where(towards, 0.0, np.inf)
+        first = np.min(shown[away < _HIDING_PIXELS, 2], initial=np.inf)
+        point = int(np.argmin(np.where(shown[:, 2] < first + _HIDDEN_MM, away, np.inf)))
+        if away[point] > _PICK_PIXELS:
+            return False
+        offset = places[point] - screen.place(pixel, places[point])
+        self._held = _SculptDrag(model, point, places[point], offset) if reshape else _PointDrag(
+            model, point, places[point], offset, self._parameters, values, self._moved_by_hand(model)
+        )  # fmt: skip
+        return True
+
+    def drag(self, pixel: tuple[float, float], screen: Screen, values: Floats) -> dict[int, float]:
+        """Move the held point under a pixel; parameters and the values they have to be held at."""
+        held, model = self._held, self._model
+        if held is None or model is None:
+            return {}
+        wanted = screen.place(pixel, held.place) + held.offset
+        turn = _turn(values[model.order])
+        local = model.pivot + turn.T @ (wanted - model.pivot)
+        if isinstance(held, _PointDrag):
+            return held.solve(local)
+        ids, moves = held.solve(turn.T @ (wanted - held.place))
+        self._shape(self._before + _spread(ids, moves, len(self._rest)))
+        return {}
+
+    def release(self) -> None:
+        """Let go; what was reshaped stays."""
+        self._held, self._before = None, self._moves
+
+    def undo(self) -> None:
+        """Take back everything that was reshaped."""
+        self._shape(np.zeros_like(self._rest))
+        self._held, self._before = None, self._moves
+
+    def save(self, path: Path, name: str) -> None:
+        """Keep what was reshaped as a group file; a stage wears it with ``groups``. Raises OSError."""
+        ids = np.flatnonzero(np.linalg.norm(self._moves, axis=1) >= 0.01).astype(np.int32)
+        save_group(path, name, Sculpted(PART, ids, self._moves[ids]))
+
+    def _shape(self, moves: Floats) -> None:
+        self._moves = moves
+        rig = self._head.part(PART).rig  # type: ignore[attr-defined]
+        np.add(self._rest, moves, out=rig.rest)
+        rig.wake()
+
+    def _moved_by_hand(self, model: _Model) -> Floats:
+        return np.asarray(model.basis @ self._moves)
+
+    def _places(self, model: _Model, values: Floats) -> tuple[Floats, Floats]:
+        """(m, 3) mm where the points are in the picture, and the head's rotation (3, 3)."""
+        local = model.skin.rest + model.skin.displacement(shapes_of(values, model.order)) + self._moved_by_hand(model)
+        turn = _turn(values[model.order])
+        return model.pivot + (local - model.pivot) @ turn.T, turn
+
+    def _prepare(self, copy: Callable[[], Head]) -> None:
+        model = _Model(copy(), self._parameters)
+        _PointDrag(model, 0, np.zeros(3), np.zeros(3), self._parameters, self._parameters.neutral(), np.zeros(3)).solve(
+            model.skin.rest[0]
+        )  # the solver is compiled before anybody waits for it
+        self._model = model
+
+
+class _PointDrag:
+    """A point whose place decides parameters, among others that stay where they are."""
+
+    def __init__(self, model: _Model, point: int, place: Floats, offset: Floats, parameters: Parameters, values: Floats,
+                 by_hand: Floats) -> None:  # fmt: skip
+        self.place, self.offset = place, offset
+        skin = model.skin
+        far = np.flatnonzero(np.linalg.norm(skin.rest - skin.rest[point], axis=1) > _KEPT_MM)
+        chosen = np.concatenate([[point], far[:: max(1, len(far) // _KEPT)]])
+        part = Skin(skin.part, skin.uv[chosen], skin.rest[chosen], skin.moves[chosen], skin.jaw[chosen])
+        weights = np.full(len(chosen), _KEPT_WEIGHT)
+        weights[0] = 1.0
+        self._by_hand = np.broadcast_to(by_hand, skin.rest.shape)[point]
+        self._dragger = PointSolver.of(part, model.order, parameters, weights=weights, start=values, sparsity=_SPARSITY)
+        self._places = part.rest + part.displacement(shapes_of(values, model.order))
+        self._told = values.copy()
+
+    def solve(self, local: Floats) -> dict[int, float]:
+        """Parameters that changed since they were told last, for the point at ``local`` : (3,), head not turned."""
+        self._places[0] = local - self._by_hand
+        found = self._dragger.solve(self._places)
+        at = self._dragger.moved
+        changed = at[np.abs(found[at] - self._told[at]) > _CHANGED]
+        self._told[changed] = found[changed]
+        return {int(i): float(found[i]) for i in changed}
+
+
+class _SculptDrag:
+    """A point whose place moves control points; they answer alike in every direction."""
+
+    def __init__(self, model: _Model, point: int, place: Floats, offset: Floats) -> None:
+        self.place, self.offset = place, offset
+        unit = model.reshaper.solve(model.skin.uv[point : point + 1], np.array([[1.0, 0.0, 0.0]]), least_mm=1e-4)
+        self._ids, self._share = unit.ids, unit.moves[:, 0]
+
+    def solve(self, move: Floats) -> tuple[NDArray[np.int32], Floats]:
+        """Control points and their moves (k, 3) mm that move the point by ``move`` : (3,) mm."""
+        return self._ids, self._share[:, None] * move
+
+
+def _spread(ids: NDArray[np.int32], moves: Floats, n: int) -> Floats:
+    out = np.zeros((n, 3))
+    out[ids] = moves
+    return out
+
+
+def _turn(head_values: Floats) -> Floats:
+    """(3, 3) rotation of the head for values (h,) in its own order."""
+    return rotation(*read_pose(head_values).head)

@@ -1,0 +1,134 @@
+"""Acting named expressions: rising, holding and falling, from whatever the face shows at that moment.
+
+There is one mood, held until the next, and at most one timed expression over it; when its time is over the face
+returns to the mood. A timed gesture moves only what it names, so a wink keeps the smile it is given with. Every
+change starts at the present face, so interrupting never makes it jump.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.base.parameters import Floats
+from controller.motion.motion import minimum_jerk
+from controller.vocabulary.expression import Expression
+
+_BLINK, _GAZE, _MOUTH = -3, -2, -1
+_OVERRIDES = 3
+
+
+@dataclass
+class _Pose:
+    """Where the face is going: an expression at an intensity; (P + 3,) with the overrides at the end."""
+
+    name: str
+    intensity: float
+    goal: Floats
+    offset_s: float
+
+
+class ExpressionPlayer:
+    """Moves between expressions.
+
+    Parameters
+    ----------
+    neutral : the expression to begin with and to return to.
+    """
+
+    def __init__(self, neutral: Expression) -> None:
+        self._neutral = neutral
+        self._now = np.zeros(len(neutral.weights) + _OVERRIDES)
+        self._from = self._now.copy()
+        self._mood = self._target = self._pose(neutral, 1.0)
+        self._start_s, self._length_s = -np.inf, 0.0
+        self._fall_at_s = np.inf
+
+    @property
+    def values(self) -> Floats:
+        """(P,) float64, the face at the last update; a view."""
+        return self._now[:-_OVERRIDES]
+
+    @property
+    def name(self) -> str:
+        """The expression shown or being reached."""
+        return self._target.name
+
+    @property
+    def intensity(self) -> float:
+        """Its intensity, 0..1."""
+        return self._target.intensity
+
+    @property
+    def blink_block(self) -> float:
+        """How much blinking is held back, 0..1."""
+        return float(self._now[_BLINK])
+
+    @property
+    def gaze_block(self) -> float:
+        """How much the gaze is held back, 0..1."""
+        return float(self._now[_GAZE])
+
+    @property
+    def mouth_block(self) -> float:
+        """How much speech is held back, 0..1."""
+        return float(self._now[_MOUTH])
+
+    def play(self, expression: Expression, intensity: float, duration_s: float | None, now_s: float) -> None:
+        """Show an expression for ``duration_s`` from now until it falls, or as the new mood without one."""
+        self.update(now_s)
+        pose = self._pose(expression, intensity)
+        if duration_s is None:
+            self._mood = pose
+            self._fall_at_s = np.inf
+            self._go(pose, expression.onset_s, now_s)
+        else:
+            if expression.kind == "gesture":
+                stronger = np.abs(pose.goal) > np.abs(self._mood.goal)
+                pose.goal = np.where(stronger, pose.goal, self._mood.goal)
+            self._fall_at_s = now_s + duration_s
+            self._go(pose, min(expression.onset_s, duration_s), now_s)
+
+    def rest(self, seconds: float, now_s: float) -> None:
+        """Return to the neutral mood over ``seconds``."""
+        self.update(now_s)
+        self._mood = self._pose(self._neutral, 1.0)
+        self._fall_at_s = np.inf
+        self._go(self._mood, seconds, now_s)
+
+    def update(self, now_s: float) -> Floats:
+        """Move to ``now_s``; returns :attr:`values`."""
+        if now_s >= self._fall_at_s:
+            self._blend(self._fall_at_s)
+            fall_at, self._fall_at_s = self._fall_at_s, np.inf
+            self._go(self._mood, self._target.offset_s, fall_at)
+        self._blend(now_s)
+        return self.values
+
+    def _go(self, pose: _Pose, length_s: float, now_s: float) -> None:
+        self._from[:] = self._now
+        self._target = pose
+        self._start_s, self._length_s = now_s, length_s
+
+    def _blend(self, now_s: float) -> None:
+        passed = now_s - self._start_s
+        if passed >= self._length_s:
+            self._now[:] = self._target.goal
+            return
+        np.subtract(self._target.goal, self._from, out=self._now)
+        self._now *= minimum_jerk(passed / self._length_s)
+        self._now += self._from
+
+    @staticmethod
+    def _pose(expression: Expression, intensity: float) -> _Pose:
+        overrides = [_override(kind, intensity) for kind in (expression.blink, expression.gaze, expression.mouth)]
+        goal = np.concatenate([expression.weights * intensity, overrides])
+        return _Pose(expression.name, intensity, goal, expression.offset_s)
+
+
+def _override(kind: str, intensity: float) -> float:
+    """VRM 1.0 rule: block holds back all as soon as the expression shows, blend as much as it shows."""
+    if kind == "blend":
+        return intensity
+    return 1.0 if kind == "block" and intensity > 0.0 else 0.0

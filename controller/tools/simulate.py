@@ -1,0 +1,185 @@
+"""Serving simulated hardware until interrupted, for ``omote simulate``."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from controller.base.errors import ConfigError
+from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
+from controller.base.signals import stop_flag
+from controller.links.line.host import RobotHost, load_script
+from controller.links.line.hostport import HostPort
+from controller.robot.buses import SIMULATION, BusSettings
+from controller.robot.channels import servo_specs
+from controller.robot.robot import load_robot
+from controller.robot.settings import ChannelSettings
+from controller.tools.monitor_view import Watch
+from drivers import open_bus
+from drivers.core.traffic import Decoder
+from drivers.sim.serving.farend import make_line
+from drivers.sim.serving.serve import PortServer, serve
+from drivers.sim.wire.line import Line
+from drivers.sim.wire.simulator import Setting, Simulator, simulator_of
+
+Where = Path | str | None
+"""A path that becomes a link to a pseudo-terminal, or a URL to listen at instead."""
+
+
+@dataclass(frozen=True)
+class Serving:
+    """Where and how something is served.
+
+    Attributes
+    ----------
+    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT``.
+    wire : bytes take the time they take at the baud rate. latency_s : a USB adapter's latency timer besides.
+    faults : faults to inject, see docs/simulated-buses.md.
+    control : path of a socket that takes faults while it runs.
+    watch : show the servos and the traffic while it runs.
+    """
+
+    link: Where = None
+    wire: bool = False
+    latency_s: float = 0.0
+    faults: tuple[str, ...] = ()
+    control: Path | None = None
+    watch: bool = False
+
+
+def serve_alone(kind: str, options: Any, how: Serving, console: Console) -> None:
+    """Serve what stands in for a family; prints ``ready PATH`` and returns when interrupted.
+
+    Parameters
+    ----------
+    options : an instance of the options of the family's simulator.
+
+    Raises
+    ------
+    DriverError : options that do not fit, or a port that cannot be made.
+    """
+    simulator = simulator_of(kind)
+    setting = Setting(now_s=time.monotonic(), baud=options.baud, names=PARAMETERS.names)
+    _serve(simulator.alone(options, setting), options.baud, how, console, simulator)
+
+
+def _serve(line: Line, baud: int, how: Serving, console: Console, simulator: Simulator) -> None:
+    line.faults.add(how.faults, time.monotonic())
+    with _watching(simulator.decoder(line) if how.watch else None, console) as look:
+        _until_stopped(
+            lambda stop: serve(
+                line,
+                how.link,
+                lambda path: _say_ready(path, console),
+                baud=baud,
+                wire=how.wire,
+                latency_s=how.latency_s,
+                commands=how.control,
+                stop=stop,
+                on_server=look,
+            )
+        )
+
+
+@contextmanager
+def _watching(decoder: Decoder | None, console: Console) -> Iterator[Callable[[PortServer], None]]:
+    """Gives what begins to watch a server; the view ends with the block. Without a decoder nobody watches."""
+    over = threading.Event()
+    threads: list[threading.Thread] = []
+
+    def look(server: PortServer) -> None:
+        if decoder is None:
+            return
+
+        def rows() -> list[dict[str, Any]]:
+            with server.chain.lock:
+                return server.chain.describe(time.monotonic())
+
+        watch = Watch(f"simulated bus on {server.port.path}", rows, decoder, console)
+        server.tap = watch.tap
+        threads.append(threading.Thread(target=watch.run, args=(lambda: not over.is_set(),)))
+        threads[-1].start()
+
+    try:
+        yield look
+    finally:
+        over.set()
+        for thread in threads:
+            thread.join()
+
+
+def _say_ready(path: str, console: Console) -> None:
+    console.print(f"ready {path}", soft_wrap=True)
+
+
+def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSettings]]:
+    """One bus of a robot file and the channels on it; the first bus without a name.
+
+    Raises
+    ------
+    ConfigError
+        when the file is wrong or has no such bus.
+    """
+    robot = load_robot(find_config("robots", name), PARAMETERS)
+    names = [entry.name for entry in robot.buses]
+    if bus is not None and bus not in names:
+        raise ConfigError(f"robot {robot.name} has no bus called {bus!r}", hint=f"its buses: {', '.join(names)}")
+    chosen = robot.buses[names.index(bus) if bus else 0]
+    return chosen, robot.on_bus(chosen.name)
+
+
+def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> None:
+    """Serve what is on a bus of a robot file (:func:`robot_bus`), set to what its driver will expect."""
+    chosen, channels = robot_bus(name, bus)
+    simulator = simulator_of(chosen.family)  # before the driver, which may not be there
+    options = {key: value for key, value in chosen.options().items() if key not in SIMULATION}
+    driver = open_bus(chosen.family, servo_specs(channels), **{"port": "", **options})
+    servos = [(channel.id, channel.model) for channel in channels]
+    line = make_line(chosen.family, servos, time.monotonic(), baud=chosen.baud, options=driver.far_end())
+    _serve(line, chosen.baud, how, console, simulator)
+
+
+def serve_host(script: str, link: Path | None, console: Console) -> None:
+    """Serve a simulated robot host; prints ``ready PATH``, returns when interrupted and says what it counted.
+
+    Raises
+    ------
+    ConfigError
+        when the script is unknown or wrong.
+    """
+    loaded = load_script(script, PARAMETERS)
+    with HostPort(link) as port, stop_flag() as flag:
+        console.print(f"ready {link or port.path}", soft_wrap=True)
+        host = RobotHost(port, loaded, PARAMETERS)
+        host.run(lambda: not flag.is_set())
+        counts = host.report()
+    console.print(
+        f"{counts['sent']} lines sent, {counts['accepted']} accepted, {counts['refused']} refused", soft_wrap=True
+    )
+
+
+def _until_stopped(serve: Callable[[socket.socket], None]) -> None:
+    """Run ``serve(stop)`` until SIGINT or SIGTERM; the socket ``stop`` becomes readable then."""
+    reading, writing = socket.socketpair()
+
+    def note(_number: int, _frame: object) -> None:
+        writing.send(b"x")
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        serve(reading)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        reading.close()
+        writing.close()

@@ -1,0 +1,285 @@
+"""A head in a hurry: only the vertices that its decimated triangles have, of all parts in one array, posed in one go.
+
+Where a picture moves, most of a pose's time goes to vertices that nobody draws and to asking each part for itself. So
+all parts that deform share one rig here, and of each only the vertices are summed that are drawn or read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.arrays import Floats, Floats32, Ints
+from surface.deform.deformation import Deformation
+from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.parameters import Pose, read_pose, rotation
+from surface.head.posing.head import Head
+from surface.head.posing.kernels import carry, turn_head, zip_border
+from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
+from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
+from surface.head.posing.seams import Zipper
+from surface.mesh.mesh import Mesh
+
+Ranges = list[tuple[int, int]]
+
+
+class DecimatedPart:
+    """A part's share of a decimated head.
+
+    Attributes
+    ----------
+    part : the head's own.
+    first, last : its vertices among the decimated head's are those from ``first`` to before ``last``.
+    kept : (m,) int64, which vertices of the part they are, rising.
+    triangles : (t, 3) int32, of these.
+    changed : ranges [start, stop) of these that the last pose touched.
+    """
+
+    def __init__(self, part: HeadPart, triangles: NDArray[np.integer], kept: Ints, first: int) -> None:
+        self.part, self.kept = part, kept
+        self.first, self.last = first, first + len(kept)
+        self.triangles = np.searchsorted(kept, triangles).astype(np.int32)
+        self.changed: Ranges = [(0, len(kept))]
+
+    @property
+    def own(self) -> Ints:
+        """Those of ``kept`` that the part's surface has; seams have added the others."""
+        return self.kept[: int(np.searchsorted(self.kept, len(self.part.mesh.uv)))]
+
+    def rows(self, ids: NDArray[np.integer]) -> Ints:
+        """Where vertices ``ids (k,)`` of the part stand among the decimated head's; all of them must be kept."""
+        return self.first + np.searchsorted(self.kept, ids)
+
+
+class DecimatedHead:
+    """Vertices and normals of a head's decimated triangles.
+
+    The head itself keeps its pose; changes to its rigs' points at rest are seen.
+
+    Parameters
+    ----------
+    head : the head; parts : its parts, in the order their vertices shall stand in.
+    level : "full" or "fast"; a part without decimated triangles keeps all.
+    wanted : other vertices that are asked for, by part.
+
+    Attributes
+    ----------
+    vertices, normals : (m, 3) float32, as posed last.
+    parts : who has which of them.
+    """
+
+    def __init__(self, head: Head, parts: Sequence[HeadPart], level: str, wanted: Mapping[str, Ints]) -> None:
+        self._pivot = head.data.neck.pivot
+        triangles = {part.name: part.decimated.get(level, part.triangles) for part in parts}
+        kept, self.parts, first = _kept(head, triangles, wanted), [], 0
+        for part in parts:
+            self.parts.append(DecimatedPart(part, triangles[part.name], kept[part.name], first))
+            first = self.parts[-1].last
+        self.vertices, self.normals = np.zeros((first, 3), np.float32), np.zeros((first, 3), np.float32)
+        skins = [(decimated, decimated.part) for decimated in self.parts if isinstance(decimated.part, SkinPart)]
+        self._rig = JoinedRig([part for _, part in skins], head.data)
+        self._skins = [_Skin(decimated, part, self._rig.rows[part.name]) for decimated, part in skins]
+        rigid = [decimated for decimated in self.parts if isinstance(decimated.part, RigidPart)]
+        follows = sorted({decimated.part.follows for decimated in rigid})
+        self._rigids = [_Rigid(name, [r for r in rigid if r.part.follows == name], head.data) for name in follows]
+        self._seams = _Seams(head.zippers, self.parts)
+        self._turn: Turn | None = None
+        self.pose(np.zeros(len(head.parameters)))
+
+    def pose(self, values: Floats) -> None:
+        """Move to parameter values (P,), as :meth:`surface.head.Head.pose`."""
+        pose = read_pose(values)
+        turn = Turn(rotation(*pose.head), self._pivot)
+        turned = self._turn is None or not np.array_equal(turn.matrix, self._turn.matrix)
+        self._turn = turn
+        points = self._rig.apply(pose)
+        for skin in self._skins:
+            skin.pose(points, self._rig.version, turn, turned, self.vertices, self.normals)
+        for rigid in self._rigids:
+            rigid.pose(pose, turn, turned, self.vertices, self.normals)
+        self._seams.close(self.vertices, self.normals)
+
+    @property
+    def turn(self) -> Floats:
+        """(3, 3) the head's rotation of the last pose."""
+        return np.eye(3) if self._turn is None else self._turn.matrix
+
+
+class JoinedRig(SkinRig):
+    """The rigs of several parts as one, over their control points one after the other.
+
+    Parameters
+    ----------
+    parts : whose points at rest it takes, now and whenever they change, and whose contacts it shares.
+
+    Attributes
+    ----------
+    rows : slices of the points, by part.
+    """
+
+    def __init__(self, parts: Sequence[SkinPart], head: HeadData) -> None:
+        of = {part.name: part for part in head.parts}
+        super().__init__(_joined([of[part.name] for part in parts]), head)
+        ends = np.cumsum([0, *(len(part.rig.rest) for part in parts)]).tolist()
+        self.rows = {part.name: slice(a, b) for part, a, b in zip(parts, ends, ends[1:], strict=False)}
+        self._rigs = [(part.rig, self.rows[part.name]) for part in parts]
+        self._woken: list[int] = []
+
+    def apply(self, pose: Pose) -> Floats:
+        woken = [rig.woken for rig, _ in self._rigs]
+        if woken != self._woken:
+            self._woken = woken
+            for rig, rows in self._rigs:
+                self.rest[rows] = rig.rest
+            self.wake()
+        return super().apply(pose)
+
+    def _asks(self, pose: Pose) -> tuple[object, ...]:
+        return *super()._asks(pose), pose.gaze.tobytes()
+
+    def _express(self, pose: Pose) -> None:
+        super()._express(pose)
+        for rig, rows in self._rigs:
+            rig.meet(pose, self.points[rows])
+
+
+def _joined(parts: Sequence[PartData]) -> PartData:
+    """Points, groups, jaw and lids of several parts as those of one."""
+    groups: dict[str, list[tuple[int, Group]]] = {}
+    first = 0
+    for part in parts:
+        for group in part.groups:
+            groups.setdefault(group.name, []).append((first, group))
+        first += len(part.points)
+    together = [
+        replace(
+            found[0][1],
+            ids=np.concatenate([np.asarray(g.ids) + at for at, g in found]),
+            moves=np.concatenate([g.moves for _, g in found]),
+        )
+        for found in groups.values()
+    ]
+    points, jaw, lids = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "jaw", "lids"))
+    return replace(parts[0], name="", points=points, jaw=jaw, lids=lids, groups=together)
+
+
+class _Skin:
+    """Moves the vertices of a part that deforms."""
+
+    def __init__(self, decimated: DecimatedPart, part: SkinPart, rows: slice) -> None:
+        self._decimated, self._rows, self._version = decimated, rows, 0
+        self._share = part.share[decimated.own]
+        self._deformation = Deformation(part.surface, thinned(part.mesh, decimated.own))
+
+    def pose(
+        self, points: Floats, version: int, turn: Turn, turned: bool, vertices: Floats32, normals: Floats32
+    ) -> None:
+        """Bring the part's rows of ``vertices`` and ``normals`` (m, 3) to control ``points`` (n, 3)."""
+        own, first = self._deformation, self._decimated.first
+        self._decimated.changed = []
+        if self._version != version:
+            self._version = version
+            own.set_points(points[self._rows])
+            self._decimated.changed = own.changed
+        if turned:
+            self._decimated.changed = [(0, len(self._share))]
+        for start, stop in self._decimated.changed:
+            if turn.none:
+                vertices[first + start : first + stop] = own.vertices[start:stop]
+                normals[first + start : first + stop] = own.normals[start:stop]
+            else:
+                turn_head(own.vertices, own.normals, self._share, turn.matrix, turn.vector, turn.pivot, start, stop,
+                          vertices[first:], normals[first:])  # fmt: skip
+
+
+class _Rigid:
+    """Moves the vertices of all parts that are fixed to the same thing."""
+
+    def __init__(self, follows: str, parts: Sequence[DecimatedPart], head: HeadData) -> None:
+        self._follows, self._head = follows, head
+        self._rest = [(decimated, *_rest(decimated)) for decimated in parts]
+        self._asked: tuple[object, ...] = ()
+
+    def pose(self, pose: Pose, turn: Turn, turned: bool, vertices: Floats32, normals: Floats32) -> None:
+        """Bring the parts' rows of ``vertices`` and ``normals`` (m, 3) to the pose."""
+        asked = motion_asks(self._follows, self._head, pose)
+        still = asked == self._asked and not turned
+        self._asked = asked
+        for decimated, rest, _ in self._rest:
+            decimated.changed = [] if still else [(0, len(rest))]
+        if still:
+            return
+        linear, shift = rigid_motion(self._follows, self._head, pose)
+        shift = (turn.matrix @ (shift - turn.pivot) + turn.pivot).astype(np.float32)
+        linear = (turn.matrix @ linear).astype(np.float32)
+        for decimated, rest, rest_normals in self._rest:
+            carry(rest, rest_normals, linear, shift, vertices[decimated.first :], normals[decimated.first :])
+
+
+def _rest(decimated: DecimatedPart) -> tuple[Floats32, Floats32]:
+    """Positions and normals at rest of the vertices that the part's own surface has, (k, 3) each."""
+    mesh, own = decimated.part.mesh, decimated.own
+    return mesh.vertices[own].astype(np.float32), mesh.normals[own].astype(np.float32)
+
+
+class _Seams:
+    """All seams of a head, closed in one go, one after the other."""
+
+    def __init__(self, zippers: Sequence[Zipper], parts: Sequence[DecimatedPart]) -> None:
+        by_name = {decimated.part.name: decimated for decimated in parts}
+        self._pairs: list[tuple[DecimatedPart, DecimatedPart]] = []
+        ids, low, high, share = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [_NO_SHARE]
+        for zipper in zippers:
+            one, two = by_name[zipper.first.name], by_name[zipper.second.name]
+            drawn = np.isin(zipper.ids, two.kept)
+            if drawn.any():
+                self._pairs.append((one, two))
+                ids.append(two.rows(zipper.ids[drawn]))
+                low.append(one.rows(zipper.low[drawn]))
+                high.append(one.rows(zipper.high[drawn]))
+                share.append(zipper.share[drawn])
+        self._rows = *(np.concatenate(rows) for rows in (ids, low, high)), np.concatenate(share)
+
+    def close(self, vertices: Floats32, normals: Floats32) -> None:
+        """Put borders onto each other among ``vertices`` and ``normals`` (m, 3)."""
+        touched = False
+        for one, two in self._pairs:
+            if one.changed or two.changed:  # by the pose, or by a seam before
+                two.changed, touched = [(0, len(two.kept))], True
+        if touched:
+            zip_border(vertices, normals, vertices, normals, *self._rows)
+
+
+_NO_SHARE = np.zeros(0, np.float32)
+
+
+def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
+    """Which vertices are drawn or asked for, by part, with those that seams put them between."""
+    kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
+    for zipper in reversed(head.zippers):  # what an earlier one gives, a later one may take
+        drawn = np.isin(zipper.ids, kept[zipper.second.name])
+        between = [kept[zipper.first.name], zipper.low[drawn], zipper.high[drawn]]
+        kept[zipper.first.name] = np.unique(np.concatenate(between))
+    return kept
+
+
+def thinned(mesh: Mesh, ids: Ints) -> Mesh:
+    """Of a mesh only vertices ``ids (k,)``, rising, and the cells that have any; no triangles."""
+    cells, cell = np.unique(mesh.cell[ids], return_inverse=True)
+    lists = [mesh.points_of(c) for c in cells.tolist()]
+    return Mesh(
+        mesh.vertices[ids],
+        mesh.normals[ids],
+        np.zeros((0, 3), np.int32),
+        mesh.uv[ids],
+        mesh.side[ids],
+        cell.astype(np.int32),
+        np.searchsorted(cell, np.arange(len(cells) + 1)),
+        np.cumsum([0, *map(len, lists)]),
+        np.concatenate([np.zeros(0, np.int32), *lists]),
+        len(cells),
+        mesh.flip,
+    )

@@ -1,0 +1,41 @@
+"""controller.base.steal_time"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from controller.base import steal_time
+from controller.base.steal_time import StealTime, steal_time_s
+
+TICK_S = 1 / os.sysconf("SC_CLK_TCK")
+
+
+def told(tmp_path: Path, ticks: int) -> Path:
+    """A file as proc(5) describes it: the steal time is the eighth of the numbers."""
+    path = tmp_path / "stat"
+    path.write_text(f"cpu  1 2 3 4 5 6 7 {ticks} 9 10\ncpu0 1 2 3 4 5 6 7 8 9 10\n", encoding="ascii")
+    return path
+
+
+def test_the_share_is_of_all_processors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steal_time, "STAT", told(tmp_path, 1000))
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    now = iter([10.0, 12.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(now))
+    counted = StealTime()
+    told(tmp_path, 1000 + round(0.8 / TICK_S))
+    assert counted.share() == pytest.approx(0.8 / 2.0 / 4)
+
+
+@pytest.mark.parametrize("text", ["", "cpu 1 2 3\n", "cpu a b c d e f g h\n"])
+def test_a_system_that_does_not_tell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    path = tmp_path / "stat"
+    monkeypatch.setattr(steal_time, "STAT", path)
+    assert steal_time_s() is None
+    path.write_text(text, encoding="ascii")
+    assert steal_time_s() is None
+    assert StealTime().share() is None

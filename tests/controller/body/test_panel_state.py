@@ -1,0 +1,59 @@
+"""What the panel shows besides the values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller.base.mailboxes import Mailbox
+from controller.base.parameters import PARAMETERS as P
+from controller.base.paths import find_config
+from controller.body.panel_state import PanelState, PanelStateWriter, panel_state_size
+from controller.layers.commands import CommandState
+from controller.robot.channels import build_table
+from controller.robot.following import Following, MeasuredFace, regions_of
+from controller.robot.robot import load_robot
+from drivers.base.bus import BusState
+
+JAW = P.index("jawOpen")
+
+
+def standing(position: np.ndarray) -> BusState:
+    n = len(position)
+    none, no, yes = np.zeros(n), np.zeros(n, bool), np.ones(n, bool)
+    return BusState(
+        0.0, position, none, none, yes, none, none.astype(np.uint8), no, none, none, none.astype(np.uint8), no
+    )
+
+
+def test_holders_measured_values_and_differences_reach_the_other_side() -> None:
+    state, out = CommandState(P), P.neutral()
+    table = build_table(load_robot(find_config("robots", "head24"), P).channels, P)
+    following = Following(table.names, regions_of(table, P))
+    wanted = table.angles(P.neutral())[0]
+    there = wanted + np.radians(np.where(np.array(table.names) == "jawOpen", 14.0, 0.0))
+    reflection = MeasuredFace([table], [lambda: standing(there)], P, [following])
+    following.note(wanted, standing(there))
+    with Mailbox.create(panel_state_size(P)) as mailbox:
+        insight = PanelState(mailbox, state.layer_names(), P)
+        insight.refresh()
+        assert insight.holder(JAW) == "" and insight.measured(JAW) is None and insight.away_deg("jaw") is None
+        state.set_parameters([JAW], [0.5], 0)
+        state.tick(10_000_000, 0.01, out)
+        PanelStateWriter(mailbox, state, reflection).publish()
+        insight.refresh()
+        assert insight.holder(JAW) == "manual" and insight.holder(P.index("browInnerUp")) == "expression"
+        assert insight.measured(JAW) == pytest.approx(0.5, abs=0.15)
+        assert insight.measured(P.index("tongueOut")) is None  # no servo for it
+        assert insight.away_deg("jaw") == pytest.approx(14.0 / np.sqrt(2)) and insight.away_deg("brows") == 0.0
+        assert insight.away_deg("tongue") is None
+
+
+def test_without_servos_only_holders_are_known() -> None:
+    state, out = CommandState(P), P.neutral()
+    state.tick(10_000_000, 0.01, out)
+    with Mailbox.create(panel_state_size(P)) as mailbox:
+        insight = PanelState(mailbox, state.layer_names(), P)
+        PanelStateWriter(mailbox, state, None).publish()
+        insight.refresh()
+        assert insight.holder(JAW) == "expression" and insight.measured(JAW) is None

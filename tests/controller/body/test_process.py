@@ -1,0 +1,150 @@
+"""The body's process: it starts, obeys, reports, and never leaves a servo powered behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import ControllerError
+from controller.base.parameters import PARAMETERS
+from controller.body.messages import Hold, Neutral, Show
+from controller.body.process import BodyProcess
+from controller.stage.stage import Stage, load_stage
+from drivers.sim import SimulatedBus
+
+JAW_ID = 4
+
+
+def until(condition: Callable[[], bool]) -> bool:
+    """Wait for ``condition``, by counting: a machine that stood still for a while is no fault of the program."""
+    for _ in range(1000):
+        if condition():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+@pytest.fixture
+def servos() -> Iterator[SimulatedBus]:
+    with SimulatedBus(range(1, 25)) as bus:
+        yield bus
+
+
+@pytest.fixture
+def stage(tmp_path: Path, root: Path, servos: SimulatedBus) -> Stage:
+    """The shipped head on the simulated bus's port, no links; late answers of a busy machine are waited for."""
+    robot = (root / "configs/robots/head24.toml").read_text()
+    robot = robot.replace('kind = "simulated"', f'kind = "dynamixel"\nport = "{servos.path}"\nmargin_s = 0.5')
+    (tmp_path / "robot.toml").write_text(robot)
+    (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["robot.toml"]\n')
+    return load_stage(str(tmp_path / "stage.toml"), PARAMETERS)
+
+
+def powered(servos: SimulatedBus) -> list[int]:
+    return [i for i in range(1, 25) if servos.servo(i).torque]
+
+
+def newest(body: BodyProcess, name: str) -> float:
+    values = np.zeros(len(PARAMETERS.names))
+    body.mailbox.read(values)
+    return float(values[PARAMETERS.index(name)])
+
+
+def test_servos_stand_until_commands_may_come_obey_the_panel_and_end_limp(stage: Stage, servos: SimulatedBus) -> None:
+    jaw, rest = PARAMETERS.index("jawOpen"), 2048
+    places = [rest + 10 * i for i in range(1, 25)]
+    for i, place in enumerate(places, 1):
+        servos.servo(i).place(place)
+    with BodyProcess(stage, PARAMETERS) as body:
+        body.wait_ready()
+        assert powered(servos) == list(range(1, 25))
+        body.tell(Hold(jaw, 1.0))
+        assert until(lambda: newest(body, "jawOpen") > 0.999)
+        assert [servos.servo(i).position_ticks for i in range(1, 25)] == pytest.approx(places, abs=2)
+        body.begin()
+        assert until(lambda: servos.servo(JAW_ID).position_ticks - rest > 300)
+        body.tell(Hold(jaw, None))
+        assert until(lambda: newest(body, "jawOpen") < 0.001)
+        body.tell(Show("happiness", 1.0))
+        assert until(lambda: newest(body, "mouthSmileLeft") > 0.3)
+        body.tell(Neutral(0.1))
+        assert until(lambda: newest(body, "mouthSmileLeft") < 0.01)
+        body.tell(Hold(jaw, 1.0))
+        assert until(lambda: servos.servo(JAW_ID).position_ticks - rest > 300)
+        body.stop()
+        report = body.report
+    assert powered(servos) == []
+    assert abs(servos.servo(JAW_ID).position_ticks - rest) < 20  # led to rest before it went limp
+    bus = report["buses"][0]  # type: ignore[index]
+    assert bus["servos"] == 24
+    assert bus["bus"]["errors"] == {}
+    assert bus["ticks"] > 10
+
+
+def test_an_error_on_the_way_out_of_main_still_stops_the_servos(stage: Stage, servos: SimulatedBus) -> None:
+    with pytest.raises(RuntimeError, match="mine"), BodyProcess(stage, PARAMETERS) as body:
+        body.wait_ready()
+        raise RuntimeError("mine")
+    assert powered(servos) == []
+
+
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGHUP])
+def test_a_body_that_is_told_to_end_stops_the_servos_first(
+    stage: Stage, servos: SimulatedBus, ending: signal.Signals
+) -> None:
+    with BodyProcess(stage, PARAMETERS) as body:
+        body.wait_ready()
+        os.kill(body.pid, ending)
+        assert until(lambda: powered(servos) == [])
+
+
+def test_a_body_that_is_killed_leaves_the_rest_to_the_bus_watchdog(stage: Stage, servos: SimulatedBus) -> None:
+    with pytest.raises(ControllerError, match="ended by itself"), BodyProcess(stage, PARAMETERS) as body:
+        body.wait_ready()
+        body.tell(Hold(PARAMETERS.index("jawOpen"), 1.0))
+        body.kill()
+        assert until(lambda: all(servos.servo(i).register("Bus Watchdog") == 255 for i in range(1, 25)))
+        while body.alive():
+            time.sleep(0.02)
+
+
+def test_main_killed_is_noticed_and_the_servos_stopped(stage: Stage, servos: SimulatedBus) -> None:
+    program = (
+        "import sys, time\n"
+        "from controller.base.parameters import PARAMETERS\n"
+        "from controller.body.process import BodyProcess\n"
+        "from controller.stage.stage import load_stage\n"
+        "if __name__ == '__main__':\n"
+        "    body = BodyProcess(load_stage(sys.argv[1], PARAMETERS), PARAMETERS)\n"
+        "    body.wait_ready(); print(body.mailbox.path, body._insights.path, flush=True); time.sleep(60)\n"
+    )
+    script = stage.path.parent / "main.py"
+    script.write_text(program)
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
+    main = subprocess.Popen([sys.executable, str(script), str(stage.path)], stdout=subprocess.PIPE, env=environment)
+    try:
+        assert main.stdout is not None
+        mailboxes = main.stdout.readline().split()
+        assert powered(servos) == list(range(1, 25))
+        main.send_signal(signal.SIGKILL)
+        assert until(lambda: powered(servos) == [])
+        assert len(mailboxes) == 2 and not any(map(os.path.exists, mailboxes))
+    finally:
+        main.kill()
+        main.communicate()
+
+
+def test_a_servo_that_does_not_answer_is_named_and_nothing_moves(stage: Stage, servos: SimulatedBus) -> None:
+    servos.fault("mute:7")
+    with pytest.raises(ControllerError, match="7") as caught, BodyProcess(stage, PARAMETERS) as body:
+        body.wait_ready()
+    assert caught.value.hint
+    assert powered(servos) == []

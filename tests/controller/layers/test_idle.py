@@ -1,0 +1,113 @@
+"""Idle life."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import ConfigError
+from controller.base.parameters import PARAMETERS as P
+from controller.layers.idle import IdleMotion, IdleSettings
+
+LID = P.index("eyeBlinkLeft")
+
+
+@pytest.fixture(scope="module")
+def settings() -> IdleSettings:
+    return IdleSettings.named("natural", P)
+
+
+def live(
+    settings: IdleSettings, seconds: float = 120.0, *, seed: int = 1, amount: float = 1.0, **how: object
+) -> np.ndarray:
+    """(n, 59) what life adds, 100 times a second."""
+    life = IdleMotion(P, settings, seed)
+    life.liveliness = amount
+    how = {"looking": False, **how}
+    return np.array([life.update(50.0 + i * 0.01, **how).copy() for i in range(round(seconds * 100))])  # type: ignore[arg-type]
+
+
+def blinks(path: np.ndarray) -> np.ndarray:
+    """Lengths (s) of the times when the lid is more than half closed."""
+    edges = np.flatnonzero(np.diff((path[:, LID] > 0.5).astype(int)))
+    return np.diff(edges)[::2] / 100
+
+
+def test_blink_rate_length_and_sides(settings: IdleSettings) -> None:
+    path = live(settings, 300.0)
+    lengths = blinks(path)
+    assert 8 <= len(lengths) / 5 <= 24  # a minute: conversation and primary gaze
+    assert np.all((lengths >= 0.08) & (lengths <= 0.25))
+    np.testing.assert_array_equal(path[:, LID], path[:, P.index("eyeBlinkRight")])
+    assert path[:, LID].max() == 1.0 and path[:, LID].min() == 0.0
+
+
+def test_nothing_at_zero_and_less_at_less(settings: IdleSettings) -> None:
+    assert not live(settings, 20.0, amount=0.0).any()
+    head = P.region("head")
+    assert np.ptp(live(settings, amount=0.5)[:, head]) < np.ptp(live(settings)[:, head]) < 0.2
+
+
+def test_glances_stay_small_return_home_and_stop_when_looking(settings: IdleSettings) -> None:
+    yaw = P.index("leftEyeYaw")
+    free = live(settings)[:, yaw]
+    assert 0.05 < np.abs(free).max() <= 7 / 35 + 1e-9
+    assert np.mean(free == 0.0) > 0.2
+    assert not live(settings, looking=True)[:, yaw].any()
+    life = IdleMotion(P, settings, 1)
+    life.liveliness = 1.0
+    steps = []
+    for i in range(2000):
+        life.update(i * 0.01, looking=True)
+        steps.append(life.eye_yaw_rad)
+    assert 0 < np.degrees(np.abs(steps).max()) <= settings.eyes.micro_deg
+
+
+def test_expressions_hold_back_blinks_and_glances(settings: IdleSettings) -> None:
+    assert not live(settings, blink_block=1.0)[:, LID].any()
+    assert live(settings, blink_block=0.5)[:, LID].max() == pytest.approx(0.5)
+    assert not live(settings, gaze_block=1.0)[:, P.index("rightEyePitch")].any()
+
+
+def test_breath_and_sway_never_jump(settings: IdleSettings) -> None:
+    path = live(settings)
+    still = np.setdiff1d(np.arange(59), [*P.region("lids"), *P.region("eyes")])
+    assert np.abs(np.diff(path[:, still], axis=0)).max() < 0.01
+    assert np.ptp(path[:, P.index("headPitch")]) > 0.01
+
+
+def test_fidgets_are_small_and_of_the_listed_parameters(settings: IdleSettings) -> None:
+    path = live(settings, 200.0)
+    listed = P.indices(settings.fidget.parameters)
+    assert (path[:, listed].max(axis=0) > 0.05).sum() >= 5
+    assert path[:, listed].max() <= settings.fidget.amount + 1e-12
+    others = np.setdiff1d(np.arange(59), [*listed, LID, P.index("eyeBlinkRight"), *P.region("head"), *P.region("eyes")])
+    assert not path[:, others].any()
+
+
+def test_a_large_gaze_shift_often_brings_a_blink(settings: IdleSettings) -> None:
+    def blinked(angle_rad: float, seed: int) -> bool:
+        life = IdleMotion(P, settings, seed)
+        life.liveliness = 1.0
+        life.update(0.0, looking=True)
+        life.shift(angle_rad, 0.01)
+        return any(life.update(0.01 + i * 0.01, looking=True)[LID] > 0.9 for i in range(20))
+
+    share = np.mean([blinked(0.5, seed) for seed in range(200)])
+    assert 0.35 < share < 0.65
+    assert not any(blinked(0.1, seed) for seed in range(50))
+
+
+def test_a_wrong_file_lists_every_fault(tmp_path: Path, root: Path) -> None:
+    text = (root / "configs" / "life" / "natural.toml").read_text()
+    path = tmp_path / "own.toml"
+    path.write_text(text.replace("interval_s = [2.0, 6.0]", "interval_s = [6.0, 2.0]").replace("roll_deg", "rol_deg"))
+    with pytest.raises(ConfigError) as caught:
+        IdleSettings.named(str(path), P)
+    for part in ("blink: interval_s must be", "head.roll_deg: missing", "head.rol_deg: unknown key"):
+        assert part in str(caught.value)
+    path.write_text(text.replace('"mouthPucker"', '"mouthPuker"'))
+    with pytest.raises(ConfigError, match="did you mean 'mouthPucker'"):
+        IdleSettings.named(str(path), P)

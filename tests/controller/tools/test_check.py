@@ -1,0 +1,77 @@
+"""``omote check`` finds out what a file is: surface files, and JSON that is a surface or speech."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from controller.base.errors import ControllerError, TakeError
+from controller.base.parameters import PARAMETERS
+from controller.cli.app import make_app
+from controller.layers.commands import CommandState
+from controller.takes.recording import Recorder
+from controller.tools.check import check_anything
+from surface import DCPSurface, Domain, Slit, SurfaceFileError
+from surface.readers import NamedSurface, write_surfaces
+
+KNOTS = '<KnotVector degree="1">0 0 1 1</KnotVector>'
+SIDE = f'<Basis type="BSplineBasis">{KNOTS}</Basis>'
+BASIS = f'<Basis type="TensorBSplineBasis2">{SIDE}{SIDE}</Basis>'
+XML = f'<xml>\n<Geometry type="TensorBSpline2" id="3">{BASIS}<coefs geoDim="2">0 0 1 0 0 1 1 1</coefs></Geometry></xml>'
+
+
+def sheet() -> NamedSurface:
+    net = [[[0, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0]]]
+    surface = DCPSurface.from_nurbs(1, 1, [0, 0, 1, 1], [0, 0, 1, 1], net)
+    return NamedSurface("cheek", surface, Domain((0, 1, 0, 1), slits=[Slit("u", 0.5, 0.2, 0.8)]))
+
+
+def test_surface_files_are_described(tmp_path: Path) -> None:
+    (tmp_path / "a.xml").write_text(XML)
+    write_surfaces(tmp_path / "b.json", [sheet(), sheet()])
+    plain = "4 control points, degree 1 x 1, u 0 to 1, v 0 to 1"
+    assert check_anything(str(tmp_path / "a.xml")) == [f"surface TensorBSpline2 3: {plain}: good"]
+    assert check_anything(str(tmp_path / "b.json")) == [f"surface cheek: {plain}, 1 slit: good"] * 2
+
+
+def test_speech_stays_speech(tmp_path: Path) -> None:
+    cues = [{"start": 0.0, "end": 0.5, "value": "A"}]
+    (tmp_path / "voice.json").write_text(json.dumps({"metadata": {}, "mouthCues": cues}))
+    assert check_anything(str(tmp_path / "voice.json"))[0].startswith("take voice.json")
+    (tmp_path / "other.json").write_text("{}")
+    with pytest.raises(TakeError):
+        check_anything(str(tmp_path / "other.json"))
+
+
+@pytest.mark.parametrize("name", ["a.xml", "a.tsm", "a.3dm"])
+def test_damaged_surfaces_are_one_error(tmp_path: Path, name: str) -> None:
+    if name == "a.3dm":
+        pytest.importorskip("rhino3dm", reason="reading .3dm needs rhino3dm: pip install rhino3dm")
+    (tmp_path / name).write_text("<xml>\n<Geometry>")
+    with pytest.raises(SurfaceFileError, match=name):
+        check_anything(str(tmp_path / name))
+
+
+def test_the_command_prints_it(tmp_path: Path) -> None:
+    write_surfaces(tmp_path / "b.json", [sheet()])
+    result = CliRunner().invoke(make_app(), ["check", str(tmp_path / "b.json")])
+    assert result.exit_code == 0
+    assert "surface cheek: 4 control points" in result.output
+
+
+def test_every_kind_of_file_is_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text("[smirk]\nweights = { mouthSmileLeft = 0.7 }\n[both]\nof = { smirk = 0.5 }")
+    (tmp_path / "script.toml").write_text('steps = ["0 EXPR smile", "1 NEUTRAL"]\nmarks = { end = 1 }')
+    with Recorder(CommandState(PARAMETERS), tmp_path / "a.rec") as state:
+        for i in range(50):
+            state.tick(10**9 + i * 10_000_000, 0.01, PARAMETERS.neutral())
+    assert check_anything(str(tmp_path / "own.toml")) == ["expressions own.toml: 2: good"]
+    assert check_anything(str(tmp_path / "script.toml")) == ["script script: 2 steps, 1 marks: good"]
+    assert check_anything(str(tmp_path / "a.rec"))[0].startswith("recording a.rec: 50 ticks, 0.5 s, all came out again")
+    text = (tmp_path / "a.rec").read_text().replace('["tick"', '["live",1.0,1000000000]\n["tick"', 1)
+    (tmp_path / "b.rec").write_text(text)
+    with pytest.raises(ControllerError, match="came out differently"):
+        check_anything(str(tmp_path / "b.rec"))

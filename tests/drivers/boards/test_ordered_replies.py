@@ -1,0 +1,89 @@
+"""drivers.boards.ordered_replies: answers without names, told apart by a question whose answer is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from drivers.boards.ordered_replies import OrderedReplies
+from drivers.sim.serving.virtual import VirtualClock
+
+
+class Script:
+    """A port whose far end answers each write as a function says; (delay, bytes) comes later."""
+
+    def __init__(self, answer: Callable[[bytes], list[tuple[float, bytes]]]) -> None:
+        self.answer, self.baud, self.clock = answer, 1_000_000, VirtualClock()
+        self.due: list[tuple[float, bytes]] = []
+
+    def write(self, data: bytes) -> None:
+        self.due += [(self.clock() + delay, piece) for delay, piece in self.answer(data)]
+        self.due.sort(key=lambda item: item[0])
+
+    def read(self, deadline_s: float) -> bytes:
+        if self.due and self.due[0][0] <= max(deadline_s, self.clock()):
+            time_s, data = self.due.pop(0)
+            self.clock.wait_until(time_s)
+            return data
+        self.clock.wait_until(deadline_s)
+        return b""
+
+    def drain(self) -> int:
+        count = 0
+        while data := self.read(0.0):
+            count += len(data)
+        return count
+
+
+def talk(answer: Callable[[bytes], list[tuple[float, bytes]]]) -> tuple[OrderedReplies, Script]:
+    port = Script(answer)
+    return OrderedReplies(port, b"V", lambda data: data == b"v!", lambda: 0.01), port  # type: ignore[arg-type]
+
+
+def honest(data: bytes) -> list[tuple[float, bytes]]:
+    return [(0.0, data[:-1].lower() + b"v!")]
+
+
+def test_answers_come_in_order() -> None:
+    conversation, _ = talk(honest)
+    assert conversation.ask(b"AB", 2) == b"ab"
+    assert conversation.ask(b"", 0) == b""
+    assert conversation.stray == 0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        [(0.0, b"xabv!")],  # noise before
+        [(0.0, b"av!")],  # one byte lost
+        [(0.0, b"abv!x")],  # noise behind
+        [(0.0, b"abv?")],  # damaged where it is known
+        [],
+        [(0.015, b"abv!")],  # late, and heard in the next batch
+        [(0.025, b"abv!")],  # later than that
+    ],
+)
+def test_nothing_counts_of_a_batch_that_is_not_whole(wrong: list[tuple[float, bytes]]) -> None:
+    replies = [[(0.0, b"v!")], wrong]
+    conversation, _ = talk(lambda data: replies.pop(0) if replies else honest(data))
+    assert conversation.ask(b"AB", 2) is None
+    got = [conversation.ask(b"CD", 2, insist=True) for _ in range(3)]
+    assert got[-1] == b"cd"
+    assert set(got) <= {None, b"cd"}
+
+
+def test_a_silent_board_is_tried_once_in_a_while() -> None:
+    asked: list[bytes] = []
+
+    def silent(data: bytes) -> list[tuple[float, bytes]]:
+        asked.append(data)
+        return []
+
+    conversation, port = talk(silent)
+    for _ in range(50):
+        assert conversation.ask(b"A", 1) is None
+    assert asked == [b"V"]
+    port.clock.sleep(1.0)
+    assert conversation.ask(b"A", 1) is None
+    assert asked == [b"V", b"V"]

@@ -1,0 +1,87 @@
+"""surface.head.posing.decimated_head"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_head import all_points, small_head
+from small_head import part as patch
+
+from surface.head import Head
+from surface.head.model.data import Seam
+from surface.head.posing.decimated_head import DecimatedHead
+
+VALUES = ({}, {"mouthPucker": 0.7, "headYaw": 0.3}, {"jawOpen": 0.4, "headYaw": 0.3}, {"jawOpen": 0.4})
+
+
+@pytest.fixture(scope="module")
+def head() -> Head:
+    made = Head(small_head())
+    for part in made.parts:
+        part.decimated = {"fast": part.triangles[::3]}
+    return made
+
+
+@pytest.fixture
+def decimated(head: Head) -> DecimatedHead:
+    return DecimatedHead(head, head.parts[::-1], "fast", {"a": np.array([2, 5])})
+
+
+def assert_alike(decimated: DecimatedHead) -> None:
+    for part in decimated.parts:
+        own = slice(part.first, part.last)
+        assert decimated.vertices[own] == pytest.approx(part.part.vertices[part.kept], abs=1e-5)
+        assert decimated.normals[own] == pytest.approx(part.part.normals[part.kept], abs=1e-5)
+
+
+def test_what_is_kept_stands_where_the_head_has_it(head: Head, decimated: DecimatedHead) -> None:
+    for given in VALUES:
+        head.pose(head.values(given))
+        decimated.pose(head.values(given))
+        assert_alike(decimated)
+
+
+def test_triangles_and_vertices_asked_for_are_kept_and_others_are_not(head: Head, decimated: DecimatedHead) -> None:
+    of = {part.part.name: part for part in decimated.parts}
+    for name, part in of.items():
+        assert np.array_equal(part.kept[part.triangles], part.part.decimated["fast"])
+        assert len(part.kept) < len(head.part(name).vertices)
+    assert np.array_equal(of["a"].kept[of["a"].rows(np.array([5, 2])) - of["a"].first], [5, 2])
+
+
+def test_only_what_moved_is_said_to_have_changed(head: Head, decimated: DecimatedHead) -> None:
+    changed = []
+    for given in ({"mouthPucker": 0.5}, {"mouthPucker": 0.5}, {"mouthPucker": 0.5, "jawOpen": 0.5}, {"headYaw": 0.1}):
+        decimated.pose(head.values(given))
+        changed.append({part.part.name for part in decimated.parts if part.changed})
+    assert changed == [{"a", "b"}, set(), {"tooth"}, {"a", "b", "tooth"}]
+
+
+def test_what_hangs_on_a_border_that_hangs_on_another_is_said_to_have_changed() -> None:
+    line, data = np.linspace(0, 1, 6), small_head()
+    under = Seam("b", "c", np.column_stack([line, np.zeros(6)]), np.column_stack([line, np.ones(6)]))
+    parts = [patch("a", -40, groups=[all_points("mouthPucker", (0, 0, 6))]), patch("b", 0), patch("c", 0)]
+    head = Head(replace(data, parts=parts, seams=[*data.seams, under]))
+    decimated = DecimatedHead(head, head.parts, "fast", {})
+    last = decimated.parts[2]
+    before = decimated.vertices[last.first :].copy()
+    decimated.pose(head.values({"mouthPucker": 1.0}))
+    assert (decimated.vertices[last.first :] != before).any() and last.changed
+
+
+def test_points_at_rest_that_are_changed_are_seen(head: Head, decimated: DecimatedHead) -> None:
+    rig, values = head.part("a").rig, head.values({"mouthPucker": 0.5})  # type: ignore[attr-defined]
+    before = rig.rest.copy()
+    decimated.pose(values)
+    try:
+        rig.rest[:, 1] += 2.0
+        rig.wake()
+        head.pose(values)
+        decimated.pose(values)
+        assert_alike(decimated)
+    finally:
+        rig.rest[:] = before
+        rig.wake()
+        head.pose(head.values({}))

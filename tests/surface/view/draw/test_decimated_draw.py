@@ -1,0 +1,70 @@
+"""surface.view.draw.decimated_draw"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from surface.head import Head
+from surface.view import Camera, Offscreen
+
+SIZE = (320, 240)
+
+
+@pytest.fixture(scope="module")
+def head(root: Path) -> Head:
+    return Head.load(root / "configs" / "heads" / "ict")
+
+
+@pytest.fixture(scope="module")
+def screen(gl: None, head: Head) -> Iterator[Offscreen]:
+    with Offscreen(head, SIZE, quality="fast") as made:
+        made.draw(np.zeros(len(head.parameters)))
+        yield made
+
+
+def test_the_picture_is_that_of_the_lean_triangles_drawn_part_by_part(screen: Offscreen, root: Path) -> None:
+    plain = Head.load(root / "configs" / "heads" / "ict")
+    for part in plain.parts:
+        part.triangles, part.decimated = part.decimated["fast"], {}
+    random = np.random.default_rng(3)
+    with Offscreen(plain, SIZE, quality="fast") as other:
+        other.renderer.openings = screen.renderer.openings  # the rim of fewer triangles is another
+        for camera in (Camera.front(), Camera.three_quarter()):
+            values = random.uniform(-0.3, 0.7, len(plain.parameters))
+            screen.draw(values, camera)
+            other.draw(values, camera)
+            assert np.array_equal(screen.read(), other.read())
+
+
+def test_what_does_not_move_is_not_sent(screen: Offscreen, head: Head) -> None:
+    renderer = screen.renderer
+    sent = []
+    for given in ({}, {"jawOpen": 0.2}, {"jawOpen": 0.2}, {"jawOpen": 0.2, "rightEyeYaw": 0.5}):
+        renderer.pose(head.values(given))
+        sent.append(renderer.update())
+    eye = next(p for p in renderer.evaluator.decimated.parts if p.part.name == "eye_right")  # type: ignore[attr-defined]
+    assert sent[1] > len(eye.kept) and sent[2] == 0
+    assert sent[3] >= len(eye.kept), "the eye, and lids that follow it"
+
+
+def test_positions_are_those_of_the_head(screen: Offscreen, head: Head) -> None:
+    values = head.values({"jawOpen": 0.6, "headYaw": -0.4, "eyeBlinkLeft": 1.0})
+    screen.draw(values)
+    head.pose(values)
+    for name, ids in screen.renderer.openings.read_vertices().items():
+        found = screen.renderer.evaluator.positions(head.part(name), ids)
+        assert np.array_equal(found, head.part(name).vertices[ids])
+
+
+def test_the_head_poses_as_before_whatever_is_drawn(screen: Offscreen, head: Head) -> None:
+    values = head.values({"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0, "mouthRollLower": 0.5})
+    head.pose(values)
+    before = {part.name: part.vertices.copy() for part in head.parts}
+    screen.draw(head.values({"eyeWideLeft": 1.0, "eyeLookDownRight": 1.0, "mouthClose": 0.5}))
+    head.pose(values)
+    for part in head.parts:
+        assert np.array_equal(part.vertices, before[part.name]), part.name
