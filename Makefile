@@ -12,7 +12,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench setup api lock clean
+.PHONY: help demo test check mutate bench setup api lock clean
 
 help: ## this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
@@ -25,6 +25,11 @@ test: setup ## set up, then run the tests (no display, graphics processor or ser
 
 check: setup ## style and types
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy
+
+# Not in the lock: nothing else needs it, and it brings a dozen packages.
+mutate: setup ## break 50 lines of a room on purpose and count what its tests notice: make mutate ROOM=drivers SEED=1
+	@$(PY) -c 'import cosmic_ray' 2>/dev/null || $(if $(UV),$(UV) pip install --python $(PY),$(PY) -m pip install) --quiet 'cosmic-ray>=8.4'
+	@$(PY) -m tests.mutate $(ROOM) --seed $(or $(SEED),1)
 
 bench: setup ## measure the engine on this machine
 	@$(BIN)/omote bench

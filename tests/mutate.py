@@ -1,0 +1,260 @@
+"""Break lines of a room on purpose and count how many of the breaks its tests notice: ``make mutate ROOM=drivers``.
+
+Mutants come from cosmic-ray. A sample of places is drawn with a fixed seed, each place once, and each mutant runs in a
+copy of the checkout against the tests mapped to its module: the test file of its name, and the test files that import
+it. A mutant is killed when a test fails, or when the tests do not end in time. Outside of CI, because 50 mutants take
+ten minutes and more.
+"""
+# ruff: noqa: T201 (a program that prints for people)
+
+from __future__ import annotations
+
+import argparse
+import ast
+import builtins
+import contextlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator
+from scipy.stats import binomtest
+
+ROOT = Path(__file__).resolve().parent.parent
+EQUIVALENT = ROOT / "tests/equivalent_mutants.txt"
+"""Mutants that behave as the original does: one a line, as this program prints them; ``#`` starts a reason."""
+OPERATORS = (
+    *("AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd"),
+    *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "NumberReplacer"),
+    *("ZeroIterationForLoop", "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Not"),
+    *(f"ReplaceBinaryOperator_{change}" for change in ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul")),
+    *(f"ReplaceBinaryOperator_{change}" for change in ("FloorDiv_Mul", "Mod_Div", "Pow_Mul", "LShift_RShift")),
+    *(f"ReplaceBinaryOperator_{change}" for change in ("RShift_LShift", "BitAnd_BitOr", "BitOr_BitAnd")),
+    *(f"ReplaceComparisonOperator_{change}" for change in ("Lt_LtE", "LtE_Lt", "Gt_GtE", "GtE_Gt")),
+    *(f"ReplaceComparisonOperator_{change}" for change in ("Lt_Gt", "Gt_Lt", "LtE_GtE", "GtE_LtE")),
+    *(f"ReplaceComparisonOperator_{change}" for change in ("Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is")),
+)
+"""Changes that leave a program which still runs. cosmic-ray has more, such as ``*`` to ``>>``, which any test notices
+by a TypeError, and the removal of decorators that compile or cache, which no test should notice."""
+TIMEOUT_S = 300.0
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change: the `occurrence`-th place in `module` (a path from the root) where `operator` applies."""
+
+    module: str
+    operator: str
+    occurrence: int
+
+    def code(self) -> str:
+        """The whole module with the change."""
+        operator = get_operator(f"core/{self.operator}")()
+        return str(mutate_code((ROOT / self.module).read_text(), operator, self.occurrence))
+
+    def title(self) -> str:
+        """Path, the line before and the line after."""
+        before, after = (ROOT / self.module).read_text().splitlines(), self.code().splitlines()
+        changed = [(a.strip(), b.strip()) for a, b in zip(before, after, strict=True) if a != b]
+        return f"{self.module}: " + " | ".join(f"{a}  ->  {b}" for a, b in changed)
+
+
+def main() -> int:
+    """Sample, run, report; exit code 1 where fewer than ``--least`` percent were killed."""
+    given = _arguments()
+    mutants = sample(given.room, given.count, given.seed)
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        copies: SimpleQueue[Path] = SimpleQueue()
+        for job in range(given.jobs):
+            copies.put(_copy(Path(folder) / str(job) / "omote"))
+        _refuse_red_tests(copies, {test for mutant in mutants for test in tests_of(mutant.module)})
+        with ThreadPoolExecutor(given.jobs) as pool:
+            noticed = list(pool.map(lambda mutant: _is_killed(mutant, copies), mutants))
+    interval = binomtest(sum(noticed), len(mutants)).proportion_ci(method="wilson")
+    print(f"\n{given.room}, seed {given.seed}: {sum(noticed)} of {len(mutants)} mutants killed,", end=" ")
+    print(f"{sum(noticed) / len(mutants):.0%} (95 % interval {interval.low:.0%} to {interval.high:.0%})")
+    for mutant, killed in zip(mutants, noticed, strict=True):
+        if not killed:
+            print(f"  survived  {mutant.title()}")
+    return int(100 * sum(noticed) < given.least * len(mutants))
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.mutate", description=str(__doc__).splitlines()[0])
+    parser.add_argument("room", help="surface, controller, drivers, or a folder or module of one of them")
+    parser.add_argument("--count", type=int, default=50, help="how many mutants (default 50)")
+    parser.add_argument("--seed", type=int, default=1, help="which sample (default 1)")
+    parser.add_argument("--jobs", type=int, default=max(1, min(4, os.cpu_count() or 1)), help="how many run at once")
+    parser.add_argument("--least", type=float, default=85.0, help="exit code 1 below this percentage (default 85)")
+    return parser.parse_args()
+
+
+def sample(room: str, count: int, seed: int) -> list[Mutant]:
+    """`count` mutants of `room`, no two at the same place, and none that is listed as equivalent."""
+    lines = EQUIVALENT.read_text().splitlines() if EQUIVALENT.is_file() else []
+    equivalent = {line.partition("  #")[0] for line in lines}
+    places = [place for module in modules_in(room) for place in _places(module)]
+    draw, chosen = random.Random(seed), list[Mutant]()
+    draw.shuffle(places)
+    for place in places:
+        mutant = draw.choice(place)
+        if _compiles(mutant.code()) and mutant.title() not in equivalent:
+            chosen.append(mutant)
+        if len(chosen) == count:
+            break
+    return chosen
+
+
+def _compiles(code: str) -> bool:
+    """Whether the change left Python; the ``*`` in a list of parameters, for one, is no product."""
+    try:
+        compile(code, "mutant", "exec")
+    except SyntaxError:
+        return False
+    return True
+
+
+def modules_in(room: str) -> list[str]:
+    """Paths of the modules of a room, or of a part of one, from the root."""
+    path = ROOT / room
+    found = [path] if path.is_file() else sorted(path.rglob("*.py"))
+    if not found:
+        raise SystemExit(f"no modules in {room}; give a room (surface, controller, drivers), a folder or a module")
+    return [p.relative_to(ROOT).as_posix() for p in found]
+
+
+def _places(module: str) -> list[list[Mutant]]:
+    """The mutants of a module, grouped by the place in the text that they change."""
+    text = (ROOT / module).read_text()
+    nodes, types = list(ast_nodes(get_ast(text))), _type_spans(text)
+    by_place: dict[tuple[tuple[int, int], str], list[Mutant]] = defaultdict(list)
+    for name in OPERATORS:
+        operator = get_operator(f"core/{name}")()
+        starts = (start for node in nodes for start, _ in operator.mutation_positions(node))
+        for occurrence, start in enumerate(starts):
+            if not any(first <= start < last for first, last in types):
+                by_place[start, name.partition("_")[0]].append(Mutant(module, name, occurrence))
+    return [by_place[key] for key in sorted(by_place)]
+
+
+def _type_spans(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Spans ((line, column) from, to) of annotations, which nothing evaluates, and of unions of types."""
+    found: list[ast.expr | None] = []
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            found.append(node.returns)
+        elif isinstance(node, ast.arg | ast.AnnAssign):
+            found.append(node.annotation)
+        elif isinstance(node, ast.BinOp) and _is_type(node):
+            found.append(node)
+    return [((n.lineno, n.col_offset), (n.end_lineno or 0, n.end_col_offset or 0)) for n in found if n is not None]
+
+
+def _is_type(value: ast.expr) -> bool:
+    """Whether an expression is a type or a union of types, as ``int | Path`` in ``isinstance(value, int | Path)``."""
+    match value:
+        case ast.BinOp(left, ast.BitOr(), right):
+            return _is_type(left) and _is_type(right)
+        case ast.Name(name) | ast.Attribute(_, name):
+            return not name.isupper() and (name[0].isupper() or isinstance(getattr(builtins, name, None), type))
+        case ast.Subscript(of, _):
+            return _is_type(of)
+        case ast.Constant(None):
+            return True
+    return False
+
+
+def tests_of(module: str) -> list[str]:
+    """Paths of the tests mapped to a module; those of its folder where none is named for it or imports it."""
+    path = Path(module)
+    folder = ROOT / "tests" / path.parent
+    own = folder / f"test_{path.stem}.py"
+    dotted = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+    importing = [p for p, names in _imports().items() if dotted in names and p != own]
+    found = [own, *importing] if own.is_file() else importing
+    return [p.relative_to(ROOT).as_posix() for p in found or sorted(folder.glob("test_*.py"))]
+
+
+_names_by_test: dict[Path, set[str]] = {}
+
+
+def _imports() -> dict[Path, set[str]]:
+    """Names of the modules that each test file imports."""
+    if not _names_by_test:
+        for path in sorted((ROOT / "tests").glob("*/**/test_*.py")):
+            names = _names_by_test.setdefault(path, set())
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.ImportFrom) and node.module:
+                    names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+                elif isinstance(node, ast.Import):
+                    names |= {alias.name for alias in node.names}
+    return _names_by_test
+
+
+def _copy(target: Path) -> Path:
+    """The checkout as it is now, with its compiled kernels, and ``shared`` beside it where there is one."""
+    names = subprocess.check_output(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, text=True).splitlines()
+    rooms = (ROOT / name for name in ("surface", "controller", "drivers"))
+    kernels = (str(path.relative_to(ROOT)) for room in rooms for path in room.rglob("*.nb[ic]"))
+    for name in (*names, *kernels):
+        if (ROOT / name).is_file():
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, target / name)
+    if (ROOT.parent / "shared").is_dir():
+        (target.parent / "shared").symlink_to(ROOT.parent / "shared")
+    return target
+
+
+def _refuse_red_tests(copies: SimpleQueue[Path], tests: set[str]) -> None:
+    copy = copies.get()
+    ended, output = _pytest(copy, sorted(tests), 4 * TIMEOUT_S)
+    copies.put(copy)
+    if ended != 0:
+        raise SystemExit(f"these tests must be green before a mutant says anything about them:\n{output}")
+
+
+def _is_killed(mutant: Mutant, copies: SimpleQueue[Path]) -> bool:
+    copy = copies.get()
+    try:
+        (copy / mutant.module).write_text(mutant.code())
+        ended, _ = _pytest(copy, tests_of(mutant.module), TIMEOUT_S)
+    finally:
+        shutil.copy2(ROOT / mutant.module, copy / mutant.module)
+        copies.put(copy)
+    killed = ended not in (0, 5)  # 5: pytest found no test
+    print(f"{'killed  ' if killed else 'SURVIVED'}  {mutant.title()}", flush=True)
+    return killed
+
+
+def _pytest(copy: Path, tests: list[str], timeout_s: float) -> tuple[int | None, str]:
+    """Exit code of pytest, None where it did not end in time, and the end of what it printed."""
+    environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--tb=line", *tests]
+    with tempfile.TemporaryFile("w+") as output:
+        process = subprocess.Popen(
+            command, cwd=copy, env=environment, stdout=output, stderr=output, start_new_session=True
+        )
+        try:
+            ended: int | None = process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            ended = None
+        with contextlib.suppress(ProcessLookupError):  # a mutant may leave processes behind, which hold their ports
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        output.seek(0)
+        return ended, output.read()[-2000:]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
