@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats
 from surface.base.checks import check_inside, check_uv
-from surface.base.progress import Progress, silent
+from surface.base.progress import Progress, no_progress
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
 from surface.spline.controlpoints import ControlPoints
@@ -147,7 +147,7 @@ class DCPSurface(ControlPoints):
         loop_error: float | None = None,
         roots: tuple[int, int] | None = None,
         flip: bool = False,
-        progress: Progress = silent,
+        progress: Progress = no_progress,
     ) -> Mesh:
         """A watertight mesh by quad tree (paper, 2.3).
 
@@ -184,7 +184,7 @@ class DCPSurface(ControlPoints):
         )
 
     def deformation(
-        self, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = silent
+        self, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = no_progress
     ) -> Deformation[Self]:
         """A mesh that follows moves of control points, changes of weights and of knots (Eq. 2).
 

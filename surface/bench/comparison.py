@@ -13,6 +13,8 @@ from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
 
+from .bench import Report, no_report
+
 FINER = 4  # samples of the reference per edge of the uniform mesh
 MOST_SAMPLES = 40  # along an edge of one large triangle
 DEEPER = 2  # levels the adaptive meshes may go below the uniform one: to the reference's samples
@@ -44,7 +46,7 @@ def compare(
     *,
     level: int = 4,
     quantile: float = 1.0,
-    tell: Callable[[str], None] = lambda text: None,
+    report: Report = no_report,
 ) -> list[Variant]:
     """A uniform mesh, and the smallest adaptive ones that deviate no more.
 
@@ -53,7 +55,7 @@ def compare(
     surface, domain : what to tessellate
     level : levels below the roots that the uniform mesh is quartered everywhere
     quantile : what "no more" means: 1 compares greatest deviations, 0.99 those that 99 % of the area keep
-    tell : is told what is being done
+    report : is called with what is being done
 
     Notes
     -----
@@ -61,7 +63,7 @@ def compare(
     """
     where = Domain.of(surface) if domain is None else domain
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
-    tell("uniform")
+    report("uniform")
     uniform = surface.tessellate(chord_error=1e9, min_depth=level, max_depth=level, domain=where, loop_error=1e9)
     spacing = _edge(uniform) / FINER
     bound = deviation(surface, uniform, spacing, quantile)
@@ -87,7 +89,7 @@ def compare(
         ("by chord error", by_error, 0.1 * size, 1e-6 * size),
     ]
     for name, make, coarse, fine in ways:
-        tell(name)
+        report(name)
         best = _search(make, off, coarse, fine, bound)
         if best is not None:
             mesh, limit, reached = best

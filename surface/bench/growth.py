@@ -10,7 +10,7 @@ import numpy as np
 
 from surface.dcp import DCPSurface
 
-from .bench import Measure, Tell, bumpy, least, least_of, nearest, shaker, sheet
+from .bench import Measure, Report, alternating, bumpy, least, least_of, nearest, no_report, sheet
 
 VERTICES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
 POINTS = (100, 1_000, 10_000, 100_000)
@@ -51,7 +51,7 @@ def growth(
     vertices: tuple[int, ...] = VERTICES,
     points: tuple[int, ...] = POINTS,
     seconds: float = 0.3,
-    tell: Tell = lambda text: None,
+    report: Report = no_report,
 ) -> list[Series]:
     """Measure sheets of rising size.
 
@@ -60,16 +60,16 @@ def growth(
     vertices : sizes with one control point per 64 vertices, so that 16 reach each
     points : numbers of control points under about a quarter of the largest of ``vertices``
     seconds : how long each call is repeated; the least time counts
-    tell : is told the size that is measured
+    report : is called with the size that is measured
     """
     lines = {(axis, name): Series(name, axis) for axis in range(2) for name in (READ, FULL, MOVE, LISTS, MEMORY)}
     for count in vertices:
-        tell(f"growth: {count} vertices")
+        report(f"growth: {count} vertices")
         surface, mesh = sheet(count)
         _add(lines, 0, len(mesh.vertices), surface, mesh.leaves, seconds)
     cells = max(16, round(np.sqrt(max(vertices)) / 2))
     for count in points:
-        tell(f"growth: {count} control points")
+        report(f"growth: {count} control points")
         surface = bumpy(count)
         _add(lines, 1, surface.n, surface, cells * cells, seconds)
     return list(lines.values())
@@ -85,8 +85,8 @@ def _add(
     mesh = surface.tessellate(chord_error=1e9, roots=(side >> level, side >> level), min_depth=level, max_depth=level)
     deformation = surface.deformation(mesh, normals=False)
     built = 1e3 * (time.perf_counter() - begin)
-    one = shaker(deformation, nearest(deformation.surface, 1))
-    read, full = least_of([deformation.table.lists.value.sum, deformation.refresh], seconds)
+    one = alternating(deformation, nearest(deformation.surface, 1))
+    read, full = least_of([deformation.lists.value.sum, deformation.refresh], seconds)
     amounts = {READ: read, FULL: full, MOVE: least(one, seconds), LISTS: built, MEMORY: deformation.nbytes / 1e6}
     for name, amount in amounts.items():
         lines[axis, name].size.append(size)

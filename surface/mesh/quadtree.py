@@ -13,7 +13,7 @@ import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
-from surface.base.progress import Progress, silent
+from surface.base.progress import Progress, no_progress
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ SplitTest = Callable[[int, Ints], np.ndarray]
 NEIGHBOURS = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])  # below, right, above, left: the order of edges
 
 
-def grow(lattice: Lattice, split: SplitTest, progress: Progress = silent) -> tuple[Leaves, list[Ints]]:
+def grow(lattice: Lattice, split: SplitTest, progress: Progress = no_progress) -> tuple[Leaves, list[Ints]]:
     """Quarter cells until none wants to be, then balance 2:1 over edges.
 
     Parameters

@@ -6,7 +6,7 @@ import numpy as np
 
 from surface.base import keys
 from surface.base.arrays import Floats, Ints
-from surface.base.progress import Progress, between, silent
+from surface.base.progress import Progress, no_progress, part_of
 from surface.spline.controlpoints import ControlPoints
 
 from . import blocks, quadtree
@@ -31,7 +31,7 @@ def tessellate(
     loop_error: float | None = None,
     roots: tuple[int, int] | None = None,
     flip: bool = False,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Mesh:
     """See :meth:`surface.DCPSurface.tessellate`."""
     _check_limits(max_points, chord_error, max_depth, min_depth)
@@ -47,7 +47,7 @@ def tessellate(
     tests.max_points, tests.chord_error, tests.min_depth = max_points, chord_error, min_depth
     if len(where.segments):
         tests.follow_loops(loop_error if loop_error is not None else chord_error or 5e-4 * size)
-    leaves, inner = quadtree.grow(lattice, tests.split, between(progress, 0.0, 0.45))
+    leaves, inner = quadtree.grow(lattice, tests.split, part_of(progress, 0.0, 0.45))
     progress("triangles", 0.45)
     corners, owner = quadtree.triangulate(lattice, leaves, inner)
     nodes, _, triangles = keys.unique(corners)
@@ -55,7 +55,7 @@ def tessellate(
     if len(where.segments):
         progress("trimming", 0.55)
         flat = trim(flat, where, scale)
-    return _finish(surface, flat, where, lattice, leaves, flip, between(progress, 0.6, 1.0))
+    return _finish(surface, flat, where, lattice, leaves, flip, part_of(progress, 0.6, 1.0))
 
 
 def _check_limits(max_points: int | None, chord_error: float | None, max_depth: int, min_depth: int) -> None:
@@ -134,7 +134,7 @@ def _finish(
     """Split vertices on slits, evaluate, drop uncovered triangles, order by cell, make the lists."""
     flat, side = _open_slits(flat, domain)
     code = _codes(flat, lattice, leaves)
-    place, out = _evaluated(surface, flat.uv, side, code, between(progress, 0.1, 0.7))
+    place, out = _evaluated(surface, flat.uv, side, code, part_of(progress, 0.1, 0.7))
     keep = (side >= 0)[flat.triangles].all(axis=1)
     if not keep.all():
         flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])

@@ -8,9 +8,9 @@ from surface.bench.bench import Measure, group, measure, sheet
 
 
 def test_rows_of_a_small_sheet() -> None:
-    told: list[str] = []
+    reported: list[str] = []
     surface, mesh = sheet(12_000)
-    rows = measure(surface, mesh, seconds=0.002, tell=told.append)
+    rows = measure(surface, mesh, seconds=0.002, report=reported.append)
     begins = (
         "one read of the weights",
         "all positions",
@@ -26,14 +26,14 @@ def test_rows_of_a_small_sheet() -> None:
     assert len(rows) == len(begins)
     assert all(row.name.startswith(begin) for row, begin in zip(rows, begins, strict=True))
     assert len({row.name for row in rows}) == len(rows)
-    assert len(told) == len(rows)
+    assert len(reported) == len(rows)
     assert all(row.milliseconds > 0 for row in rows)
     assert all(row.kept is None or isinstance(row.kept, bool) for row in rows)
 
 
 def test_every_vertex_of_the_sheet_has_at_most_sixteen_influences() -> None:
     surface, mesh = sheet(2_000)
-    lists = surface.deformation(mesh, normals=False).table.lists
+    lists = surface.deformation(mesh, normals=False).lists
     assert (lists.rows == 16).all()
     assert abs(len(mesh.vertices) / 2_000 - 1) < 0.3
 

@@ -15,7 +15,7 @@ SIZE = 100.0
 
 
 def fresh(deformation: Deformation[DCPSurface]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions, normals and sizes of S_u x S_v of the deformation's surface as it stands now, in float64."""
+    """Positions, normals and sizes of S_u x S_v of the deformation's surface at the moment, in float64."""
     mesh, surface = deformation.mesh, deformation.surface
     points, su, sv = surface.derivatives(mesh.uv, side=mesh.side)
     normals = np.cross(su, sv)
@@ -188,7 +188,7 @@ def test_a_mesh_without_vertices() -> None:
 
 
 def test_two_threads_give_the_same(sheet: tuple[DCPSurface, Mesh], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("surface.deform.table.SMALL", 0)
+    monkeypatch.setattr("surface.deform.deformation.SMALL", 0)
     surface, mesh = sheet
     one, two = surface.deformation(mesh), surface.deformation(mesh, threads=2)
     for deformation in (one, two):
