@@ -7,9 +7,9 @@ import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
-from surface.mesh import blocks
 from surface.mesh.mesh import Mesh
 from surface.spline.basis import blending
+from surface.spline.kernels import points_in
 
 from .lists import LANES, Basis, Lists, cells_by_point, write_rows
 
@@ -89,8 +89,8 @@ def _cells_in(mesh: Mesh, knots: list[Floats]) -> Ints:
     """Cells whose vertices lie within the rectangle of the knots."""
     boxes, bins = mesh.cell_boxes
     box = np.array([knots[0][0], knots[0][-1], knots[1][0], knots[1][-1]])
-    out = np.zeros(len(boxes), dtype=np.int32)
-    found = blocks.reach(box, boxes, bins.grid, bins.shape, bins.start, bins.ids, out)
+    out, along = np.zeros(len(boxes), dtype=np.int32), [np.ascontiguousarray(boxes[:, k : k + 2]) for k in (0, 2)]
+    found = points_in(box, *along, bins.grid, bins.shape, bins.start, bins.ids, out)
     return np.sort(out[:found]).astype(np.int64)
 
 

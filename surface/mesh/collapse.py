@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats
-from surface.mesh.borders import border_edges
+from surface.mesh.mesh import border_edges
 
 Ids = NDArray[np.integer]
 _LEAST_COS = 0.3  # a triangle turned by more than this counts as flipped

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from surface.base import keys
@@ -16,17 +18,19 @@ MOST_CELLS = 4_000_000
 RIM = 64  # cells along a side where the border of what is covered is followed
 
 
+@dataclass
 class SplitTests:
-    """Which cells are to be quartered."""
+    """Which cells are to be quartered; ``scale`` are lengths per unit of u and of v."""
 
-    max_points: int | None = None
-    chord_error: float | None = None
-    min_depth = 0
-
-    def __init__(self, surface: ControlPoints, domain: Domain, lattice: Lattice, scale: tuple[float, float]) -> None:
-        self.surface, self.domain, self.lattice, self.scale = surface, domain, lattice, scale
-        self.rings: list[tuple[Floats, Floats]] = []
-        self.anchors: tuple[Floats, Floats] | None = None
+    surface: ControlPoints
+    domain: Domain
+    lattice: Lattice
+    scale: tuple[float, float]
+    max_points: int | None
+    chord_error: float | None
+    min_depth: int
+    rings: list[tuple[Floats, Floats]] = field(default_factory=list)
+    anchors: tuple[Floats, Floats] | None = None
 
     def follow_loops(self, error: float) -> None:
         """Ask for cells small enough that edges follow the loops within ``error``."""
@@ -91,9 +95,9 @@ class SplitTests:
         return quadtree.codes(self.lattice, level, np.stack(index, axis=1))
 
     def _counts(self, rect: Floats) -> Ints:
-        bins = self.surface.bins
-        out = np.zeros(len(rect), dtype=np.int64)
-        blocks.count_open(rect, self.surface.all_supports, bins.grid, bins.shape, bins.start, bins.ids, out)
+        """(n,): points whose subdomain shares an area, not only an edge, with each rectangle."""
+        out, inner = np.zeros(len(rect), dtype=np.int64), np.nextafter(rect, [np.inf, -np.inf, np.inf, -np.inf])
+        blocks.count_points(inner, *self.surface.arrays()[:2], *self.surface.bin_arrays(), out)
         return out
 
     def _errors(self, level: int, cells: Ints) -> Floats:

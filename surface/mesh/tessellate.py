@@ -1,12 +1,14 @@
-"""From a surface and a domain to a watertight mesh."""
+"""Tessellation: watertight triangle meshes of a surface over a domain, by quad tree (paper, 2.3)."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from surface.base import keys
 from surface.base.arrays import Floats, Ints
-from surface.base.progress import Progress, no_progress, part_of
+from surface.base.progress import Progress, part_of
 from surface.spline.controlpoints import ControlPoints
 
 from . import blocks, quadtree
@@ -20,62 +22,54 @@ MOST_ROOTS = 24  # along the longer side
 CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
 
 
-def tessellate(
-    surface: ControlPoints,
-    *,
-    max_points: int | None = None,
-    chord_error: float | None = None,
-    max_depth: int = 9,
-    min_depth: int = 0,
-    domain: Domain | None = None,
-    loop_error: float | None = None,
-    roots: tuple[int, int] | None = None,
-    flip: bool = False,
-    progress: Progress = no_progress,
-) -> Mesh:
+class Limits(NamedTuple):
+    """How fine a mesh shall be; see :meth:`surface.DCPSurface.tessellate`. ``ValueError`` from :meth:`check`."""
+
+    max_points: int | None
+    chord_error: float | None
+    max_depth: int
+    min_depth: int
+    loop_error: float | None
+    roots: tuple[int, int] | None
+
+    def check(self) -> None:
+        """``ValueError`` for the first limit that is out of range."""
+        if self.max_points is not None and self.max_points < 1:
+            raise ValueError(f"max_points: must be at least 1, not {self.max_points}")
+        for name, error in (("chord_error", self.chord_error), ("loop_error", self.loop_error)):
+            if error is not None and not error > 0:
+                raise ValueError(f"{name}: must be positive, not {error}")
+        if not 0 <= self.min_depth <= self.max_depth <= 20:
+            raise ValueError(f"min_depth, max_depth: need 0 <= {self.min_depth} <= {self.max_depth} <= 20")
+        if self.roots is None:
+            return
+        if np.shape(self.roots) != (2,) or not all(int(count) == count >= 1 for count in self.roots):
+            raise ValueError(f"roots: needs two whole numbers of 1 or more, got {self.roots!r}")
+        if self.roots[0] * self.roots[1] > MOST_CELLS:
+            raise ValueError(f"roots: {self.roots[0]} x {self.roots[1]} cells are more than {MOST_CELLS}")
+
+
+def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: bool, progress: Progress) -> Mesh:
     """See :meth:`surface.DCPSurface.tessellate`."""
-    _check_limits(max_points, chord_error, max_depth, min_depth)
-    _check_sizes(loop_error, roots)
-    where = Domain.of(surface) if domain is None else domain
+    limits.check()
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0))) or 1.0
-    if max_points is None and chord_error is None:
-        chord_error = 1e-3 * size
-    scale = _lengths(surface, where)
-    joined = _joined(surface, where)
-    lattice = _lattice(where, scale, max_depth, roots, joined)
-    tests = SplitTests(surface, where, lattice, scale)
-    tests.max_points, tests.chord_error, tests.min_depth = max_points, chord_error, min_depth
-    if len(where.segments):
-        tests.follow_loops(loop_error if loop_error is not None else chord_error or 5e-4 * size)
+    if limits.max_points is None and limits.chord_error is None:
+        limits = limits._replace(chord_error=1e-3 * size)
+    scale = _lengths(surface, domain)
+    joined = surface.closed[0] == tuple(domain.rect[:2]), surface.closed[1] == tuple(domain.rect[2:])  # goes around
+    lattice = _lattice(domain, scale, limits.max_depth, limits.roots, joined)
+    tests = SplitTests(surface, domain, lattice, scale, limits.max_points, limits.chord_error, limits.min_depth)
+    if len(domain.segments):
+        tests.follow_loops(limits.loop_error or limits.chord_error or 5e-4 * size)
     leaves, inner = quadtree.grow(lattice, tests.split, part_of(progress, 0.0, 0.45))
     progress("triangles", 0.45)
     corners, owner = quadtree.triangulate(lattice, leaves, inner)
     nodes, _, triangles = keys.unique(corners)
     flat = Flat(lattice.uv(*lattice.point(nodes)), triangles, owner)
-    if len(where.segments):
+    if len(domain.segments):
         progress("trimming", 0.55)
-        flat = trim(flat, where, scale)
-    return _finish(surface, flat, where, lattice, leaves, flip, part_of(progress, 0.6, 1.0))
-
-
-def _check_limits(max_points: int | None, chord_error: float | None, max_depth: int, min_depth: int) -> None:
-    if max_points is not None and max_points < 1:
-        raise ValueError(f"max_points: must be at least 1, not {max_points}")
-    if chord_error is not None and not chord_error > 0:
-        raise ValueError(f"chord_error: must be positive, not {chord_error}")
-    if not 0 <= min_depth <= max_depth <= 20:
-        raise ValueError(f"min_depth, max_depth: need 0 <= {min_depth} <= {max_depth} <= 20")
-
-
-def _check_sizes(loop_error: float | None, roots: tuple[int, int] | None) -> None:
-    if loop_error is not None and not loop_error > 0:
-        raise ValueError(f"loop_error: must be positive, not {loop_error}")
-    if roots is None:
-        return
-    if np.shape(roots) != (2,) or not all(int(count) == count >= 1 for count in roots):
-        raise ValueError(f"roots: needs two whole numbers of 1 or more, got {roots!r}")
-    if roots[0] * roots[1] > MOST_CELLS:
-        raise ValueError(f"roots: {roots[0]} x {roots[1]} cells are more than {MOST_CELLS}")
+        flat = trim(flat, domain, scale)
+    return _finish(surface, flat, domain, lattice, leaves, flip, part_of(progress, 0.6, 1.0))
 
 
 def _lengths(surface: ControlPoints, domain: Domain) -> tuple[float, float]:
@@ -115,12 +109,6 @@ def _lattice(
     return Lattice(_divide(lines_u, edge_u / scale[0]), _divide(lines_v, edge_v / scale[1]), depth, joined)
 
 
-def _joined(surface: ControlPoints, domain: Domain) -> tuple[bool, bool]:
-    """In which directions does the rectangle go once around a closed surface?"""
-    u0, u1, v0, v1 = domain.rect
-    return surface.closed[0] == (u0, u1), surface.closed[1] == (v0, v1)
-
-
 def _divide(borders: Floats, edge: float) -> Floats:
     """Borders with equal parts of about ``edge`` put between them."""
     pieces = np.maximum(1, np.rint(np.diff(borders) / edge).astype(np.int64))
@@ -147,9 +135,9 @@ def _finish(
     rank = np.zeros(len(flat.uv), dtype=np.int32)
     rank[order] = np.arange(len(order))
     triangles = rank[flat.triangles]
-    uv, supports = np.ascontiguousarray(flat.uv[order]), surface.all_supports
-    start = blocks.group(code, lattice.depth, uv, supports, surface.bins) if len(order) else np.zeros(1, np.int64)
-    list_start, list_ids = blocks.point_lists(start, uv, supports, surface.bins)
+    uv = np.ascontiguousarray(flat.uv[order])
+    start = blocks.group(code, lattice.depth, uv, surface) if len(order) else np.zeros(1, np.int64)
+    list_start, list_ids = blocks.point_lists(start, uv, surface)
     vertices = out[:, 0].copy()
     normals = unit_normals(vertices, out[:, 1], out[:, 2], triangles)
     progress("cells", 1.0)

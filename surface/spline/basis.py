@@ -1,6 +1,6 @@
-"""Blending functions of single control points.
+"""B-spline blending functions of single control points, and checks of their knots.
 
-A blending function of degree p is given by its own p + 2 knots, 0 <= p <= 7. It is zero outside them.
+A blending function of degree p has p + 2 knots of its own, 0 <= p <= 7, and is zero outside them.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats, Ints
+from surface.base.checks import require
 
 MAX_DEGREE = 7
 
@@ -43,8 +44,7 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
     if side not in ("left", "right"):
         raise ValueError(f'side: must be "left" or "right", not {side!r}')
     samples = _row(np.atleast_1d(x), "x")
-    if not np.isfinite(samples).all():
-        raise ValueError(f"x[{int(np.argmin(np.isfinite(samples)))}]: must be finite")
+    require(np.isfinite(samples), samples, "x")
     out = np.zeros((len(samples), 3))
     blends.blend_samples(row, row.shape[1] - 2, samples, side == "left", out)
     return out[:, derivative].copy()
@@ -115,20 +115,18 @@ def _check_degrees(degrees: Ints, name: str) -> None:
 def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
     """Raise ``ValueError`` for knots that are not finite, that decrease, or are all equal."""
     _check_degrees(degrees, name)
-    finite = np.isfinite(padded).all(axis=1)
-    if not finite.all():
-        i = int(np.argmin(finite))
+    good = np.isfinite(padded).all(axis=1)
+    if not good.all():
+        i = int(np.argmin(good))
         raise ValueError(f"{name}[{i}]: knots must be finite, got {padded[i, : degrees[i] + 2].tolist()}")
     steps = np.diff(padded, axis=1)
-    rising = (steps >= 0).all(axis=1)
-    if not rising.all():
-        i = int(np.argmin(rising))
+    good = (steps >= 0).all(axis=1) & (padded[:, -1] > padded[:, 0])
+    if not good.all():
+        i = int(np.argmin(good))
+        if (steps[i] >= 0).all():
+            raise ValueError(f"{name}[{i}]: fewer than two distinct knots (all are {padded[i, 0]})")
         k = int(np.argmax(steps[i] < 0)) + 1
         raise ValueError(f"{name}[{i}]: knots decrease at knot {k} ({padded[i, k]} after {padded[i, k - 1]})")
-    spread = padded[:, -1] > padded[:, 0]
-    if not spread.all():
-        i = int(np.argmin(spread))
-        raise ValueError(f"{name}[{i}]: fewer than two distinct knots (all are {padded[i, 0]})")
 
 
 def check_padded(knots: ArrayLike, degrees: ArrayLike, axis: str, n: int) -> tuple[Floats, Ints]:

@@ -28,16 +28,16 @@ def test_lists_hold_every_point_with_weight(seed: int) -> None:
         assert np.isin(used, mesh.points_of(cell)).all()
 
 
-def test_open_rectangles_count_points_with_a_common_area() -> None:
+def test_rectangles_count_the_points_that_meet_them() -> None:
     surface = shapes.scattered(40, 5)
-    rng, bins, s = np.random.default_rng(0), surface.bins, surface.supports
-    low = rng.uniform(-0.4, 1.2, (50, 2))
+    rng, s = np.random.default_rng(0), surface.supports
+    low = np.vstack([rng.uniform(-0.4, 1.2, (49, 2)), s[7, [1, 3]]])  # the last one touches a corner of point 7
     high = low + rng.uniform(0.01, 0.5, (50, 2))
     rect = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
     found = np.zeros(50, dtype=np.int64)
-    blocks.count_open(rect, s, bins.grid, bins.shape, bins.start, bins.ids, found)
+    blocks.count_points(rect, *surface.arrays()[:2], *surface.bin_arrays(), found)
     for box, count in zip(rect, found, strict=True):
-        meets = (s[:, 0] < box[1]) & (s[:, 1] > box[0]) & (s[:, 2] < box[3]) & (s[:, 3] > box[2])
+        meets = (s[:, 0] <= box[1]) & (s[:, 1] >= box[0]) & (s[:, 2] <= box[3]) & (s[:, 3] >= box[2])
         assert meets.sum() == count
 
 
