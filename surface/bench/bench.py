@@ -6,6 +6,7 @@ Times are the least of many calls: on a machine with other work that is the stea
 from __future__ import annotations
 
 import time
+from bisect import bisect_left
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -38,10 +39,8 @@ class Measure:
     ----------
     name : what was measured
     milliseconds : least time of one call; 0 for rows that are a ratio of sizes
-    ratio : against what ``against`` names, or None
-    against : the other side of the ratio
+    ratio, against : a ratio, or None, and its other side
     reach : the bound the ratio shall keep, as text (``"<= 1.8"``, ``"0.9 to 1.1"``), or empty
-    kept : does it keep the bound? None without one
     """
 
     name: str
@@ -83,11 +82,7 @@ def least_of(calls: list[Callable[[], object]], seconds: float = 0.3) -> list[fl
 def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, report: Report = no_report) -> list[Measure]:
     """Full evaluation, updates of a point, a group and everything, and peers, for any surface and mesh.
 
-    Parameters
-    ----------
-    surface, mesh : what to measure
-    seconds : how long each row is repeated
-    report : is called with the name of each row before it is measured
+    Each row is repeated for ``seconds``; ``report`` gets its name before.
     """
     rows: list[Measure] = []
     with_normals, plain = surface.deformation(mesh), surface.deformation(mesh, normals=False)
@@ -123,19 +118,11 @@ def peer_rows(
     return rows
 
 
-def sheet(vertices: int = 100_000, points: int | None = None) -> tuple[DCPSurface, Mesh]:
-    """A bicubic sheet whose cells are knot spans of about 8 x 8 vertices, so that 16 points reach each.
-
-    Parameters
-    ----------
-    vertices : about how many
-    points : about how many control points instead of one per 64 vertices
-    """
-    wanted = vertices / 64 if points is None else points
-    spans = max(2, round(np.sqrt(wanted) - (0 if points is None else 3)))
+def sheet(vertices: int = 100_000) -> tuple[DCPSurface, Mesh]:
+    """A bicubic sheet of about so many vertices; its cells are knot spans of about 8 x 8, with 16 points each."""
+    spans = max(2, round(np.sqrt(vertices / 64)))
     level = max(0, round(np.log2(np.sqrt(vertices) / spans)))
-    if points is None:
-        spans = max(2, round(np.sqrt(vertices) / 2**level))
+    spans = max(2, round(np.sqrt(vertices) / 2**level))
     surface = bumpy((spans + 3) ** 2)
     mesh = surface.tessellate(max_points=surface.n + 1, min_depth=level, max_depth=level, roots=(spans, spans))
     return surface, mesh
@@ -181,11 +168,7 @@ def large_table(vertices: int = 1_000_000, seconds: float = 0.5, report: Report 
 def build_table(points: int = 100_000, level: int = 7, progress: Progress = no_progress) -> list[Measure]:
     """Time of building quad tree and lists by either rule, for 100,000 control points and a million vertices.
 
-    Parameters
-    ----------
-    points : about how many
-    level : deepest level of the tree under 8 x 8 roots, which bounds the vertices to (8 * 2**level + 1)**2
-    progress : is called with a stage and the part that is done
+    ``level`` is the deepest level of the tree under 8 x 8 roots, which bounds the vertices to (8 * 2**level + 1)**2.
     """
     bumpy(300).tessellate(max_points=16, chord_error=1.0)  # compiles the kernels before the clock starts
     surface, rows = bumpy(points), []
@@ -228,15 +211,12 @@ def nearest(surface: DCPSurface, count: int) -> np.ndarray:
 
 def group(surface: DCPSurface, mesh: Mesh, share: float) -> tuple[np.ndarray, float]:
     """The fewest neighbouring points that reach ``share`` of the vertices, and the share they really reach."""
-    low, high = 1, surface.n
-    while low < high:
-        count = (low + high) // 2
-        if share_reached(surface, mesh, nearest(surface, count)) < share:
-            low = count + 1
-        else:
-            high = count
-    ids = nearest(surface, low)
-    return ids, share_reached(surface, mesh, ids)
+
+    def reach(count: int) -> float:
+        return share_reached(surface, mesh, nearest(surface, count))
+
+    count = bisect_left(range(surface.n), share, lo=1, key=reach)
+    return nearest(surface, count), reach(count)
 
 
 def share_reached(surface: DCPSurface, mesh: Mesh, ids: np.ndarray) -> float:

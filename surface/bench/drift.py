@@ -21,13 +21,10 @@ SHARE = 0.02  # of the updates move a group
 
 @dataclass(frozen=True)
 class Drift:
-    """What updates led to.
+    """How many updates of each kind were made, and the errors they led to.
 
-    Attributes
-    ----------
-    moves, groups, weights, knots : how many updates of each kind were made
-    error : greatest distance of a vertex from a new evaluation, as a part of the size of the control net
-    normal_error : greatest difference of a normal from the exact one
+    ``error`` is the greatest distance of a vertex from a new evaluation, as a part of the size of the control net,
+    ``normal_error`` the greatest difference of a normal from the exact one.
     """
 
     moves: int
@@ -43,12 +40,7 @@ def drift(
 ) -> Drift:
     """Make random updates of every kind, one after the other, and compare with a new evaluation.
 
-    Parameters
-    ----------
-    surface, mesh : what is updated
-    updates : how many calls of ``move``, ``set_weights`` and ``set_knots`` together
-    seed : of the random numbers
-    report : is called with how many updates are done
+    ``updates`` counts calls of ``move``, ``set_weights`` and ``set_knots`` together; ``report`` gets how many are done.
     """
     rng, deformation = np.random.default_rng(seed), surface.deformation(mesh)
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))

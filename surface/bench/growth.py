@@ -27,14 +27,7 @@ REACH = {(0, FULL): "0.9 to 1.1", (0, MEMORY): "0.9 to 1.1", (0, MOVE): "-0.1 to
 
 @dataclass
 class Series:
-    """One quantity against a size.
-
-    Attributes
-    ----------
-    name : the quantity and its unit
-    axis : 0 against vertices, 1 against control points
-    size, amount : rising sizes, and the quantity
-    """
+    """One quantity (its name with the unit) at rising sizes: of vertices (axis 0) or of control points (axis 1)."""
 
     name: str
     axis: int
@@ -53,14 +46,10 @@ def growth(
     seconds: float = 0.3,
     report: Report = no_report,
 ) -> list[Series]:
-    """Measure sheets of rising size.
+    """Measure sheets of rising size; the least time of calls repeated for ``seconds`` counts.
 
-    Parameters
-    ----------
-    vertices : sizes with one control point per 64 vertices, so that 16 reach each
-    points : numbers of control points under about a quarter of the largest of ``vertices``
-    seconds : how long each call is repeated; the least time counts
-    report : is called with the size that is measured
+    ``vertices`` are sizes with one control point per 64 vertices, so that 16 reach each; ``points`` are numbers of
+    control points under about a quarter of the largest of ``vertices``.
     """
     lines = {(axis, name): Series(name, axis) for axis in range(2) for name in (READ, FULL, MOVE, LISTS, MEMORY)}
     for count in vertices:
@@ -107,13 +96,7 @@ PANEL, EDGE, GAP = (400, 420), (70, 50), 250
 
 
 def plot(series: list[Series], path: str | Path) -> None:
-    """Two log-log panels as SVG, against vertices and against control points; slopes stand at the lines.
-
-    Parameters
-    ----------
-    series : from :func:`growth`
-    path : the file to write
-    """
+    """Write two log-log panels as SVG, against vertices and against control points, with slopes at the lines."""
     width = 2 * (PANEL[0] + GAP) + EDGE[0]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{PANEL[1] + 2 * EDGE[1] + 20}" '

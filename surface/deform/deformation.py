@@ -52,25 +52,14 @@ class Deformation(Generic[Table]):
     vertices, normals : (m, 3) float32, current, read-only; (0, 3) without normals
     mesh, basis, lists : the mesh; knots, degrees and weights of the control points; their weights by cell
 
-    Raises
-    ------
-    ValueError
-        For no thread at all, or a mesh whose lists name points that the surface does not have.
+    ``ValueError`` for no thread at all, or a mesh whose lists name points that the surface does not have.
 
-    Notes
-    -----
     One object belongs to one thread at a time. Nothing is allocated by :meth:`move` and :meth:`set_positions`
     but the copy of arguments that are not already int64 and float64 arrays.
     """
 
     def __init__(
-        self,
-        surface: Table,
-        mesh: Mesh,
-        *,
-        normals: bool = True,
-        threads: int = 1,
-        progress: Progress = no_progress,
+        self, surface: Table, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = no_progress
     ) -> None:
         if threads < 1:
             raise ValueError(f"threads: must be at least 1, not {threads}")
@@ -117,10 +106,7 @@ class Deformation(Generic[Table]):
     def move(self, ids: ArrayLike, delta: ArrayLike) -> None:
         """Move points by ``delta (k, 3)`` (or one (3,) for all); an id that is given twice moves twice.
 
-        Raises
-        ------
-        ValueError
-            For ids out of range, wrong shapes or numbers that are not finite; nothing is changed then.
+        ``ValueError`` for ids out of range, wrong shapes or numbers that are not finite; nothing is changed then.
         """
         step = _rows(delta, "delta")
         if step.shape == (3,):
@@ -128,13 +114,7 @@ class Deformation(Generic[Table]):
         self._place(ids, step, True)
 
     def set_positions(self, ids: ArrayLike, xyz: ArrayLike) -> None:
-        """Put points ``ids (k,)`` at ``xyz (k, 3)``; points that are there already cost next to nothing.
-
-        Raises
-        ------
-        ValueError
-            As :meth:`move`.
-        """
+        """Put points ``ids (k,)`` at ``xyz (k, 3)``, errors as :meth:`move`; those there already cost little."""
         self._place(ids, _rows(xyz, "xyz"), False)
 
     def set_points(self, xyz: np.ndarray) -> None:
@@ -144,10 +124,7 @@ class Deformation(Generic[Table]):
     def set_weights(self, ids: ArrayLike, weights: ArrayLike) -> None:
         """Give points ``ids (k,)`` the weights ``(k,)``, positive.
 
-        Raises
-        ------
-        ValueError
-            For ids out of range, wrong shapes or weights that are not positive and finite.
+        ``ValueError`` for ids out of range, wrong shapes or weights that are not positive and finite.
         """
         which = check_ids(ids, self.basis.n)
         w = check_weights(weights)
@@ -158,10 +135,7 @@ class Deformation(Generic[Table]):
     def set_knots(self, index: int, knots_u: ArrayLike, knots_v: ArrayLike) -> None:
         """Give one point other knots, and so another subdomain; lists change only where the old or new one reaches.
 
-        Raises
-        ------
-        ValueError
-            For bad knots, or where a vertex of the mesh would be covered by no point; nothing is changed then.
+        ``ValueError`` for bad knots, or where no point would cover a vertex of the mesh; nothing is changed then.
         """
         index = int(check_ids([index], self.basis.n)[0])
         rows = [pad_knots([k], name, 1) for k, name in ((knots_u, "knots_u"), (knots_v, "knots_v"))]

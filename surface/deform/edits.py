@@ -28,10 +28,7 @@ def change_weights(basis: Basis, lists: Lists, mesh: Mesh, which: Ints, weights:
 def change_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]) -> Ints:
     """Give point i other knots; returns the rising cells that changed.
 
-    Raises
-    ------
-    ValueError
-        Where a vertex would be covered by no point; nothing is changed then.
+    ``ValueError`` where a vertex would be covered by no point; nothing is changed then.
     """
     copies = [(b * basis.n + i, [knots[k] + shift[k] for k in range(2)]) for b, shift in enumerate(basis.shifts)]
     for copy, shifted in copies:
@@ -65,11 +62,8 @@ def _replace_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[F
     rows = np.full(len(cells), -1, dtype=np.int64)
     rows[np.searchsorted(cells, old)] = old_rows
     nonzero, held = write_rows(basis, lists, mesh, i, cells, rows), rows >= 0
-    for c, row in zip(cells[held & ~nonzero], rows[held & ~nonzero], strict=True):
-        _drop_row(
-            c, row, lists.rows, lists.room, lists.at, lists.ids_at, lists.ids, lists.value, lists.slope,
-            _tiles(lists, c), lists.point_start, lists.point_count, lists.point_cell, lists.point_row,
-        )  # fmt: skip
+    for c in cells[held & ~nonzero]:
+        _drop_row(lists, i, c)
     new = cells[nonzero & ~held]
     write_rows(basis, lists, mesh, i, new, np.array([_append_row(lists, i, int(c)) for c in new], dtype=np.int64))
     _compact(lists)
@@ -94,8 +88,31 @@ def _cells_in(mesh: Mesh, knots: list[Floats]) -> Ints:
     return np.sort(out[:found]).astype(np.int64)
 
 
-def _tiles(lists: Lists, c: int) -> int:
-    return int(lists.tile_start[c + 1] - lists.tile_start[c])
+def _blocks(lists: Lists, c: int) -> list[np.ndarray]:
+    """Views of a cell's weights (tiles, room, 8) and derivative weights (tiles, room, 16), if there are any."""
+    room, at = lists.room[c], lists.at[c]
+    end = at + (lists.tile_start[c + 1] - lists.tile_start[c]) * room * LANES
+    return [lists.value[at:end].reshape(-1, room, 8), lists.slope[2 * at : 2 * end].reshape(-1, room, 16)]
+
+
+def _entry(lists: Lists, i: int, c: int) -> int:
+    """The index of point i's entry for cell c."""
+    start = lists.point_start[i]
+    return int(start + np.argmax(lists.point_cell[start : start + lists.point_count[i]] == c))
+
+
+def _drop_row(lists: Lists, i: int, c: int) -> None:
+    """Remove point i's row from cell c: the last row takes its place."""
+    entry, last, first = _entry(lists, i, c), lists.rows[c] - 1, lists.ids_at[c]
+    row, moved = lists.point_row[entry], lists.ids[first + last]
+    for block in _blocks(lists, c):
+        block[:, row] = block[:, last]
+    lists.ids[first + row] = moved
+    lists.point_row[_entry(lists, moved, c)] = row
+    lists.rows[c] = last
+    end = lists.point_start[i] + lists.point_count[i] - 1
+    lists.point_cell[entry], lists.point_row[entry] = lists.point_cell[end], lists.point_row[end]
+    lists.point_count[i] -= 1
 
 
 def _append_row(lists: Lists, i: int, c: int) -> int:
@@ -107,14 +124,13 @@ def _append_row(lists: Lists, i: int, c: int) -> int:
     lists.rows[c] += 1
     start, count = int(lists.point_start[i]), int(lists.point_count[i])
     if count == lists.point_room[i]:  # its list of cells is full: it moves to the end of the arrays
-        room = count * 5 // 4 + 4
-        lists.point_cell = _grow(lists.point_cell, lists.point_used + room)
-        lists.point_row = _grow(lists.point_row, lists.point_used + room)
-        for table in (lists.point_cell, lists.point_row):
-            table[lists.point_used : lists.point_used + count] = table[start : start + count]
-        start = lists.point_start[i] = lists.point_used
-        lists.point_room[i] = room
-        lists.point_used += room
+        room, end = count * 5 // 4 + 4, lists.point_used
+        for name in ("point_cell", "point_row"):
+            table = _grow(getattr(lists, name), end + room)
+            table[end : end + count] = table[start : start + count]
+            setattr(lists, name, table)
+        start = lists.point_start[i] = end
+        lists.point_room[i], lists.point_used = room, end + room
     lists.point_cell[start + count], lists.point_row[start + count] = c, row
     lists.point_count[i] += 1
     return row
@@ -122,16 +138,17 @@ def _append_row(lists: Lists, i: int, c: int) -> int:
 
 def _enlarge(lists: Lists, c: int, room: int) -> None:
     """Give a cell a block with more room, at the end of the arrays."""
-    tiles, place, listed = _tiles(lists, c), lists.used, lists.ids_used
-    lists.used, lists.ids_used = place + tiles * room * LANES, listed + room
-    lists.value = _grow(lists.value, lists.used)
+    rows, first, old = lists.rows[c], lists.ids_at[c], _blocks(lists, c)
+    ids = lists.ids[first : first + rows].copy()
+    lists.at[c], lists.ids_at[c], lists.room[c] = lists.used, lists.ids_used, room
+    lists.used += int(lists.tile_start[c + 1] - lists.tile_start[c]) * room * LANES
+    lists.ids_used += room
+    lists.value, lists.ids = _grow(lists.value, lists.used), _grow(lists.ids, lists.ids_used)
     if len(lists.slope):
         lists.slope = _grow(lists.slope, 2 * lists.used)
-    lists.ids = _grow(lists.ids, lists.ids_used)
-    _copy_block(
-        c, lists.rows, lists.room, lists.at, lists.ids_at, lists.ids, lists.value, lists.slope, tiles, room, place,
-        listed, lists.ids, lists.value, lists.slope,
-    )  # fmt: skip
+    for new, block in zip(_blocks(lists, c), old, strict=True):
+        new[:, :rows] = block[:, :rows]
+    lists.ids[lists.ids_at[c] : lists.ids_at[c] + rows] = ids
 
 
 def _grow(table: np.ndarray, wanted: int) -> np.ndarray:
@@ -141,81 +158,19 @@ def _grow(table: np.ndarray, wanted: int) -> np.ndarray:
 
 
 def _compact(lists: Lists) -> None:
-    """Once half of the arrays is no longer used, copy what is used to new ones."""
-    tiles = np.diff(lists.tile_start)
-    live = int((lists.rows * tiles).sum()) * LANES
-    if lists.used <= 2 * live and lists.point_used <= 2 * int(lists.point_count.sum()) + 1024:
+    """Once half of the arrays is no longer used, copy what is used to new ones without gaps."""
+    sizes = lists.rows * np.diff(lists.tile_start) * LANES
+    if lists.used <= 2 * sizes.sum() and lists.point_used <= 2 * int(lists.point_count.sum()) + 1024:
         return
-    value = np.zeros(live, dtype=np.float32)
-    slope = np.zeros(2 * live if len(lists.slope) else 0, dtype=np.float32)
-    ids = np.zeros(int(lists.rows.sum()), dtype=np.int32)
-    _pack(lists.rows, lists.room, lists.at, lists.ids_at, lists.ids, lists.value, lists.slope, tiles, ids, value, slope)
-    lists.value, lists.slope, lists.ids = value, slope, ids
-    by_point = cells_by_point(ids, lists.rows, len(lists.point_start))
+    cells = [(_blocks(lists, c), lists.ids_at[c], rows) for c, rows in enumerate(lists.rows)]
+    lists.value, lists.slope = (
+        np.concatenate([blocks[k][:, :rows].ravel() for blocks, _, rows in cells]) for k in range(2)
+    )
+    lists.ids = np.concatenate([lists.ids[first : first + rows] for _, first, rows in cells])
+    lists.at, lists.ids_at, lists.room = np.cumsum(sizes) - sizes, np.cumsum(lists.rows) - lists.rows, lists.rows.copy()
+    by_point = cells_by_point(lists.ids, lists.rows, len(lists.point_start))
     lists.point_start, lists.point_count, lists.point_cell, lists.point_row = by_point
     lists.__post_init__()
-
-
-@kernel
-def _copy_row(
-    value, slope, source, source_room, source_row, to_value, to_slope, target, target_room, target_row, tiles
-):
-    """Copy one row of a block to a row of the same or another block, tile by tile."""
-    for t in range(tiles):
-        a = source + (t * source_room + source_row) * 8
-        b = target + (t * target_room + target_row) * 8
-        for j in range(8):
-            to_value[b + j] = value[a + j]
-        if slope.shape[0] > 0:
-            for j in range(16):
-                to_slope[2 * b + j] = slope[2 * a + j]
-
-
-@kernel
-def _copy_block(
-    c, rows, room, at, ids_at, ids, value, slope, tiles, new_room, new_at, new_ids_at, to_ids, to_value, to_slope
-):
-    """Move a cell's block and list to another place, in the same arrays or others, with room for ``new_room`` rows."""
-    for k in range(rows[c]):
-        _copy_row(value, slope, at[c], room[c], k, to_value, to_slope, new_at, new_room, k, tiles)
-        to_ids[new_ids_at + k] = ids[ids_at[c] + k]
-    at[c], ids_at[c], room[c] = new_at, new_ids_at, new_room
-
-
-@kernel
-def _pack(rows, room, at, ids_at, ids, value, slope, tiles, to_ids, to_value, to_slope):
-    """Copy all blocks and lists to other arrays without gaps."""
-    place, listed = 0, 0
-    for c in range(rows.shape[0]):
-        _copy_block(
-            c, rows, room, at, ids_at, ids, value, slope, tiles[c], rows[c], place, listed, to_ids, to_value, to_slope
-        )
-        place += rows[c] * tiles[c] * 8
-        listed += rows[c]
-
-
-@kernel
-def _find_entry(i, c, start, count, cell):
-    """Where point i's entry for cell c is, or -1."""
-    for e in range(start[i], start[i] + count[i]):
-        if cell[e] == c:
-            return e
-    return -1
-
-
-@kernel
-def _drop_row(c, row, rows, room, at, ids_at, ids, value, slope, tiles, start, count, cell, entry_row):
-    """Take one row out of a cell: the last row takes its place."""
-    i, last = ids[ids_at[c] + row], rows[c] - 1
-    if row != last:
-        moved = ids[ids_at[c] + last]
-        _copy_row(value, slope, at[c], room[c], last, value, slope, at[c], room[c], row, tiles)
-        ids[ids_at[c] + row] = moved
-        entry_row[_find_entry(moved, c, start, count, cell)] = row
-    rows[c] = last
-    e, end = _find_entry(i, c, start, count, cell), start[i] + count[i] - 1
-    cell[e], entry_row[e] = cell[end], entry_row[end]
-    count[i] -= 1
 
 
 @kernel

@@ -71,15 +71,9 @@ class Lists:
 
 @dataclass
 class Basis:
-    """The knots, degrees and weights of control points, which may change.
+    """The current shifts (b, 2), knots in u and v (b n, w), degrees in u and v (b n,) and weights (b n,) of n points.
 
-    Attributes
-    ----------
-    n : how many points; all arrays hold their shifted copies after them, b blocks in all
-    shifts : (b, 2) float64, (0, 0) first
-    knots : in u and v, (b n, w) float64 each, rows repeat their last knot
-    degrees : in u and v, (b n,) int64 each
-    weights : (b n,) float64
+    Shifted copies are as in :mod:`surface.spline.closed`; rows of knots repeat their last one.
     """
 
     n: int
@@ -100,15 +94,7 @@ class Basis:
 
 
 def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Progress = no_progress) -> Lists:
-    """Weights of ``surface`` for the vertices of ``mesh``, from float64 blending functions.
-
-    Parameters
-    ----------
-    surface : the surface the mesh was made from
-    mesh : its cells and candidate lists
-    normals : also derivative weights
-    progress : is called with a stage and the part that is done
-    """
+    """Weights of ``surface`` for the vertices of its ``mesh``; also derivative weights where ``normals`` are wanted."""
     count = np.diff(mesh.cell_start)
     tiles = (count + LANES - 1) // LANES
     most = int((np.diff(mesh.list_start) * tiles).sum()) * LANES
@@ -151,11 +137,9 @@ def cells_by_point(ids: np.ndarray, rows: Ints, n: int) -> tuple[Ints, Ints, np.
 
 
 def write_rows(basis: Basis, lists: Lists, mesh: Mesh, i: int, cells: Ints, rows: Ints) -> Bools:
-    """Compute point i's ``rows (k,)`` in the blocks of ``cells (k,)`` again, none where the row is -1.
+    """Compute point i's ``rows (k,)`` in the blocks of ``cells (k,)`` again, and say which are not all zero, (k,) bool.
 
-    Returns
-    -------
-    (k,) bool : is any number of the row not zero?
+    Nothing is written where the row is -1.
     """
     nonzero = np.zeros(len(cells), dtype=np.bool_)
     weighing.rewrite_rows(

@@ -54,18 +54,9 @@ def unit_cross(a, b, out, bad):
 
 
 def group(code: Ints, depth: int, uv: Floats, surface: ControlPoints) -> Ints:
-    """First vertices of the cells.
+    """First vertices of the cells, (c + 1,) int64, for vertices ``uv (m, 2)`` that rise by ``code (m,)`` int64.
 
-    Parameters
-    ----------
-    code : (m,) int64, rising; the low ``2 * depth`` bits are the Morton code of the leaf within its root
-    depth : deepest level of the tree
-    uv : (m, 2) float64 in the same order
-    surface : whose subdomains count
-
-    Returns
-    -------
-    (c + 1,) int64
+    The low ``2 * depth`` bits of a code are the Morton code of the leaf within its root.
     """
     start = np.zeros(len(code) + 1, dtype=np.int64)
     count = _group(code, depth, uv, *surface.arrays()[:2], *surface.bin_arrays(), start)
@@ -114,7 +105,7 @@ def _splits(code, uv, low, high, shift, knots_u, knots_v, grid, shape, start, id
 
 @kernel
 def _group(code, depth, uv, knots_u, knots_v, grid, shape, start, ids, out):
-    """Walk over the branches in order: go down a level where that is cheaper, else take the branch as a cell."""
+    """Visit the branches in order: go down a level where that is cheaper, else take the branch as a cell."""
     box, none = np.zeros(4), np.zeros(0, dtype=np.int32)
     ends, shifts = np.zeros(depth + 2, dtype=np.int64), np.zeros(depth + 2, dtype=np.int64)
     count, low, top = 0, 0, -1

@@ -1,4 +1,4 @@
-"""Fewer triangles over the same vertices: edges collapse onto one of their ends, cheapest first.
+"""Mesh decimation by edge collapse: fewer triangles over the same vertices, cheapest collapse first.
 
 The measure is the quadric of Garland and Heckbert, "Simplifying Surfaces with Color and Texture using Quadric Error
 Metrics" (1998): squared distance from the planes of the triangles that were there, in as many dimensions as a vertex
@@ -22,7 +22,7 @@ _CHUNK = 4096  # edges whose costs are worked out at a time
 
 
 class Collapse:
-    """One mesh on its way to fewer triangles.
+    """A mesh while its edges are collapsed.
 
     Parameters
     ----------

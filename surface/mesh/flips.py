@@ -10,14 +10,10 @@ from surface.base.jit import kernel
 
 
 def improve(points: Floats, triangles: Ints, kept: Ints, rounds: int = 6) -> None:
-    """Flip edges whose opposite angles sum to more than half a turn, in place.
+    """Flip edges whose opposite angles sum to more than half a turn, in place, in at most ``rounds`` passes.
 
-    Parameters
-    ----------
-    points : (m, 2) or (m, 3) float64
-    triangles : (t, 3) int64, consistently oriented; an edge has one or two triangles
-    kept : (m,) int64 bit mask; edges whose ends share a bit stay
-    rounds : greatest number of passes over all edges
+    ``points`` are (m, 2) or (m, 3) float64, ``triangles`` (t, 3) int64, consistently oriented, an edge has one or two.
+    Edges whose ends share a bit of the mask ``kept (m,)`` int64 stay.
     """
     xyz = np.zeros((len(points), 3))
     xyz[:, : points.shape[1]] = points
@@ -58,7 +54,7 @@ def _cotangent(xyz, apex, a, b):
     """Cotangent of the angle at ``apex``."""
     ax, ay, az = xyz[a, 0] - xyz[apex, 0], xyz[a, 1] - xyz[apex, 1], xyz[a, 2] - xyz[apex, 2]
     bx, by, bz = xyz[b, 0] - xyz[apex, 0], xyz[b, 1] - xyz[apex, 1], xyz[b, 2] - xyz[apex, 2]
-    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    nx, ny, nz = _normal(xyz, apex, a, b)
     return (ax * bx + ay * by + az * bz) / max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
 
 

@@ -16,7 +16,7 @@ from .domain import Domain
 from .mesh import Mesh
 from .quadtree import Lattice, Leaves
 from .splitting import MOST_CELLS, SplitTests, inner_side
-from .trim import Flat, trim
+from .trim import Flat, replace_vertices, trim
 
 MOST_ROOTS = 24  # along the longer side
 CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
@@ -77,13 +77,11 @@ def _lengths(surface: ControlPoints, domain: Domain) -> tuple[float, float]:
     u0, u1, v0, v1 = domain.rect
     steps = (np.arange(24) + 0.5) / 24
     uv = np.stack(np.meshgrid(u0 + steps * (u1 - u0), v0 + steps * (v1 - v0)), axis=-1).reshape(-1, 2)
-    uv = uv[domain.inside(uv)]
-    out = surface.sample_derivatives(uv)[1]
-    su, sv = out[:, 1], out[:, 2]
-    found = np.isfinite(su).all(axis=1) & np.isfinite(sv).all(axis=1)
-    if not found.any():
+    slopes = surface.sample_derivatives(uv[domain.inside(uv)])[1][:, 1:]
+    slopes = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+    if not len(slopes):
         return 1.0, 1.0
-    lengths = [float(np.linalg.norm(d[found], axis=1).mean()) for d in (su, sv)]
+    lengths = [float(np.linalg.norm(slopes[:, k], axis=1).mean()) for k in range(2)]
     low = 1e-6 * max(*lengths, 1e-300)
     return max(lengths[0], low), max(lengths[1], low)
 
@@ -104,9 +102,9 @@ def _lattice(
     extent = (u1 - u0) * scale[0], (v1 - v0) * scale[1]
     least = min(float(np.diff(lines_u).min()) * scale[0], float(np.diff(lines_v).min()) * scale[1])
     edge = max(min(*extent, 1.2 * least), max(extent) / MOST_ROOTS)
-    edge_u = min(edge, extent[0] / 3) if joined[0] else edge  # a ring of fewer than three cells would fold flat
-    edge_v = min(edge, extent[1] / 3) if joined[1] else edge
-    return Lattice(_divide(lines_u, edge_u / scale[0]), _divide(lines_v, edge_v / scale[1]), depth, joined)
+    # A ring of fewer than three cells would fold flat.
+    edges = [min(edge, extent[k] / 3) if joined[k] else edge for k in range(2)]
+    return Lattice(_divide(lines_u, edges[0] / scale[0]), _divide(lines_v, edges[1] / scale[1]), depth, joined)
 
 
 def _divide(borders: Floats, edge: float) -> Floats:
@@ -166,7 +164,7 @@ def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
 
 
 def _evaluated(surface: ControlPoints, uv: Floats, side: Ints, code: Ints, progress: Progress) -> tuple[Ints, Floats]:
-    """S, S_u and S_v ``(m, 3, 3)``, neighbours after each other, and where each vertex stands in that.
+    """S, S_u and S_v ``(m, 3, 3)``, neighbours after each other, and the index of each vertex in that.
 
     ``side`` gets the limits that were taken.
     """
@@ -188,18 +186,10 @@ def _weld(flat: Flat, side: Ints, domain: Domain, joined: tuple[bool, bool]) -> 
             continue
         start, end = domain.rect[2 * axis : 2 * axis + 2]
         low, high = np.flatnonzero(flat.uv[:, axis] == start), np.flatnonzero(flat.uv[:, axis] == end)
-        ours, theirs = (_seam_keys(flat.uv[at, 1 - axis], side[at], 1 - axis) for at in (low, high))
-        _, first, second = np.intersect1d(ours, theirs, assume_unique=True, return_indices=True)
+        along = flat.uv[:, 1 - axis] + 1j * (side >> (1 - axis) & 1)  # place along the seam, limit there
+        _, first, second = np.intersect1d(along[low], along[high], assume_unique=True, return_indices=True)
         target[high[second]] = low[first]
-    target = target[target]  # the corner of a torus goes both ways
-    triangles = target[flat.triangles]
-    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return Flat(flat.uv, triangles[whole], flat.owner[whole])
-
-
-def _seam_keys(along: Floats, side: Ints, axis: int) -> np.ndarray:
-    """(k,) complex: place along a seam, and the limit in that direction."""
-    return along + 1j * (side >> axis & 1)
+    return replace_vertices(flat, target[target])  # the corner of a torus goes both ways
 
 
 def _codes(flat: Flat, lattice: Lattice, leaves: Leaves) -> Ints:

@@ -51,23 +51,10 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
 
 
 def pad_knots(knots: object, name: str, n: int) -> tuple[Floats, Ints]:
-    """Knot vectors of n points as one array.
+    """Knot vectors of n points, n sequences of degree + 2 numbers each or an (n, degree + 2) array, as one array.
 
-    Parameters
-    ----------
-    knots : n sequences of degree + 2 numbers each, or an (n, degree + 2) array
-    name : argument name for error messages
-    n : how many are expected
-
-    Returns
-    -------
-    padded : (n, w) float64, rows repeat their last knot up to the largest length w
-    degrees : (n,) int64
-
-    Raises
-    ------
-    ValueError
-        Naming the argument and the index of the first bad knot vector.
+    Returns (n, w) float64, whose rows repeat their last knot up to the largest length w, and degrees (n,) int64.
+    ``ValueError`` with the argument's ``name`` and the index of the first bad knot vector.
     """
     if isinstance(knots, np.ndarray) and knots.ndim == 2 and knots.dtype != object:
         padded = np.array(knots, dtype=np.float64, order="C")
@@ -130,13 +117,7 @@ def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
 
 
 def check_padded(knots: ArrayLike, degrees: ArrayLike, axis: str, n: int) -> tuple[Floats, Ints]:
-    """Clean copies of knots ``(n, w)`` and degrees ``(n,)`` that belong to n points along ``axis``.
-
-    Raises
-    ------
-    ValueError
-        Naming the argument (``knots_u``, ``degrees_u``, ...) and the index.
-    """
+    """Clean copies of knots ``(n, w)`` and degrees ``(n,)`` of n points; ``ValueError`` as :func:`pad_knots`."""
     rows = np.array(knots, dtype=np.float64, order="C", ndmin=2)
     p = np.array(degrees, dtype=np.int64, ndmin=1)
     for name, given in (("knots", rows), ("degrees", p)):

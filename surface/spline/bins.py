@@ -1,4 +1,4 @@
-"""Regular grid over (u, v) that lists, per bin, the control points whose support reaches it."""
+"""Spatial index of control points: a regular grid over (u, v) that lists, per bin, those whose support reaches it."""
 
 from __future__ import annotations
 
@@ -28,12 +28,7 @@ class Bins:
 
 
 def build_bins(knots_u: Floats, knots_v: Floats) -> Bins:
-    """Bins about as large as the median support of a point, so that a list is not much longer than needed.
-
-    Parameters
-    ----------
-    knots_u, knots_v : (n, w) float64 padded knots
-    """
+    """Bins about as large as the median support of points with these padded knots, (n, w) float64 each."""
     from . import kernels  # compiled: loaded when first used
 
     axes = [_axis(knots_u), _axis(knots_v)]

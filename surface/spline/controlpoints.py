@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,9 @@ from surface.base.checks import check_points, check_sides, check_uv, check_weigh
 from .basis import check_padded, pad_knots
 from .bins import Bins, build_bins
 from .closed import Interval, check_closed, shifts_of, wrap
+
+T = TypeVar("T")
+Pair = tuple[T, T]  # in u and in v
 
 
 class ControlPoints:
@@ -65,18 +68,9 @@ class ControlPoints:
         closed_u: Interval = None,
         closed_v: Interval = None,
     ) -> Self:
-        """From the arrays that :attr:`padded` gives: the fast way in and out of a binary file.
+        """From the arrays of :attr:`padded`, (n, w) float64, and of :attr:`degrees`: the fast way from a binary file.
 
-        Parameters
-        ----------
-        points, weights : (n, 3), (n,) float64
-        knots_u, knots_v : (n, w) float64, row i holds ``degrees[i] + 2`` knots and repeats the last one
-        degrees_u, degrees_v : (n,) int
-
-        Raises
-        ------
-        ValueError
-            As the constructor.
+        Row i of the knots holds ``degrees[i] + 2`` and repeats the last one. Errors are those of the constructor.
         """
         xyz = check_points(points)
         w = check_weights(weights, n=len(xyz))
@@ -98,12 +92,7 @@ class ControlPoints:
         return table
 
     def _keep(
-        self,
-        points: Floats,
-        weights: Floats,
-        knots: tuple[Floats, Floats],
-        degrees: tuple[Ints, Ints],
-        closed: tuple[Interval, Interval],
+        self, points: Floats, weights: Floats, knots: Pair[Floats], degrees: Pair[Ints], closed: Pair[Interval]
     ) -> None:
         """Keep arrays; of a closed direction also shifted copies of every point, block after block."""
         self._n = len(points)
@@ -175,10 +164,8 @@ class ControlPoints:
     @property
     def rect(self) -> tuple[float, float, float, float]:
         """u0, u1, v0, v1 of the smallest rectangle that holds every subdomain, or of the closed interval."""
-        ends = []
-        for knots, closed in zip(self.padded, self._closed, strict=True):
-            ends.append(closed or (float(knots[:, 0].min()), float(knots[:, -1].max())))
-        return (*ends[0], *ends[1])
+        ends = [(float(knots[:, 0].min()), float(knots[:, -1].max())) for knots in self.padded]
+        return (*(self._closed[0] or ends[0]), *(self._closed[1] or ends[1]))
 
     @property
     def bins(self) -> Bins:
@@ -197,7 +184,8 @@ class ControlPoints:
 
     def sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
         """Checked samples, the limit that was taken (-1: uncovered) and S (m, 3); as :meth:`sample_derivatives`."""
-        return self._run("sample", uv, side, (3,))
+        samples, sides, out = self._sample(uv, side, 1)
+        return samples, sides, out[:, 0]
 
     def sample_derivatives(
         self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False
@@ -209,17 +197,14 @@ class ControlPoints:
         side : (m,) int64, the limit each evaluation really takes, -1 where nothing covers
         out : (m, 3, 3) float64 with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them
         """
-        return self._run("sample_derivatives", uv, side, (6 if second else 3, 3))[1:]
+        return self._sample(uv, side, 6 if second else 3)[1:]
 
-    def _run(
-        self, name: str, uv: ArrayLike, side: ArrayLike | None, shape: tuple[int, ...]
-    ) -> tuple[Floats, Ints, Floats]:
-        """Samples, sides and what the named kernel wrote for them."""
-        from . import kernels  # compiled: loaded when first used
+    def _sample(self, uv: ArrayLike, side: ArrayLike | None, kinds: int) -> tuple[Floats, Ints, Floats]:
+        from .kernels import sample  # compiled: loaded when first used
 
         samples = wrap(check_uv(uv), self._closed)
-        sides, out = check_sides(samples, side), np.zeros((len(samples), *shape))
-        getattr(kernels, name)(*self.arrays(), *self.bin_arrays(), samples, sides, out)
+        sides, out = check_sides(samples, side), np.zeros((len(samples), kinds, 3))
+        sample(*self.arrays(), *self.bin_arrays(), samples, sides, out)
         return samples, sides, out
 
 

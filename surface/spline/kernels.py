@@ -227,20 +227,6 @@ def sum_samples(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, b
 
 
 @kernel
-def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
-    """Write S into ``out`` (NaN where nothing covers) and the side used into ``side`` (-1: uncovered)."""
-    work, acc = np.zeros(12), np.zeros((RUN, 12))
-    for first in range(0, uv.shape[0], RUN):
-        part, sides = uv[first : first + RUN], side[first : first + RUN]
-        sum_samples(
-            knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, part, sides, False, work, acc
-        )  # fmt: skip
-        for s in range(part.shape[0]):
-            for c in range(3):
-                out[first + s, c] = acc[s, c] / acc[s, 3] if sides[s] >= 0 else np.nan
-
-
-@kernel
 def sum_second_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, work, acc):
     """Add the second derivatives of b w (P, 1) into ``acc (12,)``: uu, uv, vv."""
     acc[:] = 0.0
@@ -259,11 +245,13 @@ def sum_second_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v,
 
 @kernel
 def quotient(acc, out):
-    """S, S_u and S_v into ``out[:3]`` (quotient rule, NURBS Book 4.5)."""
+    """S into ``out[0]``, and S_u and S_v into ``out[1:3]`` if there is room (quotient rule, NURBS Book 4.5)."""
     w, wu, wv = acc[3], acc[7], acc[11]
     for c in range(3):
         p = acc[c] / w
-        out[0, c], out[1, c], out[2, c] = p, (acc[4 + c] - wu * p) / w, (acc[8 + c] - wv * p) / w
+        out[0, c] = p
+        if out.shape[0] > 1:
+            out[1, c], out[2, c] = (acc[4 + c] - wu * p) / w, (acc[8 + c] - wv * p) / w
 
 
 @kernel
@@ -278,13 +266,16 @@ def second_quotient(acc, second, out):
 
 
 @kernel
-def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
-    """As :func:`sample`, with derivatives: ``out (m, 3, 3)`` for S, S_u, S_v, ``(m, 6, 3)`` for second ones too."""
-    work, acc, second = np.zeros(12), np.zeros((RUN, 12)), np.zeros(12)
+def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
+    """Evaluate samples into ``out``, NaN where nothing covers; ``side`` gets the limit that was taken (-1: uncovered).
+
+    ``out (m, 1, 3)`` is for S, ``(m, 3, 3)`` for S, S_u and S_v, ``(m, 6, 3)`` for S_uu, S_uv and S_vv as well.
+    """
+    work, acc, second, slopes = np.zeros(12), np.zeros((RUN, 12)), np.zeros(12), out.shape[1] > 1
     for first in range(0, uv.shape[0], RUN):
         part, sides = uv[first : first + RUN], side[first : first + RUN]
         sum_samples(
-            knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, part, sides, True, work, acc
+            knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, part, sides, slopes, work, acc
         )  # fmt: skip
         for s in range(part.shape[0]):
             if sides[s] < 0:

@@ -1,4 +1,4 @@
-"""The rational weights of a surface as a sparse matrix."""
+"""The rational weights of a surface at samples as sparse matrices (scipy CSR)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def basis_matrices(
     surface: ControlPoints, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None = None
 ) -> list[csr_matrix]:
     """Several matrices of :meth:`surface.DCPSurface.basis_matrix`, for hardly more than the time of one."""
-    from scipy.sparse import csr_matrix  # takes a moment to import
+    from scipy.sparse import csr_matrix  # slow to import
 
     from .kernels import TINY  # compiled: loaded when first used
 

@@ -1,4 +1,4 @@
-"""NURBS surfaces as control points with local knots."""
+"""Conversion of NURBS surfaces to control points with local knots."""
 
 from __future__ import annotations
 
@@ -28,15 +28,9 @@ def nurbs_arrays(
     control_points : (nu, nv, 3) float64
     weights : (nu, nv) float64, positive; ones if left out
 
-    Returns
-    -------
-    points (nu * nv, 3), weights (nu * nv,), knots_u (nu * nv, degree_u + 2), knots_v (nu * nv, degree_v + 2)
-
-    Raises
-    ------
-    ValueError
-        For shapes that do not fit together, a degree that is no whole number from 0 to 7, numbers that are not
-        finite, weights that are not positive, knots that decrease; names the argument and the index.
+    Returns points (nu * nv, 3), weights (nu * nv,), knots_u (nu * nv, degree_u + 2), knots_v (nu * nv, degree_v + 2).
+    ``ValueError`` for shapes that do not fit together, a degree that is no whole number from 0 to 7, numbers that are
+    not finite, weights that are not positive, knots that decrease; names the argument and the index.
     """
     net = numbers(control_points, "control_points")
     if net.ndim != 3 or net.shape[2] != 3:
