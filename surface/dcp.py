@@ -58,11 +58,8 @@ class DCPSurface(ControlPoints):
 
         ``side (m,)`` int: 1 takes the limit from the left in u, 2 in v, 3 in both.
 
-        Raises
-        ------
-        ValueError
-            For another shape, numbers that are not finite, a place outside :attr:`rect` (a closed direction has no
-            outside), or another side; names the argument and the index.
+        ``ValueError`` for another shape, numbers that are not finite, a place outside :attr:`rect` (a closed direction
+        has no outside), or another side; names the argument and the index.
         """
         return self.sample(self._inside(uv), side)[2]
 
@@ -148,12 +145,10 @@ class DCPSurface(ControlPoints):
         flip : reverse normals and triangles against S_u x S_v
         progress : is called with the name of a stage and the part of the whole that is done, 0 to 1
 
-        Raises
-        ------
-        ValueError
-            For limits out of range, or where they ask for millions of cells.
+        ``ValueError`` for limits out of range, or where they ask for millions of cells.
         """
-        from surface.mesh.tessellate import Limits, tessellate  # compiled: loaded when first used
+        from surface.mesh.splitting import Limits  # compiled: loaded when first used
+        from surface.mesh.tessellate import tessellate
 
         limits = Limits(max_points, chord_error, max_depth, min_depth, loop_error, roots)
         return tessellate(self, Domain.of(self) if domain is None else domain, limits, flip, progress)

@@ -14,18 +14,7 @@ SPREAD = np.uint64(0x9E3779B97F4A7C15)  # 2**64 / golden ratio: neighbouring key
 
 
 def unique(keys: Ints) -> tuple[Ints, Ints, Ints]:
-    """As ``numpy.unique(keys, return_index=True, return_inverse=True)``.
-
-    Parameters
-    ----------
-    keys : int64 of any shape
-
-    Returns
-    -------
-    values : (k,) int64, rising
-    first : (k,) int64, where each is first in the flat keys
-    back : int64 in the shape of ``keys``, ``values[back]`` are the keys
-    """
+    """As ``numpy.unique(keys, return_index=True, return_inverse=True)`` for int64 of any shape."""
     first, back = number(keys)
     values = keys.reshape(-1)[first]
     order = np.argsort(values)

@@ -45,15 +45,9 @@ def compare(
 ) -> list[Variant]:
     """A uniform mesh, and the smallest adaptive ones that deviate no more.
 
-    Parameters
-    ----------
-    surface, domain : what to tessellate
-    level : levels below the roots that the uniform mesh is quartered everywhere
-    quantile : what "no more" means: 1 compares greatest deviations, 0.99 those that 99 % of the area keep
-    report : is called with what is being done
+    The uniform mesh is quartered ``level`` times below the roots. A ``quantile`` of 1 compares greatest deviations,
+    0.99 those that 99 % of the area keep.
 
-    Notes
-    -----
     The reference is the surface itself, sampled everywhere at a spacing of a quarter of the uniform mesh's edges.
     """
     where = Domain.of(surface) if domain is None else domain

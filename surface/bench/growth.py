@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -31,8 +31,8 @@ class Series:
 
     name: str
     axis: int
-    size: list[float] = field(default_factory=list)
-    amount: list[float] = field(default_factory=list)
+    size: list[int]
+    amount: list[float]
 
     @property
     def slope(self) -> float:
@@ -51,23 +51,26 @@ def growth(
     ``vertices`` are sizes with one control point per 64 vertices, so that 16 reach each; ``points`` are numbers of
     control points under about a quarter of the largest of ``vertices``.
     """
-    lines = {(axis, name): Series(name, axis) for axis in range(2) for name in (READ, FULL, MOVE, LISTS, MEMORY)}
+    found: list[tuple[int, int, dict[str, float]]] = []
     for count in vertices:
         report(f"growth: {count} vertices")
         surface, mesh = sheet(count)
-        _add(lines, 0, len(mesh.vertices), surface, mesh.leaves, seconds)
+        found.append((0, len(mesh.vertices), _amounts(surface, mesh.leaves, seconds)))
     cells = max(16, round(np.sqrt(max(vertices)) / 2))
     for count in points:
         report(f"growth: {count} control points")
         surface = bumpy(count)
-        _add(lines, 1, surface.n, surface, cells * cells, seconds)
-    return list(lines.values())
+        found.append((1, surface.n, _amounts(surface, cells * cells, seconds)))
+    of_axis = [[(size, amounts) for axis, size, amounts in found if axis == k] for k in range(2)]
+    return [
+        Series(name, axis, [size for size, _ in rows], [amounts[name] for _, amounts in rows])
+        for axis, rows in enumerate(of_axis)
+        for name in (READ, FULL, MOVE, LISTS, MEMORY)
+    ]
 
 
-def _add(
-    lines: dict[tuple[int, str], Series], axis: int, size: int, surface: DCPSurface, leaves: int, seconds: float
-) -> None:
-    """Measure one surface under a mesh of so many equal cells."""
+def _amounts(surface: DCPSurface, leaves: int, seconds: float) -> dict[str, float]:
+    """Measure one surface with a mesh of so many equal cells."""
     side = round(np.sqrt(leaves))
     level = max(k for k in range(4) if side % (1 << k) == 0)
     begin = time.perf_counter()
@@ -76,10 +79,7 @@ def _add(
     built = 1e3 * (time.perf_counter() - begin)
     one = alternating(deformation, nearest(deformation.surface, 1))
     read, full = least_of([deformation.lists.value.sum, deformation.refresh], seconds)
-    amounts = {READ: read, FULL: full, MOVE: least(one, seconds), LISTS: built, MEMORY: deformation.nbytes / 1e6}
-    for name, amount in amounts.items():
-        lines[axis, name].size.append(size)
-        lines[axis, name].amount.append(amount)
+    return {READ: read, FULL: full, MOVE: least(one, seconds), LISTS: built, MEMORY: deformation.nbytes / 1e6}
 
 
 def slopes(series: list[Series]) -> list[Measure]:
@@ -142,7 +142,7 @@ def _panel(lines: list[Series], frame: tuple[float, float, float, float], left: 
 
 
 def _spread(heights: list[float], step: float = 15.0) -> list[float]:
-    """Heights of labels, moved down where they would stand on each other."""
+    """Heights of labels, moved down where they would overlap."""
     out, last = list(heights), -np.inf
     for k in np.argsort(heights):
         last = out[k] = max(heights[k], last + step)

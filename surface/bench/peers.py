@@ -76,10 +76,10 @@ def blendshapes(surface: DCPSurface, mesh: Mesh) -> Evaluator:
 
 
 def stencils(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """A stencil table, evaluated row by row with one thread, float32: every vertex has a list of its own.
+    """A stencil table, evaluated row by row with one thread, float32.
 
     It keeps, per vertex, how many control points reach it, which they are and with what weight, as Pixar's OpenSubdiv
-    (``Far::StencilTable``). The engine's own layout is in :mod:`surface.deform.lists`.
+    does (``Far::StencilTable``).
     """
     matrix = surface.basis_matrix(mesh.uv, side=mesh.side)
     sizes, ids = np.diff(matrix.indptr).astype(np.int32), matrix.indices.astype(np.int32)

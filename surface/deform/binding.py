@@ -53,7 +53,7 @@ def _rows(table, k, width, dtype):
 
 @kernel
 def _arrays(table):
-    """The arrays of a table; types and widths stand in the order of ``NAMES``."""
+    """The arrays of a table; types and widths are in the order of ``NAMES``."""
     return (
         _flat(table, 0, np.int64), _flat(table, 1, np.int64), _flat(table, 2, np.int64), _flat(table, 3, np.int64),
         _flat(table, 4, np.int64), _flat(table, 5, np.int64), _flat(table, 6, np.int32), _flat(table, 7, np.float32),

@@ -40,9 +40,9 @@ def change_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[Flo
 
 def _first_uncovered(lists: Lists, mesh: Mesh, i: int, knots: list[Floats]) -> int:
     """The first vertex that only point i covers and that the new knots do not reach, or -1."""
-    alone = np.zeros(len(mesh.uv), dtype=np.int64)
-    count = _only_covering(*lists.entries_of(i), lists.cell_start, lists.rows, lists.room, lists.at, lists.value, alone)
-    for vertex in alone[:count]:
+    found = np.zeros(len(mesh.uv), dtype=np.int64)
+    count = _only_covering(*lists.entries_of(i), lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found)
+    for vertex in found[:count]:
         value = 1.0
         for k in range(2):
             side = "left" if int(mesh.side[vertex]) >> k & 1 else "right"

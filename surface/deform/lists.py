@@ -113,18 +113,10 @@ def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Pro
         )  # fmt: skip
     progress("weights", 1.0)
     used, ids = int(at[-1]), ids[: int(ids_at[-1])].copy()
-    return Lists(
-        mesh.cell_start.copy(),  # not the read-only one: kernels are compiled for one kind of array only
-        np.concatenate([[0], np.cumsum(tiles)]),
-        rows,
-        rows.copy(),
-        at[:-1].copy(),
-        ids_at[:-1].copy(),
-        ids,
-        value[:used].copy(),
-        slope[: 2 * used].copy(),
-        *cells_by_point(ids, rows, len(arrays[4])),
-    )
+    cell_start = mesh.cell_start.copy()  # not the read-only one: kernels are compiled for one kind of array only
+    tile_start, by_point = np.concatenate([[0], np.cumsum(tiles)]), cells_by_point(ids, rows, len(arrays[4]))
+    blocks = value[:used].copy(), slope[: 2 * used].copy()
+    return Lists(cell_start, tile_start, rows, rows.copy(), at[:-1].copy(), ids_at[:-1].copy(), ids, *blocks, *by_point)
 
 
 def cells_by_point(ids: np.ndarray, rows: Ints, n: int) -> tuple[Ints, Ints, np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from .apply import compute_cells, finish_cell, gather, join_ranges, store_numera
 NOT_STORED = -1  # in ``differences``: the cell's numerators are not stored
 STORE = -2  # in ``differences``: compute and store them now
 VALID = 1 << 62  # what :func:`first_invalid` returns where nothing is wrong
-REFUSED = 1 << 61  # how far below 0 results of :func:`move_points` start that stand for a bad argument
+REFUSED = 1 << 61  # subtracted from results of :func:`move_points` that mean a bad argument
 
 
 @inlined

@@ -18,17 +18,14 @@ from surface.mesh.mesh import border_edges
 Ids = NDArray[np.integer]
 _LEAST_COS = 0.3  # a triangle turned by more than this counts as flipped
 _BORDER = 4.0  # weight of a border's line, beside a plane's
-_CHUNK = 4096  # edges whose costs are worked out at a time
+_CHUNK = 4096  # edges whose costs are computed at a time
 
 
 class Collapse:
     """A mesh while its edges are collapsed.
 
-    Parameters
-    ----------
-    places : (m, d) coordinates of every vertex, mm; the first three are its position at rest.
-    triangles : (t, 3).
-    locked : (m,) bool, vertices that stay.
+    ``places`` are (m, d) coordinates of every vertex, mm; the first three are its position at rest. Vertices that are
+    ``locked`` (m,) bool stay.
     """
 
     def __init__(self, places: Floats, triangles: Ids, locked: NDArray[np.bool_]) -> None:

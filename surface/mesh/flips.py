@@ -23,23 +23,18 @@ def improve(points: Floats, triangles: Ints, kept: Ints, rounds: int = 6) -> Non
             return
 
 
+def edge_keys(triangles: Ints) -> tuple[Ints, int]:
+    """(3 t,) keys of edges, ``least end * width + greatest end`` of each triangle in turn, and the width."""
+    edges, width = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), int(triangles.max(initial=0)) + 1
+    return edges.min(axis=1) * width + edges.max(axis=1), width
+
+
 def edge_pairs(triangles: Ints) -> Ints:
     """(e, 2) pairs of triangles that share an edge."""
-    directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    width = int(triangles.max(initial=0)) + 1
-    key = directed.min(axis=1) * width + directed.max(axis=1)
+    key = edge_keys(triangles)[0]
     order = np.argsort(key, kind="stable")
     same = key[order][1:] == key[order][:-1]
     return np.stack([order[:-1][same], order[1:][same]], axis=1) // 3
-
-
-@kernel
-def _apex(triangles, t, a, b):
-    """Position in triangle t of the corner that is neither a nor b."""
-    for k in range(3):
-        if triangles[t, k] != a and triangles[t, k] != b:
-            return k
-    return -1
 
 
 @kernel
@@ -60,7 +55,7 @@ def _cotangent(xyz, apex, a, b):
 
 @kernel
 def _flip_round(xyz, triangles, kept, pairs):
-    """One pass; a pair whose triangles were already changed in this pass is checked again as it now stands."""
+    """One pass; a pair whose triangles were already changed in this pass is checked again."""
     count = 0
     for e in range(pairs.shape[0]):
         s, t = pairs[e, 0], pairs[e, 1]
@@ -73,7 +68,7 @@ def _flip_round(xyz, triangles, kept, pairs):
         if ia < 0:
             continue
         a, b, c = triangles[s, ia], triangles[s, (ia + 1) % 3], triangles[s, (ia + 2) % 3]
-        d = triangles[t, _apex(triangles, t, a, b)]
+        d = triangles[t, 0] + triangles[t, 1] + triangles[t, 2] - a - b
         if kept[a] & kept[b] or c == d:
             continue
         if _cotangent(xyz, c, a, b) + _cotangent(xyz, d, a, b) >= -1e-9:

@@ -66,9 +66,6 @@ class Leaves:
     level: Ints
     cell: Ints
 
-    def __len__(self) -> int:
-        return len(self.level)
-
 
 SplitTest = Callable[[int, Ints], np.ndarray]
 NEIGHBOURS = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])  # below, right, above, left: the order of edges
@@ -146,7 +143,7 @@ def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[In
 
     Returns lattice keys (t, 3) int64, counter-clockwise in (u, v), and the leaf of every triangle, (t,) int64.
     """
-    pattern = np.zeros(len(leaves), dtype=np.int64)
+    pattern = np.zeros(len(leaves.level), dtype=np.int64)
     for level in np.unique(leaves.level):
         if level >= len(inner):
             continue
@@ -159,7 +156,7 @@ def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[In
     count = (TEMPLATES[:, :, 0] >= 0).sum(axis=1)[pattern]
     keys = np.zeros((int(count.sum()), 3), dtype=np.int64)
     _emit(leaves.level, leaves.cell, pattern, lattice.depth, (lattice.shape[0] << lattice.depth) + 1, TEMPLATES, keys)
-    return keys, np.repeat(np.arange(len(leaves)), count)
+    return keys, np.repeat(np.arange(len(leaves.level)), count)
 
 
 @kernel

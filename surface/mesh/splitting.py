@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,33 @@ MOST_CELLS = 4_000_000
 RIM = 64  # cells along a side where the border of what is covered is followed
 
 
+class Limits(NamedTuple):
+    """How fine a mesh shall be; see :meth:`surface.DCPSurface.tessellate`. ``ValueError`` from :meth:`check`."""
+
+    max_points: int | None
+    chord_error: float | None
+    max_depth: int
+    min_depth: int
+    loop_error: float | None
+    roots: tuple[int, int] | None
+
+    def check(self) -> None:
+        """``ValueError`` for the first limit that is out of range."""
+        if self.max_points is not None and self.max_points < 1:
+            raise ValueError(f"max_points: must be at least 1, not {self.max_points}")
+        for name, error in (("chord_error", self.chord_error), ("loop_error", self.loop_error)):
+            if error is not None and not error > 0:
+                raise ValueError(f"{name}: must be positive, not {error}")
+        if not 0 <= self.min_depth <= self.max_depth <= 20:
+            raise ValueError(f"min_depth, max_depth: need 0 <= {self.min_depth} <= {self.max_depth} <= 20")
+        if self.roots is None:
+            return
+        if np.shape(self.roots) != (2,) or not all(int(count) == count >= 1 for count in self.roots):
+            raise ValueError(f"roots: needs two whole numbers of 1 or more, got {self.roots!r}")
+        if self.roots[0] * self.roots[1] > MOST_CELLS:
+            raise ValueError(f"roots: {self.roots[0]} x {self.roots[1]} cells are more than {MOST_CELLS}")
+
+
 @dataclass
 class SplitTests:
     """Which cells are to be quartered; ``scale`` are lengths per unit of u and of v."""
@@ -26,9 +54,7 @@ class SplitTests:
     domain: Domain
     lattice: Lattice
     scale: tuple[float, float]
-    max_points: int | None
-    chord_error: float | None
-    min_depth: int
+    limits: Limits
     rings: list[tuple[Floats, Floats]] = field(default_factory=list)
     anchors: tuple[Floats, Floats] | None = None
 
@@ -51,13 +77,13 @@ class SplitTests:
             )
         rect = self._rects(level, cells)
         active, along_loop = self._active(rect, cells, level)
-        chosen = along_loop | (active & (level < self.min_depth))
+        chosen = along_loop | (active & (level < self.limits.min_depth))
         left = np.flatnonzero(active & ~chosen)
-        if self.max_points is not None and len(left):
-            chosen[left] = self._counts(rect[left]) > self.max_points
+        if self.limits.max_points is not None and len(left):
+            chosen[left] = self._counts(rect[left]) > self.limits.max_points
             left = np.flatnonzero(active & ~chosen)
-        if self.chord_error is not None and len(left):
-            chosen[left] = self._errors(level, cells[left]) > self.chord_error
+        if self.limits.chord_error is not None and len(left):
+            chosen[left] = self._errors(level, cells[left]) > self.limits.chord_error
         return chosen
 
     def _rects(self, level: int, cells: Ints) -> Floats:
@@ -119,7 +145,7 @@ class SplitTests:
         return worst
 
     def _add_anchors(self, level: int, cells: Ints, p: Floats, worst: Floats) -> None:
-        """Raise ``worst`` to how far the surface is from its cell where control points stand.
+        """Raise ``worst`` to how far the surface is from its cell near control points.
 
         So a feature between the samples of a large cell is not overlooked: where there is detail there are points.
         """

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from surface.base import keys
@@ -15,38 +13,11 @@ from . import blocks, quadtree
 from .domain import Domain
 from .mesh import Mesh
 from .quadtree import Lattice, Leaves
-from .splitting import MOST_CELLS, SplitTests, inner_side
+from .splitting import Limits, SplitTests, inner_side
 from .trim import Flat, replace_vertices, trim
 
 MOST_ROOTS = 24  # along the longer side
 CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
-
-
-class Limits(NamedTuple):
-    """How fine a mesh shall be; see :meth:`surface.DCPSurface.tessellate`. ``ValueError`` from :meth:`check`."""
-
-    max_points: int | None
-    chord_error: float | None
-    max_depth: int
-    min_depth: int
-    loop_error: float | None
-    roots: tuple[int, int] | None
-
-    def check(self) -> None:
-        """``ValueError`` for the first limit that is out of range."""
-        if self.max_points is not None and self.max_points < 1:
-            raise ValueError(f"max_points: must be at least 1, not {self.max_points}")
-        for name, error in (("chord_error", self.chord_error), ("loop_error", self.loop_error)):
-            if error is not None and not error > 0:
-                raise ValueError(f"{name}: must be positive, not {error}")
-        if not 0 <= self.min_depth <= self.max_depth <= 20:
-            raise ValueError(f"min_depth, max_depth: need 0 <= {self.min_depth} <= {self.max_depth} <= 20")
-        if self.roots is None:
-            return
-        if np.shape(self.roots) != (2,) or not all(int(count) == count >= 1 for count in self.roots):
-            raise ValueError(f"roots: needs two whole numbers of 1 or more, got {self.roots!r}")
-        if self.roots[0] * self.roots[1] > MOST_CELLS:
-            raise ValueError(f"roots: {self.roots[0]} x {self.roots[1]} cells are more than {MOST_CELLS}")
 
 
 def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: bool, progress: Progress) -> Mesh:
@@ -58,7 +29,7 @@ def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: boo
     scale = _lengths(surface, domain)
     joined = surface.closed[0] == tuple(domain.rect[:2]), surface.closed[1] == tuple(domain.rect[2:])  # goes around
     lattice = _lattice(domain, scale, limits.max_depth, limits.roots, joined)
-    tests = SplitTests(surface, domain, lattice, scale, limits.max_points, limits.chord_error, limits.min_depth)
+    tests = SplitTests(surface, domain, lattice, scale, limits)
     if len(domain.segments):
         tests.follow_loops(limits.loop_error or limits.chord_error or 5e-4 * size)
     leaves, inner = quadtree.grow(lattice, tests.split, part_of(progress, 0.0, 0.45))
@@ -149,7 +120,7 @@ def _finish(
         cell_start=start,
         list_start=list_start,
         list_ids=list_ids,
-        leaves=len(leaves),
+        leaves=len(leaves.level),
         flip=flip,
     )
 

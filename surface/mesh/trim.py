@@ -73,9 +73,7 @@ def _without_flat(flat: Flat) -> Flat:
     """Drop triangles without area that have two edges on the border: what they leave is the same domain."""
     while True:
         a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
-        directed = np.sort(flat.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        width = int(directed.max(initial=0)) + 1
-        _, _, back = keys.unique(directed[:, 0] * width + directed[:, 1])
+        _, _, back = keys.unique(flips.edge_keys(flat.triangles)[0])
         border = (np.bincount(back)[back].reshape(-1, 3) == 1).sum(axis=1)
         drop = (_cross(b - a, c - a) <= 0) & (border >= 2)
         if not drop.any():
@@ -208,25 +206,24 @@ def _leaving(flat: Flat, domain: Domain, vertex: int) -> Floats:
 
 def _insert(flat: Flat, point: Floats, triangle: int, share: Floats) -> Flat:
     """Split one triangle in three at ``point``, or the two beside an edge in four where it is close to that edge."""
-    new = len(flat.uv)
+    new, hit = len(flat.uv), [triangle]
     a, b, c = np.roll(flat.triangles[triangle], -int(np.argmin(share)))  # b-c is the nearest edge
-    hit = [triangle]
     added = [(a, b, new), (a, new, c)]
-    if share.min() < 0.15:
-        beside = _across(flat.triangles, b, c)
-        if beside is not None:
-            d = int(flat.triangles[beside].sum() - b - c)
-            hit.append(beside)
-            added += [(d, c, new), (d, new, b)]
-    if len(hit) == 1:
+    beside = _across(flat.triangles, b, c) if share.min() < 0.15 else None
+    if beside is None:
         added.append((b, c, new))
-    keep = np.ones(len(flat.triangles), dtype=bool)
-    keep[hit] = False
-    owner = [flat.owner[triangle]] * len(added)
-    if len(hit) == 2:
-        owner[2:] = [flat.owner[hit[1]]] * 2
-    triangles = np.vstack([flat.triangles[keep], added])
-    return Flat(np.vstack([flat.uv, point]), triangles, np.concatenate([flat.owner[keep], owner]))
+    else:
+        d = int(flat.triangles[beside].sum() - b - c)
+        hit.append(beside)
+        added += [(d, c, new), (d, new, b)]
+    owner = np.repeat(flat.owner[hit], len(added) // len(hit))
+    return _with_point(flat, point, np.array(hit), np.array(added), owner)
+
+
+def _with_point(flat: Flat, point: Floats, hit: Ints, added: Ints, owner: Ints) -> Flat:
+    """Add a vertex, and triangles with their leaf cells in place of the ``hit`` ones."""
+    triangles = np.concatenate([np.delete(flat.triangles, hit, axis=0), added])
+    return Flat(np.vstack([flat.uv, point]), triangles, np.append(np.delete(flat.owner, hit), owner))
 
 
 def _across(triangles: Ints, b: int, c: int) -> int | None:
@@ -237,10 +234,8 @@ def _across(triangles: Ints, b: int, c: int) -> int | None:
 
 def _edges(triangles: Ints) -> Ints:
     """(e, 2) undirected edges, each once, smaller index first."""
-    pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    width = int(triangles.max(initial=0)) + 1
-    key = np.unique(pairs[:, 0] * width + pairs[:, 1])
-    return np.stack([key // width, key % width], axis=1)
+    key, width = flips.edge_keys(triangles)
+    return np.stack(np.divmod(np.unique(key), width), axis=1)
 
 
 def _snap(flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, sign: Ints) -> None:
@@ -298,14 +293,10 @@ def _covered(flat: Flat, domain: Domain, sign: Ints) -> tuple[Ints, Floats]:
 
 
 def _split(flat: Flat, a: int, b: int, point: Floats) -> Flat:
-    """Put a vertex on the edge between two, for the triangles on both its sides."""
+    """Put a vertex on the edge a-b, for the triangles on both its sides."""
     beside = _beside(flat.triangles, a, b)
     halves = [np.where(flat.triangles[beside] == end, len(flat.uv), flat.triangles[beside]) for end in (a, b)]
-    keep = np.ones(len(flat.triangles), dtype=bool)
-    keep[beside] = False
-    triangles = np.concatenate([flat.triangles[keep], *halves])
-    owner = np.concatenate([flat.owner[keep], flat.owner[beside], flat.owner[beside]])
-    return Flat(np.vstack([flat.uv, point]), triangles, owner)
+    return _with_point(flat, point, beside, np.concatenate(halves), np.tile(flat.owner[beside], 2))
 
 
 def _beside(triangles: Ints, a: int, b: int) -> Ints:

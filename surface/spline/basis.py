@@ -27,14 +27,7 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
     side : "right" for intervals closed on the left as in NURBS, "left" for the limit from the left,
         which differs only at knots of full multiplicity and for derivatives at repeated knots.
 
-    Returns
-    -------
-    (m,) float64
-
-    Raises
-    ------
-    ValueError
-        For bad knots, samples that are not finite, an unknown derivative or an unknown side.
+    Returns (m,) float64. ``ValueError`` for bad knots, samples that are not finite, an unknown derivative or side.
     """
     from . import blends  # compiled: loaded when first used
 

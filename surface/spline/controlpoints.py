@@ -32,11 +32,8 @@ class ControlPoints:
     closed_u, closed_v : (start, end) of a direction that is joined at its ends, as around a neck or a torus; the
         points that reach over one end act at the other
 
-    Raises
-    ------
-    ValueError
-        For wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
-        decreasing knots or fewer than two distinct knots; names the argument and the index.
+    ``ValueError`` for wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
+    decreasing knots or fewer than two distinct knots; names the argument and the index.
     """
 
     def __init__(
@@ -192,10 +189,8 @@ class ControlPoints:
     ) -> tuple[Ints, Floats]:
         """Derivatives, and the limits that were taken; places outside :attr:`rect` are uncovered, not refused.
 
-        Returns
-        -------
-        side : (m,) int64, the limit each evaluation really takes, -1 where nothing covers
-        out : (m, 3, 3) float64 with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them
+        Returns the limit (m,) int64 that each evaluation really takes, -1 where nothing covers, and (m, 3, 3) float64
+        with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them.
         """
         return self._sample(uv, side, 6 if second else 3)[1:]
 

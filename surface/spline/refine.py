@@ -24,14 +24,10 @@ Table = TypeVar("Table", bound=ControlPoints)
 
 @dataclass(frozen=True)
 class Refinement(Generic[Table]):
-    """A refined surface, and where its points come from.
+    """A refined surface of the same class, and where its points come from: those that were not split come first.
 
-    Attributes
-    ----------
-    surface : the same surface, of the same class, with n' >= n control points; those that were not split come first,
-        in order
-    point, parent : (k,) int64, new point and old point of every share
-    share : (k,) float64, the shares of a new point sum to 1
+    ``point`` and ``parent`` (k,) int64 are new point and old point of every ``share`` (k,) float64; the shares of a new
+    point sum to 1.
     """
 
     surface: Table
@@ -74,11 +70,9 @@ def insert_knot(surface: Table, axis: str, value: float, ids: ArrayLike | None =
     if surface.closed[k] is None and not low <= value <= high:
         raise ValueError(f"value: {axis} = {value} is outside the domain, {low} to {high}")
     pieces = _pieces(surface)
-    chosen = np.ones(surface.n, dtype=bool)
+    chosen = np.full(surface.n, ids is None)
     if ids is not None:
-        which = check_ids(ids, surface.n)
-        chosen[:] = False
-        chosen[which] = True
+        chosen[check_ids(ids, surface.n)] = True
     for shift in np.unique(surface.shifts[:, k]):
         pieces = _split(pieces, k, np.full(len(pieces.parent), value - shift), chosen[pieces.parent])
     return _join(surface, pieces)
