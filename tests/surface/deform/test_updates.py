@@ -28,9 +28,10 @@ def test_a_cell_takes_at_most_the_limit_of_differences_and_is_then_computed_agai
     cells, _ = deformation.lists.entries_of(100)
     counts = deformation._arrays["differences"]
     assert (counts == updates.NOT_STORED).all()
+    assert LIMIT == 256
     for k in range(2 * LIMIT + 5):
         deformation.move([100], [[0.0, 0.0, 0.001]])
-        assert (counts[cells] == k % (LIMIT + 1)).all(), k
+        assert (counts[cells] == k % 257).all(), k
     others = np.setdiff1d(np.arange(len(counts)), cells)
     assert (counts[others] == updates.NOT_STORED).all()
 
