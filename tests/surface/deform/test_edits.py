@@ -7,6 +7,7 @@ import pytest
 import shapes
 
 from surface import Domain, blending
+from surface.deform.edits import change_weights
 from surface.deform.lists import Lists
 
 
@@ -61,3 +62,34 @@ def test_a_refused_change_leaves_everything() -> None:
     with pytest.raises(ValueError, match="uncovered"):
         deformation.set_knots(0, [0.5, 0.6, 0.7], [0.5, 0.6, 0.7])
     assert np.array_equal(before, deformation.lists.value)
+
+
+def test_arrays_hold_at_most_twice_of_what_is_used() -> None:
+    surface = shapes.hills(8)
+    deformation, rng = surface.deformation(surface.tessellate(chord_error=0.5)), np.random.default_rng(2)
+    before, compacted = 0, 0
+    for k in range(80):
+        low = rng.uniform(0.0, 0.5, 2)
+        deformation.set_knots(9 + k % 4, *(np.sort(rng.uniform(x, x + 0.5, 5)) for x in low))
+        x = deformation.lists
+        live = int((x.rows * np.diff(x.tile_start)).sum()) * 8
+        assert live <= x.used <= 2 * live
+        assert x.used <= len(x.value) and 2 * x.used <= len(x.slope)
+        assert x.point_used <= 2 * x.point_count.sum() + 1024
+        assert (x.rows <= x.room).all() and (x.point_count <= x.point_room).all()
+        compacted += x.used < before
+        before = x.used
+    assert compacted
+    assert np.abs(deformation.vertices - deformation.surface.evaluate(deformation.mesh.uv)).max() < 1e-4
+
+
+def test_changed_weights_name_the_cells_that_they_reach() -> None:
+    surface = shapes.hills(10)
+    mesh = surface.tessellate(chord_error=0.2)
+    deformation = surface.deformation(mesh)
+    cells = change_weights(deformation.basis, deformation.lists, mesh, np.array([33, 34]), np.array([2.0, 3.0]))
+    reached = surface.basis_matrix(mesh.uv)[:, [33, 34]].toarray().any(axis=1)
+    assert np.array_equal(cells, np.unique(mesh.cell[reached]))
+    assert deformation.basis.weights[[33, 34]].tolist() == [2, 3]
+    none = change_weights(deformation.basis, deformation.lists, mesh, np.zeros(0, dtype=np.int64), np.zeros(0))
+    assert none.shape == (0,)
