@@ -65,12 +65,13 @@ def test_a_refused_change_leaves_everything() -> None:
 
 
 def test_arrays_hold_at_most_twice_of_what_is_used() -> None:
-    surface = shapes.hills(8)
-    deformation, rng = surface.deformation(surface.tessellate(chord_error=0.5)), np.random.default_rng(2)
+    surface = shapes.scattered(40, 7)
+    mesh = surface.tessellate(chord_error=0.1, max_depth=4, domain=Domain((0, 1, 0, 1)))
+    deformation, rng = surface.deformation(mesh), np.random.default_rng(2)
     before, compacted = 0, 0
-    for k in range(80):
-        low = rng.uniform(0.0, 0.5, 2)
-        deformation.set_knots(9 + k % 4, *(np.sort(rng.uniform(x, x + 0.5, 5)) for x in low))
+    for k in range(150):
+        low = rng.uniform(-0.3, 0.8, 2)
+        deformation.set_knots(k % 40, *(np.sort(rng.uniform(x, x + 0.6, 5)) for x in low))
         x = deformation.lists
         live = int((x.rows * np.diff(x.tile_start)).sum()) * 8
         assert live <= x.used <= 2 * live
