@@ -25,8 +25,7 @@ Evaluator = Callable[[], object]
 
 
 class Peer(NamedTuple):
-    """A way to the vertices: its name, how to prepare it, by what its time is to be multiplied, and the bound, as text,
-    that the ratio of its time to the engine's shall keep."""
+    """A way to compute the vertices; its time counts ``share`` times, and ``reach`` is as of a ``Measure``."""
 
     name: str
     prepare: Callable[[DCPSurface, Mesh], Evaluator]

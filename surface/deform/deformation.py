@@ -169,7 +169,7 @@ class Deformation(Generic[Table]):
         elif found == -1:
             self.refresh()
         else:
-            check_ids(which, n)
+            check_ids(which, n * copies)
             bad = found + REFUSED
             raise ValueError(f"{name}[{bad}]: must be finite, got {target[bad].tolist()}")
 

@@ -151,3 +151,15 @@ def test_a_closed_surface_moves_every_copy() -> None:
     deformation.set_knots(0, torus.knots_u[0] * 1.1, torus.knots_v[0] * 0.9)
     deformation.move([0], [[1.0, 0.0, 0.0]])
     assert error(deformation) < 1e-4
+
+
+def test_bad_moves_of_a_closed_surface_are_named() -> None:
+    torus = shapes.torus()
+    deformation = torus.deformation(torus.tessellate(chord_error=1.0))
+    before = deformation.vertices.copy()
+    with pytest.raises(ValueError, match=r"delta\[1\]: must be finite, got \[0.0, nan, 0.0\]"):
+        deformation.move([3, 4], [[1.0, 0, 0], [0, np.nan, 0]])
+    with pytest.raises(ValueError, match=rf"ids\[0\]: {torus.n} is not a control point \(0 to {torus.n - 1}\)"):
+        deformation.set_positions([torus.n], [[1.0, 0, 0]])
+    assert np.array_equal(deformation.vertices, before)
+    assert np.array_equal(deformation.points, torus.points)
