@@ -66,6 +66,7 @@ def test_copies_of_a_closed_surface_count_for_their_point() -> None:
     found = matrix.basis_matrices(torus, uv, [(0, 0)])[0]
     assert found.shape == (3, torus.n)
     assert found.has_canonical_format
+    assert found.indices.max() < torus.n
     assert np.allclose(found @ torus.points, torus.evaluate(uv), rtol=0, atol=1e-12)
 
 
