@@ -14,12 +14,11 @@ from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats
 from surface.base.checks import check_inside, check_uv
-from surface.base.progress import Progress, silent
+from surface.base.progress import Progress, no_progress
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
 from surface.spline.controlpoints import ControlPoints
-from surface.spline.curvature import curvatures
-from surface.spline.matrix import basis_matrix
+from surface.spline.matrix import basis_matrices
 from surface.spline.nurbs import nurbs_arrays
 from surface.spline.refine import Refinement, insert_knot, refine
 
@@ -32,13 +31,8 @@ if TYPE_CHECKING:
 class DCPSurface(ControlPoints):
     """A surface of scattered control points; immutable.
 
-    Parameters
-    ----------
-    points : (n, 3) float64; weights : (n,) float64, positive; knots_u, knots_v : n sequences of degree + 2 knots each.
-        See :class:`surface.spline.controlpoints.ControlPoints` for these, ``closed_u`` and ``closed_v``, and errors.
+    See :class:`surface.spline.controlpoints.ControlPoints` for the arguments and errors.
 
-    Notes
-    -----
     Blending functions are right-continuous as in NURBS. Where that leaves (u, v) uncovered, the limits from
     the left are tried (first in u, then v, then both), which includes the right end of a clamped domain.
     """
@@ -60,22 +54,12 @@ class DCPSurface(ControlPoints):
         return cls(*nurbs_arrays(degree_u, degree_v, knots_u, knots_v, control_points, weights))
 
     def evaluate(self, uv: ArrayLike, side: ArrayLike | None = None) -> Floats:
-        """Points of the surface.
+        """Points (m, 3) float64 of the surface at ``uv (m, 2)``, NaN rows where nothing covers (u, v).
 
-        Parameters
-        ----------
-        uv : (m, 2) float64
-        side : (m,) int, optional; 1 takes the limit from the left in u, 2 in v, 3 in both
+        ``side (m,)`` int: 1 takes the limit from the left in u, 2 in v, 3 in both.
 
-        Returns
-        -------
-        (m, 3) float64, NaN rows where nothing covers (u, v)
-
-        Raises
-        ------
-        ValueError
-            For another shape, numbers that are not finite, a place outside :attr:`rect` (a closed direction has no
-            outside), or another side; names the argument and the index.
+        ``ValueError`` for another shape, numbers that are not finite, a place outside :attr:`rect` (a closed direction
+        has no outside), or another side; names the argument and the index.
         """
         return self.sample(self._inside(uv), side)[2]
 
@@ -94,21 +78,27 @@ class DCPSurface(ControlPoints):
         return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
 
     def curvatures(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats]:
-        """Gaussian and mean curvature, each (m,) float64; see :func:`surface.spline.curvature.curvatures`."""
-        return curvatures(self, self._inside(uv), side)
+        """Gaussian and mean curvature, (m,) float64 each, per length squared and per length.
+
+        Arguments are as for :meth:`evaluate`. The mean one is positive where the surface bends towards S_u x S_v. Both
+        are NaN where nothing covers or S_u x S_v vanishes (do Carmo, Differential Geometry of Curves and Surfaces 3-3).
+        """
+        su, sv, suu, suv, svv = self.sample_derivatives(self._inside(uv), side, second=True)[1].transpose(1, 0, 2)[1:]
+        normal = np.cross(su, sv)
+        area = np.linalg.norm(normal, axis=1)
+        area[area == 0] = np.nan
+        normal /= area[:, None]
+        first = [(a * b).sum(axis=1) for a, b in ((su, su), (su, sv), (sv, sv))]
+        second = [(a * normal).sum(axis=1) for a in (suu, suv, svv)]
+        gaussian = (second[0] * second[2] - second[1] ** 2) / area**2
+        mean = (second[0] * first[2] - 2 * second[1] * first[1] + second[2] * first[0]) / (2 * area**2)
+        return gaussian, mean
 
     def insert_knot(self, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement[Self]:
-        """The same surface with one more knot, exactly.
+        """The same surface with one more knot at ``value`` along ``axis`` ("u" or "v"), exactly.
 
-        Parameters
-        ----------
-        axis : "u" or "v"
-        value : where; points whose subdomain does not hold it inside stay as they are
-        ids : split only these points; all if left out
-
-        Returns
-        -------
-        Refinement : the new surface, and how data of the old points is carried over
+        Only points ``ids`` are split (all if left out), and of these those whose subdomain holds it inside. Returns the
+        new surface, and how data of the old points is carried over.
         """
         return insert_knot(self, axis, value, ids)
 
@@ -122,19 +112,11 @@ class DCPSurface(ControlPoints):
     def basis_matrix(
         self, uv: ArrayLike, derivative: tuple[int, int] = (0, 0), side: ArrayLike | None = None
     ) -> csr_matrix:
-        """Rational weights: ``basis_matrix(uv) @ points`` is ``evaluate(uv)``.
+        """Rational weights, (m, n) float64: ``basis_matrix(uv) @ points`` is ``evaluate(uv)``.
 
-        Parameters
-        ----------
-        uv : (m, 2) float64
-        derivative : (0, 0), (1, 0) for S_u or (0, 1) for S_v
-        side : as in :meth:`evaluate`
-
-        Returns
-        -------
-        (m, n) scipy CSR matrix, float64; rows where nothing covers are empty
+        ``derivative`` is (0, 0), (1, 0) for S_u or (0, 1) for S_v. Rows where nothing covers are empty.
         """
-        return basis_matrix(self, self._inside(uv), derivative, side)
+        return basis_matrices(self, self._inside(uv), [derivative], side)[0]
 
     def tessellate(
         self,
@@ -147,7 +129,7 @@ class DCPSurface(ControlPoints):
         loop_error: float | None = None,
         roots: tuple[int, int] | None = None,
         flip: bool = False,
-        progress: Progress = silent,
+        progress: Progress = no_progress,
     ) -> Mesh:
         """A watertight mesh by quad tree (paper, 2.3).
 
@@ -160,40 +142,23 @@ class DCPSurface(ControlPoints):
         domain : where to draw; the rectangle of all subdomains if left out
         loop_error : how near the mesh's border follows the loops; ``chord_error`` if left out
         roots : cells along u and v before any quartering; chosen roughly square if left out
-        flip : turn normals and triangles against S_u x S_v
-        progress : is called with what is being done and which part of the whole is done, 0 to 1
+        flip : reverse normals and triangles against S_u x S_v
+        progress : is called with the name of a stage and the part of the whole that is done, 0 to 1
 
-        Raises
-        ------
-        ValueError
-            For limits out of range, or where they ask for millions of cells.
+        ``ValueError`` for limits out of range, or where they ask for millions of cells.
         """
-        from surface.mesh.tessellate import tessellate  # compiled: loaded when first used
+        from surface.mesh.splitting import Limits  # compiled: loaded when first used
+        from surface.mesh.tessellate import tessellate
 
-        return tessellate(
-            self,
-            max_points=max_points,
-            chord_error=chord_error,
-            max_depth=max_depth,
-            min_depth=min_depth,
-            domain=domain,
-            loop_error=loop_error,
-            roots=roots,
-            flip=flip,
-            progress=progress,
-        )
+        limits = Limits(max_points, chord_error, max_depth, min_depth, loop_error, roots)
+        return tessellate(self, Domain.of(self) if domain is None else domain, limits, flip, progress)
 
     def deformation(
-        self, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = silent
+        self, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = no_progress
     ) -> Deformation[Self]:
-        """A mesh that follows moves of control points, changes of weights and of knots (Eq. 2).
+        """A mesh from :meth:`tessellate` that follows moves of control points, changes of weights and of knots (Eq. 2).
 
-        Parameters
-        ----------
-        mesh : from :meth:`tessellate`
-        normals : also keep exact normals
-        threads : how many threads compute everything anew
-        progress : as for :meth:`tessellate`
+        See :class:`surface.deform.deformation.Deformation` for the arguments.
         """
         from surface.deform.deformation import Deformation  # compiled: loaded when first used
 

@@ -39,7 +39,7 @@ def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
     vertices = sum(len(part.vertices) for part in head.parts)
     title = f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, loaded in {loading:.0f} ms"
     about = f"{largest.name}: {largest.surface.n} control points, {len(largest.mesh.vertices)} vertices"
-    engine = measure(largest.surface, largest.mesh, seconds=seconds, tell=tell)
+    engine = measure(largest.surface, largest.mesh, seconds=seconds, report=tell)
     # The bounds are for the large sheet; on a small mesh everything fits the cache.
     return [(title, pose_rows(head, seconds, tell)), (about, [replace(row, reach="") for row in engine])]
 
@@ -78,7 +78,7 @@ def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
     tell("loading")
     head = Head.load(find_config("heads", name))
     part = max(head.parts, key=lambda part: part.surface.n)
-    found = drift(part.surface, part.mesh, updates, tell=tell)
+    found = drift(part.surface, part.mesh, updates, report=tell)
     title = (
         f"{part.name} of {name} after {found.moves} moves of one point, {found.groups} of a group, "
         f"{found.weights} changes of a weight and {found.knots} of knots"
@@ -104,7 +104,7 @@ def bench_quadtree(name: str, tell: Tell, level: int = UNIFORM_LEVEL) -> tuple[T
     for quantile, title in ((1.0, "greatest deviation"), (_AREA, f"deviation of {_AREA:.0%} of the area")):
         tell(title)
         face = head.part("face").surface
-        variants = compare(face, domain, level=level, quantile=quantile, tell=tell)
+        variants = compare(face, domain, level=level, quantile=quantile, report=tell)
         tables.append((f"quad tree on the face of {name}, at equal {title}", [_saving(v) for v in variants]))
     return tables, variants
 

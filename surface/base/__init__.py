@@ -1,4 +1,4 @@
-"""What every other room of the surface stands on: errors, progress, checks of arguments, how kernels are compiled.
+"""Foundations of the surface room: errors, progress callbacks, checks of arguments, compilation of kernels.
 
 In: arguments of callers. Out: checked arrays, errors that say what to do. Imports nothing of the surface.
 """

@@ -1,4 +1,4 @@
-"""Checks of arguments: each returns a clean copy or says what is wrong, and where."""
+"""Checks of array arguments: each returns a clean array or raises ``ValueError`` with the argument's name and index."""
 
 from __future__ import annotations
 
@@ -7,23 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surface.base.arrays import Floats, Ints
-
-
-def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:
-    """(m,) int64 copy of the wanted limits; ``ValueError`` for another shape or others than 0 to 3."""
-    if side is None:
-        return np.zeros(len(samples), dtype=np.int64)
-    fast = isinstance(side, np.ndarray) and side.dtype == np.int64
-    wanted = np.asarray(side) if fast else numbers(side, "side")
-    if wanted.shape not in ((), (len(samples),)):
-        raise ValueError(f"side: shape {wanted.shape}, expected {(len(samples),)}")
-    sides = np.broadcast_to(wanted, len(samples)).astype(np.int64)
-    bad = (sides < 0) | (sides > 3) | (sides != wanted)
-    if bad.any():
-        i = int(np.argmax(bad))
-        raise ValueError(f"side[{i}]: must be 0, 1, 2 or 3, not {np.broadcast_to(wanted, len(samples))[i]:g}")
-    return sides
+from surface.base.arrays import Bools, Floats, Ints
 
 
 def numbers(values: ArrayLike, name: str) -> Floats:
@@ -45,6 +29,13 @@ def numbers(values: ArrayLike, name: str) -> Floats:
     raise ValueError(f"{name}[{i}]: shape {shapes[i]}, expected {usual}")
 
 
+def require(good: Bools | np.bool_, values: Floats, name: str, wanted: str = "finite") -> None:
+    """``ValueError`` with the index and the value of the first element that is not ``good``."""
+    if not good.all():
+        at = tuple(np.argwhere(~good)[0].tolist())
+        raise ValueError(f"{name}[{', '.join(map(str, at))}]: must be {wanted}, got {values[at].tolist()}")
+
+
 def check_points(points: ArrayLike, name: str = "points") -> Floats:
     """(n, 3) float64 copy; ``ValueError`` for another shape, no points, or numbers that are not finite."""
     xyz = numbers(points, name)
@@ -52,29 +43,19 @@ def check_points(points: ArrayLike, name: str = "points") -> Floats:
         raise ValueError(f"{name}: shape {xyz.shape}, expected (n, 3)")
     if len(xyz) == 0:
         raise ValueError(f"{name}: empty; a surface needs at least one control point")
-    finite = np.isfinite(xyz).all(axis=1)
-    if not finite.all():
-        i = int(np.argmin(finite))
-        raise ValueError(f"{name}[{i}]: must be finite, got {xyz[i].tolist()}")
+    require(np.isfinite(xyz).all(axis=1), xyz, name)
     return xyz
 
 
-def check_weights(weights: ArrayLike, name: str = "weights") -> Floats:
+def check_weights(weights: ArrayLike, name: str = "weights", n: int | None = None) -> Floats:
     """(n,) float64 copy; ``ValueError`` for another shape or weights that are not positive and finite."""
     w = numbers(weights, name)
     if w.ndim != 1:
         raise ValueError(f"{name}: shape {w.shape}, expected (n,)")
-    good = np.isfinite(w) & (w > 0)
-    if not good.all():
-        i = int(np.argmin(good))
-        raise ValueError(f"{name}[{i}]: must be positive and finite, got {w[i]}")
+    require(np.isfinite(w) & (w > 0), w, name, "positive and finite")
+    if n is not None and len(w) != n:
+        raise ValueError(f"{name}: {len(w)} weights for {n} points")
     return w
-
-
-def check_length(weights: Floats, n: int) -> None:
-    """``ValueError`` unless there is one weight per point."""
-    if len(weights) != n:
-        raise ValueError(f"weights: {len(weights)} weights for {n} points")
 
 
 def integers(ids: ArrayLike) -> Ints:
@@ -106,10 +87,7 @@ def check_uv(uv: ArrayLike, name: str = "uv") -> Floats:
     samples = np.ascontiguousarray(uv) if fast else numbers(uv, name)
     if samples.ndim != 2 or samples.shape[1] != 2:
         raise ValueError(f"{name}: shape {samples.shape}, expected (m, 2)")
-    good = np.isfinite(samples).all(axis=1)
-    if not good.all():
-        i = int(np.argmin(good))
-        raise ValueError(f"{name}[{i}]: must be finite, got {samples[i].tolist()}")
+    require(np.isfinite(samples).all(axis=1), samples, name)
     return samples
 
 
@@ -124,3 +102,20 @@ def check_inside(
             i = int(np.argmax(out))
             raise ValueError(f"{name}[{i}]: {word} = {samples[i, axis]} is outside the domain, {low} to {high}")
     return samples
+
+
+def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:
+    """(m,) int64 copy of the wanted limits; ``ValueError`` for another shape or others than 0 to 3."""
+    if side is None:
+        return np.zeros(len(samples), dtype=np.int64)
+    fast = isinstance(side, np.ndarray) and side.dtype == np.int64
+    wanted = np.asarray(side) if fast else numbers(side, "side")
+    if wanted.shape not in ((), (len(samples),)):
+        raise ValueError(f"side: shape {wanted.shape}, expected {(len(samples),)}")
+    wanted = np.broadcast_to(wanted, len(samples))
+    sides = wanted.astype(np.int64)
+    bad = (sides < 0) | (sides > 3) | (sides != wanted)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(f"side[{i}]: must be 0, 1, 2 or 3, not {wanted[i]:g}")
+    return sides

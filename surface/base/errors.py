@@ -1,13 +1,4 @@
-"""Errors of the surface room.
-
-The tree::
-
-    SurfaceError
-    ├── HeadFileError     a head's files are missing, damaged or of another version
-    ├── FitError          a mesh cannot be turned into a head (no UVs, NaN, mismatched shapes)
-    ├── ExportError       a head cannot be written for other programs
-    ├── SurfaceFileError  a surface file is damaged, or holds what no DCP surface can be exactly
-    └── ViewError         no picture can be drawn (no OpenGL, no display, context too old)
+"""The tree of errors that the surface room raises.
 
 A wrong argument to :class:`surface.DCPSurface` is a ``ValueError`` that names the argument and the index.
 """
@@ -16,7 +7,7 @@ from __future__ import annotations
 
 
 class SurfaceError(Exception):
-    """Something the surface room cannot do.
+    """Any error of the surface room.
 
     Parameters
     ----------
@@ -34,7 +25,7 @@ class HeadFileError(SurfaceError):
 
 
 class FitError(SurfaceError):
-    """A mesh cannot be turned into a head."""
+    """A mesh cannot be turned into a head: no texture coordinates, NaN, mismatched shapes."""
 
 
 class ExportError(SurfaceError):

@@ -1,8 +1,7 @@
-"""How the compiled kernels are compiled; importing this imports numba, so do it only when a kernel is needed.
+"""Decorators that compile kernels with numba and keep the compiled code on disk; importing this imports numba.
 
-Compiled code is kept on disk beside the source. Numba keeps it until the file a kernel stands in changes; here it
-also watches every file of the package that this one imports, and those these import, since kernels and numbers from
-there are compiled into it.
+Numba compiles again when the file of a kernel changes. Here it also does when a file of the package changes that this
+one imports, directly or not, since kernels and constants from there are compiled into it.
 """
 
 from __future__ import annotations
@@ -18,67 +17,64 @@ from typing import Any
 from numba import njit
 
 
-def _leave_scipy() -> None:
-    """Keep numba from importing scipy's linear algebra, 0.4 s, before a kernel asks for it; none here does.
+def _skip_scipy() -> None:
+    """Keep numba from importing scipy's linear algebra, 0.4 s, which no kernel of omote needs.
 
-    This is inside numba: where a version of it is made otherwise, scipy is imported, and nothing else changes.
+    This patches a private part of numba: a version without it imports scipy, and nothing else changes.
     """
-    from numba.np import linalg  # only to be changed here
+    from numba.np import linalg  # only to be patched here
 
-    ask = getattr(linalg, "ensure_blas", None)
-    if ask is None:
+    original = getattr(linalg, "ensure_blas", None)
+    if original is None:
         return
     linalg.ensure_blas = lambda: None
     try:
-        import_module("numba.np.arraymath")  # asks once, when it is imported; products of matrices ask again
+        import_module("numba.np.arraymath")  # calls it once, when it is imported; products of matrices call it again
     finally:
-        linalg.ensure_blas = ask
+        linalg.ensure_blas = original
 
 
-_leave_scipy()
+_skip_scipy()
 PACKAGE = Path(__file__).parents[1]
 IMPORT = re.compile(r"^from[ ]+(\.*)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n#]*)", re.MULTILINE)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile at the first call for each set of argument types, cache on disk, release the GIL."""
-    return _watching(njit(cache=True, nogil=True)(function))
+    return _watch_imports(njit(cache=True, nogil=True)(function))
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """As :func:`kernel`, and its code is put into the caller's."""
-    return _watching(njit(cache=True, nogil=True, inline="always")(function))
+    return _watch_imports(njit(cache=True, nogil=True, inline="always")(function))
 
 
-def _watching(dispatcher: Any) -> Any:
-    """Add what a kernel's file imports to what makes the code kept on disk stale."""
+def _watch_imports(dispatcher: Any) -> Any:
+    """Let changes of what a kernel's file imports invalidate its code on disk, too."""
     file = getattr(dispatcher._cache, "_cache_file", None)
     if file is not None:
-        file._source_stamp = (file._source_stamp, stamp(Path(dispatcher.py_func.__code__.co_filename)))
+        file._source_stamp = (file._source_stamp, _digest(Path(dispatcher.py_func.__code__.co_filename)))
     return dispatcher
 
 
 @cache
-def stamp(file: Path) -> str:
-    """Digest of a file and of all files of the package that it draws on."""
-    digest = hashlib.sha256()
-    for path in sorted(drawn_on(file)):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+def _digest(file: Path) -> str:
+    """Digest of a file and of its dependencies."""
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(dependencies(file)))).hexdigest()
 
 
-def drawn_on(file: Path) -> set[Path]:
-    """A file, what it imports of the package where it is loaded, what these import, and so on."""
+def dependencies(file: Path) -> set[Path]:
+    """A file, the files of the package that it imports when it is loaded, those these import, and so on."""
     found, waiting = {file}, [file]
     while waiting:
-        fresh = imported(waiting.pop()) - found
-        found |= fresh
-        waiting += fresh
+        new = _imports(waiting.pop()) - found
+        found |= new
+        waiting += new
     return found
 
 
 @cache
-def imported(file: Path) -> frozenset[Path]:
+def _imports(file: Path) -> frozenset[Path]:
     """Files of the package that a file imports with ``from ... import ...`` at the left margin."""
     out = set()
     for dots, module, names in IMPORT.findall(file.read_text(encoding="utf-8")):

@@ -1,4 +1,4 @@
-"""How far a long computation has come: callbacks that are told a stage and the part that is done, 0 to 1."""
+"""Progress callbacks of long computations: they get a stage's name and the part of the whole that is done, 0 to 1."""
 
 from __future__ import annotations
 
@@ -7,14 +7,10 @@ from collections.abc import Callable
 Progress = Callable[[str, float], None]
 
 
-def silent(stage: str, part: float) -> None:
-    """Tell nobody."""
+def no_progress(stage: str, part: float) -> None:
+    """Report nothing."""
 
 
-def between(progress: Progress, low: float, high: float) -> Progress:
+def part_of(progress: Progress, low: float, high: float) -> Progress:
     """A callback for a step that takes from ``low`` to ``high`` of the whole."""
-
-    def tell(stage: str, part: float) -> None:
-        progress(stage, low + part * (high - low))
-
-    return tell
+    return lambda stage, part: progress(stage, low + part * (high - low))

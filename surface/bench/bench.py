@@ -6,14 +6,16 @@ Times are the least of many calls: on a machine with other work that is the stea
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from bisect import bisect_left
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.base.progress import Progress, between, silent
+from surface.base.progress import Progress, no_progress, part_of
 from surface.dcp import DCPSurface
 from surface.deform.deformation import Deformation
 from surface.mesh.mesh import Mesh
@@ -22,7 +24,11 @@ from . import peers
 
 SHARES = (0.02, 0.1)  # of the vertices that groups reach
 BUILD_SECONDS = 10.0  # what building a large tree and its lists may take
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
+
+
+def no_report(text: str) -> None:
+    """Report nothing."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +39,8 @@ class Measure:
     ----------
     name : what was measured
     milliseconds : least time of one call; 0 for rows that are a ratio of sizes
-    ratio : against what ``against`` names, or None
-    against : the other side of the ratio
+    ratio, against : a ratio, or None, and its other side
     reach : the bound the ratio shall keep, as text (``"<= 1.8"``, ``"0.9 to 1.1"``), or empty
-    kept : does it keep the bound? None without one
     """
 
     name: str
@@ -58,14 +62,7 @@ class Measure:
 
 def least(call: Callable[[], object], seconds: float = 0.3) -> float:
     """Least time of a call in milliseconds, over at least five calls and ``seconds``."""
-    call()
-    best, count, end = np.inf, 0, time.perf_counter() + seconds
-    while count < 5 or time.perf_counter() < end:
-        begin = time.perf_counter()
-        call()
-        best = min(best, time.perf_counter() - begin)
-        count += 1
-    return 1e3 * float(best)
+    return least_of([call], seconds)[0]
 
 
 def least_of(calls: list[Callable[[], object]], seconds: float = 0.3) -> list[float]:
@@ -82,82 +79,50 @@ def least_of(calls: list[Callable[[], object]], seconds: float = 0.3) -> list[fl
     return [1e3 * float(x) for x in best]
 
 
-def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, tell: Tell = lambda text: None) -> list[Measure]:
+def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, report: Report = no_report) -> list[Measure]:
     """Full evaluation, updates of a point, a group and everything, and peers, for any surface and mesh.
 
-    Parameters
-    ----------
-    surface, mesh : what to measure
-    seconds : how long each row is repeated
-    tell : is told the name of each row before it is measured
+    Each row is repeated for ``seconds``; ``report`` gets its name before.
     """
     rows: list[Measure] = []
-    shaded, bare = surface.deformation(mesh), surface.deformation(mesh, normals=False)
-    weights = bare.table.lists.value
+    with_normals, plain = surface.deformation(mesh), surface.deformation(mesh, normals=False)
 
     def add(name: str, call: Callable[[], object], against: str = "", reach: str = "", base: float = 0.0) -> float:
-        tell(name)
+        report(name)
         took = least(call, seconds)
         rows.append(Measure(name, took, took / base if base else None, against if base else "", reach))
         return took
 
-    read = add("one read of the weights", weights.sum)
-    full = add("all positions", bare.refresh, "one read of the weights", "<= 1.8", read)
-    add("all positions and normals", shaded.refresh, "all positions", "<= 3.5", full)
-    everything = shaker(shaded, np.arange(surface.n))
-    add("every point moved, with normals", everything, "all positions", "", full)
-    middle = nearest(surface, 1)
-    add("one point moved, with normals", shaker(shaded, middle), "all positions", "", full)
+    read = add("one read of the weights", plain.lists.value.sum)
+    full = add("all positions", plain.refresh, "one read of the weights", "<= 1.8", read)
+    add("all positions and normals", with_normals.refresh, "all positions", "<= 3.5", full)
+    for name, ids in (("every point", np.arange(surface.n)), ("one point", nearest(surface, 1))):
+        add(f"{name} moved, with normals", alternating(with_normals, ids), "all positions", "", full)
     groups = {len(ids): (ids, part) for ids, part in (group(surface, mesh, share) for share in SHARES)}
     for count, (ids, part) in groups.items():  # one, where a single point reaches more than either share
         name = f"group of {count} moved, which reaches {100 * part:.1f} %"
-        add(name, shaker(bare, ids), "its part of all positions", "<= 1.5", part * full)
-    return rows + peer_rows(surface, mesh, full, seconds, tell)
+        add(name, alternating(plain, ids), "its part of all positions", "<= 1.5", part * full)
+    return rows + peer_rows(peers.vertex_sums(mesh), surface, mesh, full, seconds, report)
 
 
-def peer_rows(surface: DCPSurface, mesh: Mesh, full: float, seconds: float, tell: Tell) -> list[Measure]:
+def peer_rows(
+    found: Iterable[peers.Peer], surface: DCPSurface, mesh: Mesh, full: float, seconds: float, report: Report
+) -> list[Measure]:
     """Other ways to the same vertices; their ratios say how many times longer they take than ``full``."""
     rows = []
-    for name, prepare, reach in (
-        ("scipy CSR @ dense", peers.sparse_matrix, ">= 12"),
-        (f"numpy {peers.BLENDSHAPES} blendshapes, {_megabytes(mesh)}", peers.blendshapes, ">= 3"),
-        ("stencil table, row by row", peers.stencils, ""),
-    ):
-        tell(name)
+    for peer in found:
+        report(peer.name)
         with peers.one_thread():
-            took = least(prepare(surface, mesh), seconds)
-        rows.append(Measure(f"{name}, positions", took, took / full, "all positions", reach))
+            took = peer.share * least(peer.prepare(surface, mesh), seconds)
+        rows.append(Measure(f"{peer.name}, positions", took, took / full, "all positions", peer.reach))
     return rows
 
 
-def _megabytes(mesh: Mesh) -> str:
-    """What one product reads: the row is only as slow as memory where this is more than the caches hold."""
-    return f"{peers.BLENDSHAPES * 3 * 4 * len(mesh.vertices) / 1e6:.1f} MB"
-
-
-def library_rows(surface: DCPSurface, mesh: Mesh, full: float, seconds: float, tell: Tell) -> list[Measure]:
-    """Spline libraries that are installed, on a sheet from :func:`sheet`; they evaluate basis functions each time."""
-    rows = []
-    for name, prepare, share in peers.libraries(mesh):
-        tell(name)
-        took = share * least(prepare(surface, mesh), seconds)
-        rows.append(Measure(f"{name}, positions", took, took / full, "all positions"))
-    return rows
-
-
-def sheet(vertices: int = 100_000, points: int | None = None) -> tuple[DCPSurface, Mesh]:
-    """A bicubic sheet whose cells are knot spans of about 8 x 8 vertices, so that 16 points reach each.
-
-    Parameters
-    ----------
-    vertices : about how many
-    points : about how many control points instead of one per 64 vertices
-    """
-    wanted = vertices / 64 if points is None else points
-    spans = max(2, round(np.sqrt(wanted) - (0 if points is None else 3)))
+def sheet(vertices: int = 100_000) -> tuple[DCPSurface, Mesh]:
+    """A bicubic sheet of about so many vertices; its cells are knot spans of about 8 x 8, with 16 points each."""
+    spans = max(2, round(np.sqrt(vertices / 64)))
     level = max(0, round(np.log2(np.sqrt(vertices) / spans)))
-    if points is None:
-        spans = max(2, round(np.sqrt(vertices) / 2**level))
+    spans = max(2, round(np.sqrt(vertices) / 2**level))
     surface = bumpy((spans + 3) ** 2)
     mesh = surface.tessellate(max_points=surface.n + 1, min_depth=level, max_depth=level, roots=(spans, spans))
     return surface, mesh
@@ -171,79 +136,63 @@ def bumpy(points: int) -> DCPSurface:
     return DCPSurface.from_nurbs(3, 3, knots, knots, np.stack([x, y, 20 * np.sin(x / 20) * np.cos(y / 25)], axis=-1))
 
 
-def speed_table(vertices: int = 100_000, seconds: float = 0.3, tell: Tell = lambda text: None) -> list[Measure]:
+def speed_table(vertices: int = 100_000, seconds: float = 0.3, report: Report = no_report) -> list[Measure]:
     """The engine at its memory limit: about 100,000 vertices, 16 influences, one thread, float32."""
     surface, mesh = sheet(vertices)
-    rows = measure(surface, mesh, seconds=seconds, tell=tell)
+    rows = measure(surface, mesh, seconds=seconds, report=report)
     full = next(row.milliseconds for row in rows if row.name == "all positions")
-    return rows + library_rows(surface, mesh, full, seconds, tell)
+    return rows + peer_rows(peers.libraries(mesh), surface, mesh, full, seconds, report)
 
 
-def large_table(vertices: int = 1_000_000, seconds: float = 0.5, tell: Tell = lambda text: None) -> list[Measure]:
+def large_table(vertices: int = 1_000_000, seconds: float = 0.5, report: Report = no_report) -> list[Measure]:
     """Two threads against one, and memory, for a million vertices."""
-    tell(f"{vertices} vertices")
+    report(f"{vertices} vertices")
     surface, mesh = sheet(vertices)
     one = surface.deformation(mesh, normals=False)
     two = surface.deformation(mesh, normals=False, threads=2)
-    weights = one.table.lists.value
-    tell("two threads")
-    with ThreadPoolExecutor(1) as pool:
-        calls: list[Callable[[], object]] = [one.refresh, two.refresh, weights.sum, _shared_read(weights, pool)]
-        alone, together, read, shared = least_of(calls, seconds)
+    weights = one.lists.value
+    report("two threads")
+    halves = np.array_split(weights, 2)
+    with ThreadPoolExecutor(2) as pool:
+        calls: list[Callable[[], object]] = [
+            one.refresh,
+            two.refresh,
+            weights.sum,
+            lambda: list(pool.map(np.sum, halves)),
+        ]
+        single, double, read, shared = least_of(calls, seconds)
     bound = max(0.7, 1.15 * shared / read)  # where two readers gain little, two threads cannot gain more
     name = f"all positions, {len(mesh.vertices)} vertices"
     return [
-        Measure(name, alone, alone / read, "one read of the weights", "<= 1.8"),
-        Measure(f"{name}, two threads", together, together / alone, "one thread", f"<= {bound:.2f}"),
+        Measure(name, single, single / read, "one read of the weights", "<= 1.8"),
+        Measure(f"{name}, two threads", double, double / single, "one thread", f"<= {bound:.2f}"),
         Measure("one read of the weights, two threads", shared, shared / read, "one thread"),
         Measure("memory of weights and lists", 0.0, one.nbytes / weights.nbytes, "the weights alone", "<= 1.3"),
     ]
 
 
-def build_table(points: int = 100_000, level: int = 7, progress: Progress = silent) -> list[Measure]:
+def build_table(points: int = 100_000, level: int = 7, progress: Progress = no_progress) -> list[Measure]:
     """Time of building quad tree and lists by either rule, for 100,000 control points and a million vertices.
 
-    Parameters
-    ----------
-    points : about how many
-    level : deepest level of the tree under 8 x 8 roots, which bounds the vertices to (8 * 2**level + 1)**2
-    progress : is called with a stage and the part that is done
+    ``level`` is the deepest level of the tree under 8 x 8 roots, which bounds the vertices to (8 * 2**level + 1)**2.
     """
-    bumpy(300).tessellate(max_points=16, chord_error=1.0)  # compiled now, not measured
+    bumpy(300).tessellate(max_points=16, chord_error=1.0)  # compiles the kernels before the clock starts
     surface, rows = bumpy(points), []
     for title, limits in (("16 points a cell", {"max_points": 16}), ("chord error", {"chord_error": 1e-9})):
         begin = time.perf_counter()
-        mesh = surface.tessellate(roots=(8, 8), max_depth=level, **limits, progress=between(progress, 0.0, 0.85))
-        surface.deformation(mesh, progress=between(progress, 0.85, 1.0))
+        mesh = surface.tessellate(roots=(8, 8), max_depth=level, **limits, progress=part_of(progress, 0.0, 0.85))
+        surface.deformation(mesh, progress=part_of(progress, 0.85, 1.0))
         took = time.perf_counter() - begin
         name = f"tree and lists by {title}: {surface.n} points, {len(mesh.vertices)} vertices"
         rows.append(Measure(name, 1e3 * took, took / BUILD_SECONDS, f"{BUILD_SECONDS:.0f} s", "<= 1"))
     return rows
 
 
-def _shared_read(weights: np.ndarray, pool: ThreadPoolExecutor) -> Callable[[], object]:
-    """A call that sums an array half by half in two threads."""
-    half = len(weights) // 2
-
-    def call() -> None:
-        other = pool.submit(weights[half:].sum)
-        weights[:half].sum()
-        other.result()
-
-    return call
-
-
-def shaker(deformation: Deformation[DCPSurface], ids: np.ndarray) -> Callable[[], object]:
+def alternating(deformation: Deformation[DCPSurface], ids: np.ndarray) -> Callable[[], object]:
     """A call that moves the points there and back in turn."""
     here = deformation.points[ids].copy()
-    places = (here + 0.01 * np.ptp(deformation.points, axis=0).max(), here)
-    turn = [0]
-
-    def call() -> None:
-        turn[0] ^= 1
-        deformation.set_positions(ids, places[1 - turn[0]])
-
-    return call
+    places = cycle((here + 0.01 * np.ptp(deformation.points, axis=0).max(), here))
+    return lambda: deformation.set_positions(ids, next(places))
 
 
 def nearest(surface: DCPSurface, count: int) -> np.ndarray:
@@ -256,18 +205,15 @@ def nearest(surface: DCPSurface, count: int) -> np.ndarray:
 
 def group(surface: DCPSurface, mesh: Mesh, share: float) -> tuple[np.ndarray, float]:
     """The fewest neighbouring points that reach ``share`` of the vertices, and the share they really reach."""
-    low, high = 1, surface.n
-    while low < high:
-        count = (low + high) // 2
-        if reached(surface, mesh, nearest(surface, count)) < share:
-            low = count + 1
-        else:
-            high = count
-    ids = nearest(surface, low)
-    return ids, reached(surface, mesh, ids)
+
+    def reach(count: int) -> float:
+        return share_reached(surface, mesh, nearest(surface, count))
+
+    count = bisect_left(range(surface.n), share, lo=1, key=reach)
+    return nearest(surface, count), reach(count)
 
 
-def reached(surface: DCPSurface, mesh: Mesh, ids: np.ndarray) -> float:
+def share_reached(surface: DCPSurface, mesh: Mesh, ids: np.ndarray) -> float:
     """Part of the vertices at which one of the points has weight."""
     hit = np.zeros(len(mesh.uv), dtype=bool)
     copies = surface.all_supports.reshape(-1, surface.n, 4)[:, ids].reshape(-1, 4)  # of a closed surface's points

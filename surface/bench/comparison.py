@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
 
+from .bench import Report, no_report
+
 FINER = 4  # samples of the reference per edge of the uniform mesh
 MOST_SAMPLES = 40  # along an edge of one large triangle
 DEEPER = 2  # levels the adaptive meshes may go below the uniform one: to the reference's samples
@@ -20,22 +23,16 @@ DEEPER = 2  # levels the adaptive meshes may go below the uniform one: to the re
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to tessellate.
+    """One way to tessellate: uniform, by control points (as in the paper) or by chord error.
 
-    Attributes
-    ----------
-    name : uniform, by control points (the paper's way), by chord error
-    mesh : its mesh
-    deviation : greatest distance of the reference samples from the mesh, in units of the points
-    saving : part of the uniform mesh's vertices that is not needed
-    limit : the number of points or the chord error that was asked for
+    ``deviation`` is the greatest distance of the reference samples from the mesh, in units of the points; ``saving``
+    the part of the uniform mesh's vertices that is not needed.
     """
 
     name: str
     mesh: Mesh
     deviation: float
     saving: float
-    limit: float
 
 
 def compare(
@@ -44,69 +41,55 @@ def compare(
     *,
     level: int = 4,
     quantile: float = 1.0,
-    tell: Callable[[str], None] = lambda text: None,
+    report: Report = no_report,
 ) -> list[Variant]:
     """A uniform mesh, and the smallest adaptive ones that deviate no more.
 
-    Parameters
-    ----------
-    surface, domain : what to tessellate
-    level : levels below the roots that the uniform mesh is quartered everywhere
-    quantile : what "no more" means: 1 compares greatest deviations, 0.99 those that 99 % of the area keep
-    tell : is told what is being done
+    The uniform mesh is quartered ``level`` times below the roots. A ``quantile`` of 1 compares greatest deviations,
+    0.99 those that 99 % of the area keep.
 
-    Notes
-    -----
     The reference is the surface itself, sampled everywhere at a spacing of a quarter of the uniform mesh's edges.
     """
     where = Domain.of(surface) if domain is None else domain
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
-    tell("uniform")
+    report("uniform")
     uniform = surface.tessellate(chord_error=1e9, min_depth=level, max_depth=level, domain=where, loop_error=1e9)
     spacing = _edge(uniform) / FINER
     bound = deviation(surface, uniform, spacing, quantile)
     total = len(uniform.vertices)
     loop_error = max(bound, 0.1 * _edge(uniform))
-    found = [Variant("uniform", uniform, bound, 0.0, float(level))]
+    found = [Variant("uniform", uniform, bound, 0.0)]
 
     def off(mesh: Mesh) -> float:
         if len(mesh.vertices) > 4 * total:
             return 0.0  # so fine that it need not be measured, and no candidate
         return deviation(surface, mesh, spacing, quantile)
 
-    def by_points(limit: float) -> Mesh:
-        return surface.tessellate(
-            max_points=round(limit), max_depth=level + DEEPER, domain=where, loop_error=loop_error
-        )
-
-    def by_error(limit: float) -> Mesh:
-        return surface.tessellate(chord_error=limit, max_depth=level + DEEPER, domain=where, loop_error=loop_error)
-
-    ways = [
-        ("by control points", by_points, float(surface.n), 4.0),
-        ("by chord error", by_error, 0.1 * size, 1e-6 * size),
+    adaptive = partial(surface.tessellate, max_depth=level + DEEPER, domain=where, loop_error=loop_error)
+    ways: list[tuple[str, Callable[[float], Mesh], float, float]] = [
+        ("by control points", lambda limit: adaptive(max_points=round(limit)), float(surface.n), 4.0),
+        ("by chord error", lambda limit: adaptive(chord_error=limit), 0.1 * size, 1e-6 * size),
     ]
     for name, make, coarse, fine in ways:
-        tell(name)
+        report(name)
         best = _search(make, off, coarse, fine, bound)
         if best is not None:
-            mesh, limit, reached = best
-            found.append(Variant(name, mesh, reached, 1.0 - len(mesh.vertices) / total, limit))
+            found.append(Variant(name, *best, 1.0 - len(best[0].vertices) / total))
     return found
 
 
 def _search(
     make: Callable[[float], Mesh], off: Callable[[Mesh], float], coarse: float, fine: float, bound: float
-) -> tuple[Mesh, float, float] | None:
+) -> tuple[Mesh, float] | None:
     """Bisect (by ratio) for the coarsest limit whose mesh deviates no more than ``bound``."""
-    best: tuple[Mesh, float, float] | None = None
+    best: tuple[Mesh, float] | None = None
     for _ in range(14):
         limit = float(np.sqrt(coarse * fine))
         mesh = make(limit)
         reached = off(mesh)
         if reached <= bound:
             if reached > 0 and (best is None or len(mesh.vertices) < len(best[0].vertices)):
-                best = mesh, limit, reached
+                best = mesh, reached
             fine = limit
         else:
             coarse = limit
@@ -122,17 +105,10 @@ def _edge(mesh: Mesh) -> float:
 
 
 def deviation(surface: DCPSurface, mesh: Mesh, spacing: float, quantile: float = 1.0) -> float:
-    """Distance between a surface and a mesh of it.
+    """Distance between a surface and a mesh of it: of the surface's points from the planes of their triangles.
 
-    Parameters
-    ----------
-    surface, mesh : the surface, and a mesh of it
-    spacing : greatest distance of the samples in a triangle
-    quantile : 1 for the greatest distance, 0.99 for the one that 99 % of the area do not exceed
-
-    Returns
-    -------
-    float : over all samples, the distance of the surface's point from the plane of its triangle
+    Samples are at most ``spacing`` apart. ``quantile`` 1 asks for the greatest distance, 0.99 for the one that 99 % of
+    the area do not exceed.
     """
     corner, uv, side = mesh.vertices[mesh.triangles], mesh.uv[mesh.triangles], mesh.side[mesh.triangles]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
@@ -142,7 +118,8 @@ def deviation(surface: DCPSurface, mesh: Mesh, spacing: float, quantile: float =
         at = np.flatnonzero(parts == n)
         share = _lattice(int(n))
         points = surface.evaluate(
-            np.einsum("sk,tkc->tsc", share, uv[at]).reshape(-1, 2), side=np.repeat(_common(side[at]), len(share))
+            np.einsum("sk,tkc->tsc", share, uv[at]).reshape(-1, 2),
+            side=np.repeat(np.bitwise_or.reduce(side[at], axis=1), len(share)),
         )
         offset = points.reshape(len(at), -1, 3) - np.einsum("sk,tkc->tsc", share, corner[at])
         normal = np.cross(corner[at, 1] - corner[at, 0], corner[at, 2] - corner[at, 0])
@@ -172,21 +149,8 @@ def _lattice(n: int) -> Floats:
     return inner
 
 
-def _common(side: np.ndarray) -> np.ndarray:
-    """(t,) the limit that a triangle's corners on slits ask for."""
-    limits: np.ndarray = np.bitwise_or.reduce(side, axis=1)
-    return limits
-
-
 def draw(variants: list[Variant], path: str | Path, *, height: int = 900) -> None:
-    """The meshes side by side, seen along -z, as a picture file.
-
-    Parameters
-    ----------
-    variants : from :func:`compare`
-    path : PNG or another format that pillow writes
-    height : of the picture in pixels
-    """
+    """Draw the meshes of :func:`compare` side by side, seen along -z, as a PNG or another format that pillow writes."""
     from PIL import Image, ImageDraw  # optional: the extra view
 
     low = np.min([v.mesh.vertices.min(axis=0) for v in variants], axis=0)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from surface.dcp import DCPSurface
 
-from .bench import Measure, Tell, bumpy, least, least_of, nearest, shaker, sheet
+from .bench import Measure, Report, alternating, bumpy, least, least_of, nearest, no_report, sheet
 
 VERTICES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
 POINTS = (100, 1_000, 10_000, 100_000)
@@ -27,19 +27,12 @@ REACH = {(0, FULL): "0.9 to 1.1", (0, MEMORY): "0.9 to 1.1", (0, MOVE): "-0.1 to
 
 @dataclass
 class Series:
-    """One quantity against a size.
-
-    Attributes
-    ----------
-    name : the quantity and its unit
-    axis : 0 against vertices, 1 against control points
-    size, amount : rising sizes, and the quantity
-    """
+    """One quantity (its name with the unit) at rising sizes: of vertices (axis 0) or of control points (axis 1)."""
 
     name: str
     axis: int
-    size: list[float] = field(default_factory=list)
-    amount: list[float] = field(default_factory=list)
+    size: list[int]
+    amount: list[float]
 
     @property
     def slope(self) -> float:
@@ -51,46 +44,42 @@ def growth(
     vertices: tuple[int, ...] = VERTICES,
     points: tuple[int, ...] = POINTS,
     seconds: float = 0.3,
-    tell: Tell = lambda text: None,
+    report: Report = no_report,
 ) -> list[Series]:
-    """Measure sheets of rising size.
+    """Measure sheets of rising size; the least time of calls repeated for ``seconds`` counts.
 
-    Parameters
-    ----------
-    vertices : sizes with one control point per 64 vertices, so that 16 reach each
-    points : numbers of control points under about a quarter of the largest of ``vertices``
-    seconds : how long each call is repeated; the least time counts
-    tell : is told the size that is measured
+    ``vertices`` are sizes with one control point per 64 vertices, so that 16 reach each; ``points`` are numbers of
+    control points under about a quarter of the largest of ``vertices``.
     """
-    lines = {(axis, name): Series(name, axis) for axis in range(2) for name in (READ, FULL, MOVE, LISTS, MEMORY)}
+    found: list[tuple[int, int, dict[str, float]]] = []
     for count in vertices:
-        tell(f"growth: {count} vertices")
+        report(f"growth: {count} vertices")
         surface, mesh = sheet(count)
-        _add(lines, 0, len(mesh.vertices), surface, mesh.leaves, seconds)
+        found.append((0, len(mesh.vertices), _amounts(surface, mesh.leaves, seconds)))
     cells = max(16, round(np.sqrt(max(vertices)) / 2))
     for count in points:
-        tell(f"growth: {count} control points")
+        report(f"growth: {count} control points")
         surface = bumpy(count)
-        _add(lines, 1, surface.n, surface, cells * cells, seconds)
-    return list(lines.values())
+        found.append((1, surface.n, _amounts(surface, cells * cells, seconds)))
+    of_axis = [[(size, amounts) for axis, size, amounts in found if axis == k] for k in range(2)]
+    return [
+        Series(name, axis, [size for size, _ in rows], [amounts[name] for _, amounts in rows])
+        for axis, rows in enumerate(of_axis)
+        for name in (READ, FULL, MOVE, LISTS, MEMORY)
+    ]
 
 
-def _add(
-    lines: dict[tuple[int, str], Series], axis: int, size: int, surface: DCPSurface, leaves: int, seconds: float
-) -> None:
-    """Measure one surface under a mesh of so many equal cells."""
+def _amounts(surface: DCPSurface, leaves: int, seconds: float) -> dict[str, float]:
+    """Measure one surface with a mesh of so many equal cells."""
     side = round(np.sqrt(leaves))
     level = max(k for k in range(4) if side % (1 << k) == 0)
     begin = time.perf_counter()
     mesh = surface.tessellate(chord_error=1e9, roots=(side >> level, side >> level), min_depth=level, max_depth=level)
     deformation = surface.deformation(mesh, normals=False)
     built = 1e3 * (time.perf_counter() - begin)
-    one = shaker(deformation, nearest(deformation.surface, 1))
-    read, full = least_of([deformation.table.lists.value.sum, deformation.refresh], seconds)
-    amounts = {READ: read, FULL: full, MOVE: least(one, seconds), LISTS: built, MEMORY: deformation.nbytes / 1e6}
-    for name, amount in amounts.items():
-        lines[axis, name].size.append(size)
-        lines[axis, name].amount.append(amount)
+    one = alternating(deformation, nearest(deformation.surface, 1))
+    read, full = least_of([deformation.lists.value.sum, deformation.refresh], seconds)
+    return {READ: read, FULL: full, MOVE: least(one, seconds), LISTS: built, MEMORY: deformation.nbytes / 1e6}
 
 
 def slopes(series: list[Series]) -> list[Measure]:
@@ -107,13 +96,7 @@ PANEL, EDGE, GAP = (400, 420), (70, 50), 250
 
 
 def plot(series: list[Series], path: str | Path) -> None:
-    """Two log-log panels as SVG, against vertices and against control points; slopes stand at the lines.
-
-    Parameters
-    ----------
-    series : from :func:`growth`
-    path : the file to write
-    """
+    """Write two log-log panels as SVG, against vertices and against control points, with slopes at the lines."""
     width = 2 * (PANEL[0] + GAP) + EDGE[0]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{PANEL[1] + 2 * EDGE[1] + 20}" '
@@ -159,7 +142,7 @@ def _panel(lines: list[Series], frame: tuple[float, float, float, float], left: 
 
 
 def _spread(heights: list[float], step: float = 15.0) -> list[float]:
-    """Heights of labels, moved down where they would stand on each other."""
+    """Heights of labels, moved down where they would overlap."""
     out, last = list(heights), -np.inf
     for k in np.argsort(heights):
         last = out[k] = max(heights[k], last + step)

@@ -7,21 +7,49 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from typing import NamedTuple
 
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.base.jit import kernel
 from surface.dcp import DCPSurface
 from surface.mesh.mesh import Mesh
-
-from .stencils import stencil_evaluator
 
 BLENDSHAPES = 52
 SAMPLES = 200  # vertices that geomdl computes; all would take minutes
 
 Evaluator = Callable[[], object]
+
+
+class Peer(NamedTuple):
+    """A way to compute the vertices; its time counts ``share`` times, and ``reach`` is as of a ``Measure``."""
+
+    name: str
+    prepare: Callable[[DCPSurface, Mesh], Evaluator]
+    share: float = 1.0
+    reach: str = ""
+
+
+def vertex_sums(mesh: Mesh) -> list[Peer]:
+    """Ways that sum control points or shapes for any mesh.
+
+    Blendshapes read as many MB as their name says, and are only as slow as memory where caches hold less.
+    """
+    megabytes = BLENDSHAPES * 3 * 4 * len(mesh.vertices) / 1e6
+    return [
+        Peer("scipy CSR @ dense", sparse_matrix, reach=">= 12"),
+        Peer(f"numpy {BLENDSHAPES} blendshapes, {megabytes:.1f} MB", blendshapes, reach=">= 3"),
+        Peer("stencil table, row by row", stencils),
+    ]
+
+
+def libraries(mesh: Mesh) -> list[Peer]:
+    """Spline libraries that are installed, for a sheet of :mod:`.bench`; they evaluate basis functions each time."""
+    known = [Peer("splinepy", splinepy), Peer("geomdl", geomdl, len(mesh.uv) / SAMPLES)]
+    return [peer for peer in known if importlib.util.find_spec(peer.name) is not None]
 
 
 def one_thread() -> AbstractContextManager[object]:
@@ -40,15 +68,42 @@ def sparse_matrix(surface: DCPSurface, mesh: Mesh) -> Evaluator:
 
 
 def blendshapes(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """52 amounts times 52 displacements of every vertex, float32."""
+    """52 blendshape weights times 52 displacements of every vertex, float32."""
     shapes = np.ones((BLENDSHAPES, 3 * len(mesh.vertices)), dtype=np.float32)
     amounts = np.ones(BLENDSHAPES, dtype=np.float32)
     return lambda: amounts @ shapes
 
 
 def stencils(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """A stencil table, evaluated row by row."""
-    return stencil_evaluator(surface, mesh)[0]
+    """A stencil table, evaluated row by row with one thread, float32.
+
+    It keeps, per vertex, how many control points reach it, which they are and with what weight, as Pixar's OpenSubdiv
+    does (``Far::StencilTable``).
+    """
+    matrix = surface.basis_matrix(mesh.uv, side=mesh.side)
+    sizes, ids = np.diff(matrix.indptr).astype(np.int32), matrix.indices.astype(np.int32)
+    weights, points = matrix.data.astype(np.float32), surface.points.astype(np.float32)
+    out = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
+
+    def evaluate() -> np.ndarray:
+        _apply_stencils(sizes, ids, weights, points, out)
+        return out
+
+    return evaluate
+
+
+@kernel
+def _apply_stencils(sizes, ids, weights, points, out):  # type: ignore[no-untyped-def]
+    at = 0
+    for s in range(sizes.shape[0]):
+        x, y, z = np.float32(0), np.float32(0), np.float32(0)
+        for q in range(at, at + sizes[s]):
+            w, i = weights[q], ids[q]
+            x += w * points[i, 0]
+            y += w * points[i, 1]
+            z += w * points[i, 2]
+        out[s, 0], out[s, 1], out[s, 2] = x, y, z
+        at += sizes[s]
 
 
 def splinepy(surface: DCPSurface, mesh: Mesh) -> Evaluator:
@@ -70,13 +125,6 @@ def geomdl(surface: DCPSurface, mesh: Mesh) -> Evaluator:
     spline.knotvector_u = spline.knotvector_v = knots.tolist()
     uv = mesh.uv[:SAMPLES].tolist()
     return lambda: spline.evaluate_list(uv)
-
-
-def libraries(mesh: Mesh) -> Iterator[tuple[str, Callable[[DCPSurface, Mesh], Evaluator], float]]:
-    """Installed spline libraries: name, how to prepare one, and by what its time is to be multiplied."""
-    for name, prepare, share in (("splinepy", splinepy, 1.0), ("geomdl", geomdl, len(mesh.uv) / SAMPLES)):
-        if importlib.util.find_spec(name) is not None:
-            yield name, prepare, share
 
 
 def net_of(surface: DCPSurface) -> tuple[int, Floats, Floats]:

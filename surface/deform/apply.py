@@ -1,9 +1,9 @@
-"""Kernels that turn weights and control points into vertices and normals: Eq. (1) and Eq. (2) by cell.
+"""Compiled kernels that turn weights and control points into vertices and normals, Eq. (1), cell by cell.
 
-Per tile of eight vertices, ``below`` (8 numbers) holds one over the denominator, ``bend`` (16) the derivatives of
-the denominator in u and in v, ``state`` (72) the x, y and z numerators of the position, of the derivative in u
-and of that in v. Numerators are those of positions relative to the cell's origin, which keeps float32 sums exact
-to a small part of the cell's size. Without normals ``bend`` is empty and ``state`` has 24 numbers per tile.
+A tile is eight vertices. Per tile, ``inv_w`` (8 numbers) holds one over the denominator, ``dw`` (16) the derivatives
+of the denominator in u and in v, ``numerators`` (72) the x, y and z numerators of the position, of the derivative in
+u and of that in v. Numerators are those of positions relative to the cell's origin, which keeps float32 sums exact
+to a small part of the cell's size. Without normals ``dw`` is empty and ``numerators`` has 24 numbers per tile.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="call-arg, var-annotated, has-type"
@@ -14,8 +14,19 @@ import numpy as np
 from surface.base.jit import inlined, kernel
 from surface.spline.lanes import add, div, fma, load, mul, prefetch, root, splat, store, store3, sub, zero
 
-AHEAD = 1024  # weights that are asked for before they are needed
-KEEP = -2  # in ``kept``: compute this cell anew and keep its numerators
+AHEAD = 1024  # weights that are prefetched before they are needed
+
+
+NAMES = (
+    "cell_start", "tile_start", "rows", "room", "at", "ids_at", "ids", "value", "slope",
+    "point_start", "point_count", "point_cell", "point_row",
+    "points", "origin", "inv_w", "dw", "numerators", "differences", "vertices", "normals",
+    "ranges", "hits", "affected", "recomputed", "moved_ids", "delta", "local", "scratch",
+)  # fmt: skip
+"""The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`.
+
+Kernels unpack that tuple once: each access of an element costs a reference count.
+"""
 
 
 @inlined
@@ -68,15 +79,7 @@ def sum_all(value, slope, at, rows, local):
 
 
 @inlined
-def put(out, vertex, left, x, y, z, spare):
-    """Write the ``left`` last vertices of a cell, fewer than a tile has, to ``out (m * 3,)``."""
-    store3(spare, 0, x, y, z)
-    for j in range(3 * left):
-        out[3 * vertex + j] = spare[j]
-
-
-@inlined
-def cross(ax, ay, az, bx, by, bz, sign):
+def unit_cross(ax, ay, az, bx, by, bz, sign):
     """Unit vectors along a x b, times ``sign``; zero where the product vanishes."""
     nx, ny = sub(mul(ay, bz), mul(az, by)), sub(mul(az, bx), mul(ax, bz))
     nz = sub(mul(ax, by), mul(ay, bx))
@@ -86,145 +89,136 @@ def cross(ax, ay, az, bx, by, bz, sign):
 
 
 @inlined
-def scaled(tile, x, y, z, below):
+def write_last(out, vertex, last, x, y, z, scratch):
+    """Write the last vectors of a cell, fewer than a tile has, to ``out (m * 3,)``."""
+    store3(scratch, 0, x, y, z)
+    for j in range(3 * (last - vertex)):
+        out[3 * vertex + j] = scratch[j]
+
+
+@inlined
+def positions_of(tile, x, y, z, inv_w):
     """Positions of one tile relative to the cell's origin, from their numerators."""
-    w = load(below, 8 * tile)
+    w = load(inv_w, 8 * tile)
     return mul(x, w), mul(y, w), mul(z, w)
 
 
 @inlined
-def directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend):
+def normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw):
     """Normals of one tile: the direction of S_u x S_v by the quotient rule, without its common factor."""
-    wu, wv = load(bend, 16 * tile), load(bend, 16 * tile + 8)
+    wu, wv = load(dw, 16 * tile), load(dw, 16 * tile + 8)
     ax, ay, az = sub(ax, mul(x, wu)), sub(ay, mul(y, wu)), sub(az, mul(z, wu))
     bx, by, bz = sub(bx, mul(x, wv)), sub(by, mul(y, wv)), sub(bz, mul(z, wv))
-    return cross(ax, ay, az, bx, by, bz, sign)
+    return unit_cross(ax, ay, az, bx, by, bz, sign)
 
 
 @inlined
-def positions(first, last, rows, room, at, tile, value, below, local, ox, oy, oz, vertices, spare):
-    """Compute one cell's positions from its gathered points."""
-    px, py, pz = splat(ox), splat(oy), splat(oz)
-    full = last - (last - first) % 8
-    for vertex in range(first, full, 8):
-        x, y, z = sum_values(value, at, rows, local)
-        x, y, z = scaled(tile, x, y, z, below)
-        store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
-        at += room * 8
-        tile += 1
-    if full < last:
-        x, y, z = sum_values(value, at, rows, local)
-        x, y, z = scaled(tile, x, y, z, below)
-        put(vertices, full, last - full, add(x, px), add(y, py), add(z, pz), spare)
+def compute_positions(rows, at, tile, value, inv_w, local):
+    """Positions of one tile relative to the cell's origin, from the cell's control points."""
+    x, y, z = sum_values(value, at, rows, local)
+    return positions_of(tile, x, y, z, inv_w)
 
 
 @inlined
-def both(rows, at, tile, sign, value, slope, below, bend, local):
-    """Positions relative to the origin and normals of one tile."""
+def compute_normals(rows, at, tile, sign, value, slope, inv_w, dw, local):
+    """Positions relative to the cell's origin and normals of one tile, from the cell's control points."""
     x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, at, rows, local)
-    x, y, z = scaled(tile, x, y, z, below)
-    nx, ny, nz = directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend)
+    x, y, z = positions_of(tile, x, y, z, inv_w)
+    nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
     return x, y, z, nx, ny, nz
 
 
 @inlined
-def shaded(
-    first, last, rows, room, at, tile, sign, value, slope, below, bend, local, ox, oy, oz, vertices, normals, spare
-):
-    """Compute one cell's positions and normals from its gathered points."""
-    px, py, pz = splat(ox), splat(oy), splat(oz)
-    full = last - (last - first) % 8
-    for vertex in range(first, full, 8):
-        x, y, z, nx, ny, nz = both(rows, at, tile, sign, value, slope, below, bend, local)
-        store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
-        store3(normals, 3 * vertex, nx, ny, nz)
-        at += room * 8
-        tile += 1
-    if full < last:
-        x, y, z, nx, ny, nz = both(rows, at, tile, sign, value, slope, below, bend, local)
-        put(vertices, full, last - full, add(x, px), add(y, py), add(z, pz), spare)
-        put(normals, full, last - full, nx, ny, nz, spare)
-
-
-@inlined
-def keep_sums(tiles, tile, rows, room, at, value, slope, local, state):
-    """Store the numerators of one cell for later differences."""
+def store_numerators(first_tile, end_tile, rows, room, at, value, slope, local, numerators):
+    """Store the numerators of one cell, whose points are in ``local``, for later differences."""
     size = 72 if slope.shape[0] > 0 else 24
-    for t in range(tile, tile + tiles):
-        if slope.shape[0] == 0:
+    for tile in range(first_tile, end_tile):
+        base = tile * size
+        if size == 24:
             x, y, z = sum_values(value, at, rows, local)
         else:
             x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, at, rows, local)
-            store(state, t * size + 24, ax)
-            store(state, t * size + 32, ay)
-            store(state, t * size + 40, az)
-            store(state, t * size + 48, bx)
-            store(state, t * size + 56, by)
-            store(state, t * size + 64, bz)
-        store(state, t * size, x)
-        store(state, t * size + 8, y)
-        store(state, t * size + 16, z)
+            store(numerators, base + 24, ax)
+            store(numerators, base + 32, ay)
+            store(numerators, base + 40, az)
+            store(numerators, base + 48, bx)
+            store(numerators, base + 56, by)
+            store(numerators, base + 64, bz)
+        store(numerators, base, x)
+        store(numerators, base + 8, y)
+        store(numerators, base + 16, z)
         at += room * 8
 
 
 @inlined
-def kept_tile(tile, size, sign, below, bend, state):
-    """Positions relative to the origin, and normals where they are kept, of one tile from its numerators."""
+def load_tile(tile, size, sign, inv_w, dw, numerators):
+    """Positions relative to the cell's origin, and normals if there are any, of one tile from its numerators."""
     base = tile * size
-    x, y, z = scaled(tile, load(state, base), load(state, base + 8), load(state, base + 16), below)
+    x, y, z = load(numerators, base), load(numerators, base + 8), load(numerators, base + 16)
+    x, y, z = positions_of(tile, x, y, z, inv_w)
     nx, ny, nz = x, y, z
     if size == 72:
-        ax, ay, az = load(state, base + 24), load(state, base + 32), load(state, base + 40)
-        bx, by, bz = load(state, base + 48), load(state, base + 56), load(state, base + 64)
-        nx, ny, nz = directions(tile, x, y, z, ax, ay, az, bx, by, bz, sign, bend)
+        ax, ay, az = load(numerators, base + 24), load(numerators, base + 32), load(numerators, base + 40)
+        bx, by, bz = load(numerators, base + 48), load(numerators, base + 56), load(numerators, base + 64)
+        nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
     return x, y, z, nx, ny, nz
 
 
 @inlined
-def finish_cell(first, last, tile, ox, oy, oz, sign, below, bend, state, vertices, normals, spare):
-    """Vertices and normals of one cell from its kept numerators."""
+def finish_cell(first, last, tile, ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, scratch):
+    """Write the vertices and normals of one cell from its stored numerators."""
     px, py, pz = splat(ox), splat(oy), splat(oz)
-    size = 72 if normals.shape[0] > 0 else 24
-    full = last - (last - first) % 8
+    size, full = 72 if dw.shape[0] > 0 else 24, last - (last - first) % 8
     for vertex in range(first, full, 8):
-        x, y, z, nx, ny, nz = kept_tile(tile, size, sign, below, bend, state)
+        x, y, z, nx, ny, nz = load_tile(tile, size, sign, inv_w, dw, numerators)
         store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
         if size == 72:
             store3(normals, 3 * vertex, nx, ny, nz)
         tile += 1
     if full < last:
-        x, y, z, nx, ny, nz = kept_tile(tile, size, sign, below, bend, state)
-        put(vertices, full, last - full, add(x, px), add(y, py), add(z, pz), spare)
+        x, y, z, nx, ny, nz = load_tile(tile, size, sign, inv_w, dw, numerators)
+        write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
         if size == 72:
-            put(normals, full, last - full, nx, ny, nz, spare)
+            write_last(normals, full, last, nx, ny, nz, scratch)
 
 
 @kernel
-def apply_cells(
-    cells, begin, end, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids, value, slope, below,
-    bend, state, kept, sign, vertices, normals, local, spare,
-):  # fmt: skip
-    """Compute ``cells[begin:end]`` from their control points; their numerators are no longer kept."""
+def compute_cells(arrays, cells, begin, end, sign, local, scratch):
+    """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored."""
+    cell_start, tile_start, all_rows, room, at, ids_at, ids, value, slope = arrays[:9]
+    points, origin, inv_w, dw, _, differences, vertices, normals = arrays[13:21]
     for q in range(begin, end):
         c = cells[q]
-        kept[c] = -1
-        gather(points, ids, ids_at[c], rows[c], origin, c, local)
-        ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
+        differences[c] = -1
+        rows, place, step, tile = all_rows[c], at[c], room[c] * 8, tile_start[c]
+        gather(points, ids, ids_at[c], rows, origin, c, local)
+        px, py, pz = splat(np.float32(origin[c, 0])), splat(np.float32(origin[c, 1])), splat(np.float32(origin[c, 2]))
         first, last = cell_start[c], cell_start[c + 1]
+        full = last - (last - first) % 8
         if slope.shape[0] == 0:
-            positions(
-                first, last, rows[c], room[c], at[c], tile_start[c], value, below, local, ox, oy, oz, vertices,
-                spare,
-            )  # fmt: skip
-        else:
-            shaded(
-                first, last, rows[c], room[c], at[c], tile_start[c], sign, value, slope, below, bend, local,
-                ox, oy, oz, vertices, normals, spare,
-            )  # fmt: skip
+            for vertex in range(first, full, 8):
+                x, y, z = compute_positions(rows, place, tile, value, inv_w, local)
+                store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
+                place += step
+                tile += 1
+            if full < last:
+                x, y, z = compute_positions(rows, place, tile, value, inv_w, local)
+                write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
+            continue
+        for vertex in range(first, full, 8):
+            x, y, z, nx, ny, nz = compute_normals(rows, place, tile, sign, value, slope, inv_w, dw, local)
+            store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
+            store3(normals, 3 * vertex, nx, ny, nz)
+            place += step
+            tile += 1
+        if full < last:
+            x, y, z, nx, ny, nz = compute_normals(rows, place, tile, sign, value, slope, inv_w, dw, local)
+            write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
+            write_last(normals, full, last, nx, ny, nz, scratch)
 
 
 @kernel
-def denominators(cells, cell_start, tile_start, rows, room, at, value, slope, below, bend):
+def denominators(cells, cell_start, tile_start, rows, room, at, value, slope, inv_w, dw):
     """Sum the weights of the given cells."""
     for q in range(cells.shape[0]):
         c = cells[q]
@@ -240,17 +234,17 @@ def denominators(cells, cell_start, tile_start, rows, room, at, value, slope, be
                         wv += slope[2 * place + 8 + j]
                 if cell_start[c] + 8 * t + j >= cell_start[c + 1]:
                     w = 1.0  # lanes that fill up the last tile
-                below[8 * tile + j] = 1.0 / w
+                inv_w[8 * tile + j] = 1.0 / w
                 if slope.shape[0] > 0:
-                    bend[16 * tile + j], bend[16 * tile + 8 + j] = wu, wv
+                    dw[16 * tile + j], dw[16 * tile + 8 + j] = wu, wv
 
 
 @kernel
-def ranges(touched, total, cell_start, gap, out):
+def join_ranges(cells, total, cell_start, gap, out):
     """Vertex ranges of rising cells, joined where fewer than ``gap`` vertices lie between; returns their number."""
     count = 0
     for q in range(total):
-        start, stop = cell_start[touched[q]], cell_start[touched[q] + 1]
+        start, stop = cell_start[cells[q]], cell_start[cells[q] + 1]
         if count > 0 and start - out[count - 1, 1] <= gap:
             out[count - 1, 1] = stop
         else:

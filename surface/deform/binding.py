@@ -1,11 +1,13 @@
-"""One update in one short call: the addresses of all work arrays in a table.
+"""Calls of compiled kernels with one table of addresses instead of all work arrays.
 
-A compiled function looks at every array it is given, which takes longer than a small update. So they are given as a
-table of addresses, made anew whenever one of them is replaced.
+A compiled function inspects every array that Python passes to it, which takes longer than a small update. So the
+arrays are passed as a table of their addresses, which is made again whenever one of them is replaced.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="import-untyped, call-arg, attr-defined"
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 from llvmlite import ir
@@ -15,23 +17,18 @@ from numba.extending import intrinsic
 
 from surface.base.jit import inlined, kernel
 
-from .updates import place
-
-NAMES = (
-    "changed_ids", "delta", "hits", "touched", "anew", "ranges", "back_start", "back_count", "back_cell", "back_row",
-    "points", "origin", "cell_start", "tile_start", "rows", "room", "at", "ids_at", "ids", "value", "slope", "below",
-    "bend", "numerators", "kept", "vertices", "normals", "local", "spare",
-)  # fmt: skip
+from .apply import NAMES, compute_cells
+from .updates import move_points
 
 
-def address_table(arrays: dict[str, np.ndarray]) -> np.ndarray:
+def address_table(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
     """(2 * 29,) int64: address and length of every array of ``NAMES``; the arrays must outlive the table."""
-    table = np.zeros(2 * len(NAMES), dtype=np.int64)
-    for k, name in enumerate(NAMES):
+    table = []
+    for name in NAMES:
         if not arrays[name].flags.c_contiguous:
             raise ValueError(f"{name}: must be contiguous")
-        table[2 * k], table[2 * k + 1] = arrays[name].ctypes.data, len(arrays[name])
-    return table
+        table += [arrays[name].ctypes.data, len(arrays[name])]
+    return np.array(table, dtype=np.int64)
 
 
 @intrinsic
@@ -45,35 +42,38 @@ def _pointer(typingctx, address):
 
 
 @inlined
-def _int64(table, k):
-    return carray(_pointer(table[2 * k]), (table[2 * k + 1],), np.int64)
+def _flat(table, k, dtype):
+    return carray(_pointer(table[2 * k]), (table[2 * k + 1],), dtype)
 
 
 @inlined
-def _int32(table, k):
-    return carray(_pointer(table[2 * k]), (table[2 * k + 1],), np.int32)
-
-
-@inlined
-def _float32(table, k):
-    return carray(_pointer(table[2 * k]), (table[2 * k + 1],), np.float32)
-
-
-@inlined
-def _float64_3(table, k):
-    return carray(_pointer(table[2 * k]), (table[2 * k + 1], 3), np.float64)
+def _rows(table, k, width, dtype):
+    return carray(_pointer(table[2 * k]), (table[2 * k + 1], width), dtype)
 
 
 @kernel
-def place_bound(table, ids, rows, relative, most, limit, bias, gap, sign):
-    """:func:`surface.deform.updates.place` for the arrays of a table."""
-    found = carray(_pointer(table[10]), (table[11], 2), np.int64)
-    local = carray(_pointer(table[54]), (table[55], 3), np.float32)
-    return place(
-        ids, rows, relative, _int64(table, 0), _float64_3(table, 1), _int64(table, 2), _int32(table, 3),
-        _int32(table, 4), found, most, limit, bias, gap, _int64(table, 6), _int64(table, 7), _int32(table, 8),
-        _int32(table, 9), _float64_3(table, 10), _float64_3(table, 11), _int64(table, 12), _int64(table, 13),
-        _int64(table, 14), _int64(table, 15), _int64(table, 16), _int64(table, 17), _int32(table, 18),
-        _float32(table, 19), _float32(table, 20), _float32(table, 21), _float32(table, 22), _float32(table, 23),
-        _int64(table, 24), sign, _float32(table, 25), _float32(table, 26), local, _float32(table, 28),
+def _arrays(table):
+    """The arrays of a table; types and widths are in the order of ``NAMES``."""
+    return (
+        _flat(table, 0, np.int64), _flat(table, 1, np.int64), _flat(table, 2, np.int64), _flat(table, 3, np.int64),
+        _flat(table, 4, np.int64), _flat(table, 5, np.int64), _flat(table, 6, np.int32), _flat(table, 7, np.float32),
+        _flat(table, 8, np.float32), _flat(table, 9, np.int64), _flat(table, 10, np.int64),
+        _flat(table, 11, np.int32), _flat(table, 12, np.int32), _rows(table, 13, 3, np.float64),
+        _rows(table, 14, 3, np.float64), _flat(table, 15, np.float32), _flat(table, 16, np.float32),
+        _flat(table, 17, np.float32), _flat(table, 18, np.int64), _flat(table, 19, np.float32),
+        _flat(table, 20, np.float32), _rows(table, 21, 2, np.int64), _flat(table, 22, np.int64),
+        _flat(table, 23, np.int32), _flat(table, 24, np.int32), _flat(table, 25, np.int64),
+        _rows(table, 26, 3, np.float64), _rows(table, 27, 3, np.float32), _flat(table, 28, np.float32),
     )  # fmt: skip
+
+
+@kernel
+def move_points_at(table, ids, rows, relative, most, limit, bias, gap, sign):
+    """:func:`surface.deform.updates.move_points` for the arrays of a table."""
+    return move_points(_arrays(table), ids, rows, relative, most, limit, bias, gap, sign)
+
+
+@kernel
+def compute_cells_at(table, cells, begin, end, sign, local, scratch):
+    """:func:`surface.deform.apply.compute_cells` for the arrays of a table."""
+    compute_cells(_arrays(table), cells, begin, end, sign, local, scratch)

@@ -1,13 +1,15 @@
-"""Differential update of a mesh, Eq. (2): numerators and denominators are kept, a change touches its cells only.
+"""Meshes that follow their control points: the differential update, Eq. (2), touches the cells of a change only.
 
-Drift is bounded in two ways. A cell takes at most ``LIMIT`` differences before it is computed anew from the
-float64 control points; and its numerators are those of positions relative to its own origin, so that a rounding
-error is 6e-8 of the cell's size, not of the head's.
+Numerators and denominators are kept. Drift is bounded in two ways. A cell takes at most ``LIMIT`` differences before
+it is computed again from the float64 control points; and its numerators are those of positions relative to its own
+origin, so that a rounding error is 6e-8 of the cell's size, not of the head's.
 """
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import count
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -15,15 +17,23 @@ from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats, Ints
 from surface.base.checks import check_ids, check_weights, integers, numbers
-from surface.base.progress import Progress, silent
+from surface.base.progress import Progress, no_progress
 from surface.mesh.mesh import Mesh
 from surface.spline.basis import pad_knots
 from surface.spline.controlpoints import ControlPoints
 
-from .relist import change_knots, change_weights
-from .table import stencil_table
+from . import apply, edits
+from .binding import address_table, compute_cells_at, move_points_at
+from .lists import Basis, build_lists
+from .updates import NOT_STORED, REFUSED
 
 Table = TypeVar("Table", bound=ControlPoints)
+LIMIT = 256  # differences a cell takes before it is computed again
+BIAS = 6.0  # cost of one row's difference, in rows computed again (measured)
+GAP = 256  # unchanged vertices between two changed ranges that are uploaded rather than left out
+MOST_MOVED = 0.75  # from this part of the points on, everything is computed again
+PARTS = 4  # into which a thread's share of the cells is cut
+SMALL = 500_000  # weights below which one thread is as fast as two
 
 
 class Deformation(Generic[Table]):
@@ -34,82 +44,69 @@ class Deformation(Generic[Table]):
     surface : the surface the mesh was made from
     mesh : from :meth:`surface.DCPSurface.tessellate`
     normals : also keep normals; without them an update costs a third
-    threads : how many threads compute everything anew; updates of parts use one
+    threads : how many threads compute everything again; updates of parts use one
     progress : is called with a stage and the part that is done, 0 to 1
 
     Attributes
     ----------
     vertices, normals : (m, 3) float32, current, read-only; (0, 3) without normals
-    table : weights by cell; another one after a change of knots
-    state : positions, and what is kept of the last update
+    mesh, basis, lists : the mesh; knots, degrees and weights of the control points; their weights by cell
 
-    Raises
-    ------
-    ValueError
-        For no thread at all, or a mesh whose lists name points that the surface does not have.
+    ``ValueError`` for no thread at all, or a mesh whose lists name points that the surface does not have.
 
-    Notes
-    -----
     One object belongs to one thread at a time. Nothing is allocated by :meth:`move` and :meth:`set_positions`
     but the copy of arguments that are not already int64 and float64 arrays.
     """
 
     def __init__(
-        self,
-        surface: Table,
-        mesh: Mesh,
-        *,
-        normals: bool = True,
-        threads: int = 1,
-        progress: Progress = silent,
+        self, surface: Table, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = no_progress
     ) -> None:
         if threads < 1:
             raise ValueError(f"threads: must be at least 1, not {threads}")
         if mesh.list_ids.max(initial=-1) >= len(surface.shifts) * surface.n:
             raise ValueError(f"mesh: was made from another surface: this one has {surface.n} points")
-        self.mesh = mesh
-        self.table = stencil_table(surface, mesh, normals=normals, progress=progress)
-        self.state = self.table.new_state(surface.arrays()[4], threads)
-        self.vertices, self.normals = _view(self.state.vertices), _view(self.state.normals)
-        self._all, self._blocks, self._n = np.arange(surface.n), len(surface.shifts), surface.n
+        self.mesh, self.basis = mesh, Basis.of(surface)
+        self.lists = build_lists(surface, mesh, normals, progress)
+        self._sign, self._threads = np.float32(-1 if mesh.flip else 1), threads
+        self._most = int(MOST_MOVED * len(surface.arrays()[4]))
+        self._pool: ThreadPoolExecutor | None = None  # started when first used
         self._make = partial(type(surface).from_padded, closed_u=surface.closed[0], closed_v=surface.closed[1])
+        self._arrays = _work_arrays(mesh, surface.arrays()[4], int(self.lists.tile_start[-1]), normals)
+        self._points, self._ranges, self._count = self._arrays["points"], self._arrays["ranges"], 0
+        self._all, self._cells = np.arange(surface.n), np.arange(len(mesh.cell_start) - 1, dtype=np.int32)
+        self.vertices, self.normals = _view(self._arrays["vertices"]), _view(self._arrays["normals"])
+        self._sum_weights(np.arange(len(self._cells)))
+        self._bind()
         self.refresh()
 
     @property
     def points(self) -> np.ndarray:
-        """(n, 3) float64 control points as they stand now, read-only."""
-        view = self.state.points[: self._n]
+        """(n, 3) float64, the current control points, read-only."""
+        view = self._points[: self.basis.n]
         view.flags.writeable = False
         return view
 
     @property
     def changed(self) -> list[tuple[int, int]]:
         """Vertex ranges (start, stop) that the last update touched, rising."""
-        return [(int(a), int(b)) for a, b in self.state.ranges[: self.state.count]]
+        return [(int(a), int(b)) for a, b in self._ranges[: self._count]]
 
     @property
     def surface(self) -> Table:
-        """A new surface with the points, weights and knots as they stand now."""
-        basis, own = self.table.basis, slice(0, self._n)
-        return self._make(
-            self.state.points[own],
-            basis.weights[own],
-            *(knots[own] for knots in basis.knots),
-            *(degrees[own] for degrees in basis.degrees),
-        )
+        """A new surface with the current points, weights and knots."""
+        n, basis = self.basis.n, self.basis
+        rows = [array[:n] for array in (self._points, basis.weights, *basis.knots, *basis.degrees)]
+        return self._make(*rows)
 
     @property
     def nbytes(self) -> int:
         """Bytes of weights and lists."""
-        return self.table.lists.nbytes
+        return self.lists.nbytes
 
     def move(self, ids: ArrayLike, delta: ArrayLike) -> None:
-        """Move points by ``delta (k, 3)`` (or one (3,) for all); an id that stands twice moves twice.
+        """Move points by ``delta (k, 3)`` (or one (3,) for all); an id that is given twice moves twice.
 
-        Raises
-        ------
-        ValueError
-            For ids out of range, wrong shapes or numbers that are not finite; nothing is changed then.
+        ``ValueError`` for ids out of range, wrong shapes or numbers that are not finite; nothing is changed then.
         """
         step = _rows(delta, "delta")
         if step.shape == (3,):
@@ -117,13 +114,7 @@ class Deformation(Generic[Table]):
         self._place(ids, step, True)
 
     def set_positions(self, ids: ArrayLike, xyz: ArrayLike) -> None:
-        """Put points ``ids (k,)`` at ``xyz (k, 3)``; points that stand there already cost next to nothing.
-
-        Raises
-        ------
-        ValueError
-            As :meth:`move`.
-        """
+        """Put points ``ids (k,)`` at ``xyz (k, 3)``, errors as :meth:`move`; those there already cost little."""
         self._place(ids, _rows(xyz, "xyz"), False)
 
     def set_points(self, xyz: np.ndarray) -> None:
@@ -133,45 +124,123 @@ class Deformation(Generic[Table]):
     def set_weights(self, ids: ArrayLike, weights: ArrayLike) -> None:
         """Give points ``ids (k,)`` the weights ``(k,)``, positive.
 
-        Raises
-        ------
-        ValueError
-            For ids out of range, wrong shapes or weights that are not positive and finite.
+        ``ValueError`` for ids out of range, wrong shapes or weights that are not positive and finite.
         """
-        which = check_ids(ids, self._n)
+        which = check_ids(ids, self.basis.n)
         w = check_weights(weights)
         if w.shape != which.shape:
             raise ValueError(f"weights: shape {w.shape}, expected {which.shape}")
-        self.table.update(self.state, change_weights(self.table, which, w))
+        self._update_weights(edits.change_weights(self.basis, self.lists, self.mesh, which, w))
 
     def set_knots(self, index: int, knots_u: ArrayLike, knots_v: ArrayLike) -> None:
         """Give one point other knots, and so another subdomain; lists change only where the old or new one reaches.
 
-        Raises
-        ------
-        ValueError
-            For bad knots, or where a vertex of the mesh would be covered by no point; nothing is changed then.
+        ``ValueError`` for bad knots, or where no point would cover a vertex of the mesh; nothing is changed then.
         """
-        index = int(check_ids([index], self._n)[0])
+        index = int(check_ids([index], self.basis.n)[0])
         rows = [pad_knots([k], name, 1) for k, name in ((knots_u, "knots_u"), (knots_v, "knots_v"))]
-        self.table, cells = change_knots(self.table, index, [r[0][0] for r in rows], [int(r[1][0]) for r in rows])
-        self.table.update(self.state, cells)
+        knots, degrees = [row[0][0] for row in rows], [int(row[1][0]) for row in rows]
+        cells = edits.change_knots(self.basis, self.lists, self.mesh, index, knots, degrees)
+        self._bind()
+        self._update_weights(cells)
 
     def refresh(self) -> None:
-        """Compute everything anew from the control points."""
-        self.table.update(self.state)
+        """Compute everything again from the control points."""
+        if self._threads == 1 or len(self.lists.value) < SMALL:
+            self._compute(self._cells)
+        else:
+            self._compute_in_parts()
+        self._ranges[0] = 0, len(self.mesh.vertices)
+        self._count = 1
 
     def _place(self, ids: ArrayLike, target: Floats, relative: bool) -> None:
+        """Move points, or put them somewhere, and update the mesh."""
         which = integers(ids)
-        n, count = self._n, len(which)
-        if target.shape != (count, 3):
-            raise ValueError(f"{'delta' if relative else 'xyz'}: shape {target.shape}, expected {(count, 3)}")
-        if count > n:  # ids that stand several times: the last position counts, moves add up
-            which, target = _gathered(which, target, relative, n)
-        if self._blocks > 1:
-            which = self.table.basis.copies(check_ids(which, n))
-            target = np.tile(target, (self._blocks, 1))
-        self.table.update(self.state, (which, target, relative))
+        n, copies, name = self.basis.n, len(self.basis.shifts), "delta" if relative else "xyz"
+        if target.shape != (len(which), 3):
+            raise ValueError(f"{name}: shape {target.shape}, expected {(len(which), 3)}")
+        if len(which) > n:  # ids that are given several times: the last position counts, moves add up
+            which, target = _gathered(check_ids(which, n), target, relative)
+        if copies > 1:
+            which, target = self.basis.copies(check_ids(which, n)), np.tile(target, (copies, 1))
+        found = move_points_at(self._addresses, which, target, relative, self._most, LIMIT, BIAS, GAP, self._sign)
+        if found >= 0:
+            self._count = found
+        elif found == -1:
+            self.refresh()
+        else:
+            check_ids(which, n * copies)
+            bad = found + REFUSED
+            raise ValueError(f"{name}[{bad}]: must be finite, got {target[bad].tolist()}")
+
+    def _bind(self) -> None:
+        """Make room for the longest list, and take the addresses of all arrays, which other knots may have replaced."""
+        self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)), 3), dtype=np.float32)
+        self._addresses = address_table(vars(self.lists) | self._arrays)
+
+    def _sum_weights(self, cells: Ints) -> None:
+        x = self.lists
+        apply.denominators(
+            cells, x.cell_start, x.tile_start, x.rows, x.room, x.at, x.value, x.slope, self._arrays["inv_w"],
+            self._arrays["dw"],
+        )  # fmt: skip
+
+    def _update_weights(self, cells: Ints) -> None:
+        """Bring ``cells (k,)``, rising, up to date with their changed weights."""
+        self._sum_weights(cells)
+        self._compute(cells.astype(np.int32))
+        self._count = apply.join_ranges(cells, len(cells), self.lists.cell_start, GAP, self._ranges)
+
+    def _compute(self, cells: np.ndarray) -> None:
+        local, scratch = self._arrays["local"], self._arrays["scratch"]
+        compute_cells_at(self._addresses, cells, 0, len(cells), self._sign, local, scratch)
+
+    def _compute_in_parts(self) -> None:
+        """Threads take parts with equal shares of the weights, one after the other: a delayed thread does fewer."""
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="surface")
+        total = np.cumsum(self.lists.rows * np.diff(self.lists.tile_start))
+        parts = PARTS * self._threads
+        cuts = [*np.searchsorted(total, total[-1] * np.arange(parts) / parts).tolist(), len(total)]
+        turns = count()  # next(turns) is one step: no two threads take the same part
+
+        def work() -> None:
+            local, scratch = np.zeros_like(self._arrays["local"]), np.zeros_like(self._arrays["scratch"])
+            while (part := next(turns)) < parts:
+                begin, end = cuts[part], cuts[part + 1]
+                compute_cells_at(self._addresses, self._cells, begin, end, self._sign, local, scratch)
+
+        waiting = [self._pool.submit(work) for _ in range(self._threads - 1)]
+        work()
+        for done in waiting:
+            done.result()
+
+
+def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[str, np.ndarray]:
+    """The arrays of an update that are not in the lists, by their names in :data:`.apply.NAMES`.
+
+    Returns
+    -------
+    origin : (c, 3) float64, which positions within a cell are relative to
+    inv_w, dw, numerators : (8 t,), (16 t,) or (0,), (72 t,) or (24 t,) float32 by tile, see :mod:`.apply`
+    points : (n, 3) float64, current, shifted copies included
+    differences : (c,) int64, how many each cell has taken since it was computed again; -1 without numerators
+    vertices, normals : (3 m,) float32, current
+    ranges : (c, 2) int64, the vertex ranges that the last update touched
+        The others are scratch of :mod:`.updates`.
+    """
+    m, cells, n = len(mesh.vertices), len(mesh.cell_start) - 1, len(points)
+    origin = np.zeros((cells, 3))
+    if m:
+        origin[:] = np.add.reduceat(mesh.vertices, mesh.cell_start[:-1]) / np.diff(mesh.cell_start)[:, None]
+    single, cell = partial(np.zeros, dtype=np.float32), partial(np.zeros, cells)
+    return {
+        "origin": origin, "inv_w": single(8 * tiles), "dw": single(16 * tiles * normals), "points": points.copy(),
+        "numerators": single((72 if normals else 24) * tiles), "differences": np.full(cells, NOT_STORED),
+        "vertices": single(3 * m), "normals": single(3 * m * normals), "ranges": np.zeros((max(cells, 1), 2), np.int64),
+        "hits": cell(dtype=np.int64), "affected": cell(dtype=np.int32), "recomputed": cell(dtype=np.int32),
+        "moved_ids": np.zeros(n, np.int64), "delta": np.zeros((n, 3)), "scratch": single(24),
+    }  # fmt: skip
 
 
 def _rows(rows: ArrayLike, name: str) -> Floats:
@@ -180,10 +249,8 @@ def _rows(rows: ArrayLike, name: str) -> Floats:
     return np.ascontiguousarray(rows, dtype=np.float64) if fast else numbers(rows, name)
 
 
-def _gathered(which: Ints, rows: Floats, relative: bool, n: int) -> tuple[Ints, Floats]:
+def _gathered(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
     """Each id once."""
-    if (which < 0).any() or (which >= n).any():
-        return which[:n], rows[:n]  # refused later, and by then short enough for the work space
     if not relative:
         unique, last = np.unique(which[::-1], return_index=True)
         return unique, np.ascontiguousarray(rows[::-1][last])

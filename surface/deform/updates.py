@@ -1,6 +1,6 @@
-"""Kernels that bring the cells of moved control points up to date, Eq. (2).
+"""Compiled kernels that move control points and bring the cells they affect up to date, Eq. (2).
 
-Names are those of :mod:`surface.deform.apply`.
+``arrays`` is the tuple of :data:`surface.deform.apply.NAMES`.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="call-arg, var-annotated, has-type"
@@ -11,127 +11,132 @@ import numpy as np
 from surface.base.jit import inlined, kernel
 from surface.spline.lanes import fma, load, store
 
-from .apply import KEEP, apply_cells, finish_cell, gather, keep_sums, ranges
+from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
+
+NOT_STORED = -1  # in ``differences``: the cell's numerators are not stored
+STORE = -2  # in ``differences``: compute and store them now
+VALID = 1 << 62  # what :func:`first_invalid` returns where nothing is wrong
+REFUSED = 1 << 61  # subtracted from results of :func:`move_points` that mean a bad argument
 
 
 @inlined
-def nudge(state, place, weights, number):
-    """``state[place : place + 8] += weights * number``."""
-    store(state, place, fma(weights, number, load(state, place)))
+def accumulate(numerators, place, weights, number):
+    """``numerators[place : place + 8] += weights * number``."""
+    store(numerators, place, fma(weights, number, load(numerators, place)))
 
 
 @inlined
-def add_row(tiles, first_tile, place, step, dx, dy, dz, value, slope, state):
-    """Eq. (2): add b w dP of one control point to the numerators of one cell's tiles."""
+def add_row(first_tile, end_tile, place, step, dx, dy, dz, value, slope, numerators):
+    """Eq. (2): add b w dP of one control point, whose weights start at ``place``, to the numerators of one cell."""
     size = 72 if slope.shape[0] > 0 else 24
-    base = first_tile * size
-    for _ in range(tiles):
-        a = load(value, place)
-        nudge(state, base, a, dx)
-        nudge(state, base + 8, a, dy)
-        nudge(state, base + 16, a, dz)
+    for tile in range(first_tile, end_tile):
+        a, base = load(value, place), tile * size
+        accumulate(numerators, base, a, dx)
+        accumulate(numerators, base + 8, a, dy)
+        accumulate(numerators, base + 16, a, dz)
         if slope.shape[0] > 0:
             u, v = load(slope, 2 * place), load(slope, 2 * place + 8)
-            nudge(state, base + 24, u, dx)
-            nudge(state, base + 32, u, dy)
-            nudge(state, base + 40, u, dz)
-            nudge(state, base + 48, v, dx)
-            nudge(state, base + 56, v, dy)
-            nudge(state, base + 64, v, dz)
+            accumulate(numerators, base + 24, u, dx)
+            accumulate(numerators, base + 32, u, dy)
+            accumulate(numerators, base + 40, u, dz)
+            accumulate(numerators, base + 48, v, dx)
+            accumulate(numerators, base + 56, v, dy)
+            accumulate(numerators, base + 64, v, dz)
         place += step
-        base += size
 
 
 @kernel
-def mark(ids, count, back_start, back_count, back_cell, hits, touched):
-    """Cells reached by the first ``count`` of ``ids``: returns their number, fills ``touched``, counts ``hits``."""
+def find_affected(ids, count, point_start, point_count, point_cell, hits, affected):
+    """List the cells that the first ``count`` of ``ids`` reach, rising, and count by how many; returns their number."""
     total = 0
     for q in range(count):
         i = ids[q]
-        for e in range(back_start[i], back_start[i] + back_count[i]):
-            c = back_cell[e]
+        for e in range(point_start[i], point_start[i] + point_count[i]):
+            c = point_cell[e]
             if hits[c] == 0:
-                touched[total] = c
+                affected[total] = c
                 total += 1
             hits[c] += 1
-    touched[:total].sort()
+    affected[:total].sort()
     return total
 
 
 @kernel
-def choose(total, touched, hits, kept, rows, limit, bias, anew):
-    """Per touched cell, take differences (``kept`` >= 0 counts them) or compute it anew (into ``anew``)."""
+def choose_recomputed(total, affected, hits, differences, rows, limit, bias, recomputed):
+    """Decide for each affected cell how it is updated; returns how many are computed again from all their points.
+
+    Those are listed in ``recomputed``. Differences cost ``bias`` rows each, computing again costs all rows. A cell
+    is also computed again where its numerators are not stored, or would take more than ``limit`` differences.
+    """
     count = 0
     for q in range(total):
-        c = touched[q]
+        c = affected[q]
         few = bias * hits[c] < rows[c]
-        if kept[c] >= 0 and kept[c] + hits[c] <= limit and few:
-            kept[c] += hits[c]
+        if differences[c] >= 0 and differences[c] + hits[c] <= limit and few:
+            differences[c] += hits[c]
         elif few:
-            kept[c] = KEEP  # few points, perhaps again next time: compute anew and keep the numerators
+            differences[c] = STORE  # few points, perhaps again next time: compute all and store the numerators
         else:
-            kept[c] = -1
-            anew[count] = c
+            differences[c] = NOT_STORED
+            recomputed[count] = c
             count += 1
         hits[c] = 0
     return count
 
 
 @kernel
-def update(
-    ids, count, delta, hits, touched, anew, limit, bias, back_start, back_count, back_cell, back_row, points, origin,
-    cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope, below, bend, state, kept, sign, vertices,
-    normals, local, spare,
-):  # fmt: skip
-    """Bring all cells that the moved points reach up to date; returns how many there are.
-
-    Per cell the cheaper way is taken: differences cost one row each, computing anew costs all rows. A cell is
-    also computed anew when it has not kept its numerators, or has taken more than ``limit`` differences.
-    """
-    total = mark(ids, count, back_start, back_count, back_cell, hits, touched)
-    fresh = choose(total, touched, hits, kept, rows, limit, bias, anew)
+def update_cells(arrays, count, limit, bias, sign):
+    """Bring all cells that the first ``count`` moved points reach up to date; returns how many there are."""
+    cell_start, tile_start, rows, room, at, ids_at, ids, value, slope = arrays[:9]
+    point_start, point_count, point_cell, point_row = arrays[9:13]
+    points, origin, inv_w, dw, numerators, differences, vertices, normals = arrays[13:21]
+    _, hits, affected, recomputed, moved_ids, delta, local, scratch = arrays[21:]
+    total = find_affected(moved_ids, count, point_start, point_count, point_cell, hits, affected)
+    again = choose_recomputed(total, affected, hits, differences, rows, limit, bias, recomputed)
     for q in range(count):
-        i = ids[q]
+        i = moved_ids[q]
         dx, dy, dz = np.float32(delta[q, 0]), np.float32(delta[q, 1]), np.float32(delta[q, 2])
-        for e in range(back_start[i], back_start[i] + back_count[i]):
-            c = back_cell[e]
-            if kept[c] >= 0:
-                tiles, place = tile_start[c + 1] - tile_start[c], at[c] + 8 * back_row[e]
-                add_row(tiles, tile_start[c], place, room[c] * 8, dx, dy, dz, value, slope, state)
+        for e in range(point_start[i], point_start[i] + point_count[i]):
+            c = point_cell[e]
+            if differences[c] >= 0:
+                place = at[c] + 8 * point_row[e]
+                add_row(
+                    tile_start[c], tile_start[c + 1], place, room[c] * 8, dx, dy, dz, value, slope, numerators
+                )  # fmt: skip
     for q in range(total):
-        c = touched[q]
-        if kept[c] == -1:
+        c = affected[q]
+        if differences[c] == NOT_STORED:
             continue
-        if kept[c] == KEEP:
-            gather(points, ids_of, ids_at[c], rows[c], origin, c, local)
-            tiles = tile_start[c + 1] - tile_start[c]
-            keep_sums(tiles, tile_start[c], rows[c], room[c], at[c], value, slope, local, state)
-            kept[c] = 0
+        if differences[c] == STORE:
+            gather(points, ids, ids_at[c], rows[c], origin, c, local)
+            store_numerators(
+                tile_start[c], tile_start[c + 1], rows[c], room[c], at[c], value, slope, local, numerators
+            )  # fmt: skip
+            differences[c] = 0
         ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
         first, last = cell_start[c], cell_start[c + 1]
-        finish_cell(first, last, tile_start[c], ox, oy, oz, sign, below, bend, state, vertices, normals, spare)
-    apply_cells(
-        anew, np.int64(0), fresh, points, origin, cell_start, tile_start, rows, room, at, ids_at, ids_of, value, slope,
-        below, bend, state, kept, sign, vertices, normals, local, spare,
-    )  # fmt: skip
+        finish_cell(
+            first, last, tile_start[c], ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, scratch
+        )  # fmt: skip
+    compute_cells(arrays, recomputed, np.int64(0), again, sign, local, scratch)
     return total
 
 
 @kernel
-def reject(ids, rows, n):
-    """The first row with an id out of range (as ``-1 - row``) or a number that is not finite (``row``); else 2**62."""
+def first_invalid(ids, rows, n):
+    """The first row with an id out of range (as ``-1 - row``) or a number that is not finite (``row``); or VALID."""
     for q in range(ids.shape[0]):
         if ids[q] < 0 or ids[q] >= n:
             return -1 - q
     for q in range(ids.shape[0]):
         if not np.isfinite(rows[q, 0] + rows[q, 1] + rows[q, 2]):
             return q
-    return 1 << 62
+    return VALID
 
 
 @kernel
-def difference(ids, rows, relative, points, changed, delta):
-    """Store new positions; ``changed`` and ``delta`` get the points that really moved; returns their number."""
+def store_positions(ids, rows, relative, points, moved_ids, delta):
+    """Store new positions; ``moved_ids`` and ``delta`` get the points that really moved; returns their number."""
     count = 0
     for q in range(ids.shape[0]):
         i = ids[q]
@@ -140,7 +145,7 @@ def difference(ids, rows, relative, points, changed, delta):
             dx, dy, dz = dx - points[i, 0], dy - points[i, 1], dz - points[i, 2]
         if dx == 0.0 and dy == 0.0 and dz == 0.0:
             continue
-        changed[count] = i
+        moved_ids[count] = i
         delta[count, 0], delta[count, 1], delta[count, 2] = dx, dy, dz
         if relative:
             points[i, 0] += dx
@@ -153,26 +158,20 @@ def difference(ids, rows, relative, points, changed, delta):
 
 
 @kernel
-def place(
-    ids, rows, relative, changed, delta, hits, touched, anew, found, most, limit, bias, gap, back_start, back_count,
-    back_cell, back_row, points, origin, cell_start, tile_start, in_cell, room, at, ids_at, ids_of, value, slope,
-    below, bend, state, kept, sign, vertices, normals, local, spare,
-):  # fmt: skip
+def move_points(arrays, ids, rows, relative, most, limit, bias, gap, sign):
     """Move points and bring the mesh up to date: the whole of an update in one call.
 
-    ``rows (k, 3)`` are new positions, or moves if ``relative``. Returns the number of vertex ranges in ``found``; -1
-    if more than ``most`` points moved and everything is to be computed anew; or what :func:`reject` found, less
-    2**61, and then nothing has been changed.
+    ``rows (k, 3)`` are new positions, or moves if ``relative``. Returns the number of vertex ranges in ``ranges``; -1
+    if more than ``most`` points moved and everything is to be computed again; or what :func:`first_invalid` found,
+    less REFUSED, and then nothing has been changed.
     """
-    bad = reject(ids, rows, points.shape[0])
-    if bad != 1 << 62:
-        return bad - (1 << 61)
-    count = difference(ids, rows, relative, points, changed, delta)
+    cell_start, points = arrays[0], arrays[13]
+    found, _, affected, _, moved_ids, delta, _, _ = arrays[21:]
+    bad = first_invalid(ids, rows, points.shape[0])
+    if bad != VALID:
+        return bad - REFUSED
+    count = store_positions(ids, rows, relative, points, moved_ids, delta)
     if count > most:
         return -1
-    total = update(
-        changed, count, delta, hits, touched, anew, limit, bias, back_start, back_count, back_cell, back_row,
-        points, origin, cell_start, tile_start, in_cell, room, at, ids_at, ids_of, value, slope, below, bend,
-        state, kept, sign, vertices, normals, local, spare,
-    )  # fmt: skip
-    return ranges(touched, total, cell_start, gap, found)
+    total = update_cells(arrays, count, limit, bias, sign)
+    return join_ranges(affected, total, cell_start, gap, found)

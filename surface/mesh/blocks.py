@@ -11,7 +11,8 @@ import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
-from surface.spline.bins import Bins, build_bins
+from surface.spline.controlpoints import ControlPoints
+from surface.spline.kernels import bounding_box, points_in
 
 LANES = 8  # float32 numbers per vector operation
 PER_POINT = 10.0  # cost of reading a control point, in weights
@@ -52,105 +53,29 @@ def unit_cross(a, b, out, bad):
             out[s, 0], out[s, 1], out[s, 2] = x / length, y / length, z / length
 
 
-def group(code: Ints, depth: int, uv: Floats, supports: Floats, bins: Bins) -> Ints:
-    """First vertices of the cells.
+def group(code: Ints, depth: int, uv: Floats, surface: ControlPoints) -> Ints:
+    """First vertices of the cells, (c + 1,) int64, for vertices ``uv (m, 2)`` that rise by ``code (m,)`` int64.
 
-    Parameters
-    ----------
-    code : (m,) int64, rising; the low ``2 * depth`` bits are the Morton code of the leaf within its root
-    depth : deepest level of the tree
-    uv : (m, 2) float64 in the same order
-    supports : (n, 4) float64 subdomains
-    bins : the surface's bins
-
-    Returns
-    -------
-    (c + 1,) int64
+    The low ``2 * depth`` bits of a code are the Morton code of the leaf within its root.
     """
     start = np.zeros(len(code) + 1, dtype=np.int64)
-    count = _group(code, depth, uv, supports, bins.grid, bins.shape, bins.start, bins.ids, start)
+    count = _group(code, depth, uv, *surface.arrays()[:2], *surface.bin_arrays(), start)
     start[count] = len(code)
     return start[: count + 1].copy()
 
 
 @kernel
-def _bin(x, low, scale, count):
-    return max(0, min(int((x - low) * scale), count - 1))
+def count_points(boxes, knots_u, knots_v, grid, shape, start, ids, out):
+    """Number of points whose support meets each of ``boxes (k, 4)``."""
+    none = np.zeros(0, dtype=np.int32)
+    for k in range(boxes.shape[0]):
+        out[k] = points_in(boxes[k], knots_u, knots_v, grid, shape, start, ids, none)
 
 
 @kernel
-def reach(box, supports, grid, shape, start, ids, out):
-    """Points whose closed subdomain meets ``box``; writes them to ``out`` if it has room, returns the number."""
-    a0, a1 = _bin(box[0], grid[0], grid[2], shape[0]), _bin(box[1], grid[0], grid[2], shape[0])
-    b0, b1 = _bin(box[2], grid[1], grid[3], shape[1]), _bin(box[3], grid[1], grid[3], shape[1])
-    count = 0
-    for a in range(a0, a1 + 1):
-        for b in range(b0, b1 + 1):
-            for q in range(start[a * shape[1] + b], start[a * shape[1] + b + 1]):
-                i = ids[q]
-                if supports[i, 0] > box[1] or supports[i, 1] < box[0]:
-                    continue
-                if supports[i, 2] > box[3] or supports[i, 3] < box[2]:
-                    continue
-                # A point stands in several bins; it counts in the first one that the box shares with it.
-                if a != max(a0, _bin(supports[i, 0], grid[0], grid[2], shape[0])):
-                    continue
-                if b != max(b0, _bin(supports[i, 2], grid[1], grid[3], shape[1])):
-                    continue
-                if count < out.shape[0]:
-                    out[count] = i
-                count += 1
-    return count
-
-
-@kernel
-def count_open(rect, supports, grid, shape, start, ids, out):
-    """Number of points whose subdomain shares an area with each rectangle ``(k, 4)``."""
-    for r in range(rect.shape[0]):
-        box = rect[r]
-        a0, a1 = _bin(box[0], grid[0], grid[2], shape[0]), _bin(box[1], grid[0], grid[2], shape[0])
-        b0, b1 = _bin(box[2], grid[1], grid[3], shape[1]), _bin(box[3], grid[1], grid[3], shape[1])
-        count = 0
-        for a in range(a0, a1 + 1):
-            for b in range(b0, b1 + 1):
-                for q in range(start[a * shape[1] + b], start[a * shape[1] + b + 1]):
-                    i = ids[q]
-                    if supports[i, 0] >= box[1] or supports[i, 1] <= box[0]:
-                        continue
-                    if supports[i, 2] >= box[3] or supports[i, 3] <= box[2]:
-                        continue
-                    if a != max(a0, _bin(supports[i, 0], grid[0], grid[2], shape[0])):
-                        continue
-                    if b == max(b0, _bin(supports[i, 2], grid[1], grid[3], shape[1])):
-                        count += 1
-        out[r] = count
-
-
-@kernel
-def _box(uv, low, high, out):
-    out[0], out[1], out[2], out[3] = uv[low, 0], uv[low, 0], uv[low, 1], uv[low, 1]
-    for s in range(low + 1, high):
-        out[0], out[1] = min(out[0], uv[s, 0]), max(out[1], uv[s, 0])
-        out[2], out[3] = min(out[2], uv[s, 1]), max(out[3], uv[s, 1])
-
-
-def cell_boxes(cell_start: Ints, uv: Floats) -> tuple[Floats, Bins]:
-    """Rectangles ``(c, 4)`` around every cell's vertices, and bins over them."""
-    boxes = np.zeros((len(cell_start) - 1, 4))
-    _fill_boxes(cell_start, uv, boxes)
-    return boxes, build_bins(np.ascontiguousarray(boxes[:, :2]), np.ascontiguousarray(boxes[:, 2:]))
-
-
-@kernel
-def _fill_boxes(cell_start, uv, boxes):
-    for c in range(boxes.shape[0]):
-        _box(uv, cell_start[c], cell_start[c + 1], boxes[c])
-
-
-@kernel
-def _cost(uv, low, high, supports, grid, shape, start, ids, box, none):
-    _box(uv, low, high, box)
-    points = reach(box, supports, grid, shape, start, ids, none)
+def _cost(uv, low, high, knots_u, knots_v, grid, shape, start, ids, box, none):
+    bounding_box(uv, low, high, box)
+    points = points_in(box, knots_u, knots_v, grid, shape, start, ids, none)
     return points * ((high - low + LANES - 1) // LANES * LANES + PER_POINT)
 
 
@@ -164,7 +89,7 @@ def _next_edge(code, low, high, shift):
 
 
 @kernel
-def _splits(code, uv, low, high, shift, supports, grid, shape, start, ids, box, none):
+def _splits(code, uv, low, high, shift, knots_u, knots_v, grid, shape, start, ids, box, none):
     """Are the four parts of a branch cheaper than the whole?"""
     if shift == 0 or high - low <= LANES:
         return False
@@ -173,14 +98,14 @@ def _splits(code, uv, low, high, shift, supports, grid, shape, start, ids, box, 
     parts, a = 0.0, low
     while a < high:
         b = _next_edge(code, a, high, shift - 2)
-        parts += _cost(uv, a, b, supports, grid, shape, start, ids, box, none)
+        parts += _cost(uv, a, b, knots_u, knots_v, grid, shape, start, ids, box, none)
         a = b
-    return parts < _cost(uv, low, high, supports, grid, shape, start, ids, box, none)
+    return parts < _cost(uv, low, high, knots_u, knots_v, grid, shape, start, ids, box, none)
 
 
 @kernel
-def _group(code, depth, uv, supports, grid, shape, start, ids, out):
-    """Walk over the branches in order: go down a level where that is cheaper, else take the branch as a cell."""
+def _group(code, depth, uv, knots_u, knots_v, grid, shape, start, ids, out):
+    """Visit the branches in order: go down a level where that is cheaper, else take the branch as a cell."""
     box, none = np.zeros(4), np.zeros(0, dtype=np.int32)
     ends, shifts = np.zeros(depth + 2, dtype=np.int64), np.zeros(depth + 2, dtype=np.int64)
     count, low, top = 0, 0, -1
@@ -189,7 +114,7 @@ def _group(code, depth, uv, supports, grid, shape, start, ids, out):
             top, shifts[0] = 0, 2 * depth
             ends[0] = _next_edge(code, low, code.shape[0], 2 * depth)
         high, shift = ends[top], shifts[top]
-        if _splits(code, uv, low, high, shift, supports, grid, shape, start, ids, box, none):
+        if _splits(code, uv, low, high, shift, knots_u, knots_v, grid, shape, start, ids, box, none):
             top += 1
             shifts[top], ends[top] = shift - 2, _next_edge(code, low, high, shift - 2)
             continue
@@ -204,18 +129,18 @@ def _group(code, depth, uv, supports, grid, shape, start, ids, out):
 
 
 @kernel
-def _fill_lists(cell_start, uv, supports, grid, shape, start, ids, list_start, out):
+def _fill_lists(cell_start, uv, knots_u, knots_v, grid, shape, start, ids, list_start, out):
     box = np.zeros(4)
     for c in range(cell_start.shape[0] - 1):
-        _box(uv, cell_start[c], cell_start[c + 1], box)
+        bounding_box(uv, cell_start[c], cell_start[c + 1], box)
         room = out[list_start[c] :]
-        list_start[c + 1] = list_start[c] + reach(box, supports, grid, shape, start, ids, room)
+        list_start[c + 1] = list_start[c] + points_in(box, knots_u, knots_v, grid, shape, start, ids, room)
 
 
-def point_lists(cell_start: Ints, uv: Floats, supports: Floats, bins: Bins) -> tuple[Ints, np.ndarray]:
+def point_lists(cell_start: Ints, uv: Floats, surface: ControlPoints) -> tuple[Ints, np.ndarray]:
     """Control points that may reach each cell: ``list_start (c + 1,)`` and ``list_ids (k,)``, rising per cell."""
     start = np.zeros(len(cell_start), dtype=np.int64)
-    arrays = (cell_start, uv, supports, bins.grid, bins.shape, bins.start, bins.ids, start)
+    arrays = (cell_start, uv, *surface.arrays()[:2], *surface.bin_arrays(), start)
     _fill_lists(*arrays, np.zeros(0, dtype=np.int32))
     ids = np.zeros(int(start[-1]), dtype=np.int32)
     _fill_lists(*arrays, ids)

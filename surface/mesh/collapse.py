@@ -1,4 +1,4 @@
-"""Fewer triangles over the same vertices: edges collapse onto one of their ends, cheapest first.
+"""Mesh decimation by edge collapse: fewer triangles over the same vertices, cheapest collapse first.
 
 The measure is the quadric of Garland and Heckbert, "Simplifying Surfaces with Color and Texture using Quadric Error
 Metrics" (1998): squared distance from the planes of the triangles that were there, in as many dimensions as a vertex
@@ -13,22 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats
-from surface.mesh.borders import border_edges
+from surface.mesh.mesh import border_edges
 
 Ids = NDArray[np.integer]
 _LEAST_COS = 0.3  # a triangle turned by more than this counts as flipped
 _BORDER = 4.0  # weight of a border's line, beside a plane's
-_CHUNK = 4096  # edges whose costs are worked out at a time
+_CHUNK = 4096  # edges whose costs are computed at a time
 
 
 class Collapse:
-    """One mesh on its way to fewer triangles.
+    """A mesh while its edges are collapsed.
 
-    Parameters
-    ----------
-    places : (m, d) coordinates of every vertex, mm; the first three are its position at rest.
-    triangles : (t, 3).
-    locked : (m,) bool, vertices that stay.
+    ``places`` are (m, d) coordinates of every vertex, mm; the first three are its position at rest. Vertices that are
+    ``locked`` (m,) bool stay.
     """
 
     def __init__(self, places: Floats, triangles: Ids, locked: NDArray[np.bool_]) -> None:

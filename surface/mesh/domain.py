@@ -51,16 +51,13 @@ class Domain:
     ----------
     rect : u0, u1, v0, v1
     loops : closed polylines ``(k, 2)``; (u, v) is inside where it is inside an odd number of them, so outlines,
-        holes and several islands may stand in any order; the rectangle cuts off what reaches beyond it. No loops:
+        holes and several islands may be in any order; the rectangle cuts off what reaches beyond it. No loops:
         the whole rectangle.
     slits : segments across which the surface is cut; one that reaches beyond the rectangle cuts through its border
     marks : (k, 2) points on the loops at which the border gets a vertex, as at their sharp corners
 
-    Raises
-    ------
-    ValueError
-        For an empty rectangle, loops of fewer than three points, slits of another type, or numbers that are not
-        finite; names the argument and the index.
+    ``ValueError`` for an empty rectangle, loops of fewer than three points, slits of another type, or numbers that are
+    not finite; names the argument and the index.
     """
 
     rect: tuple[float, float, float, float]
@@ -115,13 +112,10 @@ class Domain:
             ring = np.asarray(loop)
             others = [np.asarray(other) for j, other in enumerate(self.loops) if j != i]
             depth = sum(bool(Domain(self.rect, [other]).inside(ring[:1])[0]) for other in others)
-            total += abs(_signed_area(ring)) * (-1 if depth % 2 else 1)
+            after = np.roll(ring, -1, axis=0)
+            area = abs(float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum() / 2))
+            total += -area if depth % 2 else area
         return total
-
-
-def _signed_area(ring: Floats) -> float:
-    after = np.roll(ring, -1, axis=0)
-    return float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum() / 2)
 
 
 def _check_loop(loop: ArrayLike, index: int) -> Floats:

@@ -10,14 +10,10 @@ from surface.base.jit import kernel
 
 
 def improve(points: Floats, triangles: Ints, kept: Ints, rounds: int = 6) -> None:
-    """Flip edges whose opposite angles sum to more than half a turn, in place.
+    """Flip edges whose opposite angles sum to more than half a turn, in place, in at most ``rounds`` passes.
 
-    Parameters
-    ----------
-    points : (m, 2) or (m, 3) float64
-    triangles : (t, 3) int64, consistently oriented; an edge has one or two triangles
-    kept : (m,) int64 bit mask; edges whose ends share a bit stay
-    rounds : greatest number of passes over all edges
+    ``points`` are (m, 2) or (m, 3) float64, ``triangles`` (t, 3) int64, consistently oriented, an edge has one or two.
+    Edges whose ends share a bit of the mask ``kept (m,)`` int64 stay.
     """
     xyz = np.zeros((len(points), 3))
     xyz[:, : points.shape[1]] = points
@@ -27,23 +23,18 @@ def improve(points: Floats, triangles: Ints, kept: Ints, rounds: int = 6) -> Non
             return
 
 
+def edge_keys(triangles: Ints) -> tuple[Ints, int]:
+    """(3 t,) keys of edges, ``least end * width + greatest end`` of each triangle in turn, and the width."""
+    edges, width = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), int(triangles.max(initial=0)) + 1
+    return edges.min(axis=1) * width + edges.max(axis=1), width
+
+
 def edge_pairs(triangles: Ints) -> Ints:
     """(e, 2) pairs of triangles that share an edge."""
-    directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    width = int(triangles.max(initial=0)) + 1
-    key = directed.min(axis=1) * width + directed.max(axis=1)
+    key = edge_keys(triangles)[0]
     order = np.argsort(key, kind="stable")
     same = key[order][1:] == key[order][:-1]
     return np.stack([order[:-1][same], order[1:][same]], axis=1) // 3
-
-
-@kernel
-def _apex(triangles, t, a, b):
-    """Position in triangle t of the corner that is neither a nor b."""
-    for k in range(3):
-        if triangles[t, k] != a and triangles[t, k] != b:
-            return k
-    return -1
 
 
 @kernel
@@ -58,13 +49,13 @@ def _cotangent(xyz, apex, a, b):
     """Cotangent of the angle at ``apex``."""
     ax, ay, az = xyz[a, 0] - xyz[apex, 0], xyz[a, 1] - xyz[apex, 1], xyz[a, 2] - xyz[apex, 2]
     bx, by, bz = xyz[b, 0] - xyz[apex, 0], xyz[b, 1] - xyz[apex, 1], xyz[b, 2] - xyz[apex, 2]
-    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    nx, ny, nz = _normal(xyz, apex, a, b)
     return (ax * bx + ay * by + az * bz) / max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
 
 
 @kernel
 def _flip_round(xyz, triangles, kept, pairs):
-    """One pass; a pair whose triangles were already changed in this pass is checked again as it now stands."""
+    """One pass; a pair whose triangles were already changed in this pass is checked again."""
     count = 0
     for e in range(pairs.shape[0]):
         s, t = pairs[e, 0], pairs[e, 1]
@@ -77,7 +68,7 @@ def _flip_round(xyz, triangles, kept, pairs):
         if ia < 0:
             continue
         a, b, c = triangles[s, ia], triangles[s, (ia + 1) % 3], triangles[s, (ia + 2) % 3]
-        d = triangles[t, _apex(triangles, t, a, b)]
+        d = triangles[t, 0] + triangles[t, 1] + triangles[t, 2] - a - b
         if kept[a] & kept[b] or c == d:
             continue
         if _cotangent(xyz, c, a, b) + _cotangent(xyz, d, a, b) >= -1e-9:

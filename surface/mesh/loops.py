@@ -12,17 +12,17 @@ from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
 
 
-def row_lists(segments: Floats, extra: float = 0.0) -> tuple[float, float, Ints, Ints]:
-    """Segments by band of v: v0, bands per unit of v, list starts (bands + 1,), segment ids."""
+def _by_band(segments: Floats) -> tuple[float, float, Ints, Ints]:
+    """Segments by band of v: v0, bands per unit of v, list starts (bands + 1,), segment ids, rising per band."""
     low, high = float(segments[:, [1, 3]].min()), float(segments[:, [1, 3]].max())
     bands = max(1, len(segments) // 2)
     scale = bands / max(high - low, 1e-300)
-    start = np.zeros(bands + 1, dtype=np.int64)
-    _fill_bands(segments, low, scale, start[1:], np.zeros(0, dtype=np.int64), True)
-    np.cumsum(start, out=start)
-    ids = np.zeros(int(start[-1]), dtype=np.int64)
-    _fill_bands(segments, low, scale, start[:-1].copy(), ids, False)
-    return low, scale, start, ids
+    ends = np.clip(((np.sort(segments[:, [1, 3]], axis=1) - low) * scale).astype(np.int64), 0, bands - 1)
+    count = ends[:, 1] - ends[:, 0] + 1
+    ids = np.repeat(np.arange(len(segments)), count)
+    band = ends[ids, 0] + np.arange(len(ids)) - np.repeat(np.cumsum(count) - count, count)
+    start = np.concatenate([[0], np.cumsum(np.bincount(band, minlength=bands))])
+    return low, scale, start, ids[np.argsort(band, kind="stable")]
 
 
 @kernel
@@ -30,22 +30,10 @@ def _band(v, low, scale, bands):
     return max(0, min(int((v - low) * scale), bands - 1))
 
 
-@kernel
-def _fill_bands(segments, low, scale, start, ids, count_only):
-    bands = start.shape[0]
-    for k in range(segments.shape[0]):
-        first = _band(min(segments[k, 1], segments[k, 3]), low, scale, bands)
-        last = _band(max(segments[k, 1], segments[k, 3]), low, scale, bands)
-        for b in range(first, last + 1):
-            if not count_only:
-                ids[start[b]] = k
-            start[b] += 1
-
-
 def inside(segments: Floats, uv: Floats) -> np.ndarray:
     """(m,) bool: even-odd rule for ``uv (m, 2)``."""
     out = np.zeros(len(uv), dtype=np.bool_)
-    _inside(segments, uv, *row_lists(segments), out)
+    _inside(segments, uv, *_by_band(segments), out)
     return out
 
 
@@ -65,19 +53,12 @@ def _inside(segments, uv, low, scale, start, ids, out):
 
 
 def crossings(segments: Floats, a: Floats, b: Floats) -> Floats:
-    """Where the edges a-b cross a loop, as a fraction of the edge: the crossing nearest to the middle.
+    """Where edges cross a loop, as a fraction (e,) of each, 0..1: the crossing nearest to the middle.
 
-    Parameters
-    ----------
-    segments : (k, 4) float64
-    a, b : (e, 2) float64 end points, one inside and one outside
-
-    Returns
-    -------
-    (e,) float64 in 0..1
+    ``a``, ``b`` (e, 2) float64 are the end points, one inside and one outside.
     """
     out = np.zeros(len(a))
-    _crossings(segments, a, b, *row_lists(segments), out)
+    _crossings(segments, a, b, *_by_band(segments), out)
     return out
 
 
@@ -116,13 +97,7 @@ def corners(loop: Floats, scale: tuple[float, float], angle: float = 40.0) -> np
 
 
 def resample(loop: Floats, scale: tuple[float, float], step: float) -> tuple[Floats, np.ndarray]:
-    """The loop with points added so that no segment is longer than ``step``; and which of them are corners.
-
-    Returns
-    -------
-    ring : (k, 2) float64
-    sharp : (k,) bool
-    """
+    """The loop (k, 2) with points added so that no segment is longer than ``step``, and which are corners (k,)."""
     after = np.roll(loop, -1, axis=0)
     length = np.linalg.norm((after - loop) * np.asarray(scale), axis=1)
     pieces = np.maximum(1, np.ceil(length / step).astype(np.int64))

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Ints
-from surface.spline.bins import Bins
+from surface.spline.bins import Bins, build_bins
 
 
 @dataclass(frozen=True)
@@ -21,12 +22,12 @@ class Mesh:
     triangles : (t, 3) int32, counter-clockwise seen from where the normals point
     uv : (m, 2) float64
     side : (m,) int64, which limit a vertex takes: 1 from the left in u, 2 in v (vertices on slits)
-    cell : (m,) int32, rising: all vertices of a cell stand together
+    cell : (m,) int32, rising: the vertices of a cell are consecutive
     cell_start : (c + 1,) int64, first vertex of every cell
     list_start : (c + 1,) int64, where every cell's list starts in ``list_ids``
     list_ids : (k,) int32 control points that may reach the cell's vertices
     leaves : how many leaf cells the quad tree had
-    flip : are normals and triangles turned against S_u x S_v?
+    flip : are normals and triangles reversed against S_u x S_v?
     """
 
     vertices: Floats
@@ -53,6 +54,16 @@ class Mesh:
     @cached_property
     def cell_boxes(self) -> tuple[Floats, Bins]:
         """(c, 4) u0, u1, v0, v1 around the vertices of every cell, and the cells by region of (u, v)."""
-        from . import blocks  # compiled: loaded when first used
+        low, high = (
+            np.minimum.reduceat(self.uv, self.cell_start[:-1]),
+            np.maximum.reduceat(self.uv, self.cell_start[:-1]),
+        )
+        along = [np.stack([low[:, k], high[:, k]], axis=1) for k in range(2)]
+        return np.hstack(along), build_bins(*along)
 
-        return blocks.cell_boxes(self.cell_start, self.uv)
+
+def border_edges(triangles: NDArray[np.int32]) -> Ints:
+    """(k, 2) edges that only one triangle has, in the direction of that triangle."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    key, back = edges[:, 0] << 32 | edges[:, 1], edges[:, 1] << 32 | edges[:, 0]
+    return edges[~np.isin(key, back)]

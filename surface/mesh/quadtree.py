@@ -1,7 +1,7 @@
-"""Quad trees over (u, v): roots on a grid of lines, quartering, 2:1 balance, conforming triangles (paper, 2.3).
+"""Quad trees over (u, v): a grid of root cells, quartering, 2:1 balance, conforming triangles (paper, 2.3).
 
-Cells are addressed by integers. At level L the domain is a grid of ``roots * 2**L`` cells; cell (i, j) covers the
-lattice square from ``(i, j) * 2**(depth - L)`` on. Lattice lines at root borders are exactly the wanted (u, v).
+At level L the domain is a grid of ``roots * 2**L`` cells; cell (i, j) covers the lattice square from
+``(i, j) * 2**(depth - L)`` on. Lattice lines at root borders are exactly the wanted (u, v).
 """
 
 from __future__ import annotations
@@ -13,18 +13,14 @@ import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
-from surface.base.progress import Progress, silent
+from surface.base.progress import Progress, no_progress
 
 
 @dataclass(frozen=True)
 class Lattice:
-    """Integer coordinates over the domain.
+    """Integer coordinates over the domain: rising root borders, and the deepest level a cell can have.
 
-    Attributes
-    ----------
-    lines_u, lines_v : root borders, rising
-    depth : deepest level a cell can have
-    joined : which directions are joined at their ends, so that cells there are neighbours
+    ``joined`` says which directions are joined at their ends, so that cells there are neighbours.
     """
 
     lines_u: Floats
@@ -36,6 +32,11 @@ class Lattice:
     def shape(self) -> tuple[int, int]:
         """Roots along u and v."""
         return len(self.lines_u) - 1, len(self.lines_v) - 1
+
+    @property
+    def roots(self) -> Ints:
+        """(n, 2): indices of the root cells."""
+        return np.argwhere(np.ones(self.shape, dtype=bool))
 
     def uv(self, x: Ints, y: Ints) -> Floats:
         """(m, 2): parameters of lattice points."""
@@ -60,40 +61,23 @@ class Lattice:
 
 @dataclass(frozen=True)
 class Leaves:
-    """The leaf cells of a tree.
-
-    Attributes
-    ----------
-    level : (n,) int64
-    cell : (n, 2) int64 indices i, j at that level
-    """
+    """The leaf cells of a tree: their levels (n,) int64, and indices i, j at that level (n, 2) int64."""
 
     level: Ints
     cell: Ints
-
-    def __len__(self) -> int:
-        return len(self.level)
 
 
 SplitTest = Callable[[int, Ints], np.ndarray]
 NEIGHBOURS = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])  # below, right, above, left: the order of edges
 
 
-def grow(lattice: Lattice, split: SplitTest, progress: Progress = silent) -> tuple[Leaves, list[Ints]]:
-    """Quarter cells until none wants to be, then balance 2:1 over edges.
+def grow(lattice: Lattice, split: SplitTest, progress: Progress = no_progress) -> tuple[Leaves, list[Ints]]:
+    """Quarter cells as long as ``split(level, cells (n, 2))``, (n,) bool, says, then balance 2:1 over edges.
 
-    Parameters
-    ----------
-    lattice : roots and greatest depth
-    split : ``split(level, cells (n, 2)) -> (n,) bool``
-    progress : is told the level; every level is taken for twice the work of the one before
-
-    Returns
-    -------
-    leaves : the leaf cells
-    inner : per level, the sorted codes of cells that were split; see :func:`codes`
+    Returns the leaf cells and, per level, the sorted codes of cells that were split; see :func:`codes`. Progress takes
+    every level for twice the work of the one before.
     """
-    cells = np.stack(np.meshgrid(*map(np.arange, lattice.shape), indexing="ij"), axis=-1).reshape(-1, 2)
+    cells = lattice.roots
     inner: list[Ints] = []
     for level in range(lattice.depth):
         progress("quad tree", 0.5 ** (lattice.depth - level))
@@ -112,14 +96,11 @@ def children(cells: Ints) -> Ints:
 
 def codes(lattice: Lattice, level: int, cells: Ints) -> Ints:
     """(n,) one integer per cell of a level; cells outside the domain give -1."""
-    width, height = lattice.shape[0] << level, lattice.shape[1] << level
+    size = np.array(lattice.shape) << level
     if any(lattice.joined):
-        cells = cells.copy()
-        for axis, size in enumerate((width, height)):
-            if lattice.joined[axis]:
-                cells[:, axis] %= size
-    valid = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
-    return np.where(valid, cells[:, 1] * width + cells[:, 0], -1)
+        cells = np.where(lattice.joined, cells % size, cells)
+    valid = ((cells >= 0) & (cells < size)).all(axis=1)
+    return np.where(valid, cells[:, 1] * size[0] + cells[:, 0], -1)
 
 
 def _decode(lattice: Lattice, level: int, code: Ints) -> Ints:
@@ -147,7 +128,7 @@ def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
         parents = codes(lattice, level - 1, around // 2)
         split[level - 1] = np.union1d(split[level - 1], parents[~contains(split[level - 1], parents)])
     levels, found = [], []
-    cells = np.stack(np.meshgrid(*map(np.arange, lattice.shape), indexing="ij"), axis=-1).reshape(-1, 2)
+    cells = lattice.roots
     for level in range(len(split) + 1):
         code = codes(lattice, level, cells)
         is_inner = contains(split[level], code) if level < len(split) else np.zeros(len(cells), dtype=bool)
@@ -158,14 +139,11 @@ def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
 
 
 def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[Ints, Ints]:
-    """Triangles without cracks: a leaf takes in the edge middles of smaller neighbours.
+    """Triangles without cracks: a leaf's edges have vertices at their middles where neighbours are smaller.
 
-    Returns
-    -------
-    keys : (t, 3) int64 lattice keys, counter-clockwise in (u, v)
-    owner : (t,) int64 leaf of every triangle
+    Returns lattice keys (t, 3) int64, counter-clockwise in (u, v), and the leaf of every triangle, (t,) int64.
     """
-    pattern = np.zeros(len(leaves), dtype=np.int64)
+    pattern = np.zeros(len(leaves.level), dtype=np.int64)
     for level in np.unique(leaves.level):
         if level >= len(inner):
             continue
@@ -178,7 +156,7 @@ def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[In
     count = (TEMPLATES[:, :, 0] >= 0).sum(axis=1)[pattern]
     keys = np.zeros((int(count.sum()), 3), dtype=np.int64)
     _emit(leaves.level, leaves.cell, pattern, lattice.depth, (lattice.shape[0] << lattice.depth) + 1, TEMPLATES, keys)
-    return keys, np.repeat(np.arange(len(leaves)), count)
+    return keys, np.repeat(np.arange(len(leaves.level)), count)
 
 
 @kernel

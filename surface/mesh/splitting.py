@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
 import numpy as np
 
 from surface.base import keys
@@ -16,17 +19,44 @@ MOST_CELLS = 4_000_000
 RIM = 64  # cells along a side where the border of what is covered is followed
 
 
+class Limits(NamedTuple):
+    """How fine a mesh shall be; see :meth:`surface.DCPSurface.tessellate`. ``ValueError`` from :meth:`check`."""
+
+    max_points: int | None
+    chord_error: float | None
+    max_depth: int
+    min_depth: int
+    loop_error: float | None
+    roots: tuple[int, int] | None
+
+    def check(self) -> None:
+        """``ValueError`` for the first limit that is out of range."""
+        if self.max_points is not None and self.max_points < 1:
+            raise ValueError(f"max_points: must be at least 1, not {self.max_points}")
+        for name, error in (("chord_error", self.chord_error), ("loop_error", self.loop_error)):
+            if error is not None and not error > 0:
+                raise ValueError(f"{name}: must be positive, not {error}")
+        if not 0 <= self.min_depth <= self.max_depth <= 20:
+            raise ValueError(f"min_depth, max_depth: need 0 <= {self.min_depth} <= {self.max_depth} <= 20")
+        if self.roots is None:
+            return
+        if np.shape(self.roots) != (2,) or not all(int(count) == count >= 1 for count in self.roots):
+            raise ValueError(f"roots: needs two whole numbers of 1 or more, got {self.roots!r}")
+        if self.roots[0] * self.roots[1] > MOST_CELLS:
+            raise ValueError(f"roots: {self.roots[0]} x {self.roots[1]} cells are more than {MOST_CELLS}")
+
+
+@dataclass
 class SplitTests:
-    """Which cells are to be quartered."""
+    """Which cells are to be quartered; ``scale`` are lengths per unit of u and of v."""
 
-    max_points: int | None = None
-    chord_error: float | None = None
-    min_depth = 0
-
-    def __init__(self, surface: ControlPoints, domain: Domain, lattice: Lattice, scale: tuple[float, float]) -> None:
-        self.surface, self.domain, self.lattice, self.scale = surface, domain, lattice, scale
-        self.rings: list[tuple[Floats, Floats]] = []
-        self.anchors: tuple[Floats, Floats] | None = None
+    surface: ControlPoints
+    domain: Domain
+    lattice: Lattice
+    scale: tuple[float, float]
+    limits: Limits
+    rings: list[tuple[Floats, Floats]] = field(default_factory=list)
+    anchors: tuple[Floats, Floats] | None = None
 
     def follow_loops(self, error: float) -> None:
         """Ask for cells small enough that edges follow the loops within ``error``."""
@@ -47,13 +77,13 @@ class SplitTests:
             )
         rect = self._rects(level, cells)
         active, along_loop = self._active(rect, cells, level)
-        chosen = along_loop | (active & (level < self.min_depth))
+        chosen = along_loop | (active & (level < self.limits.min_depth))
         left = np.flatnonzero(active & ~chosen)
-        if self.max_points is not None and len(left):
-            chosen[left] = self._counts(rect[left]) > self.max_points
+        if self.limits.max_points is not None and len(left):
+            chosen[left] = self._counts(rect[left]) > self.limits.max_points
             left = np.flatnonzero(active & ~chosen)
-        if self.chord_error is not None and len(left):
-            chosen[left] = self._errors(level, cells[left]) > self.chord_error
+        if self.limits.chord_error is not None and len(left):
+            chosen[left] = self._errors(level, cells[left]) > self.limits.chord_error
         return chosen
 
     def _rects(self, level: int, cells: Ints) -> Floats:
@@ -91,9 +121,9 @@ class SplitTests:
         return quadtree.codes(self.lattice, level, np.stack(index, axis=1))
 
     def _counts(self, rect: Floats) -> Ints:
-        bins = self.surface.bins
-        out = np.zeros(len(rect), dtype=np.int64)
-        blocks.count_open(rect, self.surface.all_supports, bins.grid, bins.shape, bins.start, bins.ids, out)
+        """(n,): points whose subdomain shares an area, not only an edge, with each rectangle."""
+        out, inner = np.zeros(len(rect), dtype=np.int64), np.nextafter(rect, [np.inf, -np.inf, np.inf, -np.inf])
+        blocks.count_points(inner, *self.surface.arrays()[:2], *self.surface.bin_arrays(), out)
         return out
 
     def _errors(self, level: int, cells: Ints) -> Floats:
@@ -115,7 +145,7 @@ class SplitTests:
         return worst
 
     def _add_anchors(self, level: int, cells: Ints, p: Floats, worst: Floats) -> None:
-        """Raise ``worst`` to how far the surface is from its cell where control points stand.
+        """Raise ``worst`` to how far the surface is from its cell near control points.
 
         So a feature between the samples of a large cell is not overlooked: where there is detail there are points.
         """

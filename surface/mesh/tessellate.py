@@ -1,4 +1,4 @@
-"""From a surface and a domain to a watertight mesh."""
+"""Tessellation: watertight triangle meshes of a surface over a domain, by quad tree (paper, 2.3)."""
 
 from __future__ import annotations
 
@@ -6,76 +6,41 @@ import numpy as np
 
 from surface.base import keys
 from surface.base.arrays import Floats, Ints
-from surface.base.progress import Progress, between, silent
+from surface.base.progress import Progress, part_of
 from surface.spline.controlpoints import ControlPoints
 
 from . import blocks, quadtree
 from .domain import Domain
 from .mesh import Mesh
 from .quadtree import Lattice, Leaves
-from .splitting import MOST_CELLS, SplitTests, inner_side
-from .trim import Flat, trim
+from .splitting import Limits, SplitTests, inner_side
+from .trim import Flat, replace_vertices, trim
 
 MOST_ROOTS = 24  # along the longer side
 CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
 
 
-def tessellate(
-    surface: ControlPoints,
-    *,
-    max_points: int | None = None,
-    chord_error: float | None = None,
-    max_depth: int = 9,
-    min_depth: int = 0,
-    domain: Domain | None = None,
-    loop_error: float | None = None,
-    roots: tuple[int, int] | None = None,
-    flip: bool = False,
-    progress: Progress = silent,
-) -> Mesh:
+def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: bool, progress: Progress) -> Mesh:
     """See :meth:`surface.DCPSurface.tessellate`."""
-    _check_limits(max_points, chord_error, max_depth, min_depth)
-    _check_sizes(loop_error, roots)
-    where = Domain.of(surface) if domain is None else domain
+    limits.check()
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0))) or 1.0
-    if max_points is None and chord_error is None:
-        chord_error = 1e-3 * size
-    scale = _lengths(surface, where)
-    joined = _joined(surface, where)
-    lattice = _lattice(where, scale, max_depth, roots, joined)
-    tests = SplitTests(surface, where, lattice, scale)
-    tests.max_points, tests.chord_error, tests.min_depth = max_points, chord_error, min_depth
-    if len(where.segments):
-        tests.follow_loops(loop_error if loop_error is not None else chord_error or 5e-4 * size)
-    leaves, inner = quadtree.grow(lattice, tests.split, between(progress, 0.0, 0.45))
+    if limits.max_points is None and limits.chord_error is None:
+        limits = limits._replace(chord_error=1e-3 * size)
+    scale = _lengths(surface, domain)
+    joined = surface.closed[0] == tuple(domain.rect[:2]), surface.closed[1] == tuple(domain.rect[2:])  # goes around
+    lattice = _lattice(domain, scale, limits.max_depth, limits.roots, joined)
+    tests = SplitTests(surface, domain, lattice, scale, limits)
+    if len(domain.segments):
+        tests.follow_loops(limits.loop_error or limits.chord_error or 5e-4 * size)
+    leaves, inner = quadtree.grow(lattice, tests.split, part_of(progress, 0.0, 0.45))
     progress("triangles", 0.45)
     corners, owner = quadtree.triangulate(lattice, leaves, inner)
     nodes, _, triangles = keys.unique(corners)
     flat = Flat(lattice.uv(*lattice.point(nodes)), triangles, owner)
-    if len(where.segments):
+    if len(domain.segments):
         progress("trimming", 0.55)
-        flat = trim(flat, where, scale)
-    return _finish(surface, flat, where, lattice, leaves, flip, between(progress, 0.6, 1.0))
-
-
-def _check_limits(max_points: int | None, chord_error: float | None, max_depth: int, min_depth: int) -> None:
-    if max_points is not None and max_points < 1:
-        raise ValueError(f"max_points: must be at least 1, not {max_points}")
-    if chord_error is not None and not chord_error > 0:
-        raise ValueError(f"chord_error: must be positive, not {chord_error}")
-    if not 0 <= min_depth <= max_depth <= 20:
-        raise ValueError(f"min_depth, max_depth: need 0 <= {min_depth} <= {max_depth} <= 20")
-
-
-def _check_sizes(loop_error: float | None, roots: tuple[int, int] | None) -> None:
-    if loop_error is not None and not loop_error > 0:
-        raise ValueError(f"loop_error: must be positive, not {loop_error}")
-    if roots is None:
-        return
-    if np.shape(roots) != (2,) or not all(int(count) == count >= 1 for count in roots):
-        raise ValueError(f"roots: needs two whole numbers of 1 or more, got {roots!r}")
-    if roots[0] * roots[1] > MOST_CELLS:
-        raise ValueError(f"roots: {roots[0]} x {roots[1]} cells are more than {MOST_CELLS}")
+        flat = trim(flat, domain, scale)
+    return _finish(surface, flat, domain, lattice, leaves, flip, part_of(progress, 0.6, 1.0))
 
 
 def _lengths(surface: ControlPoints, domain: Domain) -> tuple[float, float]:
@@ -83,13 +48,11 @@ def _lengths(surface: ControlPoints, domain: Domain) -> tuple[float, float]:
     u0, u1, v0, v1 = domain.rect
     steps = (np.arange(24) + 0.5) / 24
     uv = np.stack(np.meshgrid(u0 + steps * (u1 - u0), v0 + steps * (v1 - v0)), axis=-1).reshape(-1, 2)
-    uv = uv[domain.inside(uv)]
-    out = surface.sample_derivatives(uv)[1]
-    su, sv = out[:, 1], out[:, 2]
-    found = np.isfinite(su).all(axis=1) & np.isfinite(sv).all(axis=1)
-    if not found.any():
+    slopes = surface.sample_derivatives(uv[domain.inside(uv)])[1][:, 1:]
+    slopes = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+    if not len(slopes):
         return 1.0, 1.0
-    lengths = [float(np.linalg.norm(d[found], axis=1).mean()) for d in (su, sv)]
+    lengths = [float(np.linalg.norm(slopes[:, k], axis=1).mean()) for k in range(2)]
     low = 1e-6 * max(*lengths, 1e-300)
     return max(lengths[0], low), max(lengths[1], low)
 
@@ -110,15 +73,9 @@ def _lattice(
     extent = (u1 - u0) * scale[0], (v1 - v0) * scale[1]
     least = min(float(np.diff(lines_u).min()) * scale[0], float(np.diff(lines_v).min()) * scale[1])
     edge = max(min(*extent, 1.2 * least), max(extent) / MOST_ROOTS)
-    edge_u = min(edge, extent[0] / 3) if joined[0] else edge  # a ring of fewer than three cells would fold flat
-    edge_v = min(edge, extent[1] / 3) if joined[1] else edge
-    return Lattice(_divide(lines_u, edge_u / scale[0]), _divide(lines_v, edge_v / scale[1]), depth, joined)
-
-
-def _joined(surface: ControlPoints, domain: Domain) -> tuple[bool, bool]:
-    """In which directions does the rectangle go once around a closed surface?"""
-    u0, u1, v0, v1 = domain.rect
-    return surface.closed[0] == (u0, u1), surface.closed[1] == (v0, v1)
+    # A ring of fewer than three cells would fold flat.
+    edges = [min(edge, extent[k] / 3) if joined[k] else edge for k in range(2)]
+    return Lattice(_divide(lines_u, edges[0] / scale[0]), _divide(lines_v, edges[1] / scale[1]), depth, joined)
 
 
 def _divide(borders: Floats, edge: float) -> Floats:
@@ -134,7 +91,7 @@ def _finish(
     """Split vertices on slits, evaluate, drop uncovered triangles, order by cell, make the lists."""
     flat, side = _open_slits(flat, domain)
     code = _codes(flat, lattice, leaves)
-    place, out = _evaluated(surface, flat.uv, side, code, between(progress, 0.1, 0.7))
+    place, out = _evaluated(surface, flat.uv, side, code, part_of(progress, 0.1, 0.7))
     keep = (side >= 0)[flat.triangles].all(axis=1)
     if not keep.all():
         flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])
@@ -147,9 +104,9 @@ def _finish(
     rank = np.zeros(len(flat.uv), dtype=np.int32)
     rank[order] = np.arange(len(order))
     triangles = rank[flat.triangles]
-    uv, supports = np.ascontiguousarray(flat.uv[order]), surface.all_supports
-    start = blocks.group(code, lattice.depth, uv, supports, surface.bins) if len(order) else np.zeros(1, np.int64)
-    list_start, list_ids = blocks.point_lists(start, uv, supports, surface.bins)
+    uv = np.ascontiguousarray(flat.uv[order])
+    start = blocks.group(code, lattice.depth, uv, surface) if len(order) else np.zeros(1, np.int64)
+    list_start, list_ids = blocks.point_lists(start, uv, surface)
     vertices = out[:, 0].copy()
     normals = unit_normals(vertices, out[:, 1], out[:, 2], triangles)
     progress("cells", 1.0)
@@ -163,7 +120,7 @@ def _finish(
         cell_start=start,
         list_start=list_start,
         list_ids=list_ids,
-        leaves=len(leaves),
+        leaves=len(leaves.level),
         flip=flip,
     )
 
@@ -178,7 +135,7 @@ def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
 
 
 def _evaluated(surface: ControlPoints, uv: Floats, side: Ints, code: Ints, progress: Progress) -> tuple[Ints, Floats]:
-    """S, S_u and S_v ``(m, 3, 3)``, neighbours after each other, and where each vertex stands in that.
+    """S, S_u and S_v ``(m, 3, 3)``, neighbours after each other, and the index of each vertex in that.
 
     ``side`` gets the limits that were taken.
     """
@@ -200,18 +157,10 @@ def _weld(flat: Flat, side: Ints, domain: Domain, joined: tuple[bool, bool]) -> 
             continue
         start, end = domain.rect[2 * axis : 2 * axis + 2]
         low, high = np.flatnonzero(flat.uv[:, axis] == start), np.flatnonzero(flat.uv[:, axis] == end)
-        ours, theirs = (_seam_keys(flat.uv[at, 1 - axis], side[at], 1 - axis) for at in (low, high))
-        _, first, second = np.intersect1d(ours, theirs, assume_unique=True, return_indices=True)
+        along = flat.uv[:, 1 - axis] + 1j * (side >> (1 - axis) & 1)  # place along the seam, limit there
+        _, first, second = np.intersect1d(along[low], along[high], assume_unique=True, return_indices=True)
         target[high[second]] = low[first]
-    target = target[target]  # the corner of a torus goes both ways
-    triangles = target[flat.triangles]
-    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return Flat(flat.uv, triangles[whole], flat.owner[whole])
-
-
-def _seam_keys(along: Floats, side: Ints, axis: int) -> np.ndarray:
-    """(k,) complex: place along a seam, and the limit in that direction."""
-    return along + 1j * (side >> axis & 1)
+    return replace_vertices(flat, target[target])  # the corner of a torus goes both ways
 
 
 def _codes(flat: Flat, lattice: Lattice, leaves: Leaves) -> Ints:

@@ -1,7 +1,7 @@
-"""Cut a conforming triangulation of (u, v) along trim loops, without slivers.
+"""Trimming: cut a conforming triangulation of (u, v) along trim loops, without slivers.
 
-The way is that of isosurface stuffing (Labelle and Shewchuk 2007) in two dimensions: vertices that lie close to
-a loop are moved onto it, then the remaining crossed edges are cut, each once for both its triangles.
+As in isosurface stuffing (Labelle and Shewchuk 2007), in two dimensions: vertices that lie close to a loop are moved
+onto it, then the remaining crossed edges are cut, each once for both its triangles.
 """
 
 from __future__ import annotations
@@ -14,24 +14,17 @@ from surface.base import keys
 from surface.base.arrays import Floats, Ints
 
 from . import flips, loops
-from .domain import Domain
+from .domain import Domain, Slit
 
 ROUNDS = 4  # a triangle at a sharp corner is split so many times at most
-ALONG = 0.5, 0.25, 0.75, 0.1, 0.9  # where on an edge it is looked whether it runs through the inside
+ALONG = 0.5, 0.25, 0.75, 0.1, 0.9  # parts of an edge at which it is tested for running through the inside
 SNAP = 0.28  # of the shortest edge at a vertex: nearer crossings pull the vertex onto the loop
 LOCKED = -2
 
 
 @dataclass
 class Flat:
-    """A triangulation of (u, v).
-
-    Attributes
-    ----------
-    uv : (m, 2) float64
-    triangles : (t, 3) int64, counter-clockwise
-    owner : (t,) int64 leaf cell of every triangle
-    """
+    """A triangulation of (u, v): vertices (m, 2), counter-clockwise triangles (t, 3), and their leaf cells (t,)."""
 
     uv: Floats
     triangles: Ints
@@ -39,13 +32,9 @@ class Flat:
 
 
 def trim(flat: Flat, domain: Domain, scale: tuple[float, float]) -> Flat:
-    """The part of ``flat`` inside the domain's loops.
+    """The part of a conforming triangulation of the rectangle inside the domain's loops.
 
-    Parameters
-    ----------
-    flat : a conforming triangulation of the rectangle
-    domain : with loops
-    scale : lengths per unit of u and of v, so that "near" means near on the surface
+    ``scale`` are lengths per unit of u and of v, so that "near" means near on the surface.
     """
     flat = _near_or_inside(flat, domain)
     if not len(flat.triangles):
@@ -70,6 +59,11 @@ def _merged(flat: Flat) -> Flat:
     while (target[edges[:, 0]] != target[edges[:, 1]]).any():
         least = np.minimum(target[edges[:, 0]], target[edges[:, 1]])
         np.minimum.at(target, edges.ravel(), np.repeat(least, 2))
+    return replace_vertices(flat, target)
+
+
+def replace_vertices(flat: Flat, target: Ints) -> Flat:
+    """Use vertex ``target[i]`` instead of vertex i; triangles that lose a corner are dropped."""
     triangles = target[flat.triangles]
     whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     return Flat(flat.uv, triangles[whole], flat.owner[whole])
@@ -79,11 +73,9 @@ def _without_flat(flat: Flat) -> Flat:
     """Drop triangles without area that have two edges on the border: what they leave is the same domain."""
     while True:
         a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
-        directed = np.sort(flat.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        width = int(directed.max(initial=0)) + 1
-        _, _, back = keys.unique(directed[:, 0] * width + directed[:, 1])
-        alone = (np.bincount(back)[back].reshape(-1, 3) == 1).sum(axis=1)
-        drop = (_cross(b - a, c - a) <= 0) & (alone >= 2)
+        _, _, back = keys.unique(flips.edge_keys(flat.triangles)[0])
+        border = (np.bincount(back)[back].reshape(-1, 3) == 1).sum(axis=1)
+        drop = (_cross(b - a, c - a) <= 0) & (border >= 2)
         if not drop.any():
             return flat
         flat = Flat(flat.uv, flat.triangles[~drop], flat.owner[~drop])
@@ -97,12 +89,10 @@ def compact(flat: Flat) -> Flat:
 
 
 def lines_of_edges(uv: Floats, domain: Domain) -> Ints:
-    """(m,) bit mask per vertex: which slits it stands on. An edge lies on a slit if its ends share a bit."""
+    """(m,) bit mask per vertex: which slits it is on. An edge lies on a slit if its ends share a bit."""
     mask = np.zeros(len(uv), dtype=np.int64)
     for bit, slit in enumerate(domain.slits):
-        across, along = (1, 0) if slit.axis == "u" else (0, 1)
-        on = (uv[:, across] == slit.at) & (uv[:, along] >= slit.start) & (uv[:, along] <= slit.end)
-        mask[on] |= 1 << bit
+        mask[slit.holds(uv) | _ends(slit, uv)] |= 1 << bit
     return mask
 
 
@@ -132,10 +122,14 @@ def _lines(uv: Floats, domain: Domain) -> Ints:
     for index, on in enumerate(groups):
         line[on] = np.where(line[on] == -1, index, LOCKED)
     for slit in domain.slits:
-        along = 0 if slit.axis == "u" else 1
-        ends = (uv[:, 1 - along] == slit.at) & ((uv[:, along] == slit.start) | (uv[:, along] == slit.end))
-        line[ends] = LOCKED
+        line[_ends(slit, uv)] = LOCKED
     return line
+
+
+def _ends(slit: Slit, uv: Floats) -> np.ndarray:
+    """(m,) bool: which of ``uv (m, 2)`` are end points of a slit."""
+    across, along = (uv[:, 1], uv[:, 0]) if slit.axis == "u" else (uv[:, 0], uv[:, 1])
+    return np.asarray((across == slit.at) & ((along == slit.start) | (along == slit.end)))
 
 
 def _weights_in(flat: Flat, point: Floats) -> Floats:
@@ -212,45 +206,36 @@ def _leaving(flat: Flat, domain: Domain, vertex: int) -> Floats:
 
 def _insert(flat: Flat, point: Floats, triangle: int, share: Floats) -> Flat:
     """Split one triangle in three at ``point``, or the two beside an edge in four where it is close to that edge."""
-    new = len(flat.uv)
+    new, hit = len(flat.uv), [triangle]
     a, b, c = np.roll(flat.triangles[triangle], -int(np.argmin(share)))  # b-c is the nearest edge
-    hit = [triangle]
     added = [(a, b, new), (a, new, c)]
-    if share.min() < 0.15:
-        beside = _across(flat.triangles, b, c)
-        if beside is not None:
-            d = int(flat.triangles[beside].sum() - b - c)
-            hit.append(beside)
-            added += [(d, c, new), (d, new, b)]
-    if len(hit) == 1:
+    beside = _across(flat.triangles, b, c) if share.min() < 0.15 else None
+    if beside is None:
         added.append((b, c, new))
-    keep = np.ones(len(flat.triangles), dtype=bool)
-    keep[hit] = False
-    owner = [flat.owner[triangle]] * len(added)
-    if len(hit) == 2:
-        owner[2:] = [flat.owner[hit[1]]] * 2
-    return Flat(
-        np.vstack([flat.uv, point]),
-        np.vstack([flat.triangles[keep], added]),
-        np.concatenate([flat.owner[keep], owner]),
-    )
+    else:
+        d = int(flat.triangles[beside].sum() - b - c)
+        hit.append(beside)
+        added += [(d, c, new), (d, new, b)]
+    owner = np.repeat(flat.owner[hit], len(added) // len(hit))
+    return _with_point(flat, point, np.array(hit), np.array(added), owner)
+
+
+def _with_point(flat: Flat, point: Floats, hit: Ints, added: Ints, owner: Ints) -> Flat:
+    """Add a vertex, and triangles with their leaf cells in place of the ``hit`` ones."""
+    triangles = np.concatenate([np.delete(flat.triangles, hit, axis=0), added])
+    return Flat(np.vstack([flat.uv, point]), triangles, np.append(np.delete(flat.owner, hit), owner))
 
 
 def _across(triangles: Ints, b: int, c: int) -> int | None:
     """The triangle that holds the directed edge c-b, if any."""
-    for k in range(3):
-        found = np.flatnonzero((triangles[:, k] == c) & (triangles[:, (k + 1) % 3] == b))
-        if len(found):
-            return int(found[0])
-    return None
+    found = np.flatnonzero(((triangles == c) & (np.roll(triangles, -1, axis=1) == b)).any(axis=1))
+    return int(found[0]) if len(found) else None
 
 
 def _edges(triangles: Ints) -> Ints:
     """(e, 2) undirected edges, each once, smaller index first."""
-    pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    width = int(triangles.max(initial=0)) + 1
-    key = np.unique(pairs[:, 0] * width + pairs[:, 1])
-    return np.stack([key // width, key % width], axis=1)
+    key, width = flips.edge_keys(triangles)
+    return np.stack(np.divmod(np.unique(key), width), axis=1)
 
 
 def _snap(flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, sign: Ints) -> None:
@@ -308,14 +293,10 @@ def _covered(flat: Flat, domain: Domain, sign: Ints) -> tuple[Ints, Floats]:
 
 
 def _split(flat: Flat, a: int, b: int, point: Floats) -> Flat:
-    """Put a vertex on the edge between two, for the triangles on both its sides."""
+    """Put a vertex on the edge a-b, for the triangles on both its sides."""
     beside = _beside(flat.triangles, a, b)
     halves = [np.where(flat.triangles[beside] == end, len(flat.uv), flat.triangles[beside]) for end in (a, b)]
-    keep = np.ones(len(flat.triangles), dtype=bool)
-    keep[beside] = False
-    triangles = np.concatenate([flat.triangles[keep], *halves])
-    owner = np.concatenate([flat.owner[keep], flat.owner[beside], flat.owner[beside]])
-    return Flat(np.vstack([flat.uv, point]), triangles, owner)
+    return _with_point(flat, point, beside, np.concatenate(halves), np.tile(flat.owner[beside], 2))
 
 
 def _beside(triangles: Ints, a: int, b: int) -> Ints:
@@ -333,9 +314,7 @@ def _cut(flat: Flat, domain: Domain, scale: tuple[float, float], sign: Ints) -> 
     crossed = np.flatnonzero((low < 0) & (high > 0))
     uv, new, owner = _clip(flat, domain, scale, sign, crossed)
     return Flat(
-        uv,
-        np.concatenate([flat.triangles[keep], new]),
-        np.concatenate([flat.owner[keep], flat.owner[owner]]),
+        uv, np.concatenate([flat.triangles[keep], new]), flat.owner[np.concatenate([np.flatnonzero(keep), owner])]
     )
 
 

@@ -1,6 +1,6 @@
-"""Blending functions of single control points.
+"""B-spline blending functions of single control points, and checks of their knots.
 
-A blending function of degree p is given by its own p + 2 knots, 0 <= p <= 7. It is zero outside them.
+A blending function of degree p has p + 2 knots of its own, 0 <= p <= 7, and is zero outside them.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats, Ints
+from surface.base.checks import require
 
 MAX_DEGREE = 7
 
@@ -26,14 +27,7 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
     side : "right" for intervals closed on the left as in NURBS, "left" for the limit from the left,
         which differs only at knots of full multiplicity and for derivatives at repeated knots.
 
-    Returns
-    -------
-    (m,) float64
-
-    Raises
-    ------
-    ValueError
-        For bad knots, samples that are not finite, an unknown derivative or an unknown side.
+    Returns (m,) float64. ``ValueError`` for bad knots, samples that are not finite, an unknown derivative or side.
     """
     from . import blends  # compiled: loaded when first used
 
@@ -43,31 +37,17 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
     if side not in ("left", "right"):
         raise ValueError(f'side: must be "left" or "right", not {side!r}')
     samples = _row(np.atleast_1d(x), "x")
-    if not np.isfinite(samples).all():
-        raise ValueError(f"x[{int(np.argmin(np.isfinite(samples)))}]: must be finite")
+    require(np.isfinite(samples), samples, "x")
     out = np.zeros((len(samples), 3))
     blends.blend_samples(row, row.shape[1] - 2, samples, side == "left", out)
     return out[:, derivative].copy()
 
 
 def pad_knots(knots: object, name: str, n: int) -> tuple[Floats, Ints]:
-    """Knot vectors of n points as one array.
+    """Knot vectors of n points, n sequences of degree + 2 numbers each or an (n, degree + 2) array, as one array.
 
-    Parameters
-    ----------
-    knots : n sequences of degree + 2 numbers each, or an (n, degree + 2) array
-    name : argument name for error messages
-    n : how many are expected
-
-    Returns
-    -------
-    padded : (n, w) float64, rows repeat their last knot up to the largest length w
-    degrees : (n,) int64
-
-    Raises
-    ------
-    ValueError
-        Naming the argument and the index of the first bad knot vector.
+    Returns (n, w) float64, whose rows repeat their last knot up to the largest length w, and degrees (n,) int64.
+    ``ValueError`` with the argument's ``name`` and the index of the first bad knot vector.
     """
     if isinstance(knots, np.ndarray) and knots.ndim == 2 and knots.dtype != object:
         padded = np.array(knots, dtype=np.float64, order="C")
@@ -115,30 +95,22 @@ def _check_degrees(degrees: Ints, name: str) -> None:
 def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
     """Raise ``ValueError`` for knots that are not finite, that decrease, or are all equal."""
     _check_degrees(degrees, name)
-    finite = np.isfinite(padded).all(axis=1)
-    if not finite.all():
-        i = int(np.argmin(finite))
+    good = np.isfinite(padded).all(axis=1)
+    if not good.all():
+        i = int(np.argmin(good))
         raise ValueError(f"{name}[{i}]: knots must be finite, got {padded[i, : degrees[i] + 2].tolist()}")
     steps = np.diff(padded, axis=1)
-    rising = (steps >= 0).all(axis=1)
-    if not rising.all():
-        i = int(np.argmin(rising))
+    good = (steps >= 0).all(axis=1) & (padded[:, -1] > padded[:, 0])
+    if not good.all():
+        i = int(np.argmin(good))
+        if (steps[i] >= 0).all():
+            raise ValueError(f"{name}[{i}]: fewer than two distinct knots (all are {padded[i, 0]})")
         k = int(np.argmax(steps[i] < 0)) + 1
         raise ValueError(f"{name}[{i}]: knots decrease at knot {k} ({padded[i, k]} after {padded[i, k - 1]})")
-    spread = padded[:, -1] > padded[:, 0]
-    if not spread.all():
-        i = int(np.argmin(spread))
-        raise ValueError(f"{name}[{i}]: fewer than two distinct knots (all are {padded[i, 0]})")
 
 
 def check_padded(knots: ArrayLike, degrees: ArrayLike, axis: str, n: int) -> tuple[Floats, Ints]:
-    """Clean copies of knots ``(n, w)`` and degrees ``(n,)`` that belong to n points along ``axis``.
-
-    Raises
-    ------
-    ValueError
-        Naming the argument (``knots_u``, ``degrees_u``, ...) and the index.
-    """
+    """Clean copies of knots ``(n, w)`` and degrees ``(n,)`` of n points; ``ValueError`` as :func:`pad_knots`."""
     rows = np.array(knots, dtype=np.float64, order="C", ndmin=2)
     p = np.array(degrees, dtype=np.int64, ndmin=1)
     for name, given in (("knots", rows), ("degrees", p)):

@@ -1,4 +1,4 @@
-"""Regular grid over (u, v) that lists, per bin, the control points whose support reaches it."""
+"""Spatial index of control points: a regular grid over (u, v) that lists, per bin, those whose support reaches it."""
 
 from __future__ import annotations
 
@@ -28,19 +28,14 @@ class Bins:
 
 
 def build_bins(knots_u: Floats, knots_v: Floats) -> Bins:
-    """Bins about as large as the median support of a point, so that a list is not much longer than needed.
-
-    Parameters
-    ----------
-    knots_u, knots_v : (n, w) float64 padded knots
-    """
+    """Bins about as large as the median support of points with these padded knots, (n, w) float64 each."""
     from . import kernels  # compiled: loaded when first used
 
     axes = [_axis(knots_u), _axis(knots_v)]
-    shape = np.array([axes[0][3], axes[1][3]], dtype=np.int64)
+    shape = np.array([count for _, _, count in axes], dtype=np.int64)
     while int(shape.prod()) > max(64, 8 * len(knots_u)):
         shape = np.maximum(1, shape // 2)
-    scales = [n / (high - low) for (low, high, _, _), n in zip(axes, shape, strict=True)]
+    scales = [n / (high - low) for (low, high, _), n in zip(axes, shape, strict=True)]
     grid = np.array([axes[0][0], axes[1][0], *scales, axes[0][1], axes[1][1]])
     start = np.zeros(int(shape.prod()) + 1, dtype=np.int64)
     ids = np.zeros(0, dtype=np.int32)
@@ -51,10 +46,10 @@ def build_bins(knots_u: Floats, knots_v: Floats) -> Bins:
     return Bins(grid, shape, start, ids)
 
 
-def _axis(knots: Floats) -> tuple[float, float, float, int]:
-    """Low end, high end, median support and wanted number of bins along one direction."""
+def _axis(knots: Floats) -> tuple[float, float, int]:
+    """Low end, high end and wanted number of bins along one direction."""
     low, high = float(knots[:, 0].min()), float(knots[:, -1].max())
     if high <= low:
         high = low + 1.0
     support = max(float(np.median(knots[:, -1] - knots[:, 0])), (high - low) / 1024)
-    return low, high, support, int(np.clip(6.0 * (high - low) / support, 1, 1024))
+    return low, high, int(np.clip(6.0 * (high - low) / support, 1, 1024))

@@ -114,8 +114,8 @@ def blend2(knots, i, p, x, left, work):
     a, b, c = ratio(work[0], s0 - t0), ratio(work[1], s1 - t1), ratio(work[2], s2 - t2)
     low = ratio((x - t0) * a + (s1 - x) * b, s1 - t0)
     high = ratio((x - t1) * b + (s2 - x) * c, s2 - t1)
-    bend = ratio((p - 1) * (a - b), s1 - t0) - ratio((p - 1) * (b - c), s2 - t1)
-    return (x - t0) * low + (s2 - x) * high, p * (low - high), p * bend
+    second = ratio((p - 1) * (a - b), s1 - t0) - ratio((p - 1) * (b - c), s2 - t1)
+    return (x - t0) * low + (s2 - x) * high, p * (low - high), p * second
 
 
 @kernel

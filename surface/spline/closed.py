@@ -1,7 +1,7 @@
-"""Directions that are joined at their ends: a closed neck, a torus.
+"""Closed (periodic) directions of a surface, such as around a neck: shifted copies of control points, wrapped samples.
 
 A control point that reaches over one end acts at the other through copies of it, shifted by the period. Copies are
-kept block after block: copy b of point i is number ``b * n + i``, and block 0 are the points themselves.
+in blocks: copy b of point i has number ``b * n + i``, and block 0 are the points themselves.
 """
 
 from __future__ import annotations
@@ -57,6 +57,6 @@ def wrap(uv: Floats, closed: tuple[Interval, Interval]) -> Floats:
         if interval is not None:
             start, end = interval
             beyond = (out[:, k] < start) | (out[:, k] >= end)
-            turned = start + np.mod(out[beyond, k] - start, end - start)
-            out[beyond, k] = np.where(turned >= end, start, turned)
+            wrapped = start + np.mod(out[beyond, k] - start, end - start)
+            out[beyond, k] = np.where(wrapped >= end, start, wrapped)
     return out

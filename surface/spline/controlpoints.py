@@ -1,20 +1,23 @@
-"""A plain table of control points, and Eq. (1) evaluated over it: S = sum b_i w_i P_i / sum b_i w_i."""
+"""Control points with local knots, and Eq. (1) evaluated over them: S = sum b_i w_i P_i / sum b_i w_i."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats, Ints
-from surface.base.checks import check_length, check_points, check_sides, check_uv, check_weights
+from surface.base.checks import check_points, check_sides, check_uv, check_weights
 
 from .basis import check_padded, pad_knots
 from .bins import Bins, build_bins
 from .closed import Interval, check_closed, shifts_of, wrap
+
+T = TypeVar("T")
+Pair = tuple[T, T]  # in u and in v
 
 
 class ControlPoints:
@@ -29,11 +32,8 @@ class ControlPoints:
     closed_u, closed_v : (start, end) of a direction that is joined at its ends, as around a neck or a torus; the
         points that reach over one end act at the other
 
-    Raises
-    ------
-    ValueError
-        For wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
-        decreasing knots or fewer than two distinct knots; names the argument and the index.
+    ``ValueError`` for wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
+    decreasing knots or fewer than two distinct knots; names the argument and the index.
     """
 
     def __init__(
@@ -46,8 +46,8 @@ class ControlPoints:
         closed_u: Interval = None,
         closed_v: Interval = None,
     ) -> None:
-        xyz, w = check_points(points), check_weights(weights)
-        check_length(w, len(xyz))
+        xyz = check_points(points)
+        w = check_weights(weights, n=len(xyz))
         ku, pu = pad_knots(knots_u, "knots_u", len(xyz))
         kv, pv = pad_knots(knots_v, "knots_v", len(xyz))
         self._keep(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
@@ -65,29 +65,20 @@ class ControlPoints:
         closed_u: Interval = None,
         closed_v: Interval = None,
     ) -> Self:
-        """From the arrays that :attr:`padded` gives: the fast way in and out of a binary file.
+        """From the arrays of :attr:`padded`, (n, w) float64, and of :attr:`degrees`: the fast way from a binary file.
 
-        Parameters
-        ----------
-        points, weights : (n, 3), (n,) float64
-        knots_u, knots_v : (n, w) float64, row i holds ``degrees[i] + 2`` knots and repeats the last one
-        degrees_u, degrees_v : (n,) int
-
-        Raises
-        ------
-        ValueError
-            As the constructor.
+        Row i of the knots holds ``degrees[i] + 2`` and repeats the last one. Errors are those of the constructor.
         """
-        xyz, w = check_points(points), check_weights(weights)
+        xyz = check_points(points)
+        w = check_weights(weights, n=len(xyz))
         ku, pu = check_padded(knots_u, degrees_u, "u", len(xyz))
         kv, pv = check_padded(knots_v, degrees_v, "v", len(xyz))
-        check_length(w, len(xyz))
         table = cls.__new__(cls)
         table._keep(xyz, w, (ku, kv), (pu, pv), (closed_u, closed_v))
         return table
 
     def with_points(self, points: ArrayLike) -> Self:
-        """The same table with other positions ``(n, 3)``; knots and bins are shared."""
+        """The same control points at other positions ``(n, 3)``; knots and bins are shared."""
         xyz = check_points(points)
         if xyz.shape != (self._n, 3):
             raise ValueError(f"points: shape {xyz.shape}, expected {(self._n, 3)}")
@@ -98,12 +89,7 @@ class ControlPoints:
         return table
 
     def _keep(
-        self,
-        points: Floats,
-        weights: Floats,
-        knots: tuple[Floats, Floats],
-        degrees: tuple[Ints, Ints],
-        closed: tuple[Interval, Interval],
+        self, points: Floats, weights: Floats, knots: Pair[Floats], degrees: Pair[Ints], closed: Pair[Interval]
     ) -> None:
         """Keep arrays; of a closed direction also shifted copies of every point, block after block."""
         self._n = len(points)
@@ -111,8 +97,7 @@ class ControlPoints:
         self._shifts = shifts_of(knots, self._closed)
         blocks = len(self._shifts)
         self._points, self._weights = np.tile(points, (blocks, 1)), np.tile(weights, blocks)
-        moved = [np.concatenate([knots[k] + shift[k] for shift in self._shifts]) for k in range(2)]
-        self._ku, self._kv = moved
+        self._ku, self._kv = (np.concatenate([knots[k] + shift[k] for shift in self._shifts]) for k in range(2))
         self._pu, self._pv = (np.tile(p, blocks) for p in degrees)
         self._bins: Bins | None = None
         for array in (self._points, self._weights, self._ku, self._kv, self._pu, self._pv):
@@ -146,12 +131,12 @@ class ControlPoints:
     @property
     def knots_u(self) -> Sequence[Floats]:
         """n arrays of degree + 2 knots, read-only."""
-        return [row[: p + 2] for row, p in zip(self.padded[0], self.degrees[0], strict=True)]
+        return _without_padding(self.padded[0], self.degrees[0])
 
     @property
     def knots_v(self) -> Sequence[Floats]:
         """n arrays of degree + 2 knots, read-only."""
-        return [row[: p + 2] for row, p in zip(self.padded[1], self.degrees[1], strict=True)]
+        return _without_padding(self.padded[1], self.degrees[1])
 
     @property
     def degrees(self) -> tuple[Ints, Ints]:
@@ -176,10 +161,8 @@ class ControlPoints:
     @property
     def rect(self) -> tuple[float, float, float, float]:
         """u0, u1, v0, v1 of the smallest rectangle that holds every subdomain, or of the closed interval."""
-        ends = []
-        for knots, closed in zip(self.padded, self._closed, strict=True):
-            ends.append(closed or (float(knots[:, 0].min()), float(knots[:, -1].max())))
-        return (*ends[0], *ends[1])
+        ends = [(float(knots[:, 0].min()), float(knots[:, -1].max())) for knots in self.padded]
+        return (*(self._closed[0] or ends[0]), *(self._closed[1] or ends[1]))
 
     @property
     def bins(self) -> Bins:
@@ -197,29 +180,28 @@ class ControlPoints:
         return self.bins.grid, self.bins.shape, self.bins.start, self.bins.ids
 
     def sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
-        """Checked samples, the side really used (-1: uncovered) and S; as :meth:`sample_derivatives`."""
-        from . import kernels  # compiled: loaded when first used
-
-        samples = wrap(check_uv(uv), self._closed)
-        sides = check_sides(samples, side)
-        out = np.zeros((len(samples), 3))
-        kernels.sample(*self.arrays(), *self.bin_arrays(), samples, sides, out)
-        return samples, sides, out
+        """Checked samples, the limit that was taken (-1: uncovered) and S (m, 3); as :meth:`sample_derivatives`."""
+        samples, sides, out = self._sample(uv, side, 1)
+        return samples, sides, out[:, 0]
 
     def sample_derivatives(
         self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False
     ) -> tuple[Ints, Floats]:
         """Derivatives, and the limits that were taken; places outside :attr:`rect` are uncovered, not refused.
 
-        Returns
-        -------
-        side : (m,) int64, the limit each evaluation really takes, -1 where nothing covers
-        out : (m, 3, 3) float64 with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them
+        Returns the limit (m,) int64 that each evaluation really takes, -1 where nothing covers, and (m, 3, 3) float64
+        with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them.
         """
-        from . import kernels
+        return self._sample(uv, side, 6 if second else 3)[1:]
+
+    def _sample(self, uv: ArrayLike, side: ArrayLike | None, kinds: int) -> tuple[Floats, Ints, Floats]:
+        from .kernels import sample  # compiled: loaded when first used
 
         samples = wrap(check_uv(uv), self._closed)
-        sides = check_sides(samples, side)
-        out = np.zeros((len(samples), 6 if second else 3, 3))
-        kernels.sample_derivatives(*self.arrays(), *self.bin_arrays(), samples, sides, out)
-        return sides, out
+        sides, out = check_sides(samples, side), np.zeros((len(samples), kinds, 3))
+        sample(*self.arrays(), *self.bin_arrays(), samples, sides, out)
+        return samples, sides, out
+
+
+def _without_padding(knots: Floats, degrees: Ints) -> list[Floats]:
+    return [row[: p + 2] for row, p in zip(knots, degrees, strict=True)]

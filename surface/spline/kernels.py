@@ -1,11 +1,10 @@
-"""Compiled kernels that evaluate a surface at samples, and list its control points by bin.
+"""Compiled kernels that evaluate a surface at samples, and find control points by their subdomains.
 
-Neighbouring samples mostly stand in order, and share control points and coordinates. So samples are taken in runs,
+Consecutive samples are mostly close together and share control points and coordinates. So they are evaluated in runs,
 and blending functions are computed once for each distinct coordinate of a run.
 
-Layout: ``knots`` is as in :mod:`surface.spline.blends`. ``side`` is a bit mask per sample: 1 takes the limit from
-the left in u, 2 in v. Bins (``start``, ``bins``) list, per cell of a regular grid over (u, v), the points that reach
-it.
+``knots`` is as in :mod:`surface.spline.blends`. ``side`` is a bit mask per sample: 1 takes the limit from the left in
+u, 2 in v. ``grid``, ``shape``, ``start`` and ``ids`` are those of :class:`surface.spline.bins.Bins`.
 """
 
 # mypy: allow-untyped-defs
@@ -31,15 +30,21 @@ def bin_of(u, v, grid, shape):
     return a * shape[1] + b
 
 
+@inlined
+def bin_along(x, start, scale, count):
+    """Bin of a coordinate along one direction; the first or last one outside the grid."""
+    return max(0, min(int((x - start) * scale), count - 1))
+
+
 @kernel
 def fill_bins(knots_u, knots_v, grid, shape, start, ids, count_only):
     """Count, or write, the points whose closed support reaches each bin."""
     last_u, last_v = knots_u.shape[1] - 1, knots_v.shape[1] - 1
     for i in range(knots_u.shape[0]):
-        a0 = min(int((knots_u[i, 0] - grid[0]) * grid[2]), shape[0] - 1)
-        a1 = min(int((knots_u[i, last_u] - grid[0]) * grid[2]), shape[0] - 1)
-        b0 = min(int((knots_v[i, 0] - grid[1]) * grid[3]), shape[1] - 1)
-        b1 = min(int((knots_v[i, last_v] - grid[1]) * grid[3]), shape[1] - 1)
+        a0 = bin_along(knots_u[i, 0], grid[0], grid[2], shape[0])
+        a1 = bin_along(knots_u[i, last_u], grid[0], grid[2], shape[0])
+        b0 = bin_along(knots_v[i, 0], grid[1], grid[3], shape[1])
+        b1 = bin_along(knots_v[i, last_v], grid[1], grid[3], shape[1])
         for a in range(a0, a1 + 1):
             for b in range(b0, b1 + 1):
                 cell = a * shape[1] + b
@@ -48,51 +53,60 @@ def fill_bins(knots_u, knots_v, grid, shape, start, ids, count_only):
                 start[cell] += 1
 
 
-@inlined
-def bin_range(low, high, start, scale, count):
-    """First and last bin of an interval along one direction."""
-    first = max(0, min(int((low - start) * scale), count - 1))
-    return first, max(0, min(int((high - start) * scale), count - 1))
-
-
 @kernel
-def gather(knots_u, knots_v, grid, shape, start, bins, box, out):
-    """Points whose support meets ``box``, rising, into ``out``; -1 if it has no room or the box has too many bins."""
+def points_in(box, knots_u, knots_v, grid, shape, start, ids, out):
+    """Points whose closed support meets ``box``; writes them to ``out`` as far as it has room, returns the number."""
     last_u, last_v = knots_u.shape[1] - 1, knots_v.shape[1] - 1
-    a0, a1 = bin_range(box[0], box[1], grid[0], grid[2], shape[0])
-    b0, b1 = bin_range(box[2], box[3], grid[1], grid[3], shape[1])
-    if (a1 - a0 + 1) * (b1 - b0 + 1) > RUN:
-        return -1
+    a0, a1 = bin_along(box[0], grid[0], grid[2], shape[0]), bin_along(box[1], grid[0], grid[2], shape[0])
+    b0, b1 = bin_along(box[2], grid[1], grid[3], shape[1]), bin_along(box[3], grid[1], grid[3], shape[1])
     count = 0
     for a in range(a0, a1 + 1):
         for b in range(b0, b1 + 1):
             for q in range(start[a * shape[1] + b], start[a * shape[1] + b + 1]):
-                i = bins[q]
+                i = ids[q]
                 if knots_u[i, 0] > box[1] or knots_u[i, last_u] < box[0]:
                     continue
                 if knots_v[i, 0] > box[3] or knots_v[i, last_v] < box[2]:
                     continue
-                # A point stands in several bins; it counts in the first one that the box shares with it.
-                if a != max(a0, bin_range(knots_u[i, 0], 0.0, grid[0], grid[2], shape[0])[0]):
+                # A point is in several bins; it counts in the first one that the box shares with it.
+                if a != max(a0, bin_along(knots_u[i, 0], grid[0], grid[2], shape[0])):
                     continue
-                if b != max(b0, bin_range(knots_v[i, 0], 0.0, grid[1], grid[3], shape[1])[0]):
+                if b != max(b0, bin_along(knots_v[i, 0], grid[1], grid[3], shape[1])):
                     continue
-                if count == out.shape[0]:
-                    return -1
-                out[count] = i
+                if count < out.shape[0]:
+                    out[count] = i
                 count += 1
-    out[:count].sort()
     return count
 
 
 @kernel
-def frame(uv, grid, box):
-    """The rectangle around samples; False if one of them lies outside the grid."""
-    box[0], box[1], box[2], box[3] = uv[0, 0], uv[0, 0], uv[0, 1], uv[0, 1]
-    for s in range(1, uv.shape[0]):
+def bounding_box(uv, low, high, box):
+    """The rectangle (u0, u1, v0, v1) around ``uv[low:high]``, at least one sample."""
+    box[0], box[1], box[2], box[3] = uv[low, 0], uv[low, 0], uv[low, 1], uv[low, 1]
+    for s in range(low + 1, high):
         box[0], box[1] = min(box[0], uv[s, 0]), max(box[1], uv[s, 0])
         box[2], box[3] = min(box[2], uv[s, 1]), max(box[3], uv[s, 1])
-    return grid[0] <= box[0] and box[1] <= grid[4] and grid[1] <= box[2] and box[3] <= grid[5]
+
+
+@kernel
+def points_near(uv, knots_u, knots_v, grid, shape, start, bins, out):
+    """Points whose support meets the rectangle around samples, rising, into ``out``.
+
+    Returns their number; -1 if a sample is outside the grid, or if more bins or points than ``RUN`` meet it.
+    """
+    box = np.zeros(4)
+    bounding_box(uv, 0, uv.shape[0], box)
+    if not (grid[0] <= box[0] and box[1] <= grid[4] and grid[1] <= box[2] and box[3] <= grid[5]):
+        return -1
+    wide = bin_along(box[1], grid[0], grid[2], shape[0]) - bin_along(box[0], grid[0], grid[2], shape[0]) + 1
+    high = bin_along(box[3], grid[1], grid[3], shape[1]) - bin_along(box[2], grid[1], grid[3], shape[1]) + 1
+    if wide * high > RUN:
+        return -1
+    count = points_in(box, knots_u, knots_v, grid, shape, start, bins, out)
+    if count > out.shape[0]:
+        return -1
+    out[:count].sort()
+    return count
 
 
 @kernel
@@ -166,12 +180,8 @@ def sum_one(knots_u, knots_v, pu, pv, points, weights, ids, u, v, side, slopes, 
 def sum_run(knots_u, knots_v, pu, pv, points, weights, ids, uv, side, slopes, work, acc):
     """Sums of a run of samples over the listed points into ``acc (m, 12)``."""
     m = uv.shape[0]
-    values_u, values_v, index_u, index_v = (
-        np.zeros((m, 2)),
-        np.zeros((m, 2)),
-        np.zeros(m, np.int64),
-        np.zeros(m, np.int64),
-    )
+    values_u, values_v = np.zeros((m, 2)), np.zeros((m, 2))
+    index_u, index_v = np.zeros(m, np.int64), np.zeros(m, np.int64)
     many_u, many_v = distinct(uv, side, 0, values_u, index_u), distinct(uv, side, 1, values_v, index_v)
     along_u, along_v = np.zeros((m, 2)), np.zeros((m, 2))
     acc[:m] = 0.0
@@ -182,12 +192,8 @@ def sum_run(knots_u, knots_v, pu, pv, points, weights, ids, uv, side, slopes, wo
         if not along(knots_v, i, pv[i], values_v, many_v, slopes, work, along_v):
             continue
         for s in range(m):
-            a0, a1, b0, b1 = (
-                along_u[index_u[s], 0],
-                along_u[index_u[s], 1],
-                along_v[index_v[s], 0],
-                along_v[index_v[s], 1],
-            )
+            a0, a1 = along_u[index_u[s], 0], along_u[index_u[s], 1]
+            b0, b1 = along_v[index_v[s], 0], along_v[index_v[s], 1]
             if slopes and (a0 != 0.0 or a1 != 0.0) and (b0 != 0.0 or b1 != 0.0):
                 add_slopes(a0, a1, b0, b1, weights[i], points[i], acc[s])
             elif not slopes and a0 != 0.0 and b0 != 0.0:
@@ -196,12 +202,12 @@ def sum_run(knots_u, knots_v, pu, pv, points, weights, ids, uv, side, slopes, wo
 
 @kernel
 def sum_samples(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, slopes, work, acc):
-    """Sums of up to ``RUN`` samples, together if they stand close; uncovered ones again with other limits.
+    """Sums of up to ``RUN`` samples, together if they are close; uncovered ones again with other limits.
 
     ``side`` gets the limit that was taken, -1 where nothing covers.
     """
-    box, ids = np.zeros(4), np.zeros(RUN, dtype=np.int32)
-    count = gather(knots_u, knots_v, grid, shape, start, bins, box, ids) if frame(uv, grid, box) else -1
+    ids = np.zeros(RUN, dtype=np.int32)
+    count = points_near(uv, knots_u, knots_v, grid, shape, start, bins, ids)
     if count >= 0:
         sum_run(knots_u, knots_v, pu, pv, points, weights, ids[:count], uv, side, slopes, work, acc)
     for s in range(uv.shape[0]):
@@ -218,20 +224,6 @@ def sum_samples(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, b
             if total[3] > TINY:
                 side[s] = limit
                 break
-
-
-@kernel
-def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
-    """Write S into ``out`` (NaN where nothing covers) and the side used into ``side`` (-1: uncovered)."""
-    work, acc = np.zeros(12), np.zeros((RUN, 12))
-    for first in range(0, uv.shape[0], RUN):
-        part, sides = uv[first : first + RUN], side[first : first + RUN]
-        sum_samples(
-            knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, part, sides, False, work, acc
-        )  # fmt: skip
-        for s in range(part.shape[0]):
-            for c in range(3):
-                out[first + s, c] = acc[s, c] / acc[s, 3] if sides[s] >= 0 else np.nan
 
 
 @kernel
@@ -253,32 +245,37 @@ def sum_second_derivatives(knots_u, knots_v, pu, pv, points, weights, ids, u, v,
 
 @kernel
 def quotient(acc, out):
-    """S, S_u and S_v into ``out[:3]`` (quotient rule, NURBS Book 4.5)."""
+    """S into ``out[0]``, and S_u and S_v into ``out[1:3]`` if there is room (quotient rule, NURBS Book 4.5)."""
     w, wu, wv = acc[3], acc[7], acc[11]
     for c in range(3):
         p = acc[c] / w
-        out[0, c], out[1, c], out[2, c] = p, (acc[4 + c] - wu * p) / w, (acc[8 + c] - wv * p) / w
+        out[0, c] = p
+        if out.shape[0] > 1:
+            out[1, c], out[2, c] = (acc[4 + c] - wu * p) / w, (acc[8 + c] - wv * p) / w
 
 
 @kernel
-def second_quotient(acc, bends, out):
+def second_quotient(acc, second, out):
     """S_uu, S_uv and S_vv into ``out[3:]`` from ``out[:3]`` and the sums of :func:`sum_second_derivatives`."""
-    w, wu, wv, wuu, wuv, wvv = acc[3], acc[7], acc[11], bends[3], bends[7], bends[11]
+    w, wu, wv, wuu, wuv, wvv = acc[3], acc[7], acc[11], second[3], second[7], second[11]
     for c in range(3):
         p, du, dv = out[0, c], out[1, c], out[2, c]
-        out[3, c] = (bends[c] - 2.0 * wu * du - wuu * p) / w
-        out[4, c] = (bends[4 + c] - wu * dv - wv * du - wuv * p) / w
-        out[5, c] = (bends[8 + c] - 2.0 * wv * dv - wvv * p) / w
+        out[3, c] = (second[c] - 2.0 * wu * du - wuu * p) / w
+        out[4, c] = (second[4 + c] - wu * dv - wv * du - wuv * p) / w
+        out[5, c] = (second[8 + c] - 2.0 * wv * dv - wvv * p) / w
 
 
 @kernel
-def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
-    """As :func:`sample`, with derivatives: ``out (m, 3, 3)`` for S, S_u, S_v, ``(m, 6, 3)`` for second ones too."""
-    work, acc, bends = np.zeros(12), np.zeros((RUN, 12)), np.zeros(12)
+def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, uv, side, out):
+    """Evaluate samples into ``out``, NaN where nothing covers; ``side`` gets the limit that was taken (-1: uncovered).
+
+    ``out (m, 1, 3)`` is for S, ``(m, 3, 3)`` for S, S_u and S_v, ``(m, 6, 3)`` for S_uu, S_uv and S_vv as well.
+    """
+    work, acc, second, slopes = np.zeros(12), np.zeros((RUN, 12)), np.zeros(12), out.shape[1] > 1
     for first in range(0, uv.shape[0], RUN):
         part, sides = uv[first : first + RUN], side[first : first + RUN]
         sum_samples(
-            knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, part, sides, True, work, acc
+            knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, part, sides, slopes, work, acc
         )  # fmt: skip
         for s in range(part.shape[0]):
             if sides[s] < 0:
@@ -289,9 +286,9 @@ def sample_derivatives(knots_u, knots_v, pu, pv, points, weights, grid, shape, s
                 cell = bin_of(part[s, 0], part[s, 1], grid, shape)
                 near = bins[start[cell] : start[cell + 1]]
                 sum_second_derivatives(
-                    knots_u, knots_v, pu, pv, points, weights, near, part[s, 0], part[s, 1], sides[s], work, bends
+                    knots_u, knots_v, pu, pv, points, weights, near, part[s, 0], part[s, 1], sides[s], work, second
                 )  # fmt: skip
-                second_quotient(acc[s], bends, out[first + s])
+                second_quotient(acc[s], second, out[first + s])
 
 
 @kernel

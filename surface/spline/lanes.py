@@ -1,4 +1,4 @@
-"""Eight float32 numbers as one value inside compiled kernels.
+"""SIMD vectors of eight float32 numbers inside compiled kernels.
 
 Sums over control points stay in registers this way, whatever the loop around them looks like. LLVM turns the
 operations into AVX, SSE or NEON instructions.
@@ -6,6 +6,8 @@ operations into AVX, SSE or NEON instructions.
 
 # mypy: allow-untyped-defs, allow-untyped-calls, allow-incomplete-defs, disable-error-code="import-untyped"
 from __future__ import annotations
+
+from inspect import Parameter, Signature
 
 from llvmlite import ir
 from numba.core import types
@@ -48,88 +50,78 @@ def _splat(builder, number):
     return builder.shuffle_vector(single, ir.Constant(VECTOR, ir.Undefined), mask)
 
 
-@intrinsic
-def zero(typingctx):
+def _operation(result, *arguments):
+    """Make an intrinsic of a function that builds its code; arguments that are None may be any array."""
+
+    def wrap(build):
+        def typed(typingctx, *given):
+            kinds = [kind if wanted is None else wanted for wanted, kind in zip(arguments, given, strict=True)]
+            signature = result(*kinds)
+            return signature, lambda context, builder, _, args: build(context, builder, signature.args, args)
+
+        names = "typingctx", *(f"argument{k}" for k in range(len(arguments)))
+        typed.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in names])  # type: ignore[attr-defined]
+        typed.__name__, typed.__doc__ = build.__name__, build.__doc__
+        return intrinsic(typed)
+
+    return wrap
+
+
+@_operation(lanes)
+def zero(context, builder, kinds, args):
     """All lanes 0."""
-
-    def generate(context, builder, signature, args):
-        return ir.Constant(VECTOR, [0.0] * LANES)
-
-    return lanes(), generate
+    return ir.Constant(VECTOR, [0.0] * LANES)
 
 
-@intrinsic
-def load(typingctx, array, index):
+@_operation(lanes, None, types.intp)
+def load(context, builder, kinds, args):
     """``array[index : index + 8]``."""
-
-    def generate(context, builder, signature, args):
-        return builder.load(_pointer(context, builder, signature.args[0], *args), align=4)
-
-    return lanes(array, types.intp), generate
+    return builder.load(_pointer(context, builder, kinds[0], *args), align=4)
 
 
-@intrinsic
-def prefetch(typingctx, array, index):
+@_operation(types.void, None, types.intp)
+def prefetch(context, builder, kinds, args):
     """Ask for the cache line of ``array[index]``, which may lie beyond the array's end."""
-
-    def generate(context, builder, signature, args):
-        data = context.make_array(signature.args[0])(context, builder, args[0]).data
-        pointer = builder.bitcast(builder.gep(data, [args[1]]), ir.IntType(8).as_pointer())
-        kind = ir.FunctionType(ir.VoidType(), [pointer.type, INDEX, INDEX, INDEX])
-        flags = [ir.Constant(INDEX, number) for number in (0, 3, 1)]  # read, keep in all caches, data
-        builder.call(builder.module.declare_intrinsic("llvm.prefetch", (pointer.type,), kind), [pointer, *flags])
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp), generate
+    data = context.make_array(kinds[0])(context, builder, args[0]).data
+    pointer = builder.bitcast(builder.gep(data, [args[1]]), ir.IntType(8).as_pointer())
+    kind = ir.FunctionType(ir.VoidType(), [pointer.type, INDEX, INDEX, INDEX])
+    flags = [ir.Constant(INDEX, number) for number in (0, 3, 1)]  # read, keep in all caches, data
+    builder.call(builder.module.declare_intrinsic("llvm.prefetch", (pointer.type,), kind), [pointer, *flags])
+    return context.get_dummy_value()
 
 
-@intrinsic
-def store(typingctx, array, index, value):
+@_operation(types.void, None, types.intp, lanes)
+def store(context, builder, kinds, args):
     """``array[index : index + 8] = value``."""
-
-    def generate(context, builder, signature, args):
-        builder.store(args[2], _pointer(context, builder, signature.args[0], *args[:2]), align=4)
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp, lanes), generate
+    builder.store(args[2], _pointer(context, builder, kinds[0], *args[:2]), align=4)
+    return context.get_dummy_value()
 
 
-@intrinsic
-def store3(typingctx, array, index, x, y, z):
+@_operation(types.void, None, types.intp, lanes, lanes, lanes)
+def store3(context, builder, kinds, args):
     """``array[index : index + 24] = x0 y0 z0 x1 y1 z1 ...``."""
-
-    def generate(context, builder, signature, args):
-        wide = ir.Constant(ir.VectorType(INDEX, 2 * LANES), list(range(2 * LANES)))
-        pair = builder.shuffle_vector(args[2], args[3], wide)
-        third = builder.shuffle_vector(args[4], args[4], wide)
-        order = [2 * LANES + k // 3 if k % 3 == 2 else k % 3 * LANES + k // 3 for k in range(3 * LANES)]
-        mixed = builder.shuffle_vector(pair, third, ir.Constant(ir.VectorType(INDEX, 3 * LANES), order))
-        pointer = _pointer(context, builder, signature.args[0], *args[:2])
-        target = builder.bitcast(pointer, ir.VectorType(ir.FloatType(), 3 * LANES).as_pointer())
-        builder.store(mixed, target, align=4)
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp, lanes, lanes, lanes), generate
+    wide = ir.Constant(ir.VectorType(INDEX, 2 * LANES), list(range(2 * LANES)))
+    pair = builder.shuffle_vector(args[2], args[3], wide)
+    third = builder.shuffle_vector(args[4], args[4], wide)
+    order = [2 * LANES + k // 3 if k % 3 == 2 else k % 3 * LANES + k // 3 for k in range(3 * LANES)]
+    mixed = builder.shuffle_vector(pair, third, ir.Constant(ir.VectorType(INDEX, 3 * LANES), order))
+    pointer = _pointer(context, builder, kinds[0], *args[:2])
+    target = builder.bitcast(pointer, ir.VectorType(ir.FloatType(), 3 * LANES).as_pointer())
+    builder.store(mixed, target, align=4)
+    return context.get_dummy_value()
 
 
-@intrinsic
-def fma(typingctx, a, number, c):
+@_operation(lanes, lanes, types.float32, lanes)
+def fma(context, builder, kinds, args):
     """``a * number + c`` for a vector a, one number and a vector c."""
-
-    def generate(context, builder, signature, args):
-        product = builder.fmul(args[0], _splat(builder, args[1]), flags=FLAGS)
-        return builder.fadd(product, args[2], flags=FLAGS)
-
-    return lanes(lanes, types.float32, lanes), generate
+    product = builder.fmul(args[0], _splat(builder, args[1]), flags=FLAGS)
+    return builder.fadd(product, args[2], flags=FLAGS)
 
 
-def _binary(operation):
-    @intrinsic
-    def combine(typingctx, a, b):
-        def generate(context, builder, signature, args):
-            return getattr(builder, operation)(args[0], args[1], flags=FLAGS)
-
-        return lanes(lanes, lanes), generate
+def _binary(instruction):
+    @_operation(lanes, lanes, lanes)
+    def combine(context, builder, kinds, args):
+        return getattr(builder, instruction)(args[0], args[1], flags=FLAGS)
 
     return combine
 
@@ -137,22 +129,14 @@ def _binary(operation):
 add, sub, mul, div = _binary("fadd"), _binary("fsub"), _binary("fmul"), _binary("fdiv")
 
 
-@intrinsic
-def root(typingctx, a):
+@_operation(lanes, lanes)
+def root(context, builder, kinds, args):
     """Square root of every lane."""
-
-    def generate(context, builder, signature, args):
-        kind = ir.FunctionType(VECTOR, [VECTOR])
-        return builder.call(builder.module.declare_intrinsic(f"llvm.sqrt.v{LANES}f32", fnty=kind), args)
-
-    return lanes(lanes), generate
+    kind = ir.FunctionType(VECTOR, [VECTOR])
+    return builder.call(builder.module.declare_intrinsic(f"llvm.sqrt.v{LANES}f32", fnty=kind), args)
 
 
-@intrinsic
-def splat(typingctx, number):
+@_operation(lanes, types.float32)
+def splat(context, builder, kinds, args):
     """One number in every lane."""
-
-    def generate(context, builder, signature, args):
-        return _splat(builder, args[0])
-
-    return lanes(types.float32), generate
+    return _splat(builder, args[0])

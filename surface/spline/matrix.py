@@ -1,4 +1,4 @@
-"""The rational weights of a surface as a sparse matrix."""
+"""The rational weights of a surface at samples as sparse matrices (scipy CSR)."""
 
 from __future__ import annotations
 
@@ -20,18 +20,11 @@ if TYPE_CHECKING:
 CHUNK = 8192  # samples per pass: bounds the scratch memory
 
 
-def basis_matrix(
-    surface: ControlPoints, uv: ArrayLike, derivative: tuple[int, int], side: ArrayLike | None
-) -> csr_matrix:
-    """See :meth:`surface.DCPSurface.basis_matrix`."""
-    return basis_matrices(surface, uv, [derivative], side)[0]
-
-
 def basis_matrices(
     surface: ControlPoints, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None = None
 ) -> list[csr_matrix]:
-    """Several of :func:`basis_matrix` at the same samples, for hardly more than the time of one."""
-    from scipy.sparse import csr_matrix  # takes a moment to import
+    """Several matrices of :meth:`surface.DCPSurface.basis_matrix`, for hardly more than the time of one."""
+    from scipy.sparse import csr_matrix  # slow to import
 
     from .kernels import TINY  # compiled: loaded when first used
 

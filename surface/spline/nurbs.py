@@ -1,4 +1,4 @@
-"""NURBS surfaces as control points with local knots."""
+"""Conversion of NURBS surfaces to control points with local knots."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats
-from surface.base.checks import numbers
+from surface.base.checks import numbers, require
 
 from .basis import MAX_DEGREE
 
@@ -28,40 +28,28 @@ def nurbs_arrays(
     control_points : (nu, nv, 3) float64
     weights : (nu, nv) float64, positive; ones if left out
 
-    Returns
-    -------
-    points (nu * nv, 3), weights (nu * nv,), knots_u (nu * nv, degree_u + 2), knots_v (nu * nv, degree_v + 2)
-
-    Raises
-    ------
-    ValueError
-        For shapes that do not fit together, a degree that is no whole number from 0 to 7, numbers that are not
-        finite, weights that are not positive, knots that decrease; names the argument and the index.
+    Returns points (nu * nv, 3), weights (nu * nv,), knots_u (nu * nv, degree_u + 2), knots_v (nu * nv, degree_v + 2).
+    ``ValueError`` for shapes that do not fit together, a degree that is no whole number from 0 to 7, numbers that are
+    not finite, weights that are not positive, knots that decrease; names the argument and the index.
     """
     net = numbers(control_points, "control_points")
     if net.ndim != 3 or net.shape[2] != 3:
         raise ValueError(f"control_points: shape {net.shape}, expected (nu, nv, 3)")
     if not net.size:
         raise ValueError(f"control_points: empty, shape {net.shape}")
-    _check_grid(np.asarray(np.isfinite(net).all(axis=2)), net, "control_points", "finite")
+    require(np.isfinite(net).all(axis=2), net, "control_points")
     nu, nv = net.shape[:2]
     w = np.ones((nu, nv)) if weights is None else numbers(weights, "weights")
     if w.shape != (nu, nv):
         raise ValueError(f"weights: shape {w.shape}, expected {(nu, nv)}")
-    _check_grid(np.asarray(np.isfinite(w) & (w > 0)), w, "weights", "positive and finite")
-    local_u = _windows(knots_u, "u", nu, degree_u)
-    local_v = _windows(knots_v, "v", nv, degree_v)
+    require(np.isfinite(w) & (w > 0), w, "weights", "positive and finite")
+    local_u = _local_knots(knots_u, "u", nu, degree_u)
+    local_v = _local_knots(knots_v, "v", nv, degree_v)
     return net.reshape(-1, 3), w.ravel(), np.repeat(local_u, nv, axis=0), np.tile(local_v, (nu, 1))
 
 
-def _check_grid(good: np.ndarray, values: Floats, name: str, wanted: str) -> None:
-    if not good.all():
-        i, j = np.argwhere(~good)[0]
-        raise ValueError(f"{name}[{i}, {j}]: must be {wanted}, got {values[i, j].tolist()}")
-
-
-def _windows(knots: ArrayLike, axis: str, count: int, degree: int) -> Floats:
-    """(count, degree + 2): the knots each blending function along one direction stands on."""
+def _local_knots(knots: ArrayLike, axis: str, count: int, degree: int) -> Floats:
+    """(count, degree + 2): the knots of each blending function along one direction."""
     if degree != int(degree) or not 0 <= degree <= MAX_DEGREE:
         raise ValueError(f"degree_{axis}: must be a whole number from 0 to {MAX_DEGREE}, not {degree}")
     row = numbers(knots, f"knots_{axis}")

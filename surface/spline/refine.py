@@ -1,20 +1,20 @@
-"""Knot insertion: more control points for the same surface, where detail is wanted and nowhere else.
+"""Knot insertion and local refinement: more control points for exactly the same surface.
 
-A knot put into a blending function splits it exactly in two (Boehm 1980): over knots t_0 .. t_p+1 with x between,
-N = a N' + b N'', where N' stands on the knots but the last, N'' on those but the first (both with x), and
+A knot x inserted into a blending function splits it exactly in two (Boehm 1980): for knots t_0 .. t_p+1 around x,
+N = a N' + b N'', where N' has all knots but the last, N'' all but the first (both with x), and
 a = min(1, (x - t_0) / (t_p - t_0)), b = min(1, (t_p+1 - x) / (t_p+1 - t_1)). A control point so becomes two at the
-same place with weights a w and b w; points with equal knots are then joined at their weighted mean.
+same place with weights a w and b w; points with equal knots are then merged at their weighted mean.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.base.checks import check_ids
 
 from .controlpoints import ControlPoints
@@ -24,14 +24,10 @@ Table = TypeVar("Table", bound=ControlPoints)
 
 @dataclass(frozen=True)
 class Refinement(Generic[Table]):
-    """A refined surface, and where its points come from.
+    """A refined surface of the same class, and where its points come from: those that were not split come first.
 
-    Attributes
-    ----------
-    surface : the same surface, of the same class, with n' >= n control points; those that were not split come first,
-        in order
-    point, parent : (k,) int64, new point and old point of every share
-    share : (k,) float64, the shares of a new point sum to 1
+    ``point`` and ``parent`` (k,) int64 are new point and old point of every ``share`` (k,) float64; the shares of a new
+    point sum to 1.
     """
 
     surface: Table
@@ -47,25 +43,20 @@ class Refinement(Generic[Table]):
         return new
 
 
-@dataclass
-class _Pieces:
-    """Control points while they are split."""
+class _Pieces(NamedTuple):
+    """Control points while they are split: rows of all arrays belong together."""
 
     parent: Ints
     weight: Floats
-    knots: list[Floats]
-    degree: list[Ints]
-    split: np.ndarray
+    knots_u: Floats
+    knots_v: Floats
+    degree_u: Ints
+    degree_v: Ints
+    split: Bools
 
     def take(self, index: np.ndarray) -> _Pieces:
         """The pieces at ``index``."""
-        return _Pieces(
-            self.parent[index],
-            self.weight[index],
-            [k[index] for k in self.knots],
-            [p[index] for p in self.degree],
-            self.split[index],
-        )
+        return _Pieces(*(array[index] for array in self))
 
 
 def insert_knot(surface: Table, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement[Table]:
@@ -79,11 +70,9 @@ def insert_knot(surface: Table, axis: str, value: float, ids: ArrayLike | None =
     if surface.closed[k] is None and not low <= value <= high:
         raise ValueError(f"value: {axis} = {value} is outside the domain, {low} to {high}")
     pieces = _pieces(surface)
-    chosen = np.ones(surface.n, dtype=bool)
+    chosen = np.full(surface.n, ids is None)
     if ids is not None:
-        which = check_ids(ids, surface.n)
-        chosen[:] = False
-        chosen[which] = True
+        chosen[check_ids(ids, surface.n)] = True
     for shift in np.unique(surface.shifts[:, k]):
         pieces = _split(pieces, k, np.full(len(pieces.parent), value - shift), chosen[pieces.parent])
     return _join(surface, pieces)
@@ -109,9 +98,8 @@ def refine(surface: Table, region: tuple[float, float, float, float]) -> Refinem
 
 
 def _pieces(surface: ControlPoints) -> _Pieces:
-    knots = [k.copy() for k in surface.padded]
-    degrees = [p.copy() for p in surface.degrees]
-    return _Pieces(np.arange(surface.n), surface.weights.copy(), knots, degrees, np.zeros(surface.n, dtype=bool))
+    n = surface.n
+    return _Pieces(np.arange(n), surface.weights, *surface.padded, *surface.degrees, np.zeros(n, dtype=bool))
 
 
 def _middles(knots: Floats, low: float, high: float) -> Floats:
@@ -122,27 +110,21 @@ def _middles(knots: Floats, low: float, high: float) -> Floats:
 
 def _split(pieces: _Pieces, axis: int, value: Floats, chosen: np.ndarray) -> _Pieces:
     """Split the chosen pieces whose support has ``value`` inside."""
-    knots = pieces.knots[axis]
-    at = np.flatnonzero(chosen & (knots[:, 0] < value) & (value < knots[:, -1]))
-    if not len(at):
+    knots, degree = ((pieces.knots_u, pieces.degree_u), (pieces.knots_v, pieces.degree_v))[axis]
+    inside = chosen & (knots[:, 0] < value) & (value < knots[:, -1])
+    if not inside.any():
         return pieces
-    low, high = pieces.take(at), pieces.take(at)
-    rows, x, p = knots[at], value[at], pieces.degree[axis][at]
+    old, rows, x, p = pieces.take(inside), knots[inside], value[inside], degree[inside]
     last = np.take_along_axis(rows, p[:, None] + 1, 1)[:, 0]
     before_last = np.take_along_axis(rows, p[:, None], 1)[:, 0]
-    low.weight *= _part(x - rows[:, 0], before_last - rows[:, 0])
-    high.weight *= _part(last - x, last - rows[:, 1])
-    low.knots[axis], high.knots[axis] = _halves(rows, x, p)
-    low.split[:] = high.split[:] = True
-    rest = pieces.take(np.setdiff1d(np.arange(len(pieces.parent)), at))
-    parts = (rest, low, high)
-    return _Pieces(
-        np.concatenate([part.parent for part in parts]),
-        np.concatenate([part.weight for part in parts]),
-        [np.concatenate([part.knots[k] for part in parts]) for k in range(2)],
-        [np.concatenate([part.degree[k] for part in parts]) for k in range(2)],
-        np.concatenate([part.split for part in parts]),
-    )
+    low = old.weight * _part(x - rows[:, 0], before_last - rows[:, 0])
+    high = old.weight * _part(last - x, last - rows[:, 1])
+    name, split = ("knots_u", "knots_v")[axis], np.ones(len(x), dtype=bool)
+    halves = [
+        old._replace(weight=weight, split=split, **{name: half})  # type: ignore[arg-type]
+        for weight, half in zip((low, high), _halves(rows, x, p), strict=True)
+    ]
+    return _Pieces(*(np.concatenate(arrays) for arrays in zip(pieces.take(~inside), *halves, strict=True)))
 
 
 def _part(length: Floats, whole: Floats) -> Floats:
@@ -151,7 +133,7 @@ def _part(length: Floats, whole: Floats) -> Floats:
 
 
 def _halves(rows: Floats, x: Floats, p: Ints) -> tuple[Floats, Floats]:
-    """Knots with x put in: without the last one, and without the first one."""
+    """Knots with x inserted: without the last one, and without the first one."""
     column = np.arange(rows.shape[1])
     real = column < (p + 2)[:, None]
     full = np.sort(np.hstack([np.where(real, rows, np.inf), x[:, None]]), axis=1)  # p + 3 numbers, then inf
@@ -163,22 +145,21 @@ def _halves(rows: Floats, x: Floats, p: Ints) -> tuple[Floats, Floats]:
 
 
 def _join(surface: Table, pieces: _Pieces) -> Refinement[Table]:
-    """Join split pieces that stand on equal knots; the rest keep their order and come first."""
+    """Merge split pieces with equal knots; the rest keep their order and come first."""
     order = np.concatenate([np.flatnonzero(~pieces.split), np.flatnonzero(pieces.split)])
     pieces = pieces.take(order)
-    columns = [*pieces.knots, *(p[:, None].astype(np.float64) for p in pieces.degree)]
-    unique_tag = np.where(pieces.split, -1.0, np.arange(len(order)))[:, None]
-    table = np.ascontiguousarray(np.hstack([*columns, unique_tag]) + 0.0)
+    tag = np.where(pieces.split, -1.0, np.arange(len(order)))
+    columns = [np.asarray(array, dtype=np.float64).reshape(len(order), -1) for array in (*pieces[2:6], tag)]
+    table = np.ascontiguousarray(np.hstack(columns) + 0.0)
     _, first, group = np.unique(table.view(f"V{table.shape[1] * 8}").ravel(), return_index=True, return_inverse=True)
     rank = np.zeros(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
     point = rank[group.ravel()]
-    keep = np.sort(first)
     weight = np.bincount(point, pieces.weight)
     share = pieces.weight / weight[point]
-    xyz = np.zeros((len(keep), 3))
+    kept = pieces.take(np.sort(first))
+    xyz = np.zeros((len(first), 3))
     np.add.at(xyz, point, surface.points[pieces.parent] * share[:, None])
-    knots, degrees = [k[keep] for k in pieces.knots], [p[keep] for p in pieces.degree]
     closed_u, closed_v = surface.closed
-    made = type(surface).from_padded(xyz, weight, *knots, *degrees, closed_u=closed_u, closed_v=closed_v)
+    made = type(surface).from_padded(xyz, weight, *kept[2:6], closed_u=closed_u, closed_v=closed_v)
     return Refinement(made, point, pieces.parent, share)

@@ -1,4 +1,4 @@
-"""Compiled kernels that compute the weights of control points by cell.
+"""Compiled kernels that compute the weights b w of control points at vertices, cell by cell.
 
 Their layout is in :mod:`surface.deform.lists`.
 """
@@ -10,26 +10,7 @@ import numpy as np
 
 from surface.base.jit import kernel
 
-from .blends import blend1
 from .kernels import along, distinct
-
-
-@kernel
-def _weigh(knots_u, knots_v, pu, pv, weights, i, uv, side, first, last, work, out):
-    """b w and its derivatives of point i at vertices first..last into ``out (3, >= last - first)``; any nonzero?"""
-    found = False
-    for s in range(first, last):
-        j = s - first
-        out[0, j], out[1, j], out[2, j] = 0.0, 0.0, 0.0
-        a0, a1 = blend1(knots_u, i, pu[i], uv[s, 0], side[s] & 1, work)
-        if a0 == 0.0 and a1 == 0.0:
-            continue
-        b0, b1 = blend1(knots_v, i, pv[i], uv[s, 1], side[s] & 2, work)
-        if b0 == 0.0 and b1 == 0.0:
-            continue
-        out[0, j], out[1, j], out[2, j] = a0 * b0 * weights[i], a1 * b0 * weights[i], a0 * b1 * weights[i]
-        found = True
-    return found
 
 
 @kernel
@@ -75,8 +56,8 @@ def fill_blocks(
     along_u, along_v = np.zeros((widest, 2)), np.zeros((widest, 2))
     for c in range(begin, end):
         first, size = cell_start[c], cell_start[c + 1] - cell_start[c]
-        own, sides = uv[first : first + size], side[first : first + size]
-        many_u, many_v = distinct(own, sides, 0, values_u, at_u), distinct(own, sides, 1, values_v, at_v)
+        cell_uv, sides = uv[first : first + size], side[first : first + size]
+        many_u, many_v = distinct(cell_uv, sides, 0, values_u, at_u), distinct(cell_uv, sides, 1, values_v, at_v)
         count, tiles = 0, (size + 7) // 8
         for q in range(list_start[c], list_start[c + 1]):
             i = list_ids[q]
@@ -99,13 +80,19 @@ def fill_blocks(
 def rewrite_rows(
     knots_u, knots_v, pu, pv, weights, uv, side, cell_start, i, cells, places, value, slope, at, rows, nonzero
 ):
-    """Compute the rows ``places`` of point i in ``cells`` anew; ``nonzero`` says which rows are not all zero."""
+    """Compute the rows ``places`` of point i in ``cells`` again; ``nonzero`` says which rows are not all zero."""
     work = np.zeros(12)
     for q in range(cells.shape[0]):
         c = cells[q]
-        first, last = cell_start[c], cell_start[c + 1]
-        tiles = (last - first + 7) // 8
-        numbers = np.zeros((3, tiles * 8))
-        nonzero[q] = _weigh(knots_u, knots_v, pu, pv, weights, i, uv, side, first, last, work, numbers)
+        first, size = cell_start[c], cell_start[c + 1] - cell_start[c]
+        tiles = (size + 7) // 8
+        at_u, at_v = np.zeros(size, dtype=np.int64), np.zeros(size, dtype=np.int64)
+        along_u, along_v, values = np.zeros((size, 2)), np.zeros((size, 2)), np.zeros((size, 2))
+        numbers, cell_uv, sides = np.zeros((3, tiles * 8)), uv[first : first + size], side[first : first + size]
+        many = distinct(cell_uv, sides, 0, values, at_u)
+        found = along(knots_u, i, pu[i], values, many, True, work, along_u)
+        many = distinct(cell_uv, sides, 1, values, at_v)
+        found = along(knots_v, i, pv[i], values, many, True, work, along_v) and found
+        nonzero[q] = found and _combine(along_u, along_v, at_u, at_v, size, weights[i], numbers)
         if places[q] >= 0:
             _put_row(value, slope, at[c], rows[c], places[q], tiles, numbers)

@@ -16,8 +16,7 @@ from surface.head.model.parameters import Pose, rotation_vector
 from surface.head.model.rules import Drivers
 from surface.head.posing.kernels import carry, turn_head
 from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
-from surface.mesh.borders import border_edges
-from surface.mesh.mesh import Mesh
+from surface.mesh.mesh import Mesh, border_edges
 
 
 class Turn:

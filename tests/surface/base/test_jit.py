@@ -53,7 +53,7 @@ def run(folder: Path) -> list[float]:
     return [float(word) for word in done.stdout.split()]
 
 
-def test_an_edited_file_recompiles_the_kernels_that_draw_on_it(copy: Path) -> None:
+def test_an_edited_file_recompiles_the_kernels_that_depend_on_it(copy: Path) -> None:
     trial = copy / "surface" / "trial"
     assert run(copy) == [8.0, 0]
     assert run(copy) == [8.0, 1]
@@ -62,7 +62,7 @@ def test_an_edited_file_recompiles_the_kernels_that_draw_on_it(copy: Path) -> No
     assert run(copy) == [-4.0, 1]
     (trial / "numbers.py").write_text("AMOUNT = 5.0\n")
     assert run(copy) == [-8.0, 0]
-    (copy / "surface" / "__init__.py").write_text("# nothing that a kernel draws on\n")
+    (copy / "surface" / "__init__.py").write_text("# nothing that a kernel depends on\n")
     assert run(copy) == [-8.0, 1]
 
 
@@ -75,7 +75,7 @@ def kernel_modules() -> list[str]:
 @pytest.mark.parametrize("name", kernel_modules())
 def test_every_file_whose_kernels_a_file_calls_is_watched(name: str) -> None:
     module = importlib.import_module(name)
-    watched = jit.drawn_on(Path(str(module.__file__)))
+    watched = jit.dependencies(Path(str(module.__file__)))
     for value in vars(module).values():
         functions = [value] if isinstance(value, CPUDispatcher) else []
         if getattr(value, "__name__", "").startswith("surface."):  # a module, whose kernels may be called

@@ -1,4 +1,4 @@
-"""A million updates stay as near to a fresh evaluation as one."""
+"""Many updates stay as near to a new evaluation as one."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from surface.bench.drift import drift
 from tests.surface import shapes
 
 
-def test_a_million_updates_of_every_kind_stay_within_a_millionth_of_the_size() -> None:
+def test_many_updates_of_every_kind_stay_within_a_millionth_of_the_size() -> None:
     surface = shapes.hills()
-    found = drift(surface, surface.tessellate(chord_error=1.0), 1_000_000)
-    assert (found.moves, found.groups, found.weights, found.knots) == (979_500, 19_500, 500, 500)
+    found = drift(surface, surface.tessellate(chord_error=1.0), 200_000)
+    assert (found.moves, found.groups, found.weights, found.knots) == (195_900, 3_900, 100, 100)
     assert 0 < found.error <= 1e-6
     assert found.normal_error < 2e-6
 

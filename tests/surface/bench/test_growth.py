@@ -12,9 +12,9 @@ from surface.bench.growth import Series, growth, plot, slopes
 
 
 def test_series_and_plot_are_complete(tmp_path: Path) -> None:
-    told: list[str] = []
-    series = growth((1_000, 4_000), (64, 900), 0.001, told.append)
-    assert len(told) == 4
+    reported: list[str] = []
+    series = growth((1_000, 4_000), (64, 900), 0.001, reported.append)
+    assert len(reported) == 4
     assert len(series) == 10
     for line in series:
         assert len(line.size) == len(line.amount) == 2

@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 
 from surface.bench import bench, peers
-from surface.bench.stencils import stencil_evaluator
 
 SURFACE, MESH = bench.sheet(1_500)
 
 
 def test_stencils_and_sparse_matrix() -> None:
-    call, out = stencil_evaluator(SURFACE, MESH)
-    call()
-    assert np.abs(out - MESH.vertices).max() < 1e-4
+    assert np.abs(peers.stencils(SURFACE, MESH)() - MESH.vertices).max() < 1e-4
     assert np.abs(peers.sparse_matrix(SURFACE, MESH)() - MESH.vertices).max() < 1e-4
     assert np.shape(peers.blendshapes(SURFACE, MESH)()) == (3 * len(MESH.vertices),)
 
@@ -22,7 +19,7 @@ def test_stencils_and_sparse_matrix() -> None:
 @pytest.mark.parametrize("name", ["splinepy", "geomdl"])
 def test_libraries_where_they_are_installed(name: str) -> None:
     pytest.importorskip(name)
-    prepare = {found: make for found, make, _ in peers.libraries(MESH)}[name]
+    prepare = {peer.name: peer.prepare for peer in peers.libraries(MESH)}[name]
     points = np.asarray(prepare(SURFACE, MESH)())
     assert np.abs(points - MESH.vertices[: len(points)]).max() < 1e-9
 

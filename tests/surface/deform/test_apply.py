@@ -6,18 +6,17 @@ import numpy as np
 import shapes
 
 from surface.deform import apply
-from surface.deform.table import stencil_table
 
 
 def test_ranges_join_over_small_gaps() -> None:
     start, out = np.array([0, 10, 20, 400, 410, 1000]), np.zeros((5, 2), dtype=np.int64)
     cells = np.array([0, 1, 3, 4])
-    assert apply.ranges(cells, 4, start, 0, out) == 2
+    assert apply.join_ranges(cells, 4, start, 0, out) == 2
     assert out[:2].tolist() == [[0, 20], [400, 1000]]
-    assert apply.ranges(np.array([0, 2, 4]), 3, start, 10, out) == 1
+    assert apply.join_ranges(np.array([0, 2, 4]), 3, start, 10, out) == 1
     assert out[0].tolist() == [0, 1000]
-    assert apply.ranges(np.array([0, 2]), 2, start, 9, out) == 2
-    assert apply.ranges(cells, 0, start, 9, out) == 0
+    assert apply.join_ranges(np.array([0, 2]), 2, start, 9, out) == 2
+    assert apply.join_ranges(cells, 0, start, 9, out) == 0
 
 
 def test_positions_and_normals_are_those_of_the_surface() -> None:
@@ -34,11 +33,11 @@ def test_positions_and_normals_are_those_of_the_surface() -> None:
 def test_denominators_are_sums_of_weights() -> None:
     surface = shapes.scattered(30, 4)
     mesh = surface.tessellate(chord_error=0.3, max_depth=3)
-    table = stencil_table(surface, mesh)
-    lists = table.lists
+    deformation = surface.deformation(mesh)
+    lists = deformation.lists
     for c in range(len(lists.rows)):
         first, size = lists.cell_start[c], lists.cell_start[c + 1] - lists.cell_start[c]
         block = lists.value[lists.at[c] :][: lists.rows[c] * (-(-size // 8)) * 8].reshape(-1, lists.rows[c], 8)
         total = block.sum(axis=1).ravel()[:size]
-        mine = table.below[8 * lists.tile_start[c] :][:size]
+        mine = deformation._arrays["inv_w"][8 * lists.tile_start[c] :][:size]
         assert np.allclose(mine, 1 / total, rtol=1e-5), first

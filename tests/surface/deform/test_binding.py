@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 import shapes
 
-from surface.deform.binding import NAMES, address_table
-from surface.deform.table import arrays_of, stencil_table
+from surface import DCPSurface
+from surface.deform.apply import NAMES
+from surface.deform.binding import address_table
+from surface.deform.deformation import Deformation
+
+
+def arrays_of(deformation: Deformation[DCPSurface]) -> dict[str, np.ndarray]:
+    """All arrays of an update by name."""
+    return vars(deformation.lists) | deformation._arrays
 
 
 def test_the_table_holds_address_and_length_of_every_array() -> None:
     surface = shapes.hills(8)
-    made = stencil_table(surface, surface.tessellate(chord_error=1.0))
-    arrays = arrays_of(made, made.new_state(surface.points))
+    arrays = arrays_of(surface.deformation(surface.tessellate(chord_error=1.0)))
     table = address_table(arrays).reshape(-1, 2)
     assert len(table) == len(NAMES)
     for (address, length), name in zip(table, NAMES, strict=True):
@@ -22,8 +28,7 @@ def test_the_table_holds_address_and_length_of_every_array() -> None:
 
 def test_an_array_with_gaps_is_refused() -> None:
     surface = shapes.hills(8)
-    made = stencil_table(surface, surface.tessellate(chord_error=1.0))
-    arrays = arrays_of(made, made.new_state(surface.points))
+    arrays = arrays_of(surface.deformation(surface.tessellate(chord_error=1.0)))
     arrays["delta"] = np.zeros((8, 6))[:, ::2]
     with pytest.raises(ValueError, match="delta: must be contiguous"):
         address_table(arrays)

@@ -15,7 +15,7 @@ SIZE = 100.0
 
 
 def fresh(deformation: Deformation[DCPSurface]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions, normals and sizes of S_u x S_v of the deformation's surface as it stands now, in float64."""
+    """Positions, normals and sizes of S_u x S_v of the deformation's surface at the moment, in float64."""
     mesh, surface = deformation.mesh, deformation.surface
     points, su, sv = surface.derivatives(mesh.uv, side=mesh.side)
     normals = np.cross(su, sv)
@@ -188,7 +188,7 @@ def test_a_mesh_without_vertices() -> None:
 
 
 def test_two_threads_give_the_same(sheet: tuple[DCPSurface, Mesh], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("surface.deform.table.SMALL", 0)
+    monkeypatch.setattr("surface.deform.deformation.SMALL", 0)
     surface, mesh = sheet
     one, two = surface.deformation(mesh), surface.deformation(mesh, threads=2)
     for deformation in (one, two):
@@ -209,3 +209,36 @@ def test_published_arrays_are_read_only(sheet: tuple[DCPSurface, Mesh]) -> None:
     for array in (deformation.vertices, deformation.normals, deformation.points, sheet[1].uv):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+def test_more_ids_than_points_the_last_position_counts_and_moves_add_up(sheet: tuple[DCPSurface, Mesh]) -> None:
+    surface, mesh = sheet
+    deformation = surface.deformation(mesh)
+    ids = np.append(np.arange(surface.n), [5, 5])
+    places = np.vstack([surface.points, np.full((2, 3), [[1.0], [2.0]])])
+    deformation.set_positions(ids, places)
+    assert deformation.points[5].tolist() == [2, 2, 2]
+    deformation.move(ids, np.ones((len(ids), 3)))
+    assert deformation.points[5].tolist() == [5, 5, 5]
+    assert np.allclose(deformation.points[6], surface.points[6] + 1)
+    for bad, message in ((surface.n, rf"ids\[{len(ids)}\]: {surface.n} is not"), (-1, rf"ids\[{len(ids)}\]: -1")):
+        with pytest.raises(ValueError, match=message):
+            deformation.move(np.append(ids, bad), np.ones((len(ids) + 1, 3)))
+    check(deformation)
+
+
+def test_one_delta_moves_all_and_integers_are_numbers(sheet: tuple[DCPSurface, Mesh]) -> None:
+    deformation = sheet[0].deformation(sheet[1])
+    deformation.move([1, 2], [1, 2, 3])
+    deformation.set_positions([4], np.array([[7, 8, 9]]))
+    assert np.allclose(deformation.points[[1, 2]] - sheet[0].points[[1, 2]], [1, 2, 3])
+    assert deformation.points[4].tolist() == [7, 8, 9]
+    assert deformation.surface.points[4].tolist() == [7, 8, 9]
+    assert sheet[0].points[4].tolist() != [7, 8, 9]
+
+
+def test_the_mesh_of_as_many_copies_as_the_surface_has() -> None:
+    ring = shapes.torus()
+    mesh = ring.tessellate(chord_error=1.0)
+    assert mesh.list_ids.max() >= ring.n  # copies
+    assert ring.deformation(mesh, normals=False).nbytes > 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface import Domain
-from surface.deform.lists import LANES, back_lists, build_lists
+from surface.deform.lists import LANES, build_lists, cells_by_point
 from tests.surface import shapes
 
 
@@ -30,7 +30,7 @@ def test_blocks_hold_b_w_and_its_derivatives() -> None:
 
 def test_back_lists_lead_back() -> None:
     ids, rows = np.array([3, 1, 2, 1, 3], dtype=np.int32), np.array([3, 0, 2])
-    start, count, cell, row = back_lists(ids, rows, 5)
+    start, count, cell, row = cells_by_point(ids, rows, 5)
     assert count.tolist() == [0, 2, 1, 2, 0]
     found = {(i, cell[e], row[e]) for i in range(5) for e in range(start[i], start[i] + count[i])}
     assert found == {(3, 0, 0), (1, 0, 1), (2, 0, 2), (1, 2, 0), (3, 2, 1)}

@@ -28,16 +28,16 @@ def test_lists_hold_every_point_with_weight(seed: int) -> None:
         assert np.isin(used, mesh.points_of(cell)).all()
 
 
-def test_open_rectangles_count_points_with_a_common_area() -> None:
+def test_rectangles_count_the_points_that_meet_them() -> None:
     surface = shapes.scattered(40, 5)
-    rng, bins, s = np.random.default_rng(0), surface.bins, surface.supports
-    low = rng.uniform(-0.4, 1.2, (50, 2))
+    rng, s = np.random.default_rng(0), surface.supports
+    low = np.vstack([rng.uniform(-0.4, 1.2, (49, 2)), s[7, [1, 3]]])  # the last one touches a corner of point 7
     high = low + rng.uniform(0.01, 0.5, (50, 2))
     rect = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
     found = np.zeros(50, dtype=np.int64)
-    blocks.count_open(rect, s, bins.grid, bins.shape, bins.start, bins.ids, found)
+    blocks.count_points(rect, *surface.arrays()[:2], *surface.bin_arrays(), found)
     for box, count in zip(rect, found, strict=True):
-        meets = (s[:, 0] < box[1]) & (s[:, 1] > box[0]) & (s[:, 2] < box[3]) & (s[:, 3] > box[2])
+        meets = (s[:, 0] <= box[1]) & (s[:, 1] >= box[0]) & (s[:, 2] <= box[3]) & (s[:, 3] >= box[2])
         assert meets.sum() == count
 
 
@@ -48,3 +48,27 @@ def test_unit_vectors_and_where_there_are_none() -> None:
     blocks.unit_cross(a, b, out, bad)
     assert bad.tolist() == [False, True, True, False]
     assert out.tolist() == [[0, 0, 1], [0, 0, 0], [0, 0, 0], [1, 0, 0]]
+
+
+def test_cells_are_as_large_as_one_list_is_cheaper_than_four_and_the_cache_allows() -> None:
+    square = shapes.hills(4).tessellate(roots=(1, 1), min_depth=7, max_depth=7)  # 16 points that all reach everywhere
+    sizes = np.diff(square.cell_start)
+    assert len(square.vertices) == 129**2
+    assert blocks.MOST == 4096
+    assert sizes.max() <= 4096 and sizes.min() > 1000
+    assert len(sizes) < 20
+    spans = shapes.hills(19)  # 16 spans along a side: a cell of many spans would read points that reach little of it
+    fine = spans.tessellate(roots=(16, 16), min_depth=3, max_depth=3)
+    matrix = spans.basis_matrix(fine.uv, side=fine.side)
+    for cell, (first, last) in enumerate(zip(fine.cell_start, fine.cell_start[1:], strict=False)):
+        assert last - first <= 9 * 9
+        assert len(fine.points_of(cell)) < 2 * matrix[int(first)].nnz + 24
+
+
+def test_the_rectangle_of_every_cell_holds_its_vertices() -> None:
+    mesh = shapes.hills(8).tessellate(chord_error=0.5)
+    boxes, bins = mesh.cell_boxes
+    for c, (u0, u1, v0, v1) in enumerate(boxes):
+        uv = mesh.uv[mesh.cell_start[c] : mesh.cell_start[c + 1]]
+        assert [u0, u1, v0, v1] == [uv[:, 0].min(), uv[:, 0].max(), uv[:, 1].min(), uv[:, 1].max()]
+    assert set(bins.ids.tolist()) == set(range(len(boxes)))

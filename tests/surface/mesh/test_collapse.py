@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.mesh.borders import border_edges
 from surface.mesh.collapse import Collapse
+from surface.mesh.mesh import border_edges
 
 
 def sheet(side: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:

@@ -40,7 +40,7 @@ def test_triangles_share_every_inner_edge_and_keep_an_angle(seed: int) -> None:
     area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     assert area.min() > 0
     assert area.sum() == 2 * (3 << lattice.depth) ** 2
-    assert len(np.unique(owner)) == len(leaves)
+    assert len(np.unique(owner)) == len(leaves.level)
     directed = keys[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     back = {(b, a) for a, b in directed.tolist()}
     end = 3 << lattice.depth

@@ -199,3 +199,47 @@ def test_the_rim_of_what_is_covered_is_followed() -> None:
 def test_limits_out_of_range_are_named(limits: dict, name: str) -> None:
     with pytest.raises(ValueError, match=name):
         shapes.hills(8).tessellate(**limits)
+
+
+def test_without_limits_chords_are_within_a_thousandth_of_the_size() -> None:
+    surface = shapes.hills()
+    size = np.linalg.norm(np.ptp(surface.points, axis=0))
+    mesh, same = surface.tessellate(), surface.tessellate(chord_error=1e-3 * size)
+    assert np.array_equal(mesh.vertices, same.vertices)
+    assert len(mesh.vertices) != len(surface.tessellate(chord_error=2e-3 * size).vertices)
+
+
+def test_the_loop_error_counts_before_the_chord_error() -> None:
+    surface, domain = shapes.hills(), Domain((0, 1, 0, 1), loops=[shapes.circle(0.5, 0.5, 0.3)])
+    coarse = surface.tessellate(chord_error=5.0, domain=domain)
+    fine = surface.tessellate(chord_error=5.0, loop_error=0.1, domain=domain)
+    assert len(shapes.border(fine)) > 2 * len(shapes.border(coarse))
+    by_points = [surface.tessellate(max_points=50, max_depth=7, domain=domain, loop_error=e) for e in (None, 0.001)]
+    assert len(shapes.border(by_points[1])) > len(shapes.border(by_points[0]))
+
+
+def test_roots_and_depths_give_a_regular_mesh() -> None:
+    mesh = shapes.hills().tessellate(roots=(3, 5), min_depth=1, max_depth=1)
+    assert mesh.leaves == 4 * 15
+    assert len(mesh.vertices) == 7 * 11
+    assert np.allclose(np.unique(mesh.uv[:, 0]), np.arange(7) / 6)
+    assert np.allclose(np.unique(mesh.uv[:, 1]), np.arange(11) / 10)
+
+
+def test_a_ring_has_three_cells_or_more() -> None:
+    ring = shapes.torus()
+    narrow = ring.with_points(ring.points * [1, 1, 0.01])
+    mesh = narrow.tessellate(chord_error=1e9)
+    for axis in range(2):
+        assert len(np.unique(mesh.uv[:, axis])) >= 3
+    shapes.check_manifold(mesh)
+    assert (shapes.edge_uses(mesh.triangles)[1] == 2).all()
+
+
+def test_a_flipped_mesh_is_reversed() -> None:
+    surface = shapes.hills()
+    mesh, flipped = surface.tessellate(chord_error=1.0), surface.tessellate(chord_error=1.0, flip=True)
+    assert np.array_equal(flipped.vertices, mesh.vertices)
+    assert np.array_equal(flipped.normals, -mesh.normals)
+    assert np.array_equal(flipped.triangles, mesh.triangles[:, ::-1])
+    assert (mesh.flip, flipped.flip) == (False, True)

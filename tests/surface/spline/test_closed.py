@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surface import DCPSurface, Domain
-from surface.spline.closed import wrap
+from surface.spline.closed import check_closed, shifts_of, wrap
 from tests.surface import shapes
 from tests.surface.shapes import ROUND, torus, uniform
 
@@ -112,3 +112,63 @@ def test_wrapping() -> None:
 def test_periods_that_fit_no_surface_are_refused(closed: object) -> None:
     with pytest.raises(ValueError, match=r"closed_u: (knots reach|needs)"):
         DCPSurface([[0, 0, 0]], [1], [[0, 1]], [[0, 1]], closed_u=closed)  # type: ignore[arg-type]
+
+
+def test_shifts_cover_both_neighbours_and_as_many_periods_as_knots_reach() -> None:
+    inside, far, behind = np.array([[0.2, 0.8]]), np.array([[0.2, 2.7], [1.5, 3.1]]), np.array([[-0.8, -0.2]])
+    open_ = shifts_of((inside, inside), (None, None))
+    assert open_.tolist() == [[0, 0]]
+    assert shifts_of((inside, far), ((0.0, 1.0), None)).tolist() == [[0, 0], [-1, 0], [1, 0]]
+    assert shifts_of((behind, inside), ((0.0, 1.0), None)).tolist() == [[0, 0], [-1, 0], [1, 0], [2, 0]]
+    assert shifts_of((far - 0.2, inside), ((0.0, 1.0), None))[:, 0].tolist() == [0, -3, -2, -1, 1]
+    assert shifts_of((far + 3, inside), ((3.0, 4.0), None))[:, 0].tolist() == [0, -4, -3, -2, -1, 1]
+    both = shifts_of((inside, 2 * inside), ((0.0, 1.0), (0.0, 2.0)))
+    assert both.tolist() == [[u, v] for u in (0, -1, 1) for v in (0, -2, 2)]
+
+
+def test_knots_reach_over_a_limited_number_of_periods() -> None:
+    row = np.array([[0.0, 16.0]])
+    assert len(shifts_of((row, row), ((0.0, 1.0), None))) > 16
+    with pytest.raises(ValueError, match=r"closed_v: knots reach over 16\.5, more than 16 periods of 1"):
+        shifts_of((row, np.array([[-0.5, 16.0]])), (None, (0.0, 1.0)))
+
+
+def test_samples_are_wrapped_into_the_interval() -> None:
+    uv = np.array([[2.0, 5.0], [3.0, -5.0], [4.0, 0.0], [-1.5, 1.0]])
+    assert wrap(uv, ((2.0, 4.0), None)).tolist() == [[2, 5], [3, -5], [2, 0], [2.5, 1]]
+    assert wrap(uv, (None, None)) is uv
+    assert wrap(np.array([[-1e-18, 0.0]]), ((0.0, 1.0), None))[0, 0] == 0  # rounded to the end, which is the start
+
+
+@pytest.mark.parametrize(
+    ("closed", "message"),
+    [
+        (((1.0, 1.0), None), r"closed_u: needs finite start < end"),
+        ((None, (0.0, np.inf)), r"closed_v: needs finite start < end"),
+        (((0.0, "x"), None), r"closed_u: needs \(start, end\)"),
+        ((None, (1.0,)), r"closed_v: needs \(start, end\)"),
+    ],
+)
+def test_bad_intervals_are_named(closed: tuple, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        check_closed(closed)
+
+
+def test_points_far_outside_the_interval_take_other_knots_with_all_copies() -> None:
+    torus = torus_one_period_on()
+    mesh = torus.tessellate(chord_error=0.5)
+    deformation = torus.deformation(mesh)
+    assert sorted(set(torus.shifts[:, 0].tolist())) == [-3, -2, -1, 0, 1]
+    for i in (0, 60, torus.n - 1):
+        deformation.set_knots(i, torus.knots_u[i] * 1.05, torus.knots_v[i] + 0.05)
+        deformation.set_weights([i], [2.0])
+        deformation.move([i], [[1.0, 2.0, 3.0]])
+        expected = deformation.surface.evaluate(mesh.uv, side=mesh.side)
+        assert np.abs(deformation.vertices - expected).max() < 1e-4
+
+
+def torus_one_period_on() -> DCPSurface:
+    """The torus with knots one period further in u: the copies that reach the interval lie on one side."""
+    ring = torus()
+    knots_u = [knots + 1 for knots in ring.knots_u]
+    return DCPSurface(ring.points, ring.weights, knots_u, ring.knots_v, closed_u=(0, 1), closed_v=(0, 1))

@@ -1,4 +1,4 @@
-"""Samples that are taken in runs are those taken one by one, to the last bit."""
+"""Samples evaluated in runs equal those evaluated one by one, to the last bit."""
 
 from __future__ import annotations
 

@@ -95,3 +95,30 @@ def test_bad_regions_are_named() -> None:
         shapes.hills(8).refine((0.5, 0.5, 0, 1))
     with pytest.raises(ValueError, match="region: needs"):
         shapes.hills(8).refine((0, 1))  # type: ignore[arg-type]
+
+
+def test_knots_at_the_ends_and_outside_subdomains_change_nothing() -> None:
+    surface = shapes.hills(8)
+    for value in (0.0, 1.0):
+        assert surface.insert_knot("u", value).surface.n == surface.n
+    only = surface.insert_knot("v", 0.5, [0])  # point 0 ends before 0.5
+    assert only.surface.n == surface.n
+    assert np.array_equal(only.surface.points, surface.points)
+
+
+def test_boehms_weights_of_one_split_point() -> None:
+    surface = DCPSurface([[1.0, 2, 3]], [2.0], [[0.0, 1, 3, 6]], [[0.0, 1]])
+    made = surface.insert_knot("u", 2.0)
+    assert [k.tolist() for k in made.surface.knots_u] == [[0, 1, 2, 3], [1, 2, 3, 6]]
+    assert np.allclose(made.surface.weights, [2 * 2 / 3, 2 * 4 / 5])  # (2 - 0) / (3 - 0) and (6 - 2) / (6 - 1)
+    assert made.surface.points.tolist() == [[1, 2, 3]] * 2
+    assert made.point.tolist() == [0, 1] and made.parent.tolist() == [0, 0] and made.share.tolist() == [1, 1]
+
+
+def test_only_named_points_are_split() -> None:
+    surface = shapes.hills(8)
+    made = surface.insert_knot("u", 0.5, [27])
+    assert made.surface.n == surface.n + 1
+    rest = np.delete(np.arange(64), 27)
+    assert np.array_equal(made.surface.points[:63], surface.points[rest])
+    assert sorted(made.parent[made.point >= 63].tolist()) == [27, 27]

@@ -1,4 +1,4 @@
-"""Lists after changes of knots are those built anew."""
+"""Lists after changes of knots are those of new lists."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ import pytest
 import shapes
 
 from surface import Domain, blending
+from surface.deform.edits import change_weights
 from surface.deform.lists import Lists
-from surface.deform.relist import change_knots
-from surface.deform.table import stencil_table
 
 
 def rows(lists: Lists) -> dict[tuple[int, int], np.ndarray]:
@@ -32,7 +31,7 @@ def test_rows_after_many_changes_are_blending_functions_times_weights() -> None:
         low = rng.uniform(-0.3, 0.8, 2)
         knots = [np.sort(rng.uniform(x, x + rng.uniform(0.05, 0.7), int(rng.integers(3, 8)))) for x in low]
         deformation.set_knots(k % 40, *knots)  # point 40 covers everything and stays
-    mine, now = rows(deformation.table.lists), deformation.surface
+    mine, now = rows(deformation.lists), deformation.surface
     for i, (knots_u, knots_v) in enumerate(zip(now.knots_u, now.knots_v, strict=True)):
         share = blending(knots_u, mesh.uv[:, 0]) * blending(knots_v, mesh.uv[:, 1]) * now.weights[i]
         for c, (first, last) in enumerate(zip(mesh.cell_start, mesh.cell_start[1:], strict=False)):
@@ -46,11 +45,11 @@ def test_back_lists_agree_with_lists() -> None:
     deformation = surface.deformation(surface.tessellate(chord_error=0.2))
     for i in (33, 44, 55, 33):
         deformation.set_knots(i, [0.1, 0.2, 0.5, 0.6, 0.9], [0.2, 0.3, 0.4, 0.8, 0.85])
-    x = deformation.table.lists
+    x = deformation.lists
     pairs = {(c, int(x.ids[x.ids_at[c] + row])) for c in range(len(x.rows)) for row in range(int(x.rows[c]))}
-    for i in range(len(x.back_start)):
-        for e in range(int(x.back_start[i]), int(x.back_start[i] + x.back_count[i])):
-            c, row = int(x.back_cell[e]), int(x.back_row[e])
+    for i in range(len(x.point_start)):
+        for e in range(int(x.point_start[i]), int(x.point_start[i] + x.point_count[i])):
+            c, row = int(x.point_cell[e]), int(x.point_row[e])
             assert x.ids[x.ids_at[c] + row] == i
             pairs.remove((c, i))
     assert not pairs
@@ -59,25 +58,39 @@ def test_back_lists_agree_with_lists() -> None:
 def test_a_refused_change_leaves_everything() -> None:
     surface = shapes.hills(8)
     deformation = surface.deformation(surface.tessellate(chord_error=1.0))
-    before = deformation.table.lists.value.copy()
+    before = deformation.lists.value.copy()
     with pytest.raises(ValueError, match="uncovered"):
         deformation.set_knots(0, [0.5, 0.6, 0.7], [0.5, 0.6, 0.7])
-    assert np.array_equal(before, deformation.table.lists.value)
+    assert np.array_equal(before, deformation.lists.value)
 
 
-def test_a_table_made_of_another_serves_the_same_state() -> None:
-    surface = shapes.hills(8)
-    table = stencil_table(surface, surface.tessellate(chord_error=1.0))
-    state = table.new_state(surface.points)
-    table.update(state)
-    ids, step = np.array([20]), np.array([[0.0, 0, 1]])
-    table.update(state, (ids, step, True))
-    row = np.array([0.0, 0.1, 0.3, 0.8, 1.0])
-    other, cells = change_knots(table, 20, [row, row], [3, 3])
-    other.update(state, cells)
-    other.update(state, (ids, step, True))
-    expected = surface.deformation(table.mesh)
-    expected.move(ids, 2 * step)
-    expected.set_knots(20, row, row)
-    assert other is not table
-    assert np.allclose(state.vertices, expected.vertices.ravel(), rtol=0, atol=1e-4)
+def test_arrays_hold_at_most_twice_of_what_is_used() -> None:
+    surface = shapes.scattered(40, 7)
+    mesh = surface.tessellate(chord_error=0.1, max_depth=4, domain=Domain((0, 1, 0, 1)))
+    deformation, rng = surface.deformation(mesh), np.random.default_rng(2)
+    before, compacted = 0, 0
+    for k in range(150):
+        low = rng.uniform(-0.3, 0.8, 2)
+        deformation.set_knots(k % 40, *(np.sort(rng.uniform(x, x + 0.6, 5)) for x in low))
+        x = deformation.lists
+        live = int((x.rows * np.diff(x.tile_start)).sum()) * 8
+        assert live <= x.used <= 2 * live
+        assert x.used <= len(x.value) and 2 * x.used <= len(x.slope)
+        assert x.point_used <= 2 * x.point_count.sum() + 1024
+        assert (x.rows <= x.room).all() and (x.point_count <= x.point_room).all()
+        compacted += x.used < before
+        before = x.used
+    assert compacted
+    assert np.abs(deformation.vertices - deformation.surface.evaluate(deformation.mesh.uv)).max() < 1e-4
+
+
+def test_changed_weights_name_the_cells_that_they_reach() -> None:
+    surface = shapes.hills(10)
+    mesh = surface.tessellate(chord_error=0.2)
+    deformation = surface.deformation(mesh)
+    cells = change_weights(deformation.basis, deformation.lists, mesh, np.array([33, 34]), np.array([2.0, 3.0]))
+    reached = surface.basis_matrix(mesh.uv)[:, [33, 34]].toarray().any(axis=1)
+    assert np.array_equal(cells, np.unique(mesh.cell[reached]))
+    assert deformation.basis.weights[[33, 34]].tolist() == [2, 3]
+    none = change_weights(deformation.basis, deformation.lists, mesh, np.zeros(0, dtype=np.int64), np.zeros(0))
+    assert none.shape == (0,)

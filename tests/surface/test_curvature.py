@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surface import DCPSurface
-from surface.spline.curvature import curvatures
 
 H = np.sqrt(0.5)
 ARC = np.array([[1, 0], [1, 1], [0, 1]], dtype=float)
@@ -55,8 +54,9 @@ def test_saddle_point_and_sides() -> None:
 
 
 def test_uncovered_is_nan() -> None:
-    single = DCPSurface([[0, 0, 0]], [1], [[0, 0, 1, 1]], [[0, 0, 1, 1]])
-    gaussian, mean = curvatures(single, [[2.0, 0.5], [0.5, 0.5]])
+    apart = [[0, 0, 1, 1], [3, 3, 4, 4]]
+    single = DCPSurface([[0, 0, 0], [0, 0, 1]], [1, 1], apart, [[0, 0, 1, 1]] * 2)
+    gaussian, mean = single.curvatures([[2.0, 0.5], [0.5, 0.5]])
     assert np.isnan(gaussian).all()
     assert np.isnan(mean).all()
 

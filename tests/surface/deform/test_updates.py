@@ -1,0 +1,165 @@
+"""Which cells a move affects, when they take differences, and when they are computed again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from surface import DCPSurface
+from surface.deform import deformation as module
+from surface.deform import updates
+from surface.deform.deformation import LIMIT, MOST_MOVED, Deformation
+
+
+def moved(normals: bool = True) -> Deformation[DCPSurface]:
+    surface = shapes.hills(16)
+    return surface.deformation(surface.tessellate(chord_error=0.5), normals=normals)
+
+
+def error(deformation: Deformation[DCPSurface]) -> float:
+    """Greatest distance of a vertex from a new evaluation in float64."""
+    mesh = deformation.mesh
+    return float(np.abs(deformation.vertices - deformation.surface.evaluate(mesh.uv, side=mesh.side)).max())
+
+
+def test_a_cell_takes_at_most_the_limit_of_differences_and_is_then_computed_again() -> None:
+    deformation = moved()
+    cells, _ = deformation.lists.entries_of(100)
+    counts = deformation._arrays["differences"]
+    assert (counts == updates.NOT_STORED).all()
+    assert LIMIT == 256
+    for k in range(2 * LIMIT + 5):
+        deformation.move([100], [[0.0, 0.0, 0.001]])
+        assert (counts[cells] == k % 257).all(), k
+    others = np.setdiff1d(np.arange(len(counts)), cells)
+    assert (counts[others] == updates.NOT_STORED).all()
+
+
+@pytest.mark.parametrize("normals", [True, False])
+def test_drift_of_the_numerators_ends_at_the_limit(monkeypatch: pytest.MonkeyPatch, normals: bool) -> None:
+    monkeypatch.setattr(module, "LIMIT", 3)
+    deformation = moved(normals)
+    step = [[0.0, 0.0, 0.01]]
+    deformation.move([100], step)  # stores the numerators
+    deformation._arrays["numerators"][:] += np.float32(0.5)  # as if rounding errors had grown to that
+    for _ in range(3):
+        deformation.move([100], step)
+        assert error(deformation) > 0.1
+    deformation.move([100], step)
+    assert error(deformation) < 1e-4
+    again = deformation.vertices.copy()
+    deformation.refresh()
+    assert np.abs(deformation.vertices - again).max() < 1e-5
+
+
+def test_several_points_of_a_cell_count_each() -> None:
+    deformation = moved()
+    first = deformation.lists.entries_of(100)[0]
+    second = deformation.lists.entries_of(101)[0]
+    counts = deformation._arrays["differences"]
+    for _ in range(3):
+        deformation.move([100, 101], np.full((2, 3), 0.01))
+    both = np.intersect1d(first, second)
+    assert len(both) and (counts[both] == 4).all()
+    assert (counts[np.setxor1d(first, second)] == 2).all()
+    assert error(deformation) < 1e-4
+
+
+@pytest.mark.parametrize("few", [True, False])
+def test_differences_are_taken_where_they_cost_less_than_all_rows(few: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    deformation = moved()
+    cells, _ = deformation.lists.entries_of(100)
+    rows = deformation.lists.rows[cells]
+    monkeypatch.setattr(module, "BIAS", float(rows.min()) - (0.5 if few else 0.0))
+    deformation.move([100], [[0.0, 0.0, 1.0]])
+    counts = deformation._arrays["differences"][cells]
+    assert (counts[rows == rows.min()] == (0 if few else updates.NOT_STORED)).all()
+    assert error(deformation) < 1e-4
+
+
+def test_cells_choose_by_limit_bias_and_what_is_stored() -> None:
+    affected, hits = np.arange(6, dtype=np.int32), np.array([1, 1, 1, 2, 1, 1])
+    counts, rows = np.array([9, 10, -1, 9, 3, -1]), np.array([7, 7, 7, 13, 6, 6])
+    recomputed = np.zeros(6, dtype=np.int32)
+    assert updates.choose_recomputed(6, affected, hits, counts, rows, 10, 6.0, recomputed) == 2
+    assert counts.tolist() == [10, updates.STORE, updates.STORE, updates.STORE, -1, -1]
+    assert recomputed[:2].tolist() == [4, 5]
+    assert (hits == 0).all()
+
+
+def test_affected_cells_rise_and_count_the_points_that_reach_them() -> None:
+    start, count = np.array([0, 2, 3]), np.array([2, 1, 2])
+    cells, hits, affected = np.array([4, 1, 0, 4, 2], dtype=np.int32), np.zeros(5, np.int64), np.zeros(5, np.int32)
+    assert updates.find_affected(np.array([0, 2, 1]), 2, start, count, cells, hits, affected) == 3
+    assert affected[:3].tolist() == [1, 2, 4]
+    assert hits.tolist() == [0, 1, 1, 0, 2]
+
+
+def test_only_points_that_really_move_are_stored() -> None:
+    points, ids = np.arange(12.0).reshape(4, 3), np.array([3, 1, 0])
+    moved_ids, delta = np.zeros(4, np.int64), np.zeros((4, 3))
+    rows = np.array([[9.0, 10, 12], [3, 4, 5], [0, -1, 2]])
+    assert updates.store_positions(ids, rows, False, points, moved_ids, delta) == 2
+    assert moved_ids[:2].tolist() == [3, 0]
+    assert delta[:2].tolist() == [[0, 0, 1], [0, -2, 0]]
+    assert points.tolist() == [[0, -1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 12]]
+    steps = np.array([[0.0, 0, 0], [1, 2, 3], [0, 0, 0.5]])
+    assert updates.store_positions(ids, steps, True, points, moved_ids, delta) == 2
+    assert moved_ids[:2].tolist() == [1, 0]
+    assert delta[:2].tolist() == [[1, 2, 3], [0, 0, 0.5]]
+    assert points.tolist() == [[0, -1, 2.5], [4, 6, 8], [6, 7, 8], [9, 10, 12]]
+
+
+def test_the_first_bad_row_is_found_ids_before_numbers() -> None:
+    rows = np.zeros((3, 3))
+    assert updates.first_invalid(np.array([0, 4, 2]), rows, 5) == updates.VALID
+    assert updates.first_invalid(np.array([0, 5, 2]), rows, 5) == -2
+    assert updates.first_invalid(np.array([-1, 4, 2]), rows, 5) == -1
+    rows[2, 1] = np.nan
+    assert updates.first_invalid(np.array([0, 4, 2]), rows, 5) == 2
+    rows[0, 2] = np.inf
+    assert updates.first_invalid(np.array([0, 4, 7]), rows, 5) == -3
+    assert updates.first_invalid(np.array([0, 4, 2]), rows, 5) == 0
+
+
+def test_from_some_part_of_the_points_on_everything_is_computed_again() -> None:
+    deformation = moved()
+    n = deformation.basis.n
+    some = int(MOST_MOVED * n)
+    deformation.move(np.arange(n), [0.0, 0.0, 0.5])  # a change of all leaves no numerators
+    assert deformation.changed == [(0, len(deformation.vertices))]
+    calls: list[int] = []
+    whole = deformation.refresh
+    deformation.refresh = lambda: (calls.append(1), whole())[1]  # type: ignore[method-assign, func-returns-value]
+    deformation.move(np.arange(some), [0.0, 0.0, 0.5])
+    assert not calls
+    deformation.move(np.arange(some + 1), [0.0, 0.0, 0.5])
+    assert calls == [1]
+    assert error(deformation) < 1e-4
+
+
+def test_a_closed_surface_moves_every_copy() -> None:
+    torus = shapes.torus()
+    deformation = torus.deformation(torus.tessellate(chord_error=0.5))
+    for i in (0, 4, 60, torus.n - 1):
+        deformation.move([i], [[1.0, 2.0, 3.0]])
+        deformation.set_positions([i], [[5.0, 4.0, i]])
+        assert error(deformation) < 1e-4
+    deformation.set_weights([0, torus.n - 1], [3.0, 0.2])
+    assert error(deformation) < 1e-4
+    deformation.set_knots(0, torus.knots_u[0] * 1.1, torus.knots_v[0] * 0.9)
+    deformation.move([0], [[1.0, 0.0, 0.0]])
+    assert error(deformation) < 1e-4
+
+
+def test_bad_moves_of_a_closed_surface_are_named() -> None:
+    torus = shapes.torus()
+    deformation = torus.deformation(torus.tessellate(chord_error=1.0))
+    before = deformation.vertices.copy()
+    with pytest.raises(ValueError, match=r"delta\[1\]: must be finite, got \[0.0, nan, 0.0\]"):
+        deformation.move([3, 4], [[1.0, 0, 0], [0, np.nan, 0]])
+    with pytest.raises(ValueError, match=rf"ids\[0\]: {torus.n} is not a control point \(0 to {torus.n - 1}\)"):
+        deformation.set_positions([torus.n], [[1.0, 0, 0]])
+    assert np.array_equal(deformation.vertices, before)
+    assert np.array_equal(deformation.points, torus.points)
