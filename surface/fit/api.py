@@ -12,9 +12,9 @@ from surface.base.arrays import Floats
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
-from surface.fit.features.pieces import Body, eyeball_part, hair_parts, skin_part, teeth_part
+from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
-from surface.fit.features.wrinkles import deepened
+from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.points.lid_seating import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.points.recipe import PartRecipe, Recipe, recipe_for
 from surface.fit.points.refine import fit_chart
@@ -85,11 +85,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
     sources = sources_of(mesh.names)
-    body = Body(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
-    parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, body, progress)
+    rig = HeadRig(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
+    parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress)
     charts = {p.name: p.chart for p in fitted_parts}
     head = HeadData(
-        name, _provenance(recipe), _neck(mesh, recipe), body.eyes, body.radius, body.jaw,
+        name, _provenance(recipe), _neck(mesh, recipe), rig.eyes, rig.radius, rig.jaw,
         parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
     )  # fmt: skip
     head = finish_head(head, mesh, charts, recipe)
@@ -102,25 +102,27 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
 
 
 def _fit_parts(
-    mesh: FitMesh, recipe: Recipe, plan: Plan, body: Body, progress: Progress
+    mesh: FitMesh, recipe: Recipe, plan: Plan, rig: HeadRig, progress: Progress
 ) -> tuple[list[PartData], list[PartReport], list[FittedPart]]:  # fmt: skip
     """Every chart of the plan, teeth, hair and eyeballs."""
     parts, reports, fitted_parts = [], [], []
     steps = _Steps([p for p, _ in plan.parts], progress)
     for part, islands in plan.parts:
         chart = part_chart(mesh, part, islands)
-        fitted = fit_chart(mesh if part.follows == "skin" else _still(mesh), chart, part.request, steps.of(part))
-        parts.append(skin_part(part, chart, fitted, body))
+        fitted = fit_chart(
+            mesh if part.follows == "skin" else _without_shapes(mesh), chart, part.request, steps.of(part)
+        )
+        parts.append(skin_part(part, chart, fitted, rig))
         reports.append(measure(part.name, chart, fitted, mesh.names))
         fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))
         if recipe.hair and recipe.hair["face"] == part.name:
-            parts += hair_parts(mesh, chart, fitted, recipe.hair["brow"], body)
+            parts += hair_parts(mesh, chart, fitted, recipe.hair["brow"], rig)
     for part in recipe.teeth:
-        data, report = teeth_part(mesh, part, body)
+        data, report = teeth_part(mesh, part, rig)
         parts.append(data)
         reports.append(report)
-    if body.radius > 0:
-        parts += [eyeball_part(side, e, body.radius) for side, e in zip(("left", "right"), body.eyes, strict=True)]
+    if rig.radius > 0:
+        parts += [eyeball_part(side, e, rig.radius) for side, e in zip(("left", "right"), rig.eyes, strict=True)]
     return parts, reports, fitted_parts
 
 
@@ -131,7 +133,7 @@ def part_chart(mesh: FitMesh, part: PartRecipe, islands: list[Island]) -> Chart:
     return make_chart(mesh, islands, normalise=part.tiled, doubt_slivers=part.doubt_slivers)
 
 
-def _still(mesh: FitMesh) -> FitMesh:
+def _without_shapes(mesh: FitMesh) -> FitMesh:
     """The mesh without its shapes, for parts that move as a whole."""
     return replace(mesh, names=(), deltas=mesh.deltas[:0])
 
@@ -191,7 +193,7 @@ def _with_mesh(part: PartData, head: HeadData) -> PartData:
     surface = make_surface(part)
     if part.follows == "skin":
         lively = SkinRig(part, head).apply(read_pose(np.array([LIVELY.get(n, 0.0) for n in NAMES])))
-        surface = surface.with_points(deepened(part, lively))
+        surface = surface.with_points(with_deep_wrinkles(part, lively))
     return replace(part, mesh=pack(tessellate(part, surface, head.seams), part.budget))
 
 

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
 from surface.fit.points.net import Net
@@ -48,7 +47,7 @@ class Wanted:
 
     vertices: int
     longest: float
-    landmarks: NDArray[np.int64]
+    landmarks: Ints
     measures: dict[str, dict[str, Any]]
     identities: dict[str, dict[str, float]]
 

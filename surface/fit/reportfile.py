@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Floats32
 from surface.base.errors import FitError, ViewError
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import Errors, FitReport, face_bounds
@@ -162,7 +161,7 @@ def _worst_shape(part: FittedPart) -> Floats:
     return part.fitted.shape_error.max(axis=0) if len(part.fitted.shape_error) else np.zeros(len(part.fitted.error))
 
 
-def _colours(uv: Floats, part: FittedPart, error: Floats) -> NDArray[np.float32]:
+def _colours(uv: Floats, part: FittedPart, error: Floats) -> Floats32:
     """(m, 3) linear RGB of the error at vertices: the mean of the nearest samples; excluded ones violet."""
     from scipy.spatial import cKDTree  # takes a moment to import
 

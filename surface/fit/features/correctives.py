@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats32
 from surface.head.model.data import Group, HeadData, PartData, Rule
 
 
@@ -22,12 +22,12 @@ def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:
     for table in wanted:
         first, second = table["of"]
         name = f"{first}*{second}"
-        parts = [_less(p, name, table.get("less", {})) for p in head.parts]
+        parts = [_corrective_group(p, name, table.get("less", {})) for p in head.parts]
         head = replace(head, parts=parts, rules=[*head.rules, Rule(name, ({first: 1.0}, {second: 1.0}))])
     return head
 
 
-def _less(part: PartData, name: str, shares: dict[str, float]) -> PartData:
+def _corrective_group(part: PartData, name: str, shares: dict[str, float]) -> PartData:
     """The part with a group that takes back shares of others."""
     field = np.zeros((len(part.points), 3), np.float32)
     for g in part.groups:
@@ -35,6 +35,6 @@ def _less(part: PartData, name: str, shares: dict[str, float]) -> PartData:
     return _with_group(part, name, field)
 
 
-def _with_group(part: PartData, name: str, field: NDArray[np.float32]) -> PartData:
+def _with_group(part: PartData, name: str, field: Floats32) -> PartData:
     ids = np.flatnonzero(np.abs(field).max(axis=1) > 1e-3).astype(np.int32)
     return replace(part, groups=[*part.groups, Group(name, ids, field[ids])]) if len(ids) else part

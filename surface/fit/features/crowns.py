@@ -8,9 +8,8 @@ front, u from one neighbour to the next.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.points.strokes import evenly
 from surface.fit.source.chart import TILE, Chart
 from surface.fit.source.mesh import FitMesh, triangles
@@ -22,7 +21,7 @@ V_RANGE = (np.radians(165.0), np.radians(-165.0))
 TALL_MM = 10.0  # of a tooth, only this much below its tip is a crown
 
 
-def crown_chart(mesh: FitMesh, teeth: list[NDArray[np.int64]], upper: bool) -> tuple[Chart, FitMesh]:
+def crown_chart(mesh: FitMesh, teeth: list[Ints], upper: bool) -> tuple[Chart, FitMesh]:
     """A chart with one tile per tooth, and the sampled points as a mesh of its own.
 
     Parameters
@@ -48,7 +47,7 @@ def crown_chart(mesh: FitMesh, teeth: list[NDArray[np.int64]], upper: bool) -> t
     return chart, FitMesh(points, empty, uv, empty, (), np.zeros((0, n, 3)))
 
 
-def split_teeth(mesh: FitMesh, faces: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def split_teeth(mesh: FitMesh, faces: Ints) -> list[Ints]:
     """Face indices of every connected piece."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -62,13 +61,13 @@ def split_teeth(mesh: FitMesh, faces: NDArray[np.int64]) -> list[NDArray[np.int6
     return [faces[of_face == i] for i in np.unique(of_face)]
 
 
-def _centre(mesh: FitMesh, faces: NDArray[np.int64]) -> Floats:
+def _centre(mesh: FitMesh, faces: Ints) -> Floats:
     points = mesh.vertices[np.unique(mesh.faces[faces][mesh.faces[faces] >= 0])]
     centre: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return centre
 
 
-def _sample(mesh: FitMesh, faces: NDArray[np.int64], upper: bool, middle: Floats) -> Floats:
+def _sample(mesh: FitMesh, faces: Ints, upper: bool, middle: Floats) -> Floats:
     """(grid, 3) points of one crown, u fastest last."""
     tri = mesh.vertices[triangles(mesh.faces[faces])]
     down = np.array([0.0, -1.0 if upper else 1.0, 0.0])
@@ -88,7 +87,7 @@ def _sample(mesh: FitMesh, faces: NDArray[np.int64], upper: bool, middle: Floats
     return np.stack([evenly(column, GRID[0]) for column in rows.swapaxes(0, 1)], axis=1).reshape(-1, 3)
 
 
-def _below(row: Floats, crown: NDArray[np.bool_]) -> Floats:
+def _below(row: Floats, crown: Bools) -> Floats:
     """Of a row of points (k, 3) about a tooth, those in the middle that are its crown's."""
     middle, outside = len(row) // 2, np.flatnonzero(~crown)
     start = outside[outside < middle].max(initial=-1) + 1

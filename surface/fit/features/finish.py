@@ -1,4 +1,4 @@
-"""What is put on top of a fitted head: wrinkles, contacts of lips and lids, mends."""
+"""What is put on top of a fitted head: wrinkles, contacts of lips and lids, correctives."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SETTLINGS = 4  # each moves what is left by half
 
 
 def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe: Recipe) -> HeadData:
-    """The head with wrinkles, contacts and mends; neutral becomes what contacts make of it."""
+    """The head with wrinkles, contacts and correctives; neutral becomes what contacts make of it."""
     face = next((p for p in head.parts if p.follows == "skin" and len(p.slits) and p.name in charts), None)
     if face is None:
         return head
@@ -30,7 +30,7 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     names = tuple(p.name for p in head.parts)
     contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names)
     parts = [wrinkled if p is face else p for p in head.parts]
-    head = add_correctives(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.mends)
+    head = add_correctives(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.correctives)
     for _ in range(SETTLINGS):
         head = _settled(head)
     return head

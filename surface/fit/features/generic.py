@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.features.rigging import rigid_fit
 from surface.fit.points.lid_seating import fit_sphere
@@ -58,7 +57,7 @@ class Plan:
     parts: list[tuple[PartRecipe, list[Island]]]
     eyes: tuple[Floats, float]
     hinge: Floats
-    jaw: NDArray[np.int64]
+    jaw: Ints
     notes: list[str] = field(default_factory=list)
 
 
@@ -82,7 +81,7 @@ def make_plan(mesh: FitMesh) -> Plan:
     return Plan(parts, eyes, *_hinge(mesh, shapes, scale), notes)
 
 
-def _pieces(mesh: FitMesh) -> tuple[NDArray[np.int64], Floats]:
+def _pieces(mesh: FitMesh) -> tuple[Ints, Floats]:
     """(f,) which connected piece of one material a face belongs to, and each one's area."""
     from scipy.sparse import coo_matrix  # takes a moment to import
     from scipy.sparse.csgraph import connected_components
@@ -116,7 +115,7 @@ def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats
     return sizes * (1.0 + moving)
 
 
-def _vertices(mesh: FitMesh, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _vertices(mesh: FitMesh, chosen: Bools) -> Ints:
     used = np.unique(mesh.faces[chosen])
     return used[used >= 0]
 
@@ -164,7 +163,7 @@ def _within(mesh: FitMesh, label: Ints, eyes: Floats, radius: float) -> set[int]
     return {k for k in inside if _kind(names[k]) == "skin" and not any(w in names[k] for w in KEPT)}
 
 
-def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[PartRecipe, list[Island]]]:
+def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, list[Island]]]:
     """The face, and what of the same piece hardly moves, as a part of its own."""
     islands = _spread(mesh, chosen)
     if not islands:
@@ -182,13 +181,13 @@ def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[
     return out
 
 
-def _spread(mesh: FitMesh, chosen: NDArray[np.bool_]) -> list[Island]:
+def _spread(mesh: FitMesh, chosen: Bools) -> list[Island]:
     """Islands of the chosen faces, without overlap; those without area in (u, v) are dropped."""
     found = [part for island in find_islands(mesh, np.flatnonzero(chosen)) for part in separate(island)]
     return [i for i in found if np.ptp(i.uv, axis=0).min() > 1e-6 and np.abs(signed_areas(i)).sum() > 1e-12]
 
 
-def _shapes_moving(mesh: FitMesh, vertices: NDArray[np.int64], scale: float) -> int:
+def _shapes_moving(mesh: FitMesh, vertices: Ints, scale: float) -> int:
     if not len(mesh.deltas):
         return 0
     return int((np.abs(mesh.deltas[:, vertices]).max(axis=(1, 2)) > MOVES_MM * scale).sum())
@@ -248,7 +247,7 @@ def _area(mesh: FitMesh, island: Island) -> float:
     return float(0.5 * np.linalg.norm(np.cross(tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0]), axis=1).sum())
 
 
-def _hinge(mesh: FitMesh, shapes: dict[str, Floats], scale: float) -> tuple[Floats, NDArray[np.int64]]:
+def _hinge(mesh: FitMesh, shapes: dict[str, Floats], scale: float) -> tuple[Floats, Ints]:
     """The axis about which the chin turns when the jaw opens, and the chin's vertices; none where it does not turn."""
     none = np.zeros(3), np.zeros(0, np.int64)
     if "jawOpen" not in shapes:

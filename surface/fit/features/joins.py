@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import Chart
 from surface.head.model.data import Seam
 
@@ -14,8 +14,8 @@ from surface.head.model.data import Seam
 @dataclass(frozen=True)
 class _Loop:
     part: str
-    vertices: NDArray[np.int64]
-    uv: NDArray[np.float64]
+    vertices: Ints
+    uv: Floats
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.features.crowns import crown_chart, split_teeth
 from surface.fit.features.hair import Skin, Strip, brow_strip, lash_strip
 from surface.fit.features.rigging import lid_share, make_groups, tongue_groups
@@ -29,7 +28,7 @@ BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
 
 
 @dataclass(frozen=True)
-class Body:
+class HeadRig:
     """What all parts of one head share: shapes by parameter, the jaw's path, the eyes, the tongue's path out."""
 
     sources: dict[str, list[int]]
@@ -39,21 +38,21 @@ class Body:
     tongue: Floats = field(default_factory=lambda: np.zeros((0, 7)))
 
 
-def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, body: Body) -> PartData:
+def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, rig: HeadRig) -> PartData:
     """A fitted chart as a part; one that follows skull or jaw as a whole has no groups."""
     n, skin = len(fitted.net), part.follows == "skin"
-    groups, share = make_groups(fitted.points, fitted.moves, body.sources, body.jaw) if skin else ([], np.zeros(n))
-    if part.material == "tongue" and skin and len(body.tongue):
-        groups += tongue_groups(fitted.points, body.tongue, body.jaw)
+    groups, share = make_groups(fitted.points, fitted.moves, rig.sources, rig.jaw) if skin else ([], np.zeros(n))
+    if part.material == "tongue" and skin and len(rig.tongue):
+        groups += tongue_groups(fitted.points, rig.tongue, rig.jaw)
     slits = np.array([[c.v, c.start, c.end] for c in chart.cuts]).reshape(-1, 3)
     return PartData(
         part.name, part.material, part.follows, fitted.points, np.ones(n),
         fitted.net.knots_u, fitted.net.knots_v, np.full((n, 2), 3), chart.loops, slits, part.budget, groups, share,
-        lid_share(fitted.points, body.eyes, body.radius) if skin and body.radius > 0 else np.zeros(n),
+        lid_share(fitted.points, rig.eyes, rig.radius) if skin and rig.radius > 0 else np.zeros(n),
     )  # fmt: skip
 
 
-def teeth_part(mesh: FitMesh, part: PartRecipe, body: Body) -> tuple[PartData, PartReport]:
+def teeth_part(mesh: FitMesh, part: PartRecipe, rig: HeadRig) -> tuple[PartData, PartReport]:
     """One patch per tooth, all in one part."""
     first = mesh.faces[:, 0]
     low, high = part.vertices[0]
@@ -61,7 +60,7 @@ def teeth_part(mesh: FitMesh, part: PartRecipe, body: Body) -> tuple[PartData, P
     chart, crowns = crown_chart(mesh, teeth, part.follows != "jaw")
     request = replace(part.request, points=part.request.points * len(teeth), coarse=0.4, deepest=2, neutral_mm=0.08)
     fitted = fit_chart(crowns, chart, request)
-    return skin_part(part, chart, fitted, body), measure(part.name, chart, fitted, ())
+    return skin_part(part, chart, fitted, rig), measure(part.name, chart, fitted, ())
 
 
 def eyeball_part(side: str, centre: Floats, radius: float) -> PartData:
@@ -76,22 +75,22 @@ def eyeball_part(side: str, centre: Floats, radius: float) -> PartData:
     )  # fmt: skip
 
 
-def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], body: Body) -> list[PartData]:
+def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], rig: HeadRig) -> list[PartData]:
     """Brows and lashes of both sides, rooted in the fitted face."""
     skin = Skin(fitted)
     left = np.array(brow)
     brows, lashes = [], []
-    for ids, eye, is_left in zip((left, mirrored(chart, mesh, left)), body.eyes, (True, False), strict=True):
+    for ids, eye, is_left in zip((left, mirrored(chart, mesh, left)), rig.eyes, (True, False), strict=True):
         brows.append(brow_strip(skin, _brow_patch(chart, mesh, ids), hairs=40))
         rim = _rim_near(chart, mesh, eye)
         for upper in (True, False):
             root, along = _lid_line(rim, upper=upper, inner_first=is_left)
             length = (LASH_MM if upper else LOWER_LASH_MM) * _length_profile(along)
             lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=LASHES if upper else LOWER_LASHES))
-    return [_strips_part(n, m, s, body) for n, m, s in (("brows", "brow", brows), ("lashes", "lash", lashes))]
+    return [_strips_part(n, m, s, rig) for n, m, s in (("brows", "brow", brows), ("lashes", "lash", lashes))]
 
 
-def _brow_patch(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64]) -> Floats:
+def _brow_patch(chart: Chart, mesh: FitMesh, ids: Ints) -> Floats:
     """(m, k, 2) the skin under a brow in (u, v): along a smooth line through vertices, up and down from it."""
     line = smooth_line(mesh.vertices[ids], closed=False)
     along = np.linspace(0.0, 1.0, len(line))
@@ -125,16 +124,16 @@ def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, F
     return np.column_stack([u, v + LASH_ROOT[upper] * (1.0 if upper else -1.0)]), along
 
 
-def _strips_part(name: str, material: str, strips: list[Strip], body: Body) -> PartData:
+def _strips_part(name: str, material: str, strips: list[Strip], rig: HeadRig) -> PartData:
     """Strips as one part, each in a tile of its own."""
     points = np.concatenate([s.points for s in strips])
     moves = np.concatenate([s.moves for s in strips], axis=1)
-    groups, share = make_groups(points, moves, body.sources, body.jaw)
+    groups, share = make_groups(points, moves, rig.sources, rig.jaw)
     knots_u = np.concatenate([s.surface.padded[0] + TILE * k for k, s in enumerate(strips)])
     knots_v = np.concatenate([s.surface.padded[1] for s in strips])
     degrees = np.concatenate([np.stack(s.surface.degrees, axis=1) for s in strips])
     loops = [loop + np.array([TILE * k, 0.0]) for k, s in enumerate(strips) for loop in s.loops]
     return PartData(
         name, material, "skin", points, np.ones(len(points)), knots_u, knots_v, degrees, loops, np.zeros((0, 3)),
-        STRIP_BUDGET[material], groups, share, lid_share(points, body.eyes, body.radius),
+        STRIP_BUDGET[material], groups, share, lid_share(points, rig.eyes, rig.radius),
     )  # fmt: skip

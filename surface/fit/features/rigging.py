@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, Jaw, Rule
 from surface.head.model.parameters import TONGUE_NEEDS
@@ -20,7 +19,7 @@ DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
 TILTS = ("jawForward", "jawLeft", "jawRight")
 
 
-def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: NDArray[np.int64], hinge: Floats) -> Jaw:
+def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: Ints, hinge: Floats) -> Jaw:
     """The jaw's path out of the lower teeth, which are rigid: rotation about the hinge and what is left, a glide."""
     rest = mesh.vertices[teeth]
     if "jawOpen" not in sources or not len(teeth):

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
@@ -27,12 +26,12 @@ STEPS = np.arange(-2.0, 3.0)
 ALONG = 1.8  # distance of the points along a line, in widths of its furrow
 SPAN = 0.62  # of a knot, in widths across a line; along it spans are as long as the points are apart
 TAPER = 0.3  # share of a line's length over which its ends run out
-STIFF = 0.03  # weight of moving no point, beside what the samples say of an average one
+REGULARISATION = 0.03  # weight of moving no point, beside what the samples say of an average one
 RIDGE = 0.35  # of its depth: how far the skin beside a furrow rises
 
 
 @dataclass(frozen=True)
-class Furrow:
+class WrinkleLine:
     """One line in the skin: places (k, 2) in (u, v), (k, 3) in mm; depth and width in mm; the group that sinks it."""
 
     group: str
@@ -53,22 +52,22 @@ def add_wrinkles(
         with ``mirror`` the same on the right side, "Left" in names becoming "Right"; ``raised``, more lines, along
         which the skin comes out by ``rise`` mm, as a cheek does beside its fold.
     """
-    furrows, rules = [], []
+    lines, rules = [], []
     for table in wanted:
         for sided in (table, _mirrored(table)) if table.get("mirror") else (table,):
             rules.append(Rule(sided["group"], tuple(sided["terms"]), float(sided.get("power", 2.0))))
-            furrows += [_furrow(sided, np.array(line, float), chart, mesh) for line in sided["lines"]]
+            lines += [_wrinkle_line(sided, np.array(line, float), chart, mesh) for line in sided["lines"]]
             up = sided | {"depth": -sided.get("rise", 0.0)}
-            furrows += [_furrow(up, np.array(line, float), chart, mesh) for line in sided.get("raised", [])]
-    if not furrows:
+            lines += [_wrinkle_line(up, np.array(line, float), chart, mesh) for line in sided.get("raised", [])]
+    if not lines:
         return face, []
     surface = make_surface(face)
-    knots = [_knots(f, surface) for f in furrows]
+    knots = [_knots(f, surface) for f in lines]
     face = _with_points(face, surface, np.concatenate([k[0] for k in knots]), np.concatenate([k[1] for k in knots]))
     first = np.cumsum([surface.n, *(len(k[0]) for k in knots)])
     groups: dict[str, list[tuple[Ints, Floats]]] = {}
-    for f, a, b in zip(furrows, first, first[1:], strict=False):
-        groups.setdefault(f.group, []).append(_sunk(f, make_surface(face), np.arange(a, b)))
+    for f, a, b in zip(lines, first, first[1:], strict=False):
+        groups.setdefault(f.group, []).append(_depth_moves(f, make_surface(face), np.arange(a, b)))
     made = [
         Group(name, np.concatenate([i for i, _ in own]).astype(np.int32),
               np.concatenate([m for _, m in own]).astype(np.float32))
@@ -77,7 +76,7 @@ def add_wrinkles(
     return replace(face, groups=[*face.groups, *made]), rules
 
 
-def deepened(part: PartData, points: Floats) -> Floats:
+def with_deep_wrinkles(part: PartData, points: Floats) -> Floats:
     """Control points (n, 3) with all of a part's wrinkles in them, deeper than they ever are: to cut it into triangles
     that are fine enough for their shading."""
     out = points.copy()
@@ -98,7 +97,7 @@ def _other(name: str) -> str:
     return name.replace("Left", "*").replace("Right", "Left").replace("*", "Right")
 
 
-def _furrow(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMesh) -> Furrow:
+def _wrinkle_line(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMesh) -> WrinkleLine:
     """A line seen from the front, laid onto the mesh, in points that are evenly apart."""
     smooth = smooth_line(line, closed=False)
     samples = chart.mix @ mesh.vertices
@@ -107,10 +106,10 @@ def _furrow(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMesh) ->
     at = np.column_stack([smooth, np.convolve(np.pad(z, 3, mode="edge"), np.full(7, 1 / 7), "valid")])
     width = float(table["width"])
     at = evenly(at, max(3, round(arc_length(at)[-1] / (ALONG * width)) + 1))
-    return Furrow(table["group"], uv_of(chart, mesh, at), at, float(table["depth"]), width)
+    return WrinkleLine(table["group"], uv_of(chart, mesh, at), at, float(table["depth"]), width)
 
 
-def _knots(f: Furrow, surface: DCPSurface) -> tuple[Floats, Floats]:
+def _knots(f: WrinkleLine, surface: DCPSurface) -> tuple[Floats, Floats]:
     """Knots (k, 5) in u and in v: spans as wide as the furrow across it, as long as the points are apart along it."""
     _, su, sv = surface.derivatives(f.uv)
     along = np.abs(np.gradient(f.uv, axis=0))
@@ -147,7 +146,7 @@ def _with_points(face: PartData, surface: DCPSurface, knots_u: Floats, knots_v: 
     )
 
 
-def _sunk(f: Furrow, surface: DCPSurface, ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
+def _depth_moves(f: WrinkleLine, surface: DCPSurface, ids: Ints) -> tuple[Ints, Floats]:
     """The furrow's points and how they move when it is whole: along the skin's normals, in least squares."""
     _, su, sv = surface.derivatives(f.uv)
     normal = np.cross(su, sv)
@@ -157,19 +156,19 @@ def _sunk(f: Furrow, surface: DCPSurface, ids: NDArray[np.int64]) -> tuple[NDArr
     t = np.linspace(0.0, 1.0, len(f.uv))
     ends = np.clip(np.minimum(t, 1.0 - t) / TAPER, 0.0, 1.0)
     ends = 0.15 + 0.85 * ends * ends * (3.0 - 2.0 * ends)
-    side = _aside(f, su, sv)
+    side = _sideways_step(f, su, sv)
     for x in across:
         samples.append(f.uv + x * f.width * side)
         profile = np.exp(-0.5 * (x / 0.5) ** 2) - RIDGE * np.exp(-0.5 * ((abs(x) - 1.3) / 0.5) ** 2)
         wanted.append(-f.depth * profile * ends)
     matrix = surface.basis_matrix(np.concatenate(samples)).tocsc()[:, ids].toarray()
     normal_matrix = matrix.T @ matrix
-    normal_matrix += STIFF * np.trace(normal_matrix) / len(ids) * np.eye(len(ids))
+    normal_matrix += REGULARISATION * np.trace(normal_matrix) / len(ids) * np.eye(len(ids))
     amount = np.linalg.solve(normal_matrix, matrix.T @ np.concatenate(wanted))
     return ids, amount[:, None] * normal
 
 
-def _aside(f: Furrow, su: Floats, sv: Floats) -> Floats:
+def _sideways_step(f: WrinkleLine, su: Floats, sv: Floats) -> Floats:
     """(k, 2) step in (u, v) that is 1 mm of skin to the side of the line."""
     tangent = np.gradient(f.uv, axis=0)
     forward = tangent[:, :1] * su + tangent[:, 1:] * sv

@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.points.eyeball import surface_height
 from surface.fit.source.mesh import FitMesh
 
@@ -38,7 +37,7 @@ def fit_sphere(points: Floats) -> tuple[Floats, float]:
 
 
 def seat_lids(
-    mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: NDArray[np.int64], gazes: Floats | None = None
+    mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: Ints, gazes: Floats | None = None
 ) -> FitMesh:  # fmt: skip
     """Move the chosen vertices so that what touched the old eyeballs touches the new ones, their corneas included.
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.chart import Cut
 
 STEPS = np.arange(-2.0, 3.0)
@@ -28,15 +28,15 @@ class Net:
     knots_u, knots_v : (n, 5) float64.
     """
 
-    place: NDArray[np.int64]
-    knots_u: NDArray[np.float64]
-    knots_v: NDArray[np.float64]
+    place: Ints
+    knots_u: Floats
+    knots_v: Floats
 
     def __len__(self) -> int:
         return len(self.place)
 
     @property
-    def centres(self) -> NDArray[np.float64]:
+    def centres(self) -> Floats:
         """(n, 2) float64, the means of the inner knots: inside the support, next to a slit too."""
         return np.column_stack([self.knots_u[:, 1:4].mean(axis=1), self.knots_v[:, 1:4].mean(axis=1)])
 
@@ -46,7 +46,7 @@ class Net:
         return Net(*(np.concatenate(p) for p in pairs))
 
 
-def net_at(places: NDArray[np.int64], coarse: float, cuts: list[Cut], uv: NDArray[np.float64]) -> Net:
+def net_at(places: Ints, coarse: float, cuts: list[Cut], uv: Floats) -> Net:
     """Control points at the places (n, 4); those whose support holds no sample are left out."""
     places = np.asarray(places, np.int64).reshape(-1, 4)
     span = coarse / 2.0 ** places[:, :2]
@@ -68,11 +68,11 @@ def _cut(net: Net, cut: Cut) -> Net:
     return rest.joined(above).joined(below)
 
 
-def _take(net: Net, chosen: NDArray[np.bool_]) -> Net:
+def _take(net: Net, chosen: Bools) -> Net:
     return Net(*(a[chosen] for a in vars(net).values()))
 
 
-def _reaches(net: Net, uv: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _reaches(net: Net, uv: Floats) -> Bools:
     """Does the support hold a sample, well inside?"""
     out = np.zeros(len(net), bool)
     order = np.argsort(uv[:, 0])
@@ -87,7 +87,7 @@ def _reaches(net: Net, uv: NDArray[np.float64]) -> NDArray[np.bool_]:
     return out
 
 
-def coarse_places(uv: NDArray[np.float64], coarse: float) -> NDArray[np.int64]:
+def coarse_places(uv: Floats, coarse: float) -> Ints:
     """All places of level 0 around the samples."""
     low = np.floor(uv.min(axis=0) / coarse).astype(int) - 2
     high = np.ceil(uv.max(axis=0) / coarse).astype(int) + 2
@@ -96,9 +96,7 @@ def coarse_places(uv: NDArray[np.float64], coarse: float) -> NDArray[np.int64]:
     return np.column_stack([none, none, i.ravel(), j.ravel()])
 
 
-def wanted_places(
-    net: Net, uv: NDArray[np.float64], caps: NDArray[np.int64], error: NDArray[np.float64], coarse: float
-) -> NDArray[np.int64]:
+def wanted_places(net: Net, uv: Floats, caps: Ints, error: Floats, coarse: float) -> Ints:
     """Places (k, 4) of new points, most wanted first.
 
     Every sample with an error above 1 asks for the four points around it one level finer than what it has;
@@ -122,15 +120,13 @@ def wanted_places(
     return every[first][np.argsort(-want, kind="stable")]
 
 
-def level_caps(spacing: NDArray[np.float64], coarse: float, deepest: int) -> NDArray[np.int64]:
+def level_caps(spacing: Floats, coarse: float, deepest: int) -> Ints:
     """(m, 2) finest level in u and v whose spacing is not below the samples' own ``spacing (m, 2)``."""
     finest = np.floor(np.log2(coarse / np.maximum(spacing, 1e-9)) + 1e-6)
     return np.clip(finest, 0, deepest).astype(np.int64)
 
 
-def _next_level(
-    net: Net, uv: NDArray[np.float64], caps: NDArray[np.int64], coarse: float
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _next_level(net: Net, uv: Floats, caps: Ints, coarse: float) -> tuple[Ints, Bools]:
     """The first level (m, 2) that does not have all four points around a sample, and whether there is one."""
     have = np.unique(_keys(net.place))
     out, found = np.zeros((len(uv), 2), np.int64), np.zeros(len(uv), bool)
@@ -146,7 +142,7 @@ def _next_level(
     return out, found
 
 
-def _keys(places: NDArray[np.int64]) -> NDArray[np.int64]:
+def _keys(places: Ints) -> Ints:
     """(n,) one number for each place: levels below 16, i and j within four million of the middle."""
     level, at = places[:, :2], places[:, 2:] + (1 << 22)
     return ((level[:, 0] * 16 + level[:, 1]) << 46) + (at[:, 0] << 23) + at[:, 1]

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Ints
 from surface.fit.points.lid_seating import Eyeball, fit_sphere
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.mesh import FitMesh
@@ -62,10 +62,10 @@ class Recipe:
     hair: dict[str, Any] = field(default_factory=dict)
     frown: dict[str, Any] = field(default_factory=dict)
     wrinkles: list[dict[str, Any]] = field(default_factory=list)
-    mends: list[dict[str, Any]] = field(default_factory=list)
+    correctives: list[dict[str, Any]] = field(default_factory=list)
 
     @property
-    def seated(self) -> NDArray[np.int64]:
+    def seated(self) -> Ints:
         """Vertices that are moved with the lids."""
         return np.concatenate([np.arange(a, b) for a, b in self.seat]) if self.seat else np.zeros(0, np.int64)
 
@@ -108,7 +108,7 @@ def _read(table: dict[str, Any]) -> Recipe:
         hair=table["hair"],
         frown=table["frown"],
         wrinkles=table["wrinkles"],
-        mends=table["mends"],
+        correctives=table["correctives"],
     )
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.points.net import Net, coarse_places, level_caps, net_at, wanted_places
 from surface.fit.points.solve import basis, solve
 from surface.fit.source.chart import Chart
@@ -51,10 +51,10 @@ class Fitted:
     """
 
     net: Net
-    points: NDArray[np.float64]
-    moves: NDArray[np.float64]
-    error: NDArray[np.float64]
-    shape_error: NDArray[np.float64]
+    points: Floats
+    moves: Floats
+    error: Floats
+    shape_error: Floats
 
 
 def fit_chart(
@@ -78,24 +78,24 @@ def fit_chart(
             return fitted
 
 
-def _targets(mesh: FitMesh, mix: csr_matrix) -> NDArray[np.float64]:
+def _targets(mesh: FitMesh, mix: csr_matrix) -> Floats:
     """(m, 3 (1 + k)): neutral and shape displacements at rows of ``mix``."""
     return np.hstack([mix @ mesh.vertices, *(mix @ d for d in mesh.deltas)])
 
 
-def _measured(net: Net, b: csr_matrix, targets: NDArray[np.float64], x: NDArray[np.float64]) -> Fitted:
+def _measured(net: Net, b: csr_matrix, targets: Floats, x: Floats) -> Fitted:
     off = np.linalg.norm((b @ x - targets).reshape(len(targets), -1, 3), axis=2)
     x3 = x.reshape(len(net), -1, 3)
     return Fitted(net, x3[:, 0].copy(), x3[:, 1:].transpose(1, 0, 2).copy(), off[:, 0], off[:, 1:].T)
 
 
-def need(chart: Chart, fitted: Fitted, request: FitRequest) -> NDArray[np.float64]:
+def need(chart: Chart, fitted: Fitted, request: FitRequest) -> Floats:
     """(m,) how far each sample is off, 1 = just good enough; the worse of neutral and the worst shape."""
     worst = fitted.shape_error.max(axis=0) if len(fitted.shape_error) else np.zeros_like(fitted.error)
     return np.minimum(chart.weight, 1.0) * np.maximum(fitted.error / request.neutral_mm, worst / request.shape_mm)
 
 
-def _grow(net: Net, chart: Chart, error: NDArray[np.float64], request: FitRequest, room: int) -> tuple[Net, bool]:
+def _grow(net: Net, chart: Chart, error: Floats, request: FitRequest, room: int) -> tuple[Net, bool]:
     """Add the most wanted points, at most a share of what stands."""
     caps = level_caps(request.finest * chart.spacing, request.coarse, request.deepest)
     places = wanted_places(net, chart.uv, caps, error, request.coarse)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.points.refine import Fitted
 from surface.fit.source.chart import Chart
 
@@ -87,7 +87,7 @@ def measure(name: str, chart: Chart, fitted: Fitted, names: tuple[str, ...]) -> 
     )
 
 
-def _errors(distance: NDArray[np.float64]) -> Errors:
+def _errors(distance: Floats) -> Errors:
     if not len(distance):
         return Errors(0.0, 0.0, 0.0)
     return Errors(float(np.sqrt((distance**2).mean())), float(np.percentile(distance, 99)), float(distance.max()))

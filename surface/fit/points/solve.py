@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 
-def basis(net: Net, uv: NDArray[np.float64]) -> csr_matrix:
+def basis(net: Net, uv: Floats) -> csr_matrix:
     """Rational weights (m, n) of all control points (weights 1) at the samples."""
     return _surface(net).basis_matrix(uv)
 
@@ -45,7 +44,7 @@ class System:
         self.matrix = np.zeros((n, n))
         self.right = np.zeros((n, columns))
 
-    def add(self, rows: csr_matrix, weight: NDArray[np.float64], targets: NDArray[np.float64]) -> None:
+    def add(self, rows: csr_matrix, weight: Floats, targets: Floats) -> None:
         """Ask for rows (m, n) @ x = targets (m, c), each row with its weight (m,)."""
         matrix, right = np.zeros_like(self.matrix), np.zeros_like(self.right)
         rows.sort_indices()
@@ -57,11 +56,11 @@ class System:
 def solve(
     net: Net,
     samples: csr_matrix,
-    weight: NDArray[np.float64],
-    targets: NDArray[np.float64],
+    weight: Floats,
+    targets: Floats,
     fair: float,
-    slopes: tuple[Slopes, NDArray[np.float64], NDArray[np.float64]] | None = None,
-) -> NDArray[np.float64]:
+    slopes: tuple[Slopes, Floats, Floats] | None = None,
+) -> Floats:
     """Control point coordinates (n, c) for all targets (m, c) at once.
 
     Minimises sum weight (B P - target)^2 + slopes + fair (m / n) |F P|^2 with F of :func:`fairness`; one

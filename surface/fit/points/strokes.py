@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
 
@@ -34,14 +33,14 @@ def _layer(layer: dict[str, Any], chart: Chart, mesh: FitMesh) -> dict[str, Any]
     return out | {"lines": [np.round(line, 5).tolist() for line in lines]}
 
 
-def mirrored(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+def mirrored(chart: Chart, mesh: FitMesh, ids: Ints) -> Ints:
     """The chart's vertices on the other side of the face."""
     own = np.unique(chart.mix.indices)
     flipped = mesh.vertices[ids] * [-1.0, 1.0, 1.0]
     return np.array([own[np.argmin(((mesh.vertices[own] - p) ** 2).sum(axis=1))] for p in flipped])
 
 
-def vertex_line(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64], *, closed: bool) -> Floats:
+def vertex_line(chart: Chart, mesh: FitMesh, ids: Ints, *, closed: bool) -> Floats:
     """A smooth line through vertices, in (u, v)."""
     if len(ids) > 2 and not closed:
         return uv_of(chart, mesh, smooth_line(mesh.vertices[ids], closed=False))

@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.islands import Island, boundary_loops, directed_edges
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.slopes import Slopes, face_slopes, join_slopes
@@ -53,13 +52,13 @@ class Chart:
     size : side of the square that one island fills in (u, v).
     """
 
-    uv: NDArray[np.float64]
+    uv: Floats
     mix: csr_matrix
-    weight: NDArray[np.float64]
-    spacing: NDArray[np.float64]
-    folded: NDArray[np.bool_]
-    loops: list[NDArray[np.float64]]
-    loop_vertices: list[NDArray[np.int64]]
+    weight: Floats
+    spacing: Floats
+    folded: Bools
+    loops: list[Floats]
+    loop_vertices: list[Ints]
     cuts: list[Cut] = field(default_factory=list)
     slopes: Slopes | None = None
     size: float = 1.0
@@ -100,12 +99,12 @@ def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
     )  # fmt: skip
 
 
-def _loosened(fold: NDArray[np.float64]) -> NDArray[np.float64]:
+def _loosened(fold: Floats) -> Floats:
     """Weights of points that lie in a fold by 0..1."""
     return CLUTTER_WEIGHT + (1 - CLUTTER_WEIGHT) * (1 - fold)
 
 
-def slit_of(loop: NDArray[np.float64]) -> Cut | None:
+def slit_of(loop: Floats) -> Cut | None:
     """The centre line of a low, wide hole; None for a hole of any other form."""
     (u0, v0), (u1, v1) = loop.min(axis=0), loop.max(axis=0)
     if v1 - v0 > NARROW * (u1 - u0):
@@ -126,13 +125,13 @@ def _mirrored(island: Island) -> bool:
     return bool(((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() < 0)
 
 
-def _pick(vertex: NDArray[np.int64], n: int) -> csr_matrix:
+def _pick(vertex: Ints, n: int) -> csr_matrix:
     from scipy.sparse import csr_matrix
 
     return csr_matrix((np.ones(len(vertex)), (np.arange(len(vertex)), vertex)), shape=(len(vertex), n))
 
 
-def _sample_rows(island: Island) -> tuple[csr_matrix, NDArray[np.bool_]]:
+def _sample_rows(island: Island) -> tuple[csr_matrix, Bools]:
     """Rows over the island's points: vertices, face centres, border edge centres; and which lie on a border."""
     from scipy.sparse import csr_matrix, identity, vstack
 
@@ -152,7 +151,7 @@ def _sample_rows(island: Island) -> tuple[csr_matrix, NDArray[np.bool_]]:
     return vstack([identity(m), centres, edges]).tocsr(), border
 
 
-def _spacing(island: Island) -> NDArray[np.float64]:
+def _spacing(island: Island) -> Floats:
     """(m, 2): the longest step in u and in v along any edge at each point."""
     a, b = directed_edges(island.faces)
     step = np.abs(island.uv[a] - island.uv[b])
@@ -162,7 +161,7 @@ def _spacing(island: Island) -> NDArray[np.float64]:
     return out
 
 
-def _fold(mesh: FitMesh, island: Island) -> NDArray[np.float64]:
+def _fold(mesh: FitMesh, island: Island) -> Floats:
     """How deep each point lies in a fold, 0..1: where little of (u, v) holds much surface."""
     f = island.faces
     area3, area2 = _areas(mesh.vertices[island.vertex], f), _areas(np.pad(island.uv, ((0, 0), (0, 1))), f)
@@ -174,7 +173,7 @@ def _fold(mesh: FitMesh, island: Island) -> NDArray[np.float64]:
     return total / np.maximum(np.bincount(f[used], minlength=len(island.uv)), 1)
 
 
-def _areas(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _areas(points: Floats, faces: Ints) -> Floats:
     """Area of quads (f, 4) by their diagonals; a triangle's last corner is its third."""
     last = np.where(faces[:, 3] < 0, faces[:, 2], faces[:, 3])
     a, b, c = (points[faces[:, i]] for i in range(3))

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Ints
 from surface.fit.source.mesh import FitMesh
@@ -29,12 +28,12 @@ class Island:
     faces : (f, 4) int64 into the rows above, -1 as in the mesh.
     """
 
-    vertex: NDArray[np.int64]
-    uv: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    vertex: Ints
+    uv: Floats
+    faces: Ints
 
 
-def find_islands(mesh: FitMesh, faces: NDArray[np.int64] | None = None) -> list[Island]:
+def find_islands(mesh: FitMesh, faces: Ints | None = None) -> list[Island]:
     """All islands of the mesh, or of the chosen face indices, largest first."""
     from scipy.sparse import coo_matrix  # takes a moment to import
     from scipy.sparse.csgraph import connected_components
@@ -49,7 +48,7 @@ def find_islands(mesh: FitMesh, faces: NDArray[np.int64] | None = None) -> list[
     return [_island(corner[of_face == i], vertex, uv) for i in order if (of_face == i).any()]
 
 
-def _weld(mesh: FitMesh, chosen: NDArray[np.int64]) -> tuple[Ints, Ints, Floats]:
+def _weld(mesh: FitMesh, chosen: Ints) -> tuple[Ints, Ints, Floats]:
     """Corner points that share vertex and (rounded) texture coordinate become one."""
     f, fu = mesh.faces[chosen], mesh.face_uv[chosen]
     used = f >= 0
@@ -60,7 +59,7 @@ def _weld(mesh: FitMesh, chosen: NDArray[np.int64]) -> tuple[Ints, Ints, Floats]
     return corner, f[used][first], mesh.uv[fu[used][first]]
 
 
-def directed_edges(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def directed_edges(faces: Ints) -> tuple[Ints, Ints]:
     """Directed edges of quads and triangles."""
     nxt = np.roll(faces, -1, axis=1)
     nxt[faces[:, 3] < 0, 2] = faces[faces[:, 3] < 0, 0]
@@ -68,14 +67,14 @@ def directed_edges(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray
     return faces[used], nxt[used]
 
 
-def _island(faces: NDArray[np.int64], vertex: NDArray[np.int64], uv: NDArray[np.float64]) -> Island:
+def _island(faces: Ints, vertex: Ints, uv: Floats) -> Island:
     used, inverse = np.unique(faces, return_inverse=True)
     local = inverse.reshape(faces.shape) - (used[0] < 0)
     used = used[used >= 0]
     return Island(vertex[used], uv[used], local)
 
 
-def boundary_loops(island: Island) -> list[NDArray[np.int64]]:
+def boundary_loops(island: Island) -> list[Ints]:
     """Closed loops of the island's border, as rows of ``island.uv``, longest in (u, v) first.
 
     The first is the outline, the others are holes. Where a border touches itself in one point the loops are
@@ -114,5 +113,5 @@ def _close(path: list[int], begin: int, following: dict[int, list[int]]) -> list
     return path[begin:]
 
 
-def _length(polyline: NDArray[np.float64]) -> float:
+def _length(polyline: Floats) -> float:
     return float(np.linalg.norm(polyline - np.roll(polyline, -1, axis=0), axis=1).sum())

@@ -8,7 +8,6 @@ surface.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.chart import NARROW, TILE
@@ -49,7 +48,7 @@ def signed_areas(island: Island) -> Floats:
     return 0.5 * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
 
 
-def _neighbours(island: Island) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _neighbours(island: Island) -> tuple[Ints, Ints]:
     """Pairs of faces (e,), (e,) that share an edge."""
     a, b = directed_edges(island.faces)
     face = np.repeat(np.arange(len(island.faces)), (island.faces >= 0).sum(axis=1))
@@ -73,7 +72,7 @@ def _join_small(label: Ints, large: Bools, one: Ints, two: Ints) -> Ints:
             return out
 
 
-def cut_out(island: Island, chosen: NDArray[np.bool_]) -> Island:
+def cut_out(island: Island, chosen: Bools) -> Island:
     """Some faces of an island as one of their own."""
     faces = island.faces[chosen]
     used, inverse = np.unique(faces, return_inverse=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 
 LARGE, SMALL = 1e7, 1e-7  # in any unit: no vertex of a head lies further out, no head is smaller
@@ -25,24 +26,24 @@ class FitMesh:
     piece : (f,) int64 into ``pieces``, names of the objects that faces belong to; empty where there are none.
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    uv: NDArray[np.float64]
-    face_uv: NDArray[np.int64]
+    vertices: Floats
+    faces: Ints
+    uv: Floats
+    face_uv: Ints
     names: tuple[str, ...]
-    deltas: NDArray[np.float64]
-    piece: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    deltas: Floats
+    piece: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     pieces: tuple[str, ...] = ()
 
     def piece_of(self, face: int) -> str:
         """Name of the object that a face belongs to."""
         return self.pieces[self.piece[face]] if self.pieces else ""
 
-    def moved(self, warp_vertices: NDArray[np.float64], warp_deltas: NDArray[np.float64]) -> FitMesh:
+    def moved(self, warp_vertices: Floats, warp_deltas: Floats) -> FitMesh:
         """The same mesh with other vertices (n, 3) and deltas (k, n, 3)."""
         return replace(self, vertices=warp_vertices, deltas=warp_deltas)
 
-    def with_shapes(self, names: tuple[str, ...], deltas: NDArray[np.float64]) -> FitMesh:
+    def with_shapes(self, names: tuple[str, ...], deltas: Floats) -> FitMesh:
         """The same mesh with other shapes, (k, n, 3)."""
         return replace(self, names=names, deltas=deltas)
 
@@ -125,12 +126,12 @@ def _check_finite(where: str, mesh: FitMesh) -> None:
         raise FitError(f"{where}: all vertices stand in one place", hint="export the mesh again")
 
 
-def _usable(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _usable(rows: Floats) -> Bools:
     """(n,) whether a row's numbers are finite, and not as large as only damage makes them."""
     return np.asarray((np.abs(rows) < LARGE).all(axis=1))
 
 
-def triangles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def triangles(faces: Ints) -> Ints:
     """Quads (f, 4) with -1 for triangles, cut into triangles (t, 3)."""
     quads = faces[faces[:, 3] >= 0]
     return np.concatenate([faces[:, :3], quads[:, [0, 2, 3]]])

@@ -16,8 +16,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.parameters import SHAPES
@@ -172,7 +172,7 @@ def to_arkit(mesh: FitMesh, mapped: NameMap) -> FitMesh:
     return mesh.with_shapes(tuple(mapped.sources), deltas)
 
 
-def _halves(vertices: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+def _halves(vertices: Floats) -> dict[str, Floats]:
     """(n,) share of each side; they add up to one."""
     low, high = vertices[:, 0].min(), vertices[:, 0].max()
     t = np.clip((vertices[:, 0] - 0.5 * (low + high)) / (MIDDLE * max(high - low, 1e-9)), -1.0, 1.0)

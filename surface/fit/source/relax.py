@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.source.islands import Island, boundary_loops
 
 OPEN = 0.4  # height over width that a flat hole gets
@@ -29,7 +29,7 @@ class _Band:
     half: float
     extra: float
 
-    def shift(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shift(self, uv: Floats) -> Floats:
         """(m,) what is added to v."""
         x, width = uv[:, 1] - self.centre, self.end - self.start
         beside = np.maximum(self.start - uv[:, 0], uv[:, 0] - self.end) / (REACH_U * width)

@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import BORDER_WEIGHT, CLUTTER_WEIGHT, Chart
 from surface.fit.source.islands import Island
 from surface.fit.source.mesh import FitMesh, triangles
@@ -60,7 +59,7 @@ def _rays(points: Floats) -> tuple[Floats, Floats, Floats]:
     return np.repeat(origins, AROUND, axis=0), rays.reshape(-1, 3), uv
 
 
-def _hits(tri: Floats, origins: Floats, rays: Floats) -> tuple[NDArray[np.int64], Floats]:
+def _hits(tri: Floats, origins: Floats, rays: Floats) -> tuple[Ints, Floats]:
     """The furthest triangle (r,) of ``tri (t, 3, 3)`` that each ray meets, -1 for none, and the shares of its corners
     (r, 3) (Moeller and Trumbore, 1997)."""
     e1, e2 = tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0]
@@ -79,7 +78,7 @@ def _hits(tri: Floats, origins: Floats, rays: Floats) -> tuple[NDArray[np.int64]
 
 
 def _filled(
-    which: NDArray[np.int64], shares: Floats, corners: NDArray[np.int64], uv: Floats, n: int
+    which: Ints, shares: Floats, corners: Ints, uv: Floats, n: int
 ) -> csr_matrix:  # fmt: skip
     """(r, n) samples as mixes of vertices; a ray that meets nothing takes the sample that is nearest in (u, v)."""
     from scipy.sparse import csr_matrix  # takes a moment to import

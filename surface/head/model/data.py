@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.base.arrays import Array, Floats
+from surface.base.arrays import Array, Floats, Floats32, Ints
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Group:
 
     name: str
     ids: NDArray[np.int32]
-    moves: NDArray[np.float32]
+    moves: Floats32
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class PartData:
     weights: Floats
     knots_u: Floats
     knots_v: Floats
-    degrees: NDArray[np.int64]
+    degrees: Ints
     loops: list[Floats]
     slits: Floats
     budget: tuple[int, float, int]

@@ -10,9 +10,8 @@ from zipfile import BadZipFile
 from zlib import error as ZlibError
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Array
+from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.meshes import KEYS
@@ -71,7 +70,7 @@ class Source:
             raise self.bad(self.toml_path, f"{where}{key}", why)
         return table[key]
 
-    def numbers(self, table: dict[str, Any], key: str, shape: tuple[int, ...], where: str = "") -> NDArray[np.float64]:
+    def numbers(self, table: dict[str, Any], key: str, shape: tuple[int, ...], where: str = "") -> Floats:
         """A list of finite numbers of the given shape (-1: any length)."""
         raw = self.value(table, key, (list, int, float), where)
         try:

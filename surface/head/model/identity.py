@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Group, HeadData, PartData
-from surface.head.model.sidecar import Sidecar, beside, read_sidecar, write_sidecar
+from surface.head.model.sidecar import Sidecar, read_sidecar, sidecar_path, write_sidecar
 
 FILE = "identities.npz"
 Arrays = Mapping[str, Array]
@@ -129,7 +129,7 @@ def save_identities(head: str | Path, identities: list[Identity]) -> Path:
 
 def identities_path(head: str | Path) -> Path:
     """Where a head's identities are kept."""
-    return beside(head, FILE)
+    return sidecar_path(head, FILE)
 
 
 def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mapping[str, float], where: str) -> HeadData:

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Array
+from surface.base.arrays import Array, Floats
 from surface.dcp import DCPSurface
 from surface.head.model.data import PartData, Seam
 from surface.mesh.domain import Domain
@@ -42,7 +41,7 @@ def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) 
         )
 
 
-def _ends(seams: Sequence[Seam], part: str) -> NDArray[np.float64]:
+def _ends(seams: Sequence[Seam], part: str) -> Floats:
     """(k, 2) where seams of a part begin and end: three borders or more meet there. Closed seams have no ends."""
     lines = [uv for s in seams for name, uv in ((s.part_a, s.uv_a), (s.part_b, s.uv_b)) if name == part]
     ends = [line[k] for line in lines for k in (0, -1) if not np.array_equal(line[0], line[-1])]
@@ -84,7 +83,7 @@ def unpack(
     start, list_start, ids = (arrays[k] for k in ("mesh_cell_start", "mesh_list_start", "mesh_list_ids"))
     if made.shape != (5,) or tuple(made[:3]) != tuple(map(float, budget)):
         return None
-    if not _sound(uv, triangles, start, list_start, ids, surface.n):
+    if not _indices_valid(uv, triangles, start, list_start, ids, surface.n):
         return None
     side = arrays["mesh_side"].astype(np.int64)
     cell = np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start))
@@ -100,7 +99,7 @@ def unpack(
     )  # fmt: skip
 
 
-def _sound(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
+def _indices_valid(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
     """Do all indices point at something?"""
     if uv.ndim != 2 or triangles.ndim != 2 or not len(triangles) or len(start) != len(list_start):
         return False

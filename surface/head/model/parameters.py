@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from math import atan2, cos, hypot, sin
 
 import numpy as np
-from numpy.typing import NDArray
+
+from surface.base.arrays import Floats
 
 SIDES = ("Left", "Right")
 _EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
@@ -51,15 +52,15 @@ class Pose:
         :class:`surface.head.posing.contact.ContactSolver`; the part that has the opening fills it in for later parts.
     """
 
-    shapes: NDArray[np.float64]
+    shapes: Floats
     jaw: float
     closed: float
-    head: NDArray[np.float64]
-    gaze: NDArray[np.float64]
-    pushes: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    head: Floats
+    gaze: Floats
+    pushes: dict[str, Floats] = field(default_factory=dict)
 
 
-def read_pose(values: NDArray[np.float64]) -> Pose:
+def read_pose(values: Floats) -> Pose:
     """Parameter values (59,) in the order of NAMES, clipped, as a pose.
 
     mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
@@ -96,7 +97,7 @@ def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float
     return min(max(yaw, -1.0), 1.0), min(max(pitch, -1.0), 1.0)
 
 
-def rotation(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]:
+def rotation(yaw: float, pitch: float, roll: float = 0.0) -> Floats:
     """(3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
     cy, cp, cr, sy, sp, sr = cos(yaw), cos(pitch), cos(roll), sin(yaw), sin(pitch), sin(roll)
     return np.array(
@@ -108,7 +109,7 @@ def rotation(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]
     )
 
 
-def rotation_vector(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def rotation_vector(matrix: Floats) -> Floats:
     """(3,) axis times angle of a rotation by less than 180 degrees."""
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     axis = (h - f, c - g, d - b)

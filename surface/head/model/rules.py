@@ -1,4 +1,4 @@
-"""What moves groups that are no parameters: creases of the skin, and mends where two shapes do not add up."""
+"""What moves groups that are no parameters: creases of the skin, and correctives where two shapes do not add up."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Array
 from surface.base.errors import HeadFileError
 
 Made = TypeVar("Made")
@@ -23,7 +23,7 @@ _DAMAGE = (
 FORMAT, CHECK = f"{OWN}format", f"{OWN}checksum/"
 
 
-def beside(head: str | Path, file: str) -> Path:
+def sidecar_path(head: str | Path, file: str) -> Path:
     """Where a head keeps ``file``; ``head`` is its folder or its head.toml."""
     folder = Path(head)
     return (folder.parent if folder.suffix == ".toml" else folder) / file
@@ -41,7 +41,7 @@ class Sidecar:
     """
 
     path: Path
-    arrays: dict[str, NDArray[Any]]
+    arrays: dict[str, Array]
     checks: dict[str, int]
 
 
@@ -65,14 +65,14 @@ def read_sidecar(path: Path, make: Callable[[Sidecar], Made], hint: str) -> Made
         raise HeadFileError(f"{path}: {error}", hint=hint) from error
 
 
-def _check_version(path: Path, stored: Mapping[str, NDArray[Any]]) -> None:
+def _check_version(path: Path, stored: Mapping[str, Array]) -> None:
     """HeadFileError for a file of a later omote; those without a version are from before there was one."""
     version = int(stored[FORMAT][0]) if FORMAT in stored else 0
     if version > VERSION:
         raise HeadFileError(f"{path}: is of version {version}, this omote reads up to {VERSION}", hint="update omote")
 
 
-def write_sidecar(path: Path, arrays: Mapping[str, NDArray[Any]], checks: Mapping[str, int] | None = None) -> Path:
+def write_sidecar(path: Path, arrays: Mapping[str, Array], checks: Mapping[str, int] | None = None) -> Path:
     """Keep arrays by name, all or none of them, and checksums by part; returns the file's path.
 
     Raises

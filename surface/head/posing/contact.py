@@ -9,9 +9,8 @@ worked out once, by least squares over the samples.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.dcp import DCPSurface
 from surface.deform.lists import LANES
 from surface.head.model.data import Contact, HeadData, PartData
@@ -25,17 +24,17 @@ from surface.head.posing.contact_kernels import (
 )
 from surface.spline.kernels import fill_rows, row_capacity
 
-MEET = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
+CONTACT_SHARE = 2 / 3  # of the rows at an opening: those that can meet the other side; in the others motion fades out
 SOFT_MM = 0.1
-PRESS_MM = (0.28, 0.9)  # so deep lips and lids may overlap: triangles cut about that off the edges of both sides
-PASSES, AGAIN_MM = 3, 0.1  # further passes take what bending left over of more than that
-RAISE = 1.6  # of what a lid is off: least squares hold it back, because its neighbours need not move
+OVERLAP_MM = (0.28, 0.9)  # so deep lips and lids may overlap: triangles cut about that off the edges of both sides
+PASSES, TOLERANCE_MM = 3, 0.1  # further passes take what bending left over of more than that
+LIFT_GAIN = 1.6  # of what a lid is off: least squares hold it back, because its neighbours need not move
 LID_MM = 1.2  # a lid is this thick: what rests nearer to the eyeball than that never sinks further
 TOUCH_MM = 0.05  # what rests on the eyeball keeps this far away
-HELD_MM = (1.2, 2.4)  # what rests nearer to the eyeball than that never comes off it; what rests further may
+HOLD_MM = (1.2, 2.4)  # what rests nearer to the eyeball than that never comes off it; what rests further may
 AHEAD = np.array([0.0, 0.0, 1.0])
-STIFF = (0.02, 0.05)  # for lips and lids: weight of moving no control point, beside a sample's
-FELT = 0.004  # of a sample: points with less are left out of it
+REGULARISATION = (0.02, 0.05)  # for lips and lids: weight of moving no control point, beside a sample's
+LEAST_WEIGHT = 0.004  # of a sample: points with less are left out of it
 FAR_MM = 18.0  # from every sample: points of large spans that stand there would move brow and chin
 LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
 
@@ -55,13 +54,13 @@ class ContactSolver:
         self._near = np.unique(ids)
         self._tiles, self._room = tiled(start, ids, share), np.empty(3 * LANES, np.float32)
         self._samples = np.empty((*contact.places.shape[:3], 3))
-        self._meeting = meeting_rows(contact)
+        self._rows = contact_rows(contact)
         self._place(surface.points)
-        self._cushion = _cushion(self._samples, self.radius)
-        self.ids, table = _inverse(start, ids, share, surface.points, STIFF[self.radius > 0])
+        self._limits = _limits(self._samples, self.radius)
+        self.ids, table = _inverse(start, ids, share, surface.points, REGULARISATION[self.radius > 0])
         self._lift, self._away = table.astype(np.float32), _spread(contact).T @ table
         self._overlap = np.zeros((2, contact.places.shape[1]))
-        self._before = np.empty((2, *self._overlap.shape, self._meeting))
+        self._before = np.empty((2, *self._overlap.shape, self._rows))
         self.push = np.zeros(self._before.size if self.radius > 0 else self._overlap.size)
         self._found = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
 
@@ -70,21 +69,21 @@ class ContactSolver:
         place_samples(*self._tiles, points, self.eye, self.radius, self._room, flat)
 
     def apply(self, axis: Floats, points: Floats) -> Floats:
-        """Mend control points (n, 3) in place; returns what :meth:`Follower.apply` takes.
+        """Correct control points (n, 3) in place; returns what :meth:`Follower.apply` takes.
 
         For lips that is the overlap (2 k,) in mm that was found in each column, for lids how far their samples (2 k m,)
-        slid and how far they were lifted. ``axis (3,)`` is where the eye looks. The result is the feeler's own and is
+        slid and how far they were lifted. ``axis (3,)`` is where the eye looks. The result is the solver's own and is
         overwritten each time. Where neither the points near the opening nor the eye have moved, the last answer holds.
         """
         before, (looked, found, moved) = points[self._near], self._found
         if np.array_equal(axis, looked) and np.array_equal(before, found):
             points[self.ids] = moved
         else:
-            self._mend(axis, points)
+            self._resolve(axis, points)
             self._found = np.array(axis), before, points[self.ids]
         return self.push
 
-    def _mend(self, axis: Floats, points: Floats) -> None:
+    def _resolve(self, axis: Floats, points: Floats) -> None:
         """Move control points (n, 3) in place, and leave in ``push`` what was asked of them.
 
         Lids are laid on the eyeball before they are parted: that opens them.
@@ -96,18 +95,18 @@ class ContactSolver:
             laid = self._lay(axis, points)
             off = max(laid, self._part(points))
             self._place(points)
-            if off < AGAIN_MM:
+            if off < TOLERANCE_MM:
                 break
         if self.radius > 0:
             self.push[:] = (self._now() - self._before).ravel()
 
     def _now(self) -> Floats:
         """(2, 2, k, m) height and depth of the samples that can meet, as they are placed."""
-        return self._samples[:, :, : self._meeting, 1:].transpose(3, 0, 1, 2)
+        return self._samples[:, :, : self._rows, 1:].transpose(3, 0, 1, 2)
 
     def _part(self, points: Floats) -> float:
         """Move the sides, whose samples are placed, apart where they overlap; returns the deepest overlap, mm."""
-        find_overlap(self._samples[:, :, : self._meeting], PRESS_MM[self.radius > 0], SOFT_MM, self._overlap)
+        find_overlap(self._samples[:, :, : self._rows], OVERLAP_MM[self.radius > 0], SOFT_MM, self._overlap)
         if self.radius <= 0:
             self.push += self._overlap.ravel()
         move_points(self.ids, self._overlap.ravel(), self._away, self.eye, self.radius, False, points)
@@ -116,17 +115,17 @@ class ContactSolver:
     def _lay(self, axis: Floats, points: Floats) -> float:
         """Keep lids, whose samples are placed, on the eyeball, and place them anew; returns how far the furthest was
         off, mm."""
-        if self._cushion is None:
+        if self._limits is None:
             return 0.0
         samples = self._samples.reshape(-1, 3)
-        off = self._cushion.find(samples, axis)
+        off = self._limits.find(samples, axis)
         if off > 0.0:
-            lift_points(self.ids, self._cushion.lifts, samples, self.radius, self._lift, points)
+            lift_points(self.ids, self._limits.lifts, samples, self.radius, self._lift, points)
             self._place(points)
         return off
 
 
-class Cushion:
+class HeightLimits:
     """Says how samples of a lid must move so that it lies on an eyeball as it does at rest.
 
     Parameters
@@ -145,14 +144,14 @@ class Cushion:
         find_heights(samples, radius, AHEAD, self._heights)
         self._most = np.maximum(self._heights, TOUCH_MM)
         self._least = np.minimum(self._most, LID_MM if held else TOUCH_MM)
-        t = np.clip((HELD_MM[1] - self._most) / (HELD_MM[1] - HELD_MM[0]), 0.0, 1.0)
+        t = np.clip((HOLD_MM[1] - self._most) / (HOLD_MM[1] - HOLD_MM[0]), 0.0, 1.0)
         self._hold = t * t * (3.0 - 2.0 * t) * held
 
     def find(self, samples: Floats, axis: Floats) -> float:
         """Fill ``lifts`` for samples (s, 3) over an eye that looks along ``axis (3,)``; returns how far the furthest
         is off, mm."""
         find_heights(samples, self._radius, axis, self._heights)
-        return float(find_lifts(self._heights, self._least, self._most, self._hold, RAISE, self.lifts))
+        return float(find_lifts(self._heights, self._least, self._most, self._hold, LIFT_GAIN, self.lifts))
 
 
 class Follower:
@@ -166,7 +165,7 @@ class Follower:
 
     def __init__(self, contact: Contact, points: Floats, surface: DCPSurface, head: HeadData) -> None:
         self.eye, self.radius = eye_of(contact, head)
-        places = contact.places[:, :, : meeting_rows(contact)]
+        places = contact.places[:, :, : contact_rows(contact)]
         at = surface.evaluate(places.reshape(-1, 2)).reshape(*places.shape[:3], 3)
         _, columns, rows, _ = at.shape
         distance = np.stack([_nearest(points, side.reshape(-1, 3)) for side in at])
@@ -191,7 +190,7 @@ class Follower:
             move_points(self.ids, asked, self._with, self.eye, self.radius, k == 1, points)
 
 
-class Lining:
+class EyeballClearance:
     """Keeps what lines the lids out of the eyeball.
 
     Parameters
@@ -203,21 +202,21 @@ class Lining:
         self.eye, self.radius = np.ascontiguousarray(eye, np.float64), radius
         start, ids, share = shares_at(surface, places)
         self._tiles, self._room = tiled(start, ids, share), np.empty(3 * LANES, np.float32)
-        self.ids, table = _inverse(start, ids, share, surface.points, STIFF[1])
+        self.ids, table = _inverse(start, ids, share, surface.points, REGULARISATION[1])
         self._lift, self._samples = table.astype(np.float32), np.empty((len(places), 3))
         self._place(surface.points)
-        self._cushion = Cushion(self._samples, radius, held=False)
+        self._limits = HeightLimits(self._samples, radius, held=False)
 
     def _place(self, points: Floats) -> None:
         place_samples(*self._tiles, points, self.eye, self.radius, self._room, self._samples)
 
     def apply(self, axis: Floats, points: Floats) -> None:
-        """Mend control points (n, 3) in place; ``axis (3,)`` is where the eye looks."""
+        """Correct control points (n, 3) in place; ``axis (3,)`` is where the eye looks."""
         for _ in range(PASSES):
             self._place(points)
-            if self._cushion.find(self._samples, axis) < AGAIN_MM:
+            if self._limits.find(self._samples, axis) < TOLERANCE_MM:
                 return
-            lift_points(self.ids, self._cushion.lifts, self._samples, self.radius, self._lift, points)
+            lift_points(self.ids, self._limits.lifts, self._samples, self.radius, self._lift, points)
 
 
 def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:
@@ -227,12 +226,12 @@ def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:
     return np.ascontiguousarray(head.eyes[contact.eye], np.float64), head.eye_radius
 
 
-def _cushion(samples: Floats, radius: float) -> Cushion | None:
+def _limits(samples: Floats, radius: float) -> HeightLimits | None:
     """What keeps lids on an eyeball; None for lips."""
-    return Cushion(samples.reshape(-1, 3), radius, held=True) if radius > 0 else None
+    return HeightLimits(samples.reshape(-1, 3), radius, held=True) if radius > 0 else None
 
 
-def shares_at(surface: DCPSurface, uv: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+def shares_at(surface: DCPSurface, uv: Floats) -> tuple[Ints, Ints, Floats]:
     """The rational weights of a surface's points at places (s, 2), without scipy: those of place k are ``share (m,)``
     of the points ``ids (m,)`` from ``start[k]`` to ``start[k + 1]``."""
     samples, sides, _ = surface.sample(uv, None)
@@ -243,15 +242,13 @@ def shares_at(surface: DCPSurface, uv: Floats) -> tuple[NDArray[np.int64], NDArr
     used = fill_rows(*arrays[:4], arrays[5], *bins, samples, sides, data, ids, start)
     rows = np.repeat(np.arange(len(uv)), np.diff(start))
     share = data[:used, 0] / np.bincount(rows, data[:used, 0], len(uv))[rows]
-    felt = share > FELT
+    felt = share > LEAST_WEIGHT
     rows, share, ids = rows[felt], share[felt], ids[:used][felt]
     start = np.searchsorted(rows, np.arange(len(uv) + 1))
     return start, ids.astype(np.int64) % surface.n, share / np.bincount(rows, share, len(uv))[rows]
 
 
-def tiled(
-    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+def tiled(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Floats32]:
     """Shares as :func:`shares_at` gives them, for eight places at a time: tile t takes eight ``share (8 m,)`` each of
     the points ``ids (m,)`` from ``start[t]`` to ``start[t + 1]``."""
     places, n = len(start) - 1, int(ids.max(initial=0)) + 1
@@ -270,9 +267,7 @@ def _nearest(points: Floats, others: Floats) -> Floats:
     return distance
 
 
-def _inverse(
-    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats, points: Floats, stiff: float
-) -> tuple[NDArray[np.int64], Floats]:
+def _inverse(start: Ints, ids: Ints, share: Floats, points: Floats, stiff: float) -> tuple[Ints, Floats]:
     """Control points (k,) of ``points (n, 3)`` that reach the samples, and (s, k) how far each moves, in least squares,
     for every sample that shall move by 1. A point that mostly acts elsewhere, or stands far off, is left alone."""
     dense = np.zeros((len(start) - 1, int(ids.max()) + 1))
@@ -285,16 +280,16 @@ def _inverse(
     return used, np.ascontiguousarray(np.linalg.solve(normal, dense.T).T)
 
 
-def meeting_rows(contact: Contact) -> int:
+def contact_rows(contact: Contact) -> int:
     """How many rows from the rim on can meet the other side."""
-    return round(MEET * int(contact.places.shape[2]))
+    return round(CONTACT_SHARE * int(contact.places.shape[2]))
 
 
 def _spread(contact: Contact) -> Floats:
     """(s, 2 k) how far each sample moves for a push of each column: up by the contact's share of it, down by the
     rest."""
     _, columns, rows, _ = contact.places.shape
-    meeting = meeting_rows(contact)
+    meeting = contact_rows(contact)
     t = np.linspace(0.0, 1.0, rows - meeting + 1)[1:]
     row = np.concatenate([np.ones(meeting), 1.0 - t * t * (3.0 - 2.0 * t)])
     out = np.zeros((2, columns, rows, 2, columns))

@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Floats32
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.base.jit import kernel
 from surface.spline.lanes import fma, load, store3, zero
 
@@ -17,7 +16,7 @@ CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
 
 @kernel
 def place_samples(
-    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats32, points: Floats, eye: Floats, radius: float,
+    start: Ints, ids: Ints, share: Floats32, points: Floats, eye: Floats, radius: float,
     room: Floats32, out: Floats,
 ) -> None:  # fmt: skip
     """Samples ``out (s, 3)`` of a surface as (x, height, depth), from control points ``points (n, 3)``.
@@ -137,9 +136,7 @@ def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, eager
 
 
 @kernel
-def lift_points(
-    ids: NDArray[np.int64], lifts: Floats, samples: Floats, size: float, table: Floats32, points: Floats
-) -> None:
+def lift_points(ids: Ints, lifts: Floats, samples: Floats, size: float, table: Floats32, points: Floats) -> None:
     """Move ``points (n, 3)`` with the numbers ``ids (k,)`` by ``lifts (s,) @ table (s, k)``, mm, each lift away from
     the eyeball of radius ``size`` where its sample (s, 3) as (x, height, depth) stands."""
     count = len(ids)
@@ -165,7 +162,7 @@ def lift_points(
 
 @kernel
 def move_points(
-    ids: NDArray[np.int64], amounts: Floats, table: Floats, eye: Floats, radius: float, outward: bool, points: Floats
+    ids: Ints, amounts: Floats, table: Floats, eye: Floats, radius: float, outward: bool, points: Floats
 ) -> None:
     """Move ``points (n, 3)`` with the numbers ``ids (k,)`` up by ``amounts (s,) @ table (s, k)``, mm.
 

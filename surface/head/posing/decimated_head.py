@@ -17,10 +17,10 @@ from surface.deform.deformation import Deformation
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.parameters import Pose, read_pose, rotation
 from surface.head.posing.head import Head
-from surface.head.posing.kernels import carry, turn_head, zip_border
+from surface.head.posing.kernels import move_rigid, stitch_border, turn_head
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
-from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
-from surface.head.posing.seams import Zipper
+from surface.head.posing.rig import SkinRig, motion_key, rigid_motion
+from surface.head.posing.seams import SeamStitch
 from surface.mesh.mesh import Mesh
 
 Ranges = list[tuple[int, int]]
@@ -126,24 +126,24 @@ class JoinedRig(SkinRig):
         ends = np.cumsum([0, *(len(part.rig.rest) for part in parts)]).tolist()
         self.rows = {part.name: slice(a, b) for part, a, b in zip(parts, ends, ends[1:], strict=False)}
         self._rigs = [(part.rig, self.rows[part.name]) for part in parts]
-        self._woken: list[int] = []
+        self._invalidations: list[int] = []
 
     def apply(self, pose: Pose) -> Floats:
-        woken = [rig.woken for rig, _ in self._rigs]
-        if woken != self._woken:
-            self._woken = woken
+        invalidations = [rig.invalidations for rig, _ in self._rigs]
+        if invalidations != self._invalidations:
+            self._invalidations = invalidations
             for rig, rows in self._rigs:
                 self.rest[rows] = rig.rest
-            self.wake()
+            self.invalidate()
         return super().apply(pose)
 
-    def _asks(self, pose: Pose) -> tuple[object, ...]:
-        return *super()._asks(pose), pose.gaze.tobytes()
+    def _pose_key(self, pose: Pose) -> tuple[object, ...]:
+        return *super()._pose_key(pose), pose.gaze.tobytes()
 
-    def _express(self, pose: Pose) -> None:
-        super()._express(pose)
+    def _evaluate(self, pose: Pose) -> None:
+        super()._evaluate(pose)
         for rig, rows in self._rigs:
-            rig.meet(pose, self.points[rows])
+            rig.apply_contacts(pose, self.points[rows])
 
 
 def _joined(parts: Sequence[PartData]) -> PartData:
@@ -201,13 +201,13 @@ class _Rigid:
     def __init__(self, follows: str, parts: Sequence[DecimatedPart], head: HeadData) -> None:
         self._follows, self._head = follows, head
         self._rest = [(decimated, *_rest(decimated)) for decimated in parts]
-        self._asked: tuple[object, ...] = ()
+        self._last_key: tuple[object, ...] = ()
 
     def pose(self, pose: Pose, turn: Turn, turned: bool, vertices: Floats32, normals: Floats32) -> None:
         """Bring the parts' rows of ``vertices`` and ``normals`` (m, 3) to the pose."""
-        asked = motion_asks(self._follows, self._head, pose)
-        still = asked == self._asked and not turned
-        self._asked = asked
+        asked = motion_key(self._follows, self._head, pose)
+        still = asked == self._last_key and not turned
+        self._last_key = asked
         for decimated, rest, _ in self._rest:
             decimated.changed = [] if still else [(0, len(rest))]
         if still:
@@ -216,7 +216,7 @@ class _Rigid:
         shift = (turn.matrix @ (shift - turn.pivot) + turn.pivot).astype(np.float32)
         linear = (turn.matrix @ linear).astype(np.float32)
         for decimated, rest, rest_normals in self._rest:
-            carry(rest, rest_normals, linear, shift, vertices[decimated.first :], normals[decimated.first :])
+            move_rigid(rest, rest_normals, linear, shift, vertices[decimated.first :], normals[decimated.first :])
 
 
 def _rest(decimated: DecimatedPart) -> tuple[Floats32, Floats32]:
@@ -228,19 +228,19 @@ def _rest(decimated: DecimatedPart) -> tuple[Floats32, Floats32]:
 class _Seams:
     """All seams of a head, closed in one go, one after the other."""
 
-    def __init__(self, zippers: Sequence[Zipper], parts: Sequence[DecimatedPart]) -> None:
+    def __init__(self, stitches: Sequence[SeamStitch], parts: Sequence[DecimatedPart]) -> None:
         by_name = {decimated.part.name: decimated for decimated in parts}
         self._pairs: list[tuple[DecimatedPart, DecimatedPart]] = []
         ids, low, high, share = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [_NO_SHARE]
-        for zipper in zippers:
-            one, two = by_name[zipper.first.name], by_name[zipper.second.name]
-            drawn = np.isin(zipper.ids, two.kept)
+        for stitch in stitches:
+            one, two = by_name[stitch.first.name], by_name[stitch.second.name]
+            drawn = np.isin(stitch.ids, two.kept)
             if drawn.any():
                 self._pairs.append((one, two))
-                ids.append(two.rows(zipper.ids[drawn]))
-                low.append(one.rows(zipper.low[drawn]))
-                high.append(one.rows(zipper.high[drawn]))
-                share.append(zipper.share[drawn])
+                ids.append(two.rows(stitch.ids[drawn]))
+                low.append(one.rows(stitch.low[drawn]))
+                high.append(one.rows(stitch.high[drawn]))
+                share.append(stitch.share[drawn])
         self._rows = *(np.concatenate(rows) for rows in (ids, low, high)), np.concatenate(share)
 
     def close(self, vertices: Floats32, normals: Floats32) -> None:
@@ -250,7 +250,7 @@ class _Seams:
             if one.changed or two.changed:  # by the pose, or by a seam before
                 two.changed, touched = [(0, len(two.kept))], True
         if touched:
-            zip_border(vertices, normals, vertices, normals, *self._rows)
+            stitch_border(vertices, normals, vertices, normals, *self._rows)
 
 
 _NO_SHARE = np.zeros(0, np.float32)
@@ -259,10 +259,10 @@ _NO_SHARE = np.zeros(0, np.float32)
 def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
     """Which vertices are drawn or asked for, by part, with those that seams put them between."""
     kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
-    for zipper in reversed(head.zippers):  # what an earlier one gives, a later one may take
-        drawn = np.isin(zipper.ids, kept[zipper.second.name])
-        between = [kept[zipper.first.name], zipper.low[drawn], zipper.high[drawn]]
-        kept[zipper.first.name] = np.unique(np.concatenate(between))
+    for stitch in reversed(head.zippers):  # what an earlier one gives, a later one may take
+        drawn = np.isin(stitch.ids, kept[stitch.second.name])
+        between = [kept[stitch.first.name], stitch.low[drawn], stitch.high[drawn]]
+        kept[stitch.first.name] = np.unique(np.concatenate(between))
     return kept
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Floats32
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data
@@ -18,7 +19,7 @@ from surface.head.model.rules import Drivers
 from surface.head.posing.decimation import apply_decimated, read_decimated
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
-from surface.head.posing.seams import Zipper
+from surface.head.posing.seams import SeamStitch
 from surface.head.posing.shade import apply_shade, read_shade
 
 RIGID = ("skull", "jaw", "left_eye", "right_eye")
@@ -41,9 +42,9 @@ class Head:
         drivers = Drivers(data.rules, where)
         self.parts: tuple[HeadPart, ...] = tuple(_make_part(p, data, drivers, where) for p in data.parts)
         by_name = {p.name: p for p in self.parts}
-        self._zippers = [Zipper(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams]
-        for zipper in self._zippers:
-            zipper.close()
+        self._stitches = [SeamStitch(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams]
+        for stitch in self._stitches:
+            stitch.close()
         self._at = {name: i for i, name in enumerate(self.parameters)}
 
     @classmethod
@@ -80,9 +81,9 @@ class Head:
         raise KeyError(f"no part {name!r}; there are {', '.join(p.name for p in self.parts)}")
 
     @property
-    def zippers(self) -> tuple[Zipper, ...]:
+    def zippers(self) -> tuple[SeamStitch, ...]:
         """The head's seams, in the order in which they are closed."""
-        return tuple(self._zippers)
+        return tuple(self._stitches)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -102,14 +103,14 @@ class Head:
             raise KeyError(f"no group {name!r}; there are {', '.join(self.groups)}")
         return found
 
-    def values(self, given: Mapping[str, float]) -> NDArray[np.float64]:
+    def values(self, given: Mapping[str, float]) -> Floats:
         """A parameter vector (P,) from names and values, 0 elsewhere; KeyError for an unknown name."""
         out = np.zeros(len(self.parameters))
         for name, value in given.items():
             out[self._at[name]] = value
         return out
 
-    def pose(self, values: NDArray[np.float64]) -> None:
+    def pose(self, values: Floats) -> None:
         """Move all parts to parameter values (P,) in the order of :attr:`parameters`; values are clipped.
 
         Raises
@@ -120,10 +121,10 @@ class Head:
         turn = Turn(rotation(*pose.head), self.data.neck.pivot)
         for part in self.parts:
             part.pose(pose, turn)
-        for zipper in self._zippers:
-            zipper.close()
+        for stitch in self._stitches:
+            stitch.close()
 
-    def place_points(self, values: NDArray[np.float64]) -> tuple[list[NDArray[np.float64]], Turn]:
+    def place_points(self, values: Floats) -> tuple[list[Floats], Turn]:
         """As :meth:`pose`, but only what vertices are summed from; they and their normals stay.
 
         Returns
@@ -157,7 +158,7 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
     return made
 
 
-def _eye_directions(part: PartData, head: HeadData, vertices: NDArray[np.floating]) -> dict[str, NDArray[np.float32]]:
+def _eye_directions(part: PartData, head: HeadData, vertices: NDArray[np.floating]) -> dict[str, Floats32]:
     """``eye_local`` (m, 3): where a vertex of an eyeball lies in the eye's own frame, in radii, +z the pupil."""
     if part.follows not in ("left_eye", "right_eye"):
         return {}

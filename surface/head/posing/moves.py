@@ -4,9 +4,8 @@ move, and these without asking for each where it stands."""
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.head.model.data import Group, PartData
 from surface.head.posing.kernels import add_moves
 
@@ -39,7 +38,7 @@ class Moves:
         """Add the displacements by ``amounts (g,)`` of the groups to ``points (n, 3)``, contiguous."""
         add_moves(amounts, self._group, self._first, self._start, self._rows, points.reshape(-1))
 
-    def at(self, ids: NDArray[np.int64]) -> NDArray[np.float32]:
+    def at(self, ids: Ints) -> Floats32:
         """(g, k, 3) displacements of the points ``ids (k,)``."""
         dense = np.zeros((len(self.used), 3 * self._n), np.float32)
         for group, first, start, stop in zip(self._group, self._first, self._start, self._start[1:], strict=False):
@@ -47,7 +46,7 @@ class Moves:
         return dense.reshape(len(self.used), self._n, 3)[:, ids]
 
 
-def _runs(index: int, group: Group) -> list[tuple[int, int, NDArray[np.float32]]]:
+def _runs(index: int, group: Group) -> list[tuple[int, int, Floats32]]:
     """A group's displacements as runs of points: its number, where among all coordinates a run begins, and its
     displacements (k, 3)."""
     order = np.argsort(group.ids, kind="stable")

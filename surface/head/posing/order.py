@@ -7,22 +7,22 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Array
 from surface.base.errors import HeadFileError
 from surface.head.model.sidecar import Sidecar
 from surface.head.posing.part import HeadPart
 
 STEPS = 1 << 14  # of u and v per unit
-BESIDE = 1 / 3  # of a step: halves, quarters and so on never lie between two steps, where a last bit would decide
+OFFSET = 1 / 3  # of a step: halves, quarters and so on never lie between two steps, where a last bit would decide
 
 
 def checksum(triangles: NDArray[np.integer], uv: NDArray[np.floating]) -> int:
     """A number that changes with the order of vertices: of ``triangles (t, 3)`` and of ``uv (m, 2)`` in steps."""
-    places = np.floor(np.asarray(uv, np.float64) * STEPS + BESIDE)
+    places = np.floor(np.asarray(uv, np.float64) * STEPS + OFFSET)
     check = zlib.crc32(np.ascontiguousarray(triangles, "<i4").tobytes())
     return zlib.crc32(np.ascontiguousarray(places, "<i4").tobytes(), check)
 
@@ -32,7 +32,7 @@ def checksums(parts: Iterable[HeadPart]) -> dict[str, int]:
     return {part.name: checksum(part.mesh.triangles, part.mesh.uv) for part in parts}
 
 
-def belonging(kept: Sidecar, parts: Iterable[HeadPart]) -> dict[str, NDArray[Any]]:
+def matching_arrays(kept: Sidecar, parts: Iterable[HeadPart]) -> dict[str, Array]:
     """The arrays of a file that belong to these parts as they are tessellated.
 
     A part that is tessellated anew when the head is loaded, for another budget, loses its arrays: they were made for

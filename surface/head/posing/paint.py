@@ -14,9 +14,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Bools, Floats, Floats32
 from surface.base.errors import HeadFileError
 from surface.head.posing.kernels import nearest_on_line
 
@@ -28,7 +27,7 @@ BASE: dict[str, tuple[float, ...]] = {
 }
 
 
-def paint_part(layers: list[dict[str, Any]], part: str, uv: Floats, where: str) -> dict[str, NDArray[np.float32]]:
+def paint_part(layers: list[dict[str, Any]], part: str, uv: Floats, where: str) -> dict[str, Floats32]:
     """Attributes (m, k) of one part at its vertices ``uv (m, 2)``.
 
     Raises
@@ -81,7 +80,7 @@ def _distance(uv: Floats, line: Floats, closed: bool) -> Floats:
     return distance
 
 
-def _inside(uv: Floats, ring: Floats) -> NDArray[np.bool_]:
+def _inside(uv: Floats, ring: Floats) -> Bools:
     """Even-odd rule."""
     odd = np.zeros(len(uv), bool)
     for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Floats32
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.dcp import DCPSurface
 from surface.deform.deformation import Deformation
 from surface.head.model.data import HeadData, PartData
 from surface.head.model.meshes import make_surface as make_surface
 from surface.head.model.parameters import Pose, rotation_vector
 from surface.head.model.rules import Drivers
-from surface.head.posing.kernels import carry, turn_head
-from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
+from surface.head.posing.kernels import move_rigid, turn_head
+from surface.head.posing.rig import SkinRig, motion_key, rigid_motion
 from surface.mesh.borders import border_edges
 from surface.mesh.mesh import Mesh
 
@@ -62,7 +62,7 @@ class HeadPart:
 
     def pose(self, pose: Pose, turn: Turn) -> None:
         """Move to a pose; ``turn`` is the head's rotation."""
-        ranges, vertices, normals = self._express(pose)
+        ranges, vertices, normals = self._evaluate(pose)
         if not np.array_equal(turn.matrix, self._turn.matrix):
             ranges = [(0, len(vertices))]
         self._turn, self.changed = turn, ranges
@@ -74,7 +74,7 @@ class HeadPart:
                 turn_head(vertices, normals, self._share, turn.matrix, turn.vector, turn.pivot, start, stop,
                           self.vertices, self.normals)  # fmt: skip
 
-    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
+    def _evaluate(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
         """Everything but the head's rotation: ranges that changed, vertices, normals."""
         raise NotImplementedError
 
@@ -100,7 +100,7 @@ class HeadPart:
         """(m,) how much of the head's rotation each vertex of the mesh takes, 0..1."""
         return self._share
 
-    def append(self, like: NDArray[np.int64], triangles: NDArray[np.int32]) -> None:
+    def append(self, like: Ints, triangles: NDArray[np.int32]) -> None:
         """Add vertices that look like others, ids ``like (k,)``, and triangles that may use them.
 
         The new vertices stand behind the part's own; whoever adds them moves them.
@@ -134,7 +134,7 @@ class SkinPart(HeadPart):
         self.vertices[:], self.normals[:] = self.deformation.vertices, self.deformation.normals
         self._share[:] = head.neck.share(self.vertices.astype(np.float64))
 
-    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
+    def _evaluate(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
         points = self.rig.apply(pose)
         if self._version == self.rig.version:
             return [], self.deformation.vertices, self.deformation.normals
@@ -164,19 +164,19 @@ class RigidPart(HeadPart):
         self._head = head
         self._rest, self._rest_normals = self.vertices.copy(), self.normals.copy()
         self._linear, self._shift = np.eye(3), np.zeros(3)
-        self._asked: tuple[object, ...] = ()
+        self._last_key: tuple[object, ...] = ()
 
     def pose(self, pose: Pose, turn: Turn) -> None:
         """Move to a pose; ``turn`` is the head's rotation, which a rigid part takes as a whole."""
-        asked = (*motion_asks(self.follows, self._head, pose), turn.matrix.tobytes())
+        asked = (*motion_key(self.follows, self._head, pose), turn.matrix.tobytes())
         self._turn, self.changed = turn, []
-        if asked == self._asked:
+        if asked == self._last_key:
             return
-        self._asked, self.changed = asked, [(0, len(self._rest))]
+        self._last_key, self.changed = asked, [(0, len(self._rest))]
         self._linear, self._shift = rigid_motion(self.follows, self._head, pose)
         linear = (turn.matrix @ self._linear).astype(np.float32)
         shift = (turn.matrix @ (self._shift - turn.pivot) + turn.pivot).astype(np.float32)
-        carry(self._rest, self._rest_normals, linear, shift, self.vertices, self.normals)
+        move_rigid(self._rest, self._rest_normals, linear, shift, self.vertices, self.normals)
 
     @property
     def control_points(self) -> Floats:

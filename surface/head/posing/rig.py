@@ -9,12 +9,12 @@ from surface.head.model.data import HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers
-from surface.head.posing.contact import LID_MM, ContactSolver, Follower, Lining
+from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import keep_on_eyeball, mix_rows, swing_jaw
 from surface.head.posing.moves import Moves
 
-LINING_GRID = (72, 36)  # places looked at all over what lines the lids, along u and v
-LINED = 1.4  # in radii: so near to an eye what lines its lids is kept out of it
+CLEARANCE_GRID = (72, 36)  # places looked at all over what lines the lids, along u and v
+CLEARANCE_RADII = 1.4  # in radii: so near to an eye what lines its lids is kept out of it
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
 
 
@@ -32,10 +32,10 @@ class SkinRig:
 
     Attributes
     ----------
-    rest : (n, 3) float64, control points at rest; whoever changes them calls :meth:`wake`.
+    rest : (n, 3) float64, control points at rest; whoever changes them calls :meth:`invalidate`.
     points : (n, 3) float64, control points of the last pose.
     version : grows whenever ``points`` is worked out anew.
-    woken : grows with every :meth:`wake`.
+    invalidations : grows with every :meth:`invalidate`.
     """
 
     def __init__(self, part: PartData, head: HeadData, drivers: Drivers | None = None) -> None:
@@ -46,14 +46,14 @@ class SkinRig:
         self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
         self._swings, self._whole = bool(self._open.any()), jaw_path(head.jaw, 1.0)
         self._undo = _undo_share(part)
-        self._feelers, self._followers = _contacts(part, head)
-        self._linings = _linings(part, head)
+        self._solvers, self._followers = _contacts(part, head)
+        self._clearances = _clearances(part, head)
         self._lids = Lids(part, head, self._moves)
         self._amounts = np.zeros(len(self._moves.used))
-        self._asked: tuple[object, ...] = ()
+        self._last_key: tuple[object, ...] = ()
         self._pushes: dict[str, Floats] = {}
         self.points = np.zeros((n, 3))
-        self.version = self.woken = 0
+        self.version = self.invalidations = 0
 
     def apply(self, pose: Pose) -> Floats:
         """Positions (n, 3) of all control points before the head turns.
@@ -62,39 +62,39 @@ class SkinRig:
         they ask for in ``pose.pushes``.
         """
         np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
-        asked = self._asks(pose)
-        if asked != self._asked:
-            self._asked = asked
-            self._express(pose)
+        asked = self._pose_key(pose)
+        if asked != self._last_key:
+            self._last_key = asked
+            self._evaluate(pose)
             self.version += 1
         pose.pushes.update(self._pushes)
         return self.points
 
-    def wake(self) -> None:
+    def invalidate(self) -> None:
         """Work everything out anew at the next pose: the points at rest have been changed."""
-        self._asked = ()
-        self.woken += 1
+        self._last_key = ()
+        self.invalidations += 1
 
-    def meet(self, pose: Pose, points: Floats) -> None:
+    def apply_contacts(self, pose: Pose, points: Floats) -> None:
         """Let the part's own openings close, and what goes with others' openings follow, in control points (n, 3) that
         everything else has moved; what the openings ask for is left in ``pose.pushes``. The rig's own pose stays."""
-        for feeler in self._feelers:
-            axis = optical_axis(pose.gaze[max(feeler.contact.eye, 0)])
-            pose.pushes[feeler.contact.name] = feeler.apply(axis, points)
+        for solver in self._solvers:
+            axis = optical_axis(pose.gaze[max(solver.contact.eye, 0)])
+            pose.pushes[solver.contact.name] = solver.apply(axis, points)
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)
-        for eye, lining in self._linings:
+        for eye, lining in self._clearances:
             lining.apply(optical_axis(pose.gaze[eye]), points)
 
-    def _asks(self, pose: Pose) -> tuple[object, ...]:
+    def _pose_key(self, pose: Pose) -> tuple[object, ...]:
         """All that the part's points depend on, to compare with the pose before."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
-        gaze = pose.gaze.tobytes() if self._feelers or self._linings else b""
+        gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
         return self._amounts.tobytes(), jaw, gaze, *pushes
 
-    def _express(self, pose: Pose) -> None:
+    def _evaluate(self, pose: Pose) -> None:
         """Groups, jaw, lids and contacts, one after the other."""
         np.copyto(self.points, self.rest)
         self._moves.add(self._amounts, self.points)
@@ -105,9 +105,9 @@ class SkinRig:
             swing_jaw(self.rest, self._open, turn, shift, full_turn * pose.jaw, full_shift * pose.jaw,
                       pose.jaw, undo, self.points)  # fmt: skip
         self._lids.apply(self._amounts, self.points)
-        self.meet(pose, self.points)
-        own = (feeler.contact.name for feeler in self._feelers)
-        self._pushes = {name: pose.pushes[name].copy() for name in own}  # others may use the feelers meanwhile
+        self.apply_contacts(pose, self.points)
+        own = (solver.contact.name for solver in self._solvers)
+        self._pushes = {name: pose.pushes[name].copy() for name in own}  # others may use the solvers meanwhile
 
 
 class Lids:
@@ -142,32 +142,34 @@ def optical_axis(gaze: Floats) -> Floats:
 
 def _contacts(part: PartData, head: HeadData) -> tuple[list[ContactSolver], list[tuple[str, Follower]]]:
     """What keeps the part's own openings from crossing, and what moves its points with other parts' openings."""
-    feelers, followers = [], []
+    solvers, followers = [], []
     for contact in head.contacts:
         if contact.part == part.name:
-            feelers.append(ContactSolver(contact, part, make_surface(part), head))
+            solvers.append(ContactSolver(contact, part, make_surface(part), head))
         elif part.name in contact.followers:
             opening = next(p for p in head.parts if p.name == contact.part)
             follower = Follower(contact, part.points, make_surface(opening), head)
             followers.append((contact.name, follower))
-    return feelers, followers
+    return solvers, followers
 
 
-def _linings(part: PartData, head: HeadData) -> list[tuple[int, Lining]]:
+def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballClearance]]:
     """What keeps the part out of the eyeballs, if it is sewn to lids from behind."""
     lids = [c for c in head.contacts if c.eye >= 0 and part.name in c.followers]
     if not any(s.part_b == part.name and s.part_a == c.part for s in head.seams for c in lids):
         return []
     domain, surface = domain_of(part), make_surface(part)
     u0, u1, v0, v1 = domain.rect
-    grid = np.stack(np.meshgrid(np.linspace(u0, u1, LINING_GRID[0]), np.linspace(v0, v1, LINING_GRID[1])), axis=-1)
+    grid = np.stack(
+        np.meshgrid(np.linspace(u0, u1, CLEARANCE_GRID[0]), np.linspace(v0, v1, CLEARANCE_GRID[1])), axis=-1
+    )
     places = grid.reshape(-1, 2)[domain.inside(grid.reshape(-1, 2))]
     at, out = surface.evaluate(places), []
     for eye in (c.eye for c in lids):
         local = at - head.eyes[eye]
-        near = (np.linalg.norm(local, axis=1) < LINED * head.eye_radius) & (local[:, 2] > 0.0)
+        near = (np.linalg.norm(local, axis=1) < CLEARANCE_RADII * head.eye_radius) & (local[:, 2] > 0.0)
         if near.any():
-            out.append((eye, Lining(surface, places[near], head.eyes[eye], head.eye_radius)))
+            out.append((eye, EyeballClearance(surface, places[near], head.eyes[eye], head.eye_radius)))
     return out
 
 
@@ -191,7 +193,7 @@ def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
     return turn, centre - turn @ centre + amount * np.array(jaw.glide)
 
 
-def motion_asks(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
+def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
     """All that the motion of a part fixed to skull, jaw or an eye depends on, before the head turns."""
     if follows == "jaw":
         return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))

@@ -8,17 +8,17 @@ edges of the second.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Ints
 from surface.head.model.data import Seam
-from surface.head.posing.kernels import nearest_on_line, zip_border
+from surface.head.posing.kernels import nearest_on_line, stitch_border
 from surface.head.posing.part import HeadPart
 
 NEAR = 2e-3  # in (u, v): a vertex nearer than this to the seam's polyline is on it
 SAME = 1e-4  # in points of the seam: vertices nearer than this are one
 
 
-class Zipper:
+class SeamStitch:
     """One seam, ready to be closed.
 
     Parameters
@@ -42,12 +42,10 @@ class Zipper:
         self.share = np.clip((at - a_at[after - 1]) / gap, 0.0, 1.0).astype(np.float32)
         self._fill(a_ids, a_at, *_around(self.ids, at, seam.uv_a))
 
-    def _fill(
-        self, a_ids: NDArray[np.int64], a_at: NDArray[np.float64], ids: NDArray[np.int64], at: NDArray[np.float64]
-    ) -> None:
+    def _fill(self, a_ids: Ints, a_at: Floats, ids: Ints, at: Floats) -> None:
         """Slivers over the first part's vertices ``a_ids`` that stand between neighbours ``ids`` of the second's."""
         directed = {(int(p), int(q)) for p, q in self.second.borders}
-        triangles: list[NDArray[np.int64]] = []
+        triangles: list[Ints] = []
         copies: list[int] = []
         like: list[int] = []
         for p, q, start, end in zip(ids, ids[1:], at, at[1:], strict=False):
@@ -74,11 +72,11 @@ class Zipper:
         if not len(self.ids) or not (self.first.changed or self.second.changed):
             return
         one, two = self.first, self.second
-        zip_border(one.vertices, one.normals, two.vertices, two.normals, self.ids, self.low, self.high, self.share)
+        stitch_border(one.vertices, one.normals, two.vertices, two.normals, self.ids, self.low, self.high, self.share)
         self.second.touch()
 
 
-def _along(part: HeadPart, line: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:
     """Border vertices of a part on a polyline, and how far along it they lie, in its points; in order."""
     ids = np.unique(part.borders)
     distance, at = np.empty(len(ids)), np.empty(len(ids))
@@ -89,9 +87,7 @@ def _along(part: HeadPart, line: NDArray[np.float64]) -> tuple[NDArray[np.int64]
     return ids[order], at[order]
 
 
-def _around(
-    ids: NDArray[np.int64], at: NDArray[np.float64], line: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _around(ids: Ints, at: Floats, line: Floats) -> tuple[Ints, Floats]:
     """Vertices along a polyline; on a closed one the last also stands before the first, the first after the last."""
     if not len(ids) or not np.array_equal(line[0], line[-1]):
         return ids, at

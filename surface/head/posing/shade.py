@@ -15,15 +15,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.head.model.sidecar import beside, read_sidecar, write_sidecar
-from surface.head.posing.order import belonging, checksums
+from surface.base.arrays import Floats32
+from surface.head.model.sidecar import read_sidecar, sidecar_path, write_sidecar
+from surface.head.posing.order import checksums, matching_arrays
 from surface.head.posing.part import HeadPart
 
 FILE = "occlusion.npz"
 Shares = Mapping[str, NDArray[np.floating]]
 
 
-def read_shade(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, NDArray[np.float32]]:
+def read_shade(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, Floats32]:
     """Shares (m, k) of each part, 0..1, by the part's name; empty where the head has no such file.
 
     Parameters
@@ -37,7 +38,7 @@ def read_shade(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, ND
     """
     path = shade_path(head)
     hint = f"delete {path}, or make the head again: omote fit"
-    return read_sidecar(path, lambda kept: {k: _rows(v) for k, v in belonging(kept, parts).items()}, hint) or {}
+    return read_sidecar(path, lambda kept: {k: _rows(v) for k, v in matching_arrays(kept, parts).items()}, hint) or {}
 
 
 def write_shade(head: str | Path, shares: Shares, parts: Iterable[HeadPart] = ()) -> Path:
@@ -65,11 +66,11 @@ def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:
                 part.attributes[name] = more
 
 
-def _rows(stored: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _rows(stored: NDArray[np.uint8]) -> Floats32:
     """Bytes (m,) or (m, k) as shares (m, k)."""
     return stored.reshape(len(stored), -1).astype(np.float32) / np.float32(255)
 
 
 def shade_path(head: str | Path) -> Path:
     """Where a head's shade is kept."""
-    return beside(head, FILE)
+    return sidecar_path(head, FILE)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from surface.base.errors import HeadFileError
-from surface.head.model.sidecar import FORMAT, VERSION, beside, read_sidecar, write_sidecar
+from surface.head.model.sidecar import FORMAT, VERSION, read_sidecar, sidecar_path, write_sidecar
 
 
 def test_arrays_come_back_and_nothing_else_is_left(tmp_path: Path) -> None:
-    path = beside(tmp_path / "head.toml", "more.npz")
-    assert path == beside(tmp_path, "more.npz") == tmp_path / "more.npz"
+    path = sidecar_path(tmp_path / "head.toml", "more.npz")
+    assert path == sidecar_path(tmp_path, "more.npz") == tmp_path / "more.npz"
     assert read_sidecar(path, lambda kept: kept, "") is None
     write_sidecar(path, {"a/b": np.arange(3), "c": np.ones((2, 2))})
     found = read_sidecar(path, lambda kept: kept, "")

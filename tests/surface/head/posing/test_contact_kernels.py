@@ -5,7 +5,7 @@ import pytest
 from face_measures import eye_height
 
 from surface.fit.points.eyeball import surface_height
-from surface.head.posing.contact import LID_MM, TOUCH_MM, Cushion
+from surface.head.posing.contact import LID_MM, TOUCH_MM, HeightLimits
 from surface.head.posing.contact_kernels import find_heights, find_lifts, lift_points, place_samples
 from surface.head.posing.rig import optical_axis
 
@@ -69,7 +69,7 @@ def test_what_lay_on_the_ball_follows_the_cornea_and_what_stood_off_does_not():
     way = np.array([[0.0, 0.1, 1.0], [0.0, 0.1, 1.0], [0.0, 0.1, 1.0]]) / np.hypot(0.1, 1.0)
     ground = RADIUS * eye_height(way, ahead)
     rest = samples_at(way * (ground + np.array([0.3, LID_MM, 4.0]))[:, None])
-    cushion = Cushion(rest, RADIUS, held=True)
+    cushion = HeightLimits(rest, RADIUS, held=True)
     assert cushion.find(rest, ahead) == pytest.approx(0.0, abs=1e-9)
     fall = ground[0] - RADIUS * eye_height(way, aside)[0]
     assert fall > 0.9  # the cornea turned away
@@ -80,7 +80,7 @@ def test_what_lay_on_the_ball_follows_the_cornea_and_what_stood_off_does_not():
 def test_a_lining_only_keeps_out():
     way = np.array([[0.0, 0.3, 1.0]]) / np.hypot(0.3, 1.0)
     ground = RADIUS * eye_height(way, optical_axis(np.zeros(2)))
-    cushion = Cushion(samples_at(way * (ground + 0.5)[:, None]), RADIUS, held=False)
+    cushion = HeightLimits(samples_at(way * (ground + 0.5)[:, None]), RADIUS, held=False)
     for height, wanted in ((2.0, 0.0), (0.1, 0.0), (-0.4, 0.4 + TOUCH_MM)):
         off = cushion.find(samples_at(way * (ground + height)[:, None]), optical_axis(np.zeros(2)))
         assert off == pytest.approx(wanted, abs=5e-3)

@@ -42,10 +42,10 @@ def test_weights_of_a_position_add_up_and_of_a_derivative_cancel() -> None:
 def test_a_vertex_of_a_seam_takes_the_share_of_those_it_lies_between() -> None:
     head = Head(small_head())
     sums = Influence(head)
-    zipper = head.zippers[0]
-    own = sums.share[sums.part_start[1] + zipper.ids]
+    stitch = head.zippers[0]
+    own = sums.share[sums.part_start[1] + stitch.ids]
     first = sums.share[: sums.part_start[1]]
-    low, high = first[zipper.low], first[zipper.high]
+    low, high = first[stitch.low], first[stitch.high]
     assert len(own) > 5
     assert (own >= np.minimum(low, high) - 1e-6).all()
     assert (own <= np.maximum(low, high) + 1e-6).all()

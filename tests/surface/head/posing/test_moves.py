@@ -48,6 +48,6 @@ def test_a_rig_rests_while_nothing_changes_and_wakes_when_it_is_told_to():
     rig.apply(pose(mouthPucker=0.5, browInnerUp=1.0))  # none of this part's business
     assert rig.version == version
     rig.rest[0] += 1.0
-    rig.wake()
+    rig.invalidate()
     np.testing.assert_allclose(rig.apply(pose(mouthPucker=0.5))[0] - points[0], 1.0)
     assert rig.version == version + 1
