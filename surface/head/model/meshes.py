@@ -1,6 +1,6 @@
-"""The tessellation of a part, kept in the head file so that a face starts at once.
+"""Tessellate parts, and store their meshes in the head file so that loading need not tessellate again.
 
-A head without it, or with another budget than it was made with, is tessellated when it is loaded.
+A part without a stored mesh, or with another budget than it was made with, is tessellated when it is loaded.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) 
 
 
 def _ends(seams: Sequence[Seam], part: str) -> Floats:
-    """(k, 2) where seams of a part begin and end: three borders or more meet there. Closed seams have no ends."""
+    """(k, 2) ends of a part's seams, where three borders or more meet; closed seams have none."""
     lines = [uv for s in seams for name, uv in ((s.part_a, s.uv_a), (s.part_b, s.uv_b)) if name == part]
     ends = [line[k] for line in lines for k in (0, -1) if not np.array_equal(line[0], line[-1])]
     return np.unique(np.array(ends, float).reshape(-1, 2), axis=0)
@@ -56,7 +56,7 @@ def domain_of(data: PartData) -> Domain:
 
 
 def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
-    """Arrays to keep; positions and normals are left out, the surface gives them."""
+    """The mesh as arrays to store, without positions and normals, which the surface gives."""
     return {
         "mesh_uv": mesh.uv,
         "mesh_triangles": mesh.triangles.astype(np.int32),
@@ -71,10 +71,10 @@ def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
 def unpack(
     arrays: dict[str, Array], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool
 ) -> Mesh | None:
-    """The kept mesh, or None if it is absent, made with another budget, or does not fit the surface.
+    """The stored mesh, or None if it is absent, made with another budget, or does not fit the surface.
 
-    ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex then stands
-    in the middle of its cell's control points.
+    ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex is put in the middle
+    of its cell's control points.
     """
     if any(key not in arrays for key in KEYS):
         return None
@@ -100,7 +100,7 @@ def unpack(
 
 
 def _indices_valid(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
-    """Do all indices point at something?"""
+    """Are all indices in range?"""
     if uv.ndim != 2 or triangles.ndim != 2 or not len(triangles) or len(start) != len(list_start):
         return False
     whole = start[0] == 0 and start[-1] == len(uv) and list_start[0] == 0 and list_start[-1] == len(ids)

@@ -67,7 +67,7 @@ def test_another_order_of_as_many_vertices_is_refused_with_what_to_do(folder: Pa
 
 def test_another_budget_leaves_the_files_out(folder: Path) -> None:
     toml = folder / "head.toml"
-    toml.write_text(toml.read_text().replace("0.1, 4]", "0.3, 4]"))
+    toml.write_text(toml.read_text().replace("    0.1,\n    4,\n]", "    0.3,\n    4,\n]"))
     head = Head.load(folder)
     assert not head.part("a").stored
     assert not shaded(head)
