@@ -1,4 +1,4 @@
-"""The head: load it, pose it, read vertices and normals of its parts."""
+"""Load and pose a head: vertices and normals of all its parts."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ from surface.head.model.identity import load_identities, with_identities
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.parameters import NAMES, read_pose, rotation
 from surface.head.model.rules import Drivers
-from surface.head.posing.decimation import apply_decimated, read_decimated
+from surface.head.posing.baked import apply_decimated, apply_shade, read_decimated, read_shade
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
 from surface.head.posing.seams import SeamStitch
-from surface.head.posing.shade import apply_shade, read_shade
 
 RIGID = ("skull", "jaw", "left_eye", "right_eye")
 
@@ -42,7 +41,7 @@ class Head:
         drivers = Drivers(data.rules, where)
         self.parts: tuple[HeadPart, ...] = tuple(_make_part(p, data, drivers, where) for p in data.parts)
         by_name = {p.name: p for p in self.parts}
-        self._stitches = [SeamStitch(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams]
+        self._stitches = tuple(SeamStitch(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams)
         for stitch in self._stitches:
             stitch.close()
         self._at = {name: i for i, name in enumerate(self.parameters)}
@@ -83,7 +82,7 @@ class Head:
     @property
     def zippers(self) -> tuple[SeamStitch, ...]:
         """The head's seams, in the order in which they are closed."""
-        return tuple(self._stitches)
+        return self._stitches
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -125,11 +124,9 @@ class Head:
             stitch.close()
 
     def place_points(self, values: Floats) -> tuple[list[Floats], Turn]:
-        """As :meth:`pose`, but only what vertices are summed from; they and their normals stay.
+        """As :meth:`pose`, but only the points that vertices are summed from; vertices and normals stay.
 
-        Returns
-        -------
-        (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
+        Returns (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
         :class:`surface.head.posing.influence.Influence`.
         """
         pose = read_pose(values)
@@ -159,7 +156,7 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
 
 
 def _eye_directions(part: PartData, head: HeadData, vertices: NDArray[np.floating]) -> dict[str, Floats32]:
-    """``eye_local`` (m, 3): where a vertex of an eyeball lies in the eye's own frame, in radii, +z the pupil."""
+    """``eye_local`` (m, 3): vertices of an eyeball in the eye's frame, in radii, +z through the pupil."""
     if part.follows not in ("left_eye", "right_eye"):
         return {}
     local = (vertices - head.eyes[int(part.follows == "right_eye")]) / head.eye_radius

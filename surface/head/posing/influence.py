@@ -1,4 +1,4 @@
-"""Every vertex of a head as sums over control points, for whoever evaluates the surfaces elsewhere.
+"""Express every vertex of a head as sums over control points, to evaluate the surfaces on a graphics processor.
 
 Weights do not change while a face moves, so the division of Eq. (1) can be done beforehand. With W the sum of all
 b w, a vertex is the sum of c P with c = b w / W, and by the quotient rule its derivative in u, times a positive
@@ -57,10 +57,7 @@ class Influence:
 
 
 def _rows(part: HeadPart) -> tuple[list[Row], int]:
-    """Sums of one part's vertices over its own points, and how many points it has.
-
-    Vertices that a seam has added get an empty sum; the seam fills it.
-    """
+    """Sums of one part's vertices over its own points, empty for those that a seam has added; and how many points."""
     if isinstance(part, SkinPart):
         lists = build_lists(part.surface, part.mesh, True)
         rows, count = _skin_rows(lists, -1.0 if part.mesh.flip else 1.0), part.surface.n
@@ -101,8 +98,8 @@ def _rigid_rows(part: HeadPart) -> list[Row]:
     """Sums over the columns of a rigid motion and its shift; derivatives are any two directions along the surface."""
     mesh = part.mesh
     vertices, normals = np.asarray(mesh.vertices, float), np.asarray(mesh.normals, float)
-    aside = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    along = np.cross(aside, normals)
+    sideways = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    along = np.cross(sideways, normals)
     weights = np.zeros((len(vertices), _RIGID_POINTS, 3))
     weights[:, :3] = np.stack([vertices, along, np.cross(normals, along)], axis=2)
     weights[:, 3, 0] = 1.0
@@ -111,7 +108,7 @@ def _rigid_rows(part: HeadPart) -> list[Row]:
 
 
 def _share(part: HeadPart) -> Floats32:
-    """How much of the head's rotation each of a part's vertices takes; 1 for those that a seam has added."""
+    """Share of the head's rotation of each of a part's vertices; 1 for those that a seam has added."""
     share = np.ones(len(part.vertices), np.float32)
     share[: len(part.share)] = part.share
     return share

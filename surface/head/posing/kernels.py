@@ -1,4 +1,4 @@
-"""Loops over control points, compiled."""
+"""Compiled loops of posing: group displacements, jaw, lids, head rotation, seams and distances from polylines."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def swing_jaw(
     rest: Floats, share: Floats, turn: Floats, shift: Floats, full_turn: Floats, full_shift: Floats,
     amount: float, undo: Floats, points: Floats,
 ) -> None:  # fmt: skip
-    """Add to ``points (n, 3)`` each point's ``share`` of the jaw's motion from where it rests.
+    """Add to ``points (n, 3)`` each point's ``share`` of the jaw's motion from its place at rest.
 
     ``undo (n,)`` takes back the difference between the arc and the straight way, for lips that mouthClose
     (a straight displacement) brings together.

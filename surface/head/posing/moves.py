@@ -1,5 +1,5 @@
-"""Displacements of a part's groups, kept in runs of points: a pose touches only the groups that act and the points they
-move, and these without asking for each where it stands."""
+"""Add displacements of a part's groups to its control points, stored as runs of consecutive points: a pose touches only
+the groups that act and the points they move."""
 
 from __future__ import annotations
 
@@ -9,20 +9,11 @@ from surface.base.arrays import Floats, Floats32, Ints
 from surface.head.model.data import Group, PartData
 from surface.head.posing.kernels import add_moves
 
-GAP = 16  # points that a group does not move, between two that it moves, are carried along up to this number
+GAP = 16  # so many points that a group does not move may lie between two of one run
 
 
 class Moves:
-    """What the groups of one part do to its control points.
-
-    Parameters
-    ----------
-    part : its groups; those that are not among ``names`` are left out.
-
-    Attributes
-    ----------
-    used : (g,) int64, indices into ``names`` of the groups that are kept.
-    """
+    """Displacements of one part's groups; ``used (g,)`` are the indices into ``names`` of those that are among them."""
 
     def __init__(self, part: PartData, names: tuple[str, ...]) -> None:
         place = {name: i for i, name in enumerate(names)}
@@ -47,8 +38,7 @@ class Moves:
 
 
 def _runs(index: int, group: Group) -> list[tuple[int, int, Floats32]]:
-    """A group's displacements as runs of points: its number, where among all coordinates a run begins, and its
-    displacements (k, 3)."""
+    """A group's displacements as runs of points: its index, the first coordinate of a run, and its rows (k, 3)."""
     order = np.argsort(group.ids, kind="stable")
     ids, moves = np.asarray(group.ids, np.int64)[order], np.asarray(group.moves, np.float32)[order]
     cuts = np.flatnonzero(np.diff(ids) > GAP) + 1

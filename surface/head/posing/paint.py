@@ -1,4 +1,4 @@
-"""Static colours painted in (u, v): lips, brows, cheeks, shade in folds; data of head.toml.
+"""Paint static attributes of vertices in (u, v), such as colours of lips and cheeks, from the layers of head.toml.
 
 A layer of paint names a part, an attribute, a value and a field between 0 and 1 in (u, v):
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats, Floats32
 from surface.base.errors import HeadFileError
+from surface.head.model.parameters import smoothstep
 from surface.head.posing.kernels import nearest_on_line
 
 BASE: dict[str, tuple[float, ...]] = {
@@ -68,9 +69,7 @@ def _field(layer: dict[str, Any], uv: Floats) -> Floats:
     if closed:
         inside = np.any([_inside(uv, line) for line in lines], axis=0)
         distance = np.where(inside, 0.0, distance)
-    t = np.clip((distance - width) / max(feather, 1e-9), 0.0, 1.0)
-    cover: Floats = 1.0 - t * t * (3.0 - 2.0 * t)
-    return cover
+    return 1.0 - smoothstep((distance - width) / max(feather, 1e-9))
 
 
 def _distance(uv: Floats, line: Floats, closed: bool) -> Floats:

@@ -1,4 +1,4 @@
-"""From a pose to control points: group displacements, the jaw's arc, lids on the eyeball."""
+"""Compute a part's control points for a pose: group displacements, the jaw's arc, lids on the eyeball, contacts."""
 
 from __future__ import annotations
 
@@ -13,16 +13,14 @@ from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance,
 from surface.head.posing.kernels import keep_on_eyeball, mix_rows, swing_jaw
 from surface.head.posing.moves import Moves
 
-CLEARANCE_GRID = (72, 36)  # places looked at all over what lines the lids, along u and v
-CLEARANCE_RADII = 1.4  # in radii: so near to an eye what lines its lids is kept out of it
+CLEARANCE_GRID = (72, 36)  # samples all over what lines the lids, along u and v
+CLEARANCE_RADII = 1.4  # what lines the lids is kept out of an eye so near to its centre
+UNDONE_MM = 20.0  # displacement by mouthClose that takes back the whole motion of the jaw
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
 
 
 class SkinRig:
-    """Control points of one deforming part.
-
-    Apply functions write into buffers made here; nothing grows while a face runs. What a pose asks of the part is
-    worked out again only where it differs from the pose before.
+    """Control points of one deforming part; they are computed again only where a pose differs from the one before.
 
     Parameters
     ----------
@@ -33,62 +31,61 @@ class SkinRig:
     Attributes
     ----------
     rest : (n, 3) float64, control points at rest; whoever changes them calls :meth:`invalidate`.
-    points : (n, 3) float64, control points of the last pose.
-    version : grows whenever ``points`` is worked out anew.
-    invalidations : grows with every :meth:`invalidate`.
+    points : (n, 3) float64, control points of the last pose; the same array for every pose.
+    version : grows whenever ``points`` is computed; invalidations : grows with every :meth:`invalidate`.
     """
 
     def __init__(self, part: PartData, head: HeadData, drivers: Drivers | None = None) -> None:
-        n = len(part.points)
         self.rest = np.ascontiguousarray(part.points, np.float64)
         self._drivers = drivers or Drivers(head.rules)
         self._moves = Moves(part, self._drivers.names)
         self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
         self._swings, self._whole = bool(self._open.any()), jaw_path(head.jaw, 1.0)
         self._undo = _undo_share(part)
-        self._solvers, self._followers = _contacts(part, head)
+        own = [c for c in head.contacts if c.part == part.name]
+        others = [c for c in head.contacts if c.part != part.name and part.name in c.followers]
+        surfaces = {p.name: make_surface(p) for p in head.parts if p.name in {c.part for c in (*own, *others)}}
+        self._solvers = [ContactSolver(c, surfaces[c.part], head) for c in own]
+        self._followers = [(c.name, Follower(c, part.points, surfaces[c.part], head)) for c in others]
         self._clearances = _clearances(part, head)
         self._lids = Lids(part, head, self._moves)
         self._amounts = np.zeros(len(self._moves.used))
         self._last_key: tuple[object, ...] = ()
         self._pushes: dict[str, Floats] = {}
-        self.points = np.zeros((n, 3))
+        self.points = np.zeros_like(self.rest)
         self.version = self.invalidations = 0
 
     def apply(self, pose: Pose) -> Floats:
-        """Positions (n, 3) of all control points before the head turns.
-
-        The array is the rig's own and is overwritten each time. A part whose opening has contacts leaves what
-        they ask for in ``pose.pushes``.
-        """
+        """Positions (n, 3) of all control points before the head turns, overwritten by the next call; corrections at
+        the part's own contacts are put into ``pose.pushes``."""
         np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
-        asked = self._pose_key(pose)
-        if asked != self._last_key:
-            self._last_key = asked
+        key = self._pose_key(pose)
+        if key != self._last_key:
+            self._last_key = key
             self._evaluate(pose)
             self.version += 1
         pose.pushes.update(self._pushes)
         return self.points
 
     def invalidate(self) -> None:
-        """Work everything out anew at the next pose: the points at rest have been changed."""
+        """Compute everything again at the next pose: the points at rest have been changed."""
         self._last_key = ()
         self.invalidations += 1
 
     def apply_contacts(self, pose: Pose, points: Floats) -> None:
-        """Let the part's own openings close, and what goes with others' openings follow, in control points (n, 3) that
-        everything else has moved; what the openings ask for is left in ``pose.pushes``. The rig's own pose stays."""
+        """Correct control points (n, 3), moved by everything else, at the part's own contacts and at those it follows;
+        corrections at its own are put into ``pose.pushes``."""
         for solver in self._solvers:
             axis = optical_axis(pose.gaze[max(solver.contact.eye, 0)])
             pose.pushes[solver.contact.name] = solver.apply(axis, points)
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)
-        for eye, lining in self._clearances:
-            lining.apply(optical_axis(pose.gaze[eye]), points)
+        for eye, clearance in self._clearances:
+            clearance.apply(optical_axis(pose.gaze[eye]), points)
 
     def _pose_key(self, pose: Pose) -> tuple[object, ...]:
-        """All that the part's points depend on, to compare with the pose before."""
+        """Everything in a pose that the part's points depend on."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
         gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
@@ -111,12 +108,7 @@ class SkinRig:
 
 
 class Lids:
-    """Keeps the lids of one part at their distance from the eyeballs while they slide.
-
-    Parameters
-    ----------
-    part : its ``lids`` say which points and how closely; head : the eyes; moves : what its groups do.
-    """
+    """Keeps the lids of one part, its points with ``lids``, at their distance from the eyeballs while they slide."""
 
     def __init__(self, part: PartData, head: HeadData, moves: Moves) -> None:
         self._ids = np.flatnonzero(part.lids).astype(np.int64)
@@ -140,30 +132,16 @@ def optical_axis(gaze: Floats) -> Floats:
     return np.ascontiguousarray(rotation(*gaze)[:, 2])
 
 
-def _contacts(part: PartData, head: HeadData) -> tuple[list[ContactSolver], list[tuple[str, Follower]]]:
-    """What keeps the part's own openings from crossing, and what moves its points with other parts' openings."""
-    solvers, followers = [], []
-    for contact in head.contacts:
-        if contact.part == part.name:
-            solvers.append(ContactSolver(contact, part, make_surface(part), head))
-        elif part.name in contact.followers:
-            opening = next(p for p in head.parts if p.name == contact.part)
-            follower = Follower(contact, part.points, make_surface(opening), head)
-            followers.append((contact.name, follower))
-    return solvers, followers
-
-
 def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballClearance]]:
-    """What keeps the part out of the eyeballs, if it is sewn to lids from behind."""
+    """By eye, what keeps the part out of the eyeball; none unless it is sewn to lids from behind."""
     lids = [c for c in head.contacts if c.eye >= 0 and part.name in c.followers]
     if not any(s.part_b == part.name and s.part_a == c.part for s in head.seams for c in lids):
         return []
     domain, surface = domain_of(part), make_surface(part)
     u0, u1, v0, v1 = domain.rect
-    grid = np.stack(
-        np.meshgrid(np.linspace(u0, u1, CLEARANCE_GRID[0]), np.linspace(v0, v1, CLEARANCE_GRID[1])), axis=-1
-    )
-    places = grid.reshape(-1, 2)[domain.inside(grid.reshape(-1, 2))]
+    columns, rows = CLEARANCE_GRID
+    grid = np.stack(np.meshgrid(np.linspace(u0, u1, columns), np.linspace(v0, v1, rows)), axis=-1).reshape(-1, 2)
+    places = grid[domain.inside(grid)]
     at, out = surface.evaluate(places), []
     for eye in (c.eye for c in lids):
         local = at - head.eyes[eye]
@@ -174,13 +152,12 @@ def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballCleara
 
 
 def _undo_share(part: PartData) -> Floats:
-    """(n,) how much of the jaw's motion mouthClose takes back at each point, 0..1."""
+    """(n,) share of the jaw's motion that mouthClose takes back at each point, 0..1."""
     close = np.zeros_like(part.points)
     for g in part.groups:
         if g.name == "mouthClose":
             close[g.ids] = g.moves
-    share: Floats = np.clip(np.linalg.norm(close, axis=1) / 20.0, 0.0, 1.0)
-    return share
+    return np.clip(np.linalg.norm(close, axis=1) / UNDONE_MM, 0.0, 1.0)  # type: ignore[no-any-return]
 
 
 def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
@@ -194,7 +171,7 @@ def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
 
 
 def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
-    """All that the motion of a part fixed to skull, jaw or an eye depends on, before the head turns."""
+    """Everything in a pose that :func:`rigid_motion` depends on."""
     if follows == "jaw":
         return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))
     if follows in ("left_eye", "right_eye"):

@@ -1,8 +1,7 @@
-"""Seams: two islands of the mesh meet in one border; drawn from two surfaces it must not show a crack.
+"""Close seams: two parts of a head that meet in one border are drawn from two surfaces and must not show a crack.
 
-The first part is the master. After every pose the second part's border vertices are put onto the first part's
-border edges, with its normals; slivers fill what is left between vertices that only the first part has and the
-edges of the second.
+After every pose the second part's border vertices are put onto the first part's border edges, with its normals; slivers
+fill what is left between vertices that only the first part has and the edges of the second.
 """
 
 from __future__ import annotations
@@ -19,11 +18,12 @@ SAME = 1e-4  # in points of the seam: vertices nearer than this are one
 
 
 class SeamStitch:
-    """One seam, ready to be closed.
+    """Closes one seam: moves the border of the ``second`` part, which gets slivers, onto that of the ``first``.
 
-    Parameters
+    Attributes
     ----------
-    seam : polylines of both sides; first, second : the parts they belong to. The second part gets slivers.
+    ids : (k,) vertices of the second part; low, high : (k,) those of the first that each is put between.
+    share : (k,) float32, how far from ``low`` to ``high``.
     """
 
     def __init__(self, seam: Seam, first: HeadPart, second: HeadPart) -> None:
@@ -36,14 +36,14 @@ class SeamStitch:
             self.ids = self.low = self.high = self.ids[:0]
             self.share = np.zeros(0, np.float32)
             return
-        after = np.clip(np.searchsorted(a_at, at), 1, max(len(a_at) - 1, 1))
+        after = np.clip(np.searchsorted(a_at, at), 1, len(a_at) - 1)
         self.low, self.high = a_ids[after - 1], a_ids[after]
         gap = np.maximum(a_at[after] - a_at[after - 1], 1e-12)
         self.share = np.clip((at - a_at[after - 1]) / gap, 0.0, 1.0).astype(np.float32)
         self._fill(a_ids, a_at, *_around(self.ids, at, seam.uv_a))
 
     def _fill(self, a_ids: Ints, a_at: Floats, ids: Ints, at: Floats) -> None:
-        """Slivers over the first part's vertices ``a_ids`` that stand between neighbours ``ids`` of the second's."""
+        """Add slivers over the first part's vertices ``a_ids`` that lie between neighbours ``ids`` of the second's."""
         directed = {(int(p), int(q)) for p, q in self.second.borders}
         triangles: list[Ints] = []
         copies: list[int] = []
@@ -53,8 +53,7 @@ class SeamStitch:
             forward = (int(p), int(q)) in directed
             if not len(between) or not (forward or (int(q), int(p)) in directed):
                 continue
-            new = len(self.second.vertices) + len(copies) + np.arange(len(between))
-            fan = np.concatenate([new, [q]])
+            fan = np.append(len(self.second.vertices) + len(copies) + np.arange(len(between)), q)
             pairs = np.column_stack([np.full(len(between), p), fan[:-1], fan[1:]])
             triangles.append(pairs if forward else pairs[:, [0, 2, 1]])
             copies += between.tolist()
@@ -63,17 +62,17 @@ class SeamStitch:
             new = len(self.second.vertices) + np.arange(len(copies))
             self.second.append(np.array(like), np.concatenate(triangles))
             self.ids = np.concatenate([self.ids, new])
-            self.low = np.concatenate([self.low, copies])
-            self.high = np.concatenate([self.high, copies])
+            self.low, self.high = np.concatenate([self.low, copies]), np.concatenate([self.high, copies])
             self.share = np.concatenate([self.share, np.zeros(len(copies), np.float32)])
 
     def close(self) -> None:
-        """Put the second part's border onto the first one's."""
-        if not len(self.ids) or not (self.first.changed or self.second.changed):
-            return
+        """Put the second part's border onto the first one's, if either has changed."""
         one, two = self.first, self.second
-        stitch_border(one.vertices, one.normals, two.vertices, two.normals, self.ids, self.low, self.high, self.share)
-        self.second.touch()
+        if len(self.ids) and (one.changed or two.changed):
+            stitch_border(
+                one.vertices, one.normals, two.vertices, two.normals, self.ids, self.low, self.high, self.share
+            )
+            two.touch()
 
 
 def _along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:
@@ -82,13 +81,12 @@ def _along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:
     distance, at = np.empty(len(ids)), np.empty(len(ids))
     nearest_on_line(part.mesh.uv[ids], np.ascontiguousarray(line, np.float64), False, distance, at)
     on = distance < NEAR
-    ids, at = ids[on], at[on]
-    order = np.argsort(at, kind="stable")
-    return ids[order], at[order]
+    order = np.argsort(at[on], kind="stable")
+    return ids[on][order], at[on][order]
 
 
 def _around(ids: Ints, at: Floats, line: Floats) -> tuple[Ints, Floats]:
-    """Vertices along a polyline; on a closed one the last also stands before the first, the first after the last."""
+    """Vertices along a polyline; on a closed one the last comes before the first, too, and the first after the last."""
     if not len(ids) or not np.array_equal(line[0], line[-1]):
         return ids, at
     length = len(line) - 1.0
