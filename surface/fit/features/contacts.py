@@ -1,4 +1,4 @@
-"""Where lips and lids can meet: samples across an opening for :mod:`surface.head.posing.contact`."""
+"""Find openings whose sides can touch, lips and lids, and place samples across them for contacts."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from surface.head.model.data import Contact, PartData
 from surface.head.model.meshes import make_surface
 
 COLUMNS, ROWS, FADE_ROWS = 21, 10, 5
-FINE_U, FINE_V = 61, 49  # places looked at, along and across an opening
+FINE_U, FINE_V = 61, 49  # grid that columns are interpolated in, along and across an opening
 NAMES = ("left_lids", "right_lids", "lips")
 LID_LINING, LIP_LINING = ("lashes", "sockets"), ("cavity",)
-ASIDE, WIDEST_V = 0.5, 0.25  # how far beside the opening (in its widths) and from its rim (in v) samples may stand
-INSET = 0.03  # of the opening's width: where its first column stands
+MARGIN_U, WIDEST_V = 0.5, 0.25  # how far outside the opening (in its widths) and from its rim (in v) samples may be
+INSET = 0.03  # of the opening's width: place of its first column
 
 
 def find_contacts(face: PartData, eyes: Floats, radius: float, parts: tuple[str, ...]) -> list[Contact]:
@@ -24,7 +24,7 @@ def find_contacts(face: PartData, eyes: Floats, radius: float, parts: tuple[str,
     Parameters
     ----------
     face : the part with the holes. eyes : (2, 3) centres; radius : 0 for a head without known eyes.
-    parts : names of all parts; those that line an opening or grow at it follow.
+    parts : names of all parts; those that line an opening or are rooted at it are its followers.
     """
     surface = make_surface(face)
     out = []
@@ -65,7 +65,7 @@ def sample_places(surface: DCPSurface, loop: Floats, depth_mm: float, reach_mm: 
 def _along(surface: DCPSurface, loop: Floats, start: Floats, x: Floats, sign: float, wanted: Floats) -> Floats:
     """(COLUMNS, rows, 2) places ``wanted (rows,)`` mm along the skin from ``start (COLUMNS, 2)``, at constant x."""
     width = np.ptp(loop[:, 0])
-    u = np.linspace(loop[:, 0].min() - ASIDE * width, loop[:, 0].max() + ASIDE * width, FINE_U)
+    u = np.linspace(loop[:, 0].min() - MARGIN_U * width, loop[:, 0].max() + MARGIN_U * width, FINE_U)
     middle = 0.5 * (loop[:, 1].min() + loop[:, 1].max())
     v = middle + sign * np.linspace(1e-4, WIDEST_V, FINE_V)
     at = surface.evaluate(np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)).reshape(FINE_V, FINE_U, 3)

@@ -1,4 +1,4 @@
-"""Brows and lashes: small surfaces of their own, rooted in the fitted skin and moved by the same groups.
+"""Make brows and lashes: small surfaces of their own, rooted in the fitted skin and moved by the same groups.
 
 Each is a strip; its trim loop cuts it into a comb of hairs. s runs along the strip (u), t from root to tip (v).
 """
@@ -15,10 +15,10 @@ from surface.fit.points.refine import Fitted
 from surface.fit.points.solve import basis
 
 DEGREES = (3, 2)
-END_LASH = 0.045  # how far from the strip's ends the first and the last lash stand
+END_LASH = 0.045  # distance of the first and the last lash from the strip's ends
 TIP = 0.003  # half the width of a lash's tip, in the strip's length: a finer one would be cut into pieces
 LASH_LEAN, LASH_LIFT = 0.85, 0.5  # of a lash's length: away from the eyeball, up along it
-ROOT_MM = 0.4  # how far above the skin lashes begin: it is cut into triangles that may come up to a quarter through
+ROOT_MM = 0.4  # height above the skin of the lashes' roots: its triangles may be up to a quarter higher
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Skin:
         self._all = np.concatenate([fitted.points[None], fitted.points + fitted.moves])
 
     def at(self, uv: Floats) -> Floats:
-        """(1 + k, m, 3): where the points (u, v) are in neutral and in every shape."""
+        """(1 + k, m, 3) positions at places (m, 2) in (u, v), in neutral and in every shape."""
         b = basis(self._net, uv)
         return np.stack([b @ p for p in self._all])
 
@@ -66,8 +66,7 @@ def fit_strip(rows: Floats, n_u: int, n_v: int, loops: list[Floats]) -> Strip:
 
 
 def _clamped(n: int, degree: int) -> Floats:
-    inner = np.linspace(0, 1, n - degree + 1)
-    return np.concatenate([np.zeros(degree), inner, np.ones(degree)])
+    return np.pad(np.linspace(0, 1, n - degree + 1), degree, mode="edge")
 
 
 def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: bool, hairs: int) -> Strip:
@@ -102,8 +101,7 @@ def _comb(hairs: int, *, lean: float, thick: float) -> Floats:
         shift = lean * (2 * s - 1) * 4 + 0.6 * (rng.random() - 0.5) / hairs
         tops += [(s - half, root), (s + shift - TIP, tip), (s + shift + TIP, tip), (s + half, root)]
     line = np.array([(0.0, 0.0), *tops, (1.0, 0.0)])
-    kept: Floats = np.clip(line, 0.0, 1.0)
-    return kept
+    return np.clip(line, 0.0, 1.0)  # type: ignore[no-any-return]
 
 
 def brow_strip(skin: Skin, uv: Floats, *, hairs: int) -> Strip:
@@ -125,5 +123,4 @@ def _ragged(hairs: int) -> Floats:
         top += [(x - 0.35 / hairs, 0.66 + 0.06 * rng.random()), (x + lean, reach)]
         bottom += [(x, 0.06 + 0.12 * rng.random()), (x + 0.5 / hairs, 0.2 + 0.08 * rng.random())]
     line = np.array([(0.0, 0.35), *top, (1.0, 0.5), *bottom[::-1]])
-    kept: Floats = np.clip(line, 0.0, 1.0)
-    return kept
+    return np.clip(line, 0.0, 1.0)  # type: ignore[no-any-return]

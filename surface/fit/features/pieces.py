@@ -1,4 +1,4 @@
-"""The kinds of parts a head is put together from: fitted skin, crowns, eyeballs, hair."""
+"""Make the parts of a head: fitted skin, crowns, eyeballs, brows and lashes."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ from surface.fit.source.chart import TILE, Chart
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Jaw, PartData
 
-STILL = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
-LASH_ROOT = (0.0145, 0.0188)  # how far outside the hole in the skin lower and upper lashes stand, in v: where lids meet
+LASH_ROOT = (0.0145, 0.0188)  # how far outside the hole in the skin lower and upper lashes begin, in v
 LASH_MM, LOWER_LASH_MM = 8.0, 3.2
 STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.2, 7)}  # fine enough for single hairs
 LASHES, LOWER_LASHES = 24, 14
@@ -29,7 +28,7 @@ BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
 
 @dataclass(frozen=True)
 class HeadRig:
-    """What all parts of one head share: shapes by parameter, the jaw's path, the eyes, the tongue's path out."""
+    """What all parts of one head share: shapes by parameter, the jaw's path, eyes, the path of the tongue (k, 7)."""
 
     sources: dict[str, list[int]]
     jaw: Jaw
@@ -107,9 +106,8 @@ def _length_profile(along: Floats) -> Floats:
 
 def _rim_near(chart: Chart, mesh: FitMesh, eye: Floats) -> Floats:
     """(k, 2) the hole of the face whose rim lies nearest to an eyeball."""
-    middles = [mesh.vertices[ids].mean(axis=0) for ids in chart.loop_vertices]
-    nearest = int(np.argmin([np.linalg.norm(m - eye) for m in middles]))
-    return chart.loops[nearest]
+    middles = [np.linalg.norm(mesh.vertices[ids].mean(axis=0) - eye) for ids in chart.loop_vertices]
+    return chart.loops[int(np.argmin(middles))]
 
 
 def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, Floats]:

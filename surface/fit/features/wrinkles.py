@@ -1,8 +1,7 @@
-"""Wrinkles: control points with small spans put in along lines of a fitted face, and groups that sink them.
+"""Add wrinkles to a fitted face: control points with small spans along lines, and groups that sink them.
 
-At rest they lie on the surface and move with every other group as the skin around them does, so that they change
-little: a sum with one more point on it is not quite the same sum. What sinks them is worked out by least squares, so
-that a furrow of the wanted depth and width comes out.
+At rest they lie on the surface and move with every other group as the skin around them does, so that they change it
+little. The displacements that sink them are solved by least squares for a furrow of the wanted depth and width.
 """
 
 from __future__ import annotations
@@ -22,12 +21,11 @@ from surface.head.model.meshes import make_surface
 
 PREFIX = "wrinkle"  # of their groups' names
 DEEPENED = 1.5
-STEPS = np.arange(-2.0, 3.0)
 ALONG = 1.8  # distance of the points along a line, in widths of its furrow
 SPAN = 0.62  # of a knot, in widths across a line; along it spans are as long as the points are apart
 TAPER = 0.3  # share of a line's length over which its ends run out
 REGULARISATION = 0.03  # weight of moving no point, beside what the samples say of an average one
-RIDGE = 0.35  # of its depth: how far the skin beside a furrow rises
+RIDGE = 0.35  # height of the skin along both sides of a furrow, in its depths
 
 
 @dataclass(frozen=True)
@@ -66,8 +64,9 @@ def add_wrinkles(
     face = _with_points(face, surface, np.concatenate([k[0] for k in knots]), np.concatenate([k[1] for k in knots]))
     first = np.cumsum([surface.n, *(len(k[0]) for k in knots)])
     groups: dict[str, list[tuple[Ints, Floats]]] = {}
+    surface = make_surface(face)
     for f, a, b in zip(lines, first, first[1:], strict=False):
-        groups.setdefault(f.group, []).append(_depth_moves(f, make_surface(face), np.arange(a, b)))
+        groups.setdefault(f.group, []).append(_depth_moves(f, surface, np.arange(a, b)))
     made = [
         Group(name, np.concatenate([i for i, _ in own]).astype(np.int32),
               np.concatenate([m for _, m in own]).astype(np.float32))
@@ -116,7 +115,7 @@ def _knots(f: WrinkleLine, surface: DCPSurface) -> tuple[Floats, Floats]:
     out = []
     for axis, slope in enumerate((su, sv)):
         span = np.maximum(SPAN * f.width / np.linalg.norm(slope, axis=1), along[:, axis])
-        out.append(f.uv[:, axis, None] + span[:, None] * STEPS)
+        out.append(f.uv[:, axis, None] + span[:, None] * np.arange(-2.0, 3.0))
     return out[0], out[1]
 
 
@@ -175,5 +174,4 @@ def _sideways_step(f: WrinkleLine, su: Floats, sv: Floats) -> Floats:
     normal = np.cross(su, sv)
     left = np.cross(normal, forward)
     left /= np.linalg.norm(left, axis=1)[:, None]
-    jacobian = np.stack([su, sv], axis=2)
-    return np.stack([np.linalg.lstsq(j, x, rcond=None)[0] for j, x in zip(jacobian, left, strict=True)])
+    return (np.linalg.pinv(np.stack([su, sv], axis=2)) @ left[..., None])[..., 0]

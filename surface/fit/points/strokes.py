@@ -1,10 +1,11 @@
-"""Paint of a recipe, given by mesh vertices, as lines in (u, v) of the fitted part."""
+"""Convert a recipe's paint, given by mesh vertices, to lines in (u, v) of the fitted part."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import Chart
@@ -36,8 +37,8 @@ def _layer(layer: dict[str, Any], chart: Chart, mesh: FitMesh) -> dict[str, Any]
 def mirrored(chart: Chart, mesh: FitMesh, ids: Ints) -> Ints:
     """The chart's vertices on the other side of the face."""
     own = np.unique(chart.mix.indices)
-    flipped = mesh.vertices[ids] * [-1.0, 1.0, 1.0]
-    return np.array([own[np.argmin(((mesh.vertices[own] - p) ** 2).sum(axis=1))] for p in flipped])
+    nearest: Ints = own[cKDTree(mesh.vertices[own]).query(mesh.vertices[ids] * [-1.0, 1.0, 1.0])[1]]
+    return nearest
 
 
 def vertex_line(chart: Chart, mesh: FitMesh, ids: Ints, *, closed: bool) -> Floats:
@@ -49,9 +50,7 @@ def vertex_line(chart: Chart, mesh: FitMesh, ids: Ints, *, closed: bool) -> Floa
 
 
 def uv_of(chart: Chart, mesh: FitMesh, points: Floats) -> Floats:
-    """(m, 2) where points (m, 3) near the mesh lie in (u, v), from the samples around each."""
-    from scipy.spatial import cKDTree  # takes a moment to import
-
+    """(m, 2) places in (u, v) of points (m, 3) near the mesh, from the samples around each."""
     samples = chart.mix @ mesh.vertices
     distance, nearest = cKDTree(samples).query(points, k=6)
     weight = 1.0 / (distance**2 + 0.05)

@@ -1,6 +1,6 @@
 """Fewer triangles for pictures in a hurry: a software renderer spends more on small triangles than on pixels.
 
-Done once when a head is made and kept in its file; see :mod:`surface.head.posing.decimation`.
+Done once when a head is made and kept in its file; see :mod:`surface.head.posing.baked`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,12 @@
 """What is put on top of a fitted head."""
 
 import numpy as np
+import pytest
+from face_measures import lips_gap
 from slit_sheet import slit_sheet
-from small_head import small_head
+from small_head import all_points, part, small_head
 
-from surface.fit.features.finish import finish_head
+from surface.fit.features.finish import add_correctives, finish_head
 from surface.fit.points.recipe import Recipe
 from surface.head import Head
 from surface.head.model.file import load_data
@@ -21,11 +23,42 @@ def test_the_shipped_head_stands_at_rest_where_its_contacts_put_it(root):
     before = {p.name: p.vertices.copy() for p in head.parts}
     head.pose(head.values({"jawOpen": 1.0, "eyeBlinkLeft": 1.0}))
     head.pose(head.values({}))
-    for part in head.parts:
-        assert np.abs(part.vertices - before[part.name]).max() < 0.3, part.name
+    for p in head.parts:
+        assert np.abs(p.vertices - before[p.name]).max() < 0.3, p.name
 
 
 def test_the_shipped_head_has_a_rule_for_every_group_that_is_no_parameter(root):
     data = load_data(root / "configs" / "heads" / "ict")
     extra = {g.name for p in data.parts for g in p.groups if g.name not in SHAPES}
     assert extra == {r.group for r in data.rules}
+
+
+LEFT, UP = (4.0, 0.0, 0.0), (0.0, 6.0, 0.0)
+
+
+@pytest.fixture
+def mended():
+    groups = [all_points("mouthLeft", LEFT), all_points("mouthShrugLower", UP)]
+    head = small_head(parts=[part("a", -40, groups=groups), part("b", 0.5)], seams=[])
+    return add_correctives(head, [{"shapes": ["mouthLeft", "mouthShrugLower"], "subtract": {"mouthShrugLower": 0.4}}])
+
+
+@pytest.mark.parametrize(("one", "other"), [(0, 0), (1, 0), (0, 1), (1, 1), (0.5, 0.5), (0.25, 1)])
+def test_a_share_is_taken_back_by_the_product(mended, one, other):
+    head = Head(mended)
+    rest = head.part("a").control_points.copy()
+    head.pose(head.values({"mouthLeft": one, "mouthShrugLower": other}))
+    wanted = np.array(LEFT) * one + np.array(UP) * (other - 0.4 * one * other)
+    np.testing.assert_allclose(head.part("a").control_points - rest, np.tile(wanted, (25, 1)), atol=1e-5)
+
+
+def test_parts_that_neither_shape_moves_get_no_group(mended):
+    assert [g.name for g in mended.parts[0].groups][-1] == "mouthLeft*mouthShrugLower"
+    assert mended.parts[1].groups == []
+    assert [(r.group, r.power) for r in mended.rules] == [("mouthLeft*mouthShrugLower", 1.0)]
+
+
+def test_rolled_lips_stay_together(root):
+    head = Head.load(root / "configs" / "heads" / "ict")
+    head.pose(head.values({"mouthRollLower": 1.0, "mouthRollUpper": 1.0}))
+    assert lips_gap(head) < 0.45
