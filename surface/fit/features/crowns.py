@@ -13,8 +13,7 @@ from scipy.sparse import identity
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.points.strokes import evenly
 from surface.fit.source.chart import TILE, Chart
-from surface.fit.source.mesh import FitMesh, components, corners, renumbered, triangles
-from surface.fit.source.rays import intersect
+from surface.fit.source.mesh import FitMesh, components, corners, intersect, renumbered, triangles
 
 GRID = (19, 31)  # samples along u and v
 RAYS = (41, 91)  # that they are found with

@@ -10,7 +10,7 @@ from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
 from surface.dcp import DCPSurface
 from surface.fit.points.net import Net
-from surface.fit.source.slopes import Slopes
+from surface.fit.source.chart import Slopes
 from surface.spline.matrix import basis_matrices
 
 

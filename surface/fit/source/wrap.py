@@ -14,8 +14,7 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import BORDER_WEIGHT, CLUTTER_WEIGHT, Chart
 from surface.fit.source.islands import Island
-from surface.fit.source.mesh import FitMesh, triangles
-from surface.fit.source.rays import intersect
+from surface.fit.source.mesh import FitMesh, intersect, triangles
 
 STATIONS, FAN, AROUND = 20, 18, 41  # rays along the line, over its tip, around it
 OVERLAP = 0.125  # of the way around, on either side, is sampled twice, so that slopes match where the skin is sewn

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from slit_sheet import slit_sheet
 
-from surface.fit.features.hair import ROOT_MM, Skin, brow_strip, fit_strip, lash_strip
+from surface.fit.features.pieces import ROOT_MM, Skin, brow_strip, fit_strip, lash_strip
 from surface.fit.points.refine import FitRequest, fit_chart
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
