@@ -60,8 +60,6 @@ def read_wanted(path: Path = TABLE) -> Wanted:
 def add_identities(head: str | Path, mesh_path: str | Path, modes_path: str | Path) -> list[str]:
     """Fit the table's variations to a head and keep them in its folder; returns their names.
 
-    Parameters
-    ----------
     head : a head folder that was fitted to the mesh. mesh_path : that mesh.
     modes_path : .npz with ``deltas (k, n, 3)``, displacements of the mesh's vertices per standard deviation.
 

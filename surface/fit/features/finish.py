@@ -50,8 +50,6 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
 def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:
     """The head with corrective shapes: groups for pairs of shapes that do not add up, worth the product of the two.
 
-    Parameters
-    ----------
     wanted : tables with ``shapes``, two of them; ``subtract``, shares of displacements of shapes that are taken back
         where both are whole.
     """
@@ -75,8 +73,6 @@ def _corrected(part: PartData, name: str, shares: dict[str, float]) -> PartData:
 def find_contacts(face: PartData, eyes: Floats, radius: float, parts: tuple[str, ...]) -> list[Contact]:
     """Contacts at the holes of a face that are cut by slits: lids where an eyeball is behind, else lips.
 
-    Parameters
-    ----------
     face : the part with the holes. eyes : (2, 3) centres; radius : 0 for a head without known eyes.
     parts : names of all parts; those that line an opening or are rooted at it are its followers.
     """

@@ -63,9 +63,7 @@ class Plan:
 def make_plan(mesh: FitMesh) -> Plan:
     """Sort the mesh's pieces; its shapes are named as ARKit's.
 
-    Raises
-    ------
-    FitError : nothing is left that could be skin.
+    Raises FitError: nothing is left that could be skin.
     """
     shapes = dict(zip(mesh.names, mesh.deltas, strict=True))
     scale = head_scale(mesh.vertices, shapes)

@@ -83,8 +83,6 @@ def _clamped(n: int, degree: int) -> Floats:
 def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: bool, hairs: int) -> Strip:
     """Lashes along a lid.
 
-    Parameters
-    ----------
     root : (m, 2) (u, v) along the lid's edge; length : (m,) mm; eye : (3,) the eyeball's centre.
     """
     at = skin.at(root)

@@ -80,8 +80,6 @@ def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
     """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_NEEDS`: ``tongueOut``, straight
     ahead, and :data:`DROOP`, which lets it hang once it is out.
 
-    Parameters
-    ----------
     points : (n, 3) control points of the tongue at rest.
     path : (k, 7) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, how much
         of its thickness and of its width is left, and how much further down it hangs.

@@ -44,8 +44,6 @@ def add_wrinkles(
 ) -> tuple[PartData, list[Rule]]:
     """The face with control points along the wanted lines, and what moves them.
 
-    Parameters
-    ----------
     wanted : tables with ``group``, ``terms``, ``depth`` and ``width`` in mm, ``lines`` of (x, y) seen from the front;
         with ``mirror`` the same on the right side, "Left" in names becoming "Right"; ``raised``, more lines, along
         which the skin comes out by ``rise`` mm, as a cheek does beside its fold.

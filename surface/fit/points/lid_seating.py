@@ -42,8 +42,6 @@ def seat_lids(
 ) -> FitMesh:  # fmt: skip
     """Move the chosen vertices so that what touched the old eyeballs touches the new ones, their corneas included.
 
-    Parameters
-    ----------
     gazes : (k, 2, 3) where the left and the right eye look in every shape; straight ahead if not given.
     """
     ahead = np.tile(AHEAD, (2, 1))
@@ -133,8 +131,6 @@ def draw_brows(
 ) -> FitMesh:
     """Make shapes whose names begin with ``prefix`` move the inner ends of the brows further, as the corrugator does.
 
-    Parameters
-    ----------
     centre : (x, y) of the left brow's inner end, mm; reach : standard deviation of what follows, in x and y, mm.
     move : (3,) of it, mm; the right one's is its mirror image.
     """

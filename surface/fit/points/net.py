@@ -25,8 +25,6 @@ CORNERS = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])  # of a cell of the net, fr
 class Net:
     """Control points without positions.
 
-    Attributes
-    ----------
     place : (n, 4) int64: levels in u and v, then i and j in the net of that level.
     knots_u, knots_v : (n, 5) float64.
     """

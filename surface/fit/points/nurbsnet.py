@@ -31,8 +31,6 @@ class UniformNet:
 def uniform_nets(chart: Chart, targets: Floats, points: int, enough: float) -> list[UniformNet]:
     """Nets of growing size for the chart's first tile, until one is as good as ``enough`` (mm).
 
-    Parameters
-    ----------
     targets : (m, 3) positions of the chart's samples; points : how many the head's own net has there.
     """
     own = chart.uv[:, 0] < TILE / 2

@@ -41,8 +41,6 @@ class FitRequest:
 class Fitted:
     """A fitted chart.
 
-    Attributes
-    ----------
     net : the knots; points : (n, 3); moves : (k, n, 3), one displacement field per shape.
     error : (m,) neutral error at the chart's samples, mm; shape_error : (k, m).
     """

@@ -47,8 +47,6 @@ class PartReport:
 class FitReport:
     """The whole head.
 
-    Attributes
-    ----------
     parameters : ARKit's names that the head has shapes for; missing : those it has none for.
     left_out : shapes of the mesh that mean none of them; notes : what was guessed or left out, in words.
     scale : size of the head relative to the one that the bounds were set for.

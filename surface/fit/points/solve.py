@@ -40,8 +40,6 @@ def add_normal(
 
     Control points overlap so much that the matrix is as good as full: a dense one is filled directly.
 
-    Parameters
-    ----------
     start (m + 1,), columns, data : the rows as CSR with sorted columns; weight (m,); targets (m, c).
     """
     for k in range(len(start) - 1):

@@ -155,8 +155,6 @@ def _fold(mesh: FitMesh, island: Island) -> Floats:
 class Slopes:
     """Slopes at the faces of a chart.
 
-    Attributes
-    ----------
     uv : (f, 2) face centres; span : (f, 2) a face's extent in u and in v.
     mix_u, mix_v : (f, n) sparse; times the mesh's n vertices: what a surface's S_u, S_v times span should be.
     weight : (f,) in least squares.

@@ -38,14 +38,10 @@ def find_frame(
 ) -> Frame:  # fmt: skip
     """Find axes and unit: as given, else by the shapes, else y up, z forward and a head's usual height.
 
-    Parameters
-    ----------
     shapes : displacements (n, 3) by ARKit's names.
     unit : one of :data:`UNITS`; up, forward : x, y, z, -x, -y or -z.
 
-    Raises
-    ------
-    FitError : an unknown word, or up and forward along one axis.
+    Raises FitError: an unknown word, or up and forward along one axis.
     """
     notes: list[str] = []
     turn = _turn(vertices, shapes, up, forward, notes)

@@ -21,8 +21,6 @@ WELD = 1e5  # texture coordinates that agree to this many parts of the unit squa
 class Island:
     """One connected piece of the mesh in (u, v).
 
-    Attributes
-    ----------
     vertex : (m,) int64, the mesh vertex of each corner point (a vertex on a cut appears twice).
     uv : (m, 2) float64.
     faces : (f, 4) int64 into the rows above, -1 as in the mesh.

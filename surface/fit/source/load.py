@@ -24,8 +24,6 @@ SUFFIXES = (".glb", ".gltf", ".obj", ".npz")
 class LoadOptions:
     """How to interpret a mesh file; what is not given is guessed.
 
-    Attributes
-    ----------
     shapes : folder with one OBJ a shape; names : TOML table of shape names.
     unit, up, forward : see :func:`surface.fit.source.frame.find_frame`.
     without : objects or materials to leave out; a part of the name will do.
@@ -51,10 +49,8 @@ class Loaded:
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     """Read and check a mesh.
 
-    Raises
-    ------
-    FitError : the file is missing, damaged or too large, has no texture coordinates, holds NaN, or its arrays do not
-        fit together; names file and element.
+    Raises FitError: the file is missing, damaged or too large, has no texture coordinates, holds NaN, or its arrays do
+    not fit together; names file and element.
     """
     path = Path(path)
     raw = _read(path, options.shapes)

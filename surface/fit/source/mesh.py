@@ -150,8 +150,6 @@ def intersect(tri: Floats, origins: Floats, rays: Floats) -> tuple[Floats, Float
     """Distance (r, t) along each ray to each triangle, NaN where it misses, and the shares (r, t) of the triangle's
     second and third corner there (Moeller and Trumbore, 1997).
 
-    Parameters
-    ----------
     tri : (t, 3, 3); origins : (r, 3), or (3,) of all rays; rays : (r, 3) directions.
     """
     e1, e2, s = tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0], origins[..., None, :] - tri[:, 0]

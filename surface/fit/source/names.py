@@ -39,8 +39,6 @@ class Source:
 class NameMap:
     """Which shapes of a mesh make which of ARKit's 52.
 
-    Attributes
-    ----------
     sources : parameter -> the shapes that add up to it, in the order of ARKit's list.
     missing : parameters that no shape makes; left_out : shapes of the mesh that make none.
     """
@@ -95,11 +93,8 @@ def _table() -> dict[str, dict[str, list[str]]]:
 @cache
 def _keys() -> dict[str, str]:
     """Every way to say it, without spaces and sides -> key of the table."""
-    out: dict[str, str] = {}
-    for group in _table().values():
-        for key, ways in group.items():
-            out |= {w.replace(" ", ""): key for w in (key.lower(), *ways)}
-    return out
+    every = [(key, way) for group in _table().values() for key, ways in group.items() for way in (key.lower(), *ways)]
+    return {way.replace(" ", ""): key for key, way in every}
 
 
 def _read(name: str) -> tuple[str, str, bool] | None:
@@ -126,9 +121,7 @@ def _common(names: tuple[str, ...]) -> str:
 def read_names(path: Path) -> dict[str, str]:
     """A user's table of names.
 
-    Raises
-    ------
-    FitError : the file cannot be read, or maps to something that is not one of ARKit's 52.
+    Raises FitError: the file cannot be read, or maps to something that is not one of ARKit's 52.
     """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8")).get("names")

@@ -131,8 +131,6 @@ class Rule:
 class HeadData:
     """All of a head.
 
-    Attributes
-    ----------
     provenance : free text by key (source, licence, how it was made).
     eyes : centres (2, 3), left then right, mm; eye_radius : mm.
     """

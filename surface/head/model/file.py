@@ -99,9 +99,7 @@ class _Arrays:
 def load_data(path: str | Path) -> HeadData:
     """Read a head from its folder, or from the path of its head.toml.
 
-    Raises
-    ------
-    HeadFileError : a file is missing, damaged, cut short or of another version; names file and key.
+    Raises HeadFileError: a file is missing, damaged, cut short or of another version; names file and key.
     """
     folder = Path(path)
     folder = folder.parent if folder.name == "head.toml" else folder
@@ -214,9 +212,7 @@ def check_writable(folder: str | Path) -> None:
 def save_data(folder: str | Path, head: HeadData) -> None:
     """Write head.toml and head.npz; either both are replaced or none is.
 
-    Raises
-    ------
-    HeadFileError : the folder cannot be written to, or the disk is full; the files that were there are unchanged.
+    Raises HeadFileError: the folder cannot be written to, or the disk is full; the files that were there are unchanged.
     """
     folder = Path(folder)
     new = folder / "head.npz.new", folder / "head.toml.new"

@@ -51,9 +51,7 @@ def fingerprint(head: HeadData) -> int:
 def load_identities(head: str | Path) -> dict[str, Identity]:
     """The identities of a head, given by its folder or its head.toml, by name; empty where it has none.
 
-    Raises
-    ------
-    HeadFileError : the file is damaged or of a newer version.
+    Raises HeadFileError: the file is damaged or of a newer version.
     """
     hint = "make it again: omote fit MESH -o FOLDER --keep --identities FILE"
     return read_sidecar(sidecar_path(head, FILE), _identities, hint) or {}
@@ -113,9 +111,7 @@ def save_identities(head: str | Path, identities: list[Identity]) -> Path:
 def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mapping[str, float], where: str) -> HeadData:
     """The head with identities mixed in, each by 0 to 1.
 
-    Raises
-    ------
-    HeadFileError : no identity of that name, an amount out of range, or identities that were made for another fit.
+    Raises HeadFileError: no identity of that name, an amount out of range, or one that was made for another fit.
     """
     eyes, jaw = head.eyes.copy(), np.array(head.jaw.centre, float)
     parts = {p.name: p for p in head.parts}

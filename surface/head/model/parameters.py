@@ -66,9 +66,7 @@ def read_pose(values: Floats) -> Pose:
     mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
     opens the jaw as far as it needs, ahead of the tongue, and keeps the lips off it.
 
-    Raises
-    ------
-    ValueError : wrong shape, or a value that is not a number (names the parameter).
+    Raises ValueError: wrong shape, or a value that is not a number (names the parameter).
     """
     v = np.asarray(values, float)
     if v.shape != (len(NAMES),):

@@ -13,9 +13,7 @@ from surface.head.model.parameters import SHAPES
 class Drivers:
     """Computes amounts of all groups: the 52 shapes, then those of ``rules``, in order; ``where`` names the file.
 
-    Raises
-    ------
-    HeadFileError : a rule names something that is no shape.
+    Raises HeadFileError: a rule names something that is no shape.
     """
 
     def __init__(self, rules: list[Rule], where: str = "head") -> None:

@@ -42,9 +42,7 @@ class Sidecar:
 def read_sidecar(path: Path, make: Callable[[Sidecar], Made], hint: str) -> Made | None:
     """Return ``make`` of the file's contents; None where there is no such file. A file without a version is read.
 
-    Raises
-    ------
-    HeadFileError : the file is damaged or of a newer version, or ``make`` raised one of :data:`DAMAGED`.
+    Raises HeadFileError: the file is damaged or of a newer version, or ``make`` raised one of :data:`DAMAGED`.
     """
     if not path.is_file():
         return None
@@ -64,9 +62,7 @@ def read_sidecar(path: Path, make: Callable[[Sidecar], Made], hint: str) -> Made
 def write_sidecar(path: Path, arrays: Mapping[str, Array], checks: Mapping[str, int] | None = None) -> Path:
     """Write arrays by name, all or none of them, and checksums by part; returns the file's path.
 
-    Raises
-    ------
-    HeadFileError : the file cannot be written, or the disk is full.
+    Raises HeadFileError: the file cannot be written, or the disk is full.
     """
     new = path.with_suffix(".npz.new")
     packed: dict[str, Any] = {**arrays, FORMAT: np.array([VERSION], np.int64)}

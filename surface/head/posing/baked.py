@@ -64,14 +64,10 @@ def _read(head: str | Path, file: str, parts: Iterable[HeadPart]) -> dict[str, A
 def read_shade(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, Floats32]:
     """Shares (m, k), 0..1, by the name they are stored under; empty where the head has no such file.
 
-    Parameters
-    ----------
     head : the head's folder or its head.toml.
     parts : what the shares are for; those of another tessellation are left out.
 
-    Raises
-    ------
-    HeadFileError : the file is damaged, of a newer version, or was made for another mesh of a part.
+    Raises HeadFileError: the file is damaged, of a newer version, or was made for another mesh of a part.
     """
     return {name: bytes_.reshape(len(bytes_), -1).astype(np.float32) / np.float32(255)
             for name, bytes_ in _read(head, SHADE, parts).items()}  # fmt: skip

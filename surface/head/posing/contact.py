@@ -117,8 +117,6 @@ class EyeballClearance:
 class ContactSolver:
     """Keeps the two sides of one opening apart, and lids on the eyeball, on the part that has the opening.
 
-    Parameters
-    ----------
     surface : of the part at rest; head : for the eyes.
     """
 
@@ -184,8 +182,6 @@ class Follower:
     """Moves the control points of another part near an opening along with it: at lids, each as the sample next to it in
     two columns; at lips, by the correction of each side.
 
-    Parameters
-    ----------
     points : (n, 3) of the part at rest; surface : of the part that has the opening.
     """
 

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Floats32
+from surface.base.arrays import Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data
@@ -29,8 +28,6 @@ class Head:
 
     Use :meth:`load`. One object belongs to one thread at a time.
 
-    Parameters
-    ----------
     data : everything a head file holds; where : its path, for messages.
     """
 
@@ -50,14 +47,10 @@ class Head:
     def load(cls, path: str | Path, identity: Mapping[str, float] | None = None) -> Head:
         """Read a head from its folder or its head.toml.
 
-        Parameters
-        ----------
         identity : variations of the head to mix in, by name, each by 0 to 1.
 
-        Raises
-        ------
-        HeadFileError : a file is missing, damaged, cut short, of another version or made for another mesh; names file
-            and key. Or the head has no identity of that name.
+        Raises HeadFileError: a file is missing, damaged, cut short, of another version or made for another mesh (names
+        file and key), or the head has no identity of that name.
         """
         data = load_data(path)
         if identity:
@@ -93,9 +86,7 @@ class Head:
     def group(self, name: str) -> dict[str, Group]:
         """The group of that name: part name -> control points and their displacements per unit.
 
-        Raises
-        ------
-        KeyError : no group of that name.
+        Raises KeyError: no group of that name.
         """
         found = {p.name: g for p in self.data.parts for g in p.groups if g.name == name}
         if not found:
@@ -112,9 +103,7 @@ class Head:
     def pose(self, values: Floats) -> None:
         """Move all parts to parameter values (P,) in the order of :attr:`parameters`; values are clipped.
 
-        Raises
-        ------
-        ValueError : wrong shape or a value that is not a number; the head keeps its pose.
+        Raises ValueError: wrong shape or a value that is not a number; the head keeps its pose.
         """
         pose = read_pose(values)
         turn = Turn(rotation(*pose.head), self.data.neck.pivot)
@@ -145,7 +134,9 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
     except ValueError as e:
         raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e
     attributes = paint_part(head.paint, part.name, mesh.uv, where)
-    attributes |= _eye_directions(part, head, mesh.vertices)
+    if part.follows in ("left_eye", "right_eye"):  # in the eye's frame, in radii, +z through the pupil
+        local = (mesh.vertices - head.eyes[int(part.follows == "right_eye")]) / head.eye_radius
+        attributes["eye_local"] = local.astype(np.float32)
     made: HeadPart = (
         SkinPart(part, head, mesh, surface, attributes, drivers)
         if part.follows == "skin"
@@ -153,11 +144,3 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
     )
     made.stored = kept is not None
     return made
-
-
-def _eye_directions(part: PartData, head: HeadData, vertices: NDArray[np.floating]) -> dict[str, Floats32]:
-    """``eye_local`` (m, 3): vertices of an eyeball in the eye's frame, in radii, +z through the pupil."""
-    if part.follows not in ("left_eye", "right_eye"):
-        return {}
-    local = (vertices - head.eyes[int(part.follows == "right_eye")]) / head.eye_radius
-    return {"eye_local": local.astype(np.float32)}

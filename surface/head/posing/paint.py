@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from surface.base.arrays import Bools, Floats, Floats32
+from surface.base.arrays import Floats, Floats32
 from surface.base.errors import HeadFileError
 from surface.head.model.parameters import smoothstep
 from surface.head.posing.kernels import nearest_on_line
+from surface.mesh.loops import inside
 
 BASE: dict[str, tuple[float, ...]] = {
     "albedo": (0.60, 0.37, 0.28),
@@ -31,9 +32,7 @@ BASE: dict[str, tuple[float, ...]] = {
 def paint_part(layers: list[dict[str, Any]], part: str, uv: Floats, where: str) -> dict[str, Floats32]:
     """Attributes (m, k) of one part at its vertices ``uv (m, 2)``.
 
-    Raises
-    ------
-    HeadFileError : a layer lacks a key or has a wrong one; names ``where`` and the layer.
+    Raises HeadFileError: a layer lacks a key or has a wrong one; names ``where`` and the layer.
     """
     out: dict[str, Floats] = {}
     for i, layer in enumerate(layers):
@@ -64,26 +63,13 @@ def _field(layer: dict[str, Any], uv: Floats) -> Floats:
     width, feather = float(layer.get("width", 0.0)), float(layer["feather"])
     if kind not in ("band", "region", "spots"):
         raise ValueError(f"kind {kind!r} is not one of all, band, region, spots")
-    closed = kind == "region"
-    distance = np.min([_distance(uv, line, closed) for line in lines], axis=0)
-    if closed:
-        inside = np.any([_inside(uv, line) for line in lines], axis=0)
-        distance = np.where(inside, 0.0, distance)
-    return 1.0 - smoothstep((distance - width) / max(feather, 1e-9))
-
-
-def _distance(uv: Floats, line: Floats, closed: bool) -> Floats:
-    """Distance (m,) of points from a polyline; a single point counts as one."""
-    distance, at = np.empty(len(uv)), np.empty(len(uv))
-    nearest_on_line(np.ascontiguousarray(uv), np.ascontiguousarray(line), closed, distance, at)
-    return distance
-
-
-def _inside(uv: Floats, ring: Floats) -> Bools:
-    """Even-odd rule."""
-    odd = np.zeros(len(uv), bool)
-    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-        crosses = (a[1] > uv[:, 1]) != (b[1] > uv[:, 1])
-        height = b[1] - a[1] if b[1] != a[1] else 1e-18
-        odd ^= crosses & (uv[:, 0] < a[0] + (uv[:, 1] - a[1]) / height * (b[0] - a[0]))
-    return odd
+    if not lines:
+        raise ValueError("lines is empty")
+    uv, least = np.ascontiguousarray(uv), np.full(len(uv), np.inf)
+    distance, along = np.empty(len(uv)), np.empty(len(uv))
+    for line in lines:
+        nearest_on_line(uv, line, kind == "region", distance, along)
+        np.minimum(least, distance, out=least)
+        if kind == "region":
+            least[inside(np.hstack([line, np.roll(line, -1, axis=0)]), uv)] = 0.0
+    return 1.0 - smoothstep((least - width) / max(feather, 1e-9))

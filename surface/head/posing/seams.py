@@ -20,8 +20,6 @@ SAME = 1e-4  # in points of the seam: vertices nearer than this are one
 class SeamStitch:
     """Closes one seam: moves the border of the ``second`` part, which gets slivers, onto that of the ``first``.
 
-    Attributes
-    ----------
     ids : (k,) vertices of the second part; low, high : (k,) those of the first that each is put between.
     share : (k,) float32, how far from ``low`` to ``high``.
     """
