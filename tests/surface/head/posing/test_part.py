@@ -14,12 +14,6 @@ def head() -> Head:
     return Head(small_head(seams=[], neck=Neck((0.0, -50.0, 0.0), 0.0, -18.0, 10.0)))
 
 
-def test_the_neck_bends_between_chin_and_shoulders():
-    chin, nape, chest = [0, -80, 95.0], [0, -50, -75.0], [0, -190.0, 30]
-    share = Neck((0.0, -55.0, 0.0)).share(np.array([chin, nape, chest]))
-    assert share[0] == 1 and share[1] > 0.95 and share[2] == 0
-
-
 def test_what_is_above_turns_whole_and_what_is_below_stays(head):
     p = head.part("a")
     rest, normals = p.vertices.copy(), p.normals.copy()
