@@ -38,7 +38,7 @@ from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig, optical_axis
 
 # pose that decides how finely a part is cut into triangles
-LIVELY = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
+SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
 
 
 def fit_head(
@@ -167,8 +167,8 @@ def _with_mesh(part: PartData, head: HeadData) -> PartData:
     """The part with its tessellation, so that a face starts at once; fine enough for a face that moves."""
     surface = make_surface(part)
     if part.follows == "skin":
-        lively = SkinRig(part, head).apply(read_pose(np.array([LIVELY.get(n, 0.0) for n in NAMES])))
-        surface = surface.with_points(with_deep_wrinkles(part, lively))
+        moved = SkinRig(part, head).apply(read_pose(np.array([SAMPLE_POSE.get(n, 0.0) for n in NAMES])))
+        surface = surface.with_points(with_deep_wrinkles(part, moved))
     return replace(part, mesh=pack(tessellate(part, surface, head.seams), part.budget))
 
 

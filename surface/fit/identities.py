@@ -1,7 +1,7 @@
 """Fit named variations of a head (identities) to mixes of the identity modes of its mesh.
 
-Each variation asks for measures of the face to change (``identities.toml``). The modes are made symmetric; the shortest
-mix of them, in standard deviations, that changes the measures so is fitted with the knots that the head has.
+Each variation lists by how much measures of the face change (``identities.toml``). The modes are made symmetric; the
+shortest mix of them, in standard deviations, that changes the measures so is fitted with the knots that the head has.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def symmetric(vertices: Floats, modes: Floats) -> Floats:
 
 
 def mixes(vertices: Floats, modes: Floats, wanted: Wanted) -> list[Floats]:
-    """Displacements (n, 3) of every variation: shortest mix of modes that changes the measures as asked."""
+    """Displacements (n, 3) of every variation: shortest mix of modes that changes the measures as wanted."""
     at = wanted.landmarks
     base = measure(vertices[at], wanted.measures)
     per_mode = {n: np.array([measure(d, wanted.measures)[n] for d in modes[:, at]]) for n in base}

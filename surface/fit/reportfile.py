@@ -63,15 +63,9 @@ def _nets(result: FitResult) -> list[UniformNet]:
 def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
     """The report as plain values."""
     return {
-        "format": FORMAT,
-        "version": VERSION,
-        "head": report.name,
-        "scale": report.scale,
-        "control_points": report.points,
-        "parameters": report.parameters,
-        "missing": list(report.missing),
-        "left_out": list(report.left_out),
-        "notes": list(report.notes),
+        "format": FORMAT, "version": VERSION, "head": report.name, "scale": report.scale,
+        "control_points": report.points, "parameters": report.parameters,
+        "missing": list(report.missing), "left_out": list(report.left_out), "notes": list(report.notes),
         "parts": [
             {
                 "name": p.name, "control_points": p.points, "samples": p.samples, "excluded_samples": p.folded,

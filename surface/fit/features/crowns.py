@@ -73,7 +73,7 @@ def _sample(mesh: FitMesh, faces: Ints, upper: bool, middle: Floats) -> Floats:
     distance = np.nan_to_num(intersect(tri, centre, rays.reshape(-1, 3))[0], nan=np.inf).min(axis=1)
     distance[np.isinf(distance)] = np.median(distance[np.isfinite(distance)])
     hits = centre + rays * distance.reshape(*RAYS, 1)
-    # Rays crowd in some places and miss thin edges; samples shall not.
+    # Rays are dense in some places and miss thin edges; samples are placed evenly.
     rows = np.stack([evenly(_below(row, row @ down > gum), GRID[1]) for row in hits])
     return np.stack([evenly(column, GRID[0]) for column in rows.swapaxes(0, 1)], axis=1).reshape(-1, 3)
 

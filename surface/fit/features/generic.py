@@ -37,7 +37,7 @@ LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one
 TOOTH_MM, TEETH = 24.0, 12  # so many pieces no larger than this are teeth
 ROUND = 0.07  # how far a ball may stray from a sphere, in radii
 BALL = (0.02, 0.14)  # radius of an eyeball, in heights of the mesh
-LIVELY = 0.4  # an island that this share of the liveliest one's shapes move belongs to the face
+MOVING = 0.4  # an island moved by at least this share of the shapes that move the most mobile one is the face's
 MOVES_MM = 1.0  # of a head of usual size: what moves less does not count as moved
 
 
@@ -153,14 +153,14 @@ def _within(mesh: FitMesh, label: Ints, eyes: Floats, radius: float) -> set[int]
 
 
 def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, list[Island]]]:
-    """The face, and what of the same piece hardly moves, as a part of its own."""
+    """The face, and, as a part of their own, islands of the same piece that hardly move."""
     islands = _separated(mesh, chosen)
     if not islands:
         raise FitError("the skin's texture coordinates have no area", hint="unwrap the mesh first")
     most = [np.abs(mesh.deltas[:, i.vertex]).max(axis=(1, 2), initial=0.0) for i in islands]
     moved = np.array([(m > MOVES_MM * scale).sum() for m in most])
-    lively = moved >= LIVELY * moved.max(initial=0)
-    face, rest = ([i for i, x in zip(islands, lively, strict=True) if x == wanted] for wanted in (True, False))
+    mobile = moved >= MOVING * moved.max(initial=0)
+    face, rest = ([i for i, x in zip(islands, mobile, strict=True) if x == wanted] for wanted in (True, False))
     area = sum(_area(mesh, i) for i in face)
     beyond = np.clip(area / (FACE_MM2 * scale**2) - 1.0, 0.0, 1.0)
     out = [_part("face", "skin", int(POINTS * (1.0 + beyond)), 0.1, 0.25, scale, face, mesh)]

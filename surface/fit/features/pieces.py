@@ -104,7 +104,7 @@ def _comb(hairs: int, *, lean: float, thick: float) -> Floats:
     rng, root = np.random.default_rng(5), 0.22 * thick
     tops = []
     for k in range(hairs):
-        s = END_LASH + (1.0 - 2.0 * END_LASH) * (k + 0.5) / hairs  # the outermost lean out, and stay whole
+        s = END_LASH + (1.0 - 2.0 * END_LASH) * (k + 0.5) / hairs  # the outermost lean outwards and must not be cut off
         half = thick / hairs
         tip = 1.0 - 0.35 * rng.random()
         shift = lean * (2 * s - 1) * 4 + 0.6 * (rng.random() - 0.5) / hairs
@@ -172,7 +172,7 @@ def teeth_part(mesh: FitMesh, part: PartRecipe, rig: HeadRig) -> tuple[PartData,
 
 
 def eyeball_part(side: str, centre: Floats, radius: float) -> PartData:
-    """An exact sphere with a cornea; the pole is left out by a hair so that normals are defined everywhere."""
+    """An exact sphere with a cornea; a tiny hole at the pole is left out so that normals are defined everywhere."""
     s = eyeball_surface(centre, radius)
     none = np.zeros(s.n)
     loop = np.array([[0.0, 1e-3], [1.0, 1e-3], [1.0, 1.0], [0.0, 1.0]])

@@ -82,7 +82,7 @@ def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
 
     points : (n, 3) control points of the tongue at rest.
     path : (k, 7) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, how much
-        of its thickness and of its width is left, and how much further down it hangs.
+        of its thickness and of its width is left, and how much further down it hangs at :data:`DROOP` 1.
     """
     hanging = path[:, 1:6].copy()
     hanging[:, 1] -= path[:, 6]

@@ -18,13 +18,14 @@ from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, PartData, Rule
 from surface.head.model.meshes import make_surface
+from surface.head.model.parameters import smoothstep
 
 PREFIX = "wrinkle"  # of their groups' names
 DEEPENED = 1.5
 ALONG = 1.8  # distance of the points along a line, in widths of its furrow
 SPAN = 0.62  # of a knot, in widths across a line; along it spans are as long as the points are apart
 TAPER = 0.3  # share of a line's length over which its ends run out
-REGULARISATION = 0.03  # weight of moving no point, beside what the samples say of an average one
+REGULARISATION = 0.03  # weight of moving no point, relative to that of the samples of an average one
 RIDGE = 0.35  # height of the skin along both sides of a furrow, in its depths
 
 
@@ -46,7 +47,7 @@ def add_wrinkles(
 
     wanted : tables with ``group``, ``terms``, ``depth`` and ``width`` in mm, ``lines`` of (x, y) seen from the front;
         with ``mirror`` the same on the right side, "Left" in names becoming "Right"; ``raised``, more lines, along
-        which the skin comes out by ``rise`` mm, as a cheek does beside its fold.
+        which the skin rises by ``rise`` mm, as a cheek does next to its fold.
     """
     lines, rules = [], []
     for table in wanted:
@@ -95,7 +96,7 @@ def _other(name: str) -> str:
 
 
 def _wrinkle_line(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMesh) -> WrinkleLine:
-    """A line seen from the front, laid onto the mesh, in points that are evenly apart."""
+    """A line seen from the front, projected onto the mesh, in evenly spaced points."""
     smooth = smooth_line(line, closed=False)
     samples = chart.mix @ mesh.vertices
     near = ((samples[None, :, :2] - smooth[:, None]) ** 2).sum(axis=2) - 1e-3 * samples[:, 2] * np.abs(samples[:, 2])
@@ -148,20 +149,15 @@ def _depth_moves(f: WrinkleLine, surface: DCPSurface, ids: Ints) -> tuple[Ints, 
     _, su, sv = surface.derivatives(f.uv)
     normal = np.cross(su, sv)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    across = np.linspace(-2.5, 2.5, 11)
-    samples, wanted = [], []
     t = np.linspace(0.0, 1.0, len(f.uv))
-    ends = np.clip(np.minimum(t, 1.0 - t) / TAPER, 0.0, 1.0)
-    ends = 0.15 + 0.85 * ends * ends * (3.0 - 2.0 * ends)
-    side = _sideways_step(f, su, sv)
-    for x in across:
-        samples.append(f.uv + x * f.width * side)
-        profile = np.exp(-0.5 * (x / 0.5) ** 2) - RIDGE * np.exp(-0.5 * ((abs(x) - 1.3) / 0.5) ** 2)
-        wanted.append(-f.depth * profile * ends)
-    matrix = surface.basis_matrix(np.concatenate(samples)).tocsc()[:, ids].toarray()
+    ends = 0.15 + 0.85 * smoothstep(np.minimum(t, 1.0 - t) / TAPER)
+    x = np.linspace(-2.5, 2.5, 11)[:, None]  # across, in widths
+    profile = np.exp(-0.5 * (x / 0.5) ** 2) - RIDGE * np.exp(-0.5 * ((np.abs(x) - 1.3) / 0.5) ** 2)
+    samples = f.uv + (x * f.width)[..., None] * _sideways_step(f, su, sv)
+    matrix = surface.basis_matrix(samples.reshape(-1, 2)).tocsc()[:, ids].toarray()
     normal_matrix = matrix.T @ matrix
     normal_matrix += REGULARISATION * np.trace(normal_matrix) / len(ids) * np.eye(len(ids))
-    amount = np.linalg.solve(normal_matrix, matrix.T @ np.concatenate(wanted))
+    amount = np.linalg.solve(normal_matrix, matrix.T @ (-f.depth * profile * ends).ravel())
     return ids, amount[:, None] * normal
 
 

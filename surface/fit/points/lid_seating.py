@@ -16,7 +16,7 @@ from surface.fit.source.mesh import FitMesh
 from surface.head.model.parameters import smoothstep
 
 LID_MM = (0.1, 1.2)  # a lid that lies on the eyeball is this far above it: its inner edge, its skin
-LOOSE_MM = 1.6  # what stands further above it at rest may come off it; what lies nearer stays as near in every shape
+LOOSE_MM = 1.6  # points further above it at rest may come off it; those nearer stay as near in every shape
 AHEAD = np.array([0.0, 0.0, 1.0])
 FRONT_MM = (0.0, 5.0)  # in front of an eyeball's centre: where lids begin to lie on it, and where they do
 HELD = 0.93  # of the radius: further out a sphere's front is too steep to seat a lid on

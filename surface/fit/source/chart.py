@@ -21,7 +21,7 @@ NARROW = 0.7  # a hole lower than this part of its width is a slit
 BORDER_WEIGHT = 8.0  # samples on a border hold the surface to its neighbour
 CLUTTER = (4.5, 7.0)  # stretch, in medians, where a fold of the mesh begins and where it is only held loosely
 CLUTTER_WEIGHT = 0.05
-SLOPE_WEIGHT = 2.0  # of a face's slope, beside a sample's position
+SLOPE_WEIGHT = 2.0  # of a face's slope, relative to a sample's position
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Chart:
     uv : (m, 2) float64, the samples.
     mix : (m, n) sparse, the samples out of the mesh's n vertices.
     weight : (m,) float64, of each sample in least squares.
-    spacing : (m, 2) float64, how far apart mesh vertices stand around each sample, in u and in v.
+    spacing : (m, 2) float64, distance of mesh vertices around each sample, in u and in v.
     folded : (m,) bool, samples inside folds (nostrils, ear canals) that are not measured.
     loops : closed polylines (k, 2) in (u, v); loop_vertices : the mesh vertex of each of their points.
     cuts : slits of the chart; slopes : what the surface's derivatives should be, if wanted.

@@ -85,7 +85,7 @@ def _check_finite(where: str, mesh: FitMesh) -> None:
             raise FitError(f"{where}: {element.format(bad[0])} is not a finite number of usable size",
                            hint=f"repair the {what} and export again")  # fmt: skip
     if not np.ptp(mesh.vertices, axis=0).max() > SMALL:
-        raise FitError(f"{where}: all vertices stand in one place", hint="export the mesh again")
+        raise FitError(f"{where}: all vertices are in one place", hint="export the mesh again")
 
 
 def check_manifold(mesh: FitMesh, where: str) -> None:

@@ -100,7 +100,7 @@ def _keys() -> dict[str, str]:
 def _read(name: str) -> tuple[str, str, bool] | None:
     """Key of the table and side that a name means, and whether it is ARKit's own word.
 
-    What stands before the last dot or colon is passed over.
+    Everything before the last dot or colon is ignored.
     """
     words = [w.lower() for w in WORDS.findall(re.split(r"[.:|](?=[^.:|]{3})", name)[-1])]
     sides = [SIDES[w] for w in words if w in SIDES]

@@ -21,7 +21,7 @@ OVERLAP = 0.125  # of the way around, on either side, is sampled twice, so that 
 ROOT, TIP_SHARE = 0.12, 0.22  # of the length: where the line begins, and how far before the tip it ends
 HEIGHT = 0.5  # of the line between the lowest and the highest place
 BOW = np.radians(45.0)  # how far below straight ahead the last ray points, so that the pole lies under the tip
-END = 0.997  # of u: the pole at the tip is left out by a hair, so that normals are defined everywhere
+END = 0.997  # of u: a tiny hole at the tip's pole is left out, so that normals are defined everywhere
 
 
 def wrap_chart(mesh: FitMesh, islands: list[Island]) -> Chart:

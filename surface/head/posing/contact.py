@@ -149,7 +149,7 @@ class ContactSolver:
         return self.push
 
     def _resolve(self, axis: Floats, points: Floats) -> None:
-        """Move control points (n, 3) in place and set ``push``. Lids are laid on the eyeball first: that opens them."""
+        """Move control points (n, 3) and set ``push``. Lids are moved onto the eyeball first, which opens them."""
         self.push[:] = 0.0
         self._sides.place(points)
         self._before[:] = self._heights()
@@ -255,7 +255,7 @@ def _nearest(points: Floats, others: Floats) -> Floats:
 
 def _inverse(start: Ints, ids: Ints, share: Floats, points: Floats, regularisation: float) -> tuple[Ints, Floats]:
     """Control points (k,) of ``points (n, 3)`` that reach the samples, and (s, k) how far each moves, in least squares,
-    per sample that shall move by 1. Points that mostly act elsewhere, or are far from every sample, are left out."""
+    per sample that is to move by 1. Points that mostly act elsewhere, or are far from every sample, are left out."""
     dense = np.zeros((len(start) - 1, int(ids.max()) + 1))
     np.add.at(dense, (np.repeat(np.arange(len(dense)), np.diff(start)), ids), share)
     used = np.flatnonzero(dense.max(axis=0) > LEAST_SHARE).astype(np.int64)

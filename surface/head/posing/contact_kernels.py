@@ -9,7 +9,7 @@ from surface.base.arrays import Floats, Floats32, Ints
 from surface.base.jit import kernel
 from surface.spline.lanes import fma, load, store3, zero
 
-# The cornea stands out of the eyeball: its sphere's centre and radius, in eyeball radii, as
+# The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
 
@@ -102,7 +102,7 @@ def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> No
 def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) -> None:
     """How high samples (s, 3) as (x, height, depth) lie above an eyeball of radius ``size``: ``heights (s,)``.
 
-    The eye looks along ``axis (3,)``; its cornea stands out.
+    The eye looks along ``axis (3,)``; its cornea protrudes.
     """
     for s in range(len(samples)):
         x, depth = samples[s, 0], max(samples[s, 2], 1e-6)
@@ -138,7 +138,7 @@ def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, gain:
 @kernel
 def lift_points(ids: Ints, lifts: Floats, samples: Floats, size: float, table: Floats32, points: Floats) -> None:
     """Move ``points (n, 3)`` with the numbers ``ids (k,)`` by ``lifts (s,) @ table (s, k)``, mm, each lift away from
-    the eyeball of radius ``size`` where its sample (s, 3) as (x, height, depth) stands."""
+    the eyeball of radius ``size`` at its sample (s, 3) as (x, height, depth)."""
     count = len(ids)
     x, y, z = np.zeros(count, np.float32), np.zeros(count, np.float32), np.zeros(count, np.float32)
     for s in range(len(lifts)):

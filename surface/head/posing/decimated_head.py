@@ -1,7 +1,7 @@
 """Pose a head's decimated triangles: only the vertices that they use, of all parts, in one array.
 
 Where a picture moves, most of a pose's time goes to vertices that are not drawn and to calls for each part. Here all
-parts that deform share one rig, and only vertices that are drawn or asked for are summed.
+parts that deform share one rig, and only vertices that are drawn or wanted are summed.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class DecimatedHead:
     ----------
     parts : the head's, in the order of their vertices here.
     level : "full" or "fast"; a part without decimated triangles keeps all.
-    wanted : other vertices that are asked for, by part.
+    wanted : other vertices to pose, by part.
 
     Attributes
     ----------
@@ -234,7 +234,7 @@ class _Seams:
 
 
 def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
-    """Which vertices are drawn or asked for, by part, with those that seams put them between."""
+    """Which vertices are drawn or wanted, by part, with those that seams put them between."""
     kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
     for stitch in reversed(head.zippers):  # a later seam may take what an earlier one moves
         drawn = np.isin(stitch.ids, kept[stitch.second.name])

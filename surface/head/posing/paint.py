@@ -6,7 +6,7 @@ A layer of paint names a part, an attribute, a value and a field between 0 and 1
 ``region``   inside closed polygons, fading to 0 over ``feather`` outside
 ``spots``    round ``points``, fading to 0 over ``feather`` from ``width`` on
 
-Layers are laid on in order: attribute = attribute + amount * field * (value - attribute).
+Layers are applied in order: attribute = attribute + amount * field * (value - attribute).
 """
 
 from __future__ import annotations

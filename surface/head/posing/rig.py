@@ -14,7 +14,7 @@ from surface.head.posing.kernels import add_moves, keep_on_eyeball, mix_rows, sw
 
 GAP = 16  # so many points that a group does not move may lie between two of one run
 CLEARANCE_GRID = (72, 36)  # samples all over what lines the lids, along u and v
-CLEARANCE_RADII = 1.4  # what lines the lids is kept out of an eye so near to its centre
+CLEARANCE_RADII = 1.4  # distance from an eye's centre, in its radii, within which what lines the lids is kept out of it
 UNDONE_MM = 20.0  # displacement by mouthClose that takes back the whole motion of the jaw
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
 

@@ -43,6 +43,10 @@ def face(rms: float, p99: float, shape: float | None) -> FitReport:
     return FitReport("h", [part, replace(part, points=8, neutral=Errors(9.0, 9.0, 9.0))], [])
 
 
+def test_the_bounds_of_a_face():
+    assert (RMS_MM, P99_MM, SHAPES_MM) == (0.25, 0.8, 0.08)
+
+
 def test_the_points_of_all_parts_are_counted():
     assert face(0, 0, 0).points == 13
 

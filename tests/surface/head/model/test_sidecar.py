@@ -63,3 +63,11 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, full_disk: Callable[[in
     with pytest.raises(HeadFileError, match=r"more\.npz: cannot be written \(.*File too large"):
         write_sidecar(path, {"a": np.random.default_rng(1).random(9999)})
     assert [entry.name for entry in tmp_path.iterdir()] == ["more.npz"] and path.stat().st_size < 2000
+
+
+def test_the_version_and_checksums_are_kept_apart_from_the_arrays(tmp_path: Path) -> None:
+    path = write_sidecar(tmp_path / "more.npz", {"a": np.arange(3)}, {"p": 7})
+    with np.load(path) as stored:
+        assert {k: stored[k].tolist() for k in stored.files} == {
+            "a": [0, 1, 2], "omote/format": [1], "omote/checksum/p": [7],
+        }  # fmt: skip
