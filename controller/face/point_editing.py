@@ -179,7 +179,7 @@ class PointEditor:
         self._moves = moves
         rig = self._head.part(PART).rig  # type: ignore[attr-defined]
         np.add(self._rest, moves, out=rig.rest)
-        rig.wake()
+        rig.invalidate()
 
     def _moved_by_hand(self, model: _Model) -> Floats:
         return np.asarray(model.basis @ self._moves)

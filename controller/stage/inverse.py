@@ -211,7 +211,7 @@ def wear(head: Head, shape: Sculpted, amount: float = 1.0) -> None:
     """Move a head's control points by ``amount`` of a reshape; every pose goes on from there."""
     rig = head.part(shape.part).rig  # type: ignore[attr-defined]
     rig.rest[shape.ids] += amount * shape.moves
-    rig.wake()
+    rig.invalidate()
 
 
 def save_group(path: Path, name: str, shape: Sculpted) -> None:

@@ -1,34 +1,34 @@
-"""Turn a mesh with texture coordinates and expression shapes into a head."""
+"""Fit a head to a mesh with texture coordinates and expression shapes, from the file to the head's folder."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.base.progress import Progress, no_progress, part_of
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
-from surface.fit.features.pieces import Body, eyeball_part, hair_parts, skin_part, teeth_part
+from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
-from surface.fit.features.wrinkles import deepened
+from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.points.lid_seating import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.points.recipe import PartRecipe, Recipe, recipe_for
 from surface.fit.points.refine import fit_chart
-from surface.fit.points.report import FitReport, PartReport, measure
+from surface.fit.points.report import FitReport, FitResult, FittedPart, PartReport, measure
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
-from surface.fit.result import FitResult, FittedPart
 from surface.fit.source.chart import Chart, make_chart
 from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island, find_islands
+from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold
 from surface.fit.source.names import sources_of, to_arkit
-from surface.fit.source.relax import open_flat_holes
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
 from surface.head.model.file import check_writable, save_data
@@ -37,9 +37,8 @@ from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig, optical_axis
 
-Progress = Callable[[str, float], None]
-# the pose that decides how finely a part is cut into triangles
-LIVELY = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
+# pose that decides how finely a part is cut into triangles
+SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
 
 
 def fit_head(
@@ -52,9 +51,8 @@ def fit_head(
     ----------
     mesh_path : .glb or .gltf with morph targets, .obj with a folder of shapes, or .npz.
     out_dir : folder that gets head.toml and head.npz.
-    name : the head's short name.
     progress : called with the part being fitted and the fraction done, 0..1.
-    options : how the mesh is to be understood. report_dir : folder that gets the report (see
+    options : how to interpret the mesh. report_dir : folder that gets the report (see
         :func:`surface.fit.reportfile.write_report`).
 
     Raises
@@ -63,13 +61,13 @@ def fit_head(
         fit together. Nothing is written then.
     HeadFileError : a folder cannot be written to.
     """
-    tell = progress or (lambda part, done: None)
+    report = progress or no_progress
     for folder in (out_dir, report_dir):
         check_writable(folder or out_dir)
     loaded = load_mesh(mesh_path, options)
-    result = fit_mesh(loaded, name, tell, str(mesh_path))
+    result = fit_mesh(loaded, name, report, str(mesh_path))
     if report_dir is not None:
-        write_report(result, report_dir, tell)
+        write_report(result, report_dir, report)
     save_data(out_dir, result.head)
     return result.report
 
@@ -85,11 +83,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
     sources = sources_of(mesh.names)
-    body = Body(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
-    parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, body, progress)
+    rig = HeadRig(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
+    parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress)
     charts = {p.name: p.chart for p in fitted_parts}
     head = HeadData(
-        name, _provenance(recipe), _neck(mesh, recipe), body.eyes, body.radius, body.jaw,
+        name, _provenance(recipe), _neck(mesh, recipe), rig.eyes, rig.radius, rig.jaw,
         parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
     )  # fmt: skip
     head = finish_head(head, mesh, charts, recipe)
@@ -102,25 +100,28 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
 
 
 def _fit_parts(
-    mesh: FitMesh, recipe: Recipe, plan: Plan, body: Body, progress: Progress
+    mesh: FitMesh, recipe: Recipe, plan: Plan, rig: HeadRig, progress: Progress
 ) -> tuple[list[PartData], list[PartReport], list[FittedPart]]:  # fmt: skip
-    """Every chart of the plan, teeth, hair and eyeballs."""
+    """Every chart of the plan, teeth, hair and eyeballs; progress counts control points."""
     parts, reports, fitted_parts = [], [], []
-    steps = _Steps([p for p, _ in plan.parts], progress)
-    for part, islands in plan.parts:
-        chart = part_chart(mesh, part, islands)
-        fitted = fit_chart(mesh if part.follows == "skin" else _still(mesh), chart, part.request, steps.of(part))
-        parts.append(skin_part(part, chart, fitted, body))
+    ends = np.cumsum([0, *(p.request.points for p, _ in plan.parts)]) / max(
+        sum(p.request.points for p, _ in plan.parts), 1
+    )
+    still = replace(mesh, names=(), deltas=mesh.deltas[:0])  # for parts that move as a whole
+    for (part, islands), low, high in zip(plan.parts, ends, ends[1:], strict=False):
+        chart, step = part_chart(mesh, part, islands), part_of(progress, low, high)
+        fitted = fit_chart(mesh if part.follows == "skin" else still, chart, part.request, partial(step, part.name))
+        parts.append(skin_part(part, chart, fitted, rig))
         reports.append(measure(part.name, chart, fitted, mesh.names))
         fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))
         if recipe.hair and recipe.hair["face"] == part.name:
-            parts += hair_parts(mesh, chart, fitted, recipe.hair["brow"], body)
+            parts += hair_parts(mesh, chart, fitted, recipe.hair["brow"], rig)
     for part in recipe.teeth:
-        data, report = teeth_part(mesh, part, body)
+        data, report = teeth_part(mesh, part, rig)
         parts.append(data)
         reports.append(report)
-    if body.radius > 0:
-        parts += [eyeball_part(side, e, body.radius) for side, e in zip(("left", "right"), body.eyes, strict=True)]
+    if rig.radius > 0:
+        parts += [eyeball_part(side, e, rig.radius) for side, e in zip(("left", "right"), rig.eyes, strict=True)]
     return parts, reports, fitted_parts
 
 
@@ -129,11 +130,6 @@ def part_chart(mesh: FitMesh, part: PartRecipe, islands: list[Island]) -> Chart:
     if part.wrapped:
         return wrap_chart(mesh, islands)
     return make_chart(mesh, islands, normalise=part.tiled, doubt_slivers=part.doubt_slivers)
-
-
-def _still(mesh: FitMesh) -> FitMesh:
-    """The mesh without its shapes, for parts that move as a whole."""
-    return replace(mesh, names=(), deltas=mesh.deltas[:0])
 
 
 def prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
@@ -146,7 +142,7 @@ def prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
 
 
 def _gazes(mesh: FitMesh) -> Floats:
-    """(k, 2, 3) where the left and the right eye look in every shape of a mesh."""
+    """(k, 2, 3) directions in which the left and the right eye look in every shape of a mesh."""
     out = np.tile([0.0, 0.0, 1.0], (len(mesh.names), 2, 1))
     for name, indices in sources_of(mesh.names).items():
         pose = read_pose(np.array([float(n == name) for n in NAMES]))
@@ -161,37 +157,18 @@ def recipe_plan(mesh: FitMesh, recipe: Recipe) -> Plan:
     for part in recipe.parts:
         own = [open_flat_holes(i) for i in islands if part.holds(float(np.median(i.vertex)))]
         if own:
-            tiled = len(own) > 1 or not _unit_square(own[0])
-            parts.append((replace(part, tiled=tiled), own))
-    hinge = np.array(recipe.hinge or (0.0, 0.0, 0.0))
-    return Plan(parts, eyes_of(mesh, recipe), hinge, np.arange(*recipe.jaw_teeth))
-
-
-def _unit_square(island: Island) -> bool:
-    return bool(island.uv.min() > -0.05 and island.uv.max() < 1.05 and np.ptp(island.uv, axis=0).min() > 0.7)
-
-
-class _Steps:
-    """Progress over all parts, by their number of points."""
-
-    def __init__(self, parts: list[PartRecipe], progress: Progress) -> None:
-        self._progress = progress
-        self._total = float(sum(p.request.points for p in parts) or 1)
-        self._before = 0.0
-
-    def of(self, part: PartRecipe) -> Callable[[float], None]:
-        """Progress of one part, 0..1."""
-        start = self._before
-        self._before += part.request.points / self._total
-        return lambda done: self._progress(part.name, min(1.0, start + done * part.request.points / self._total))
+            uv = own[0].uv
+            unit_square = uv.min() > -0.05 and uv.max() < 1.05 and np.ptp(uv, axis=0).min() > 0.7
+            parts.append((replace(part, tiled=len(own) > 1 or not unit_square), own))
+    return Plan(parts, eyes_of(mesh, recipe), np.array(recipe.hinge), np.arange(*recipe.jaw_teeth))
 
 
 def _with_mesh(part: PartData, head: HeadData) -> PartData:
     """The part with its tessellation, so that a face starts at once; fine enough for a face that moves."""
     surface = make_surface(part)
     if part.follows == "skin":
-        lively = SkinRig(part, head).apply(read_pose(np.array([LIVELY.get(n, 0.0) for n in NAMES])))
-        surface = surface.with_points(deepened(part, lively))
+        moved = SkinRig(part, head).apply(read_pose(np.array([SAMPLE_POSE.get(n, 0.0) for n in NAMES])))
+        surface = surface.with_points(with_deep_wrinkles(part, moved))
     return replace(part, mesh=pack(tessellate(part, surface, head.seams), part.budget))
 
 
@@ -206,8 +183,9 @@ def eyes_of(mesh: FitMesh, recipe: Recipe) -> tuple[Floats, float]:
 
 def _neck(mesh: FitMesh, recipe: Recipe) -> Neck:
     """The recipe's neck, or one in the lower quarter of a head nothing is known of."""
-    if recipe.neck is not None:
-        return Neck(recipe.neck)
+    if recipe.neck:
+        x, y, z = recipe.neck
+        return Neck((x, y, z))
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     height = float(high[1] - low[1])
     pivot = (0.0, float(low[1]) + 0.3 * height, float(0.5 * (low[2] + high[2])))

@@ -1,7 +1,7 @@
-"""Named people-like variations of a fitted head, out of the identity modes of its mesh.
+"""Fit named variations of a head (identities) to mixes of the identity modes of its mesh.
 
-Each variation asks for measures of the face to change (``identities.toml``). The modes are made symmetric; the shortest
-mix of them, in standard deviations, that changes the measures so is fitted with the knots that the head has.
+Each variation lists by how much measures of the face change (``identities.toml``). The modes are made symmetric; the
+shortest mix of them, in standard deviations, that changes the measures so is fitted with the knots that the head has.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
 from surface.fit.points.net import Net
@@ -30,16 +31,13 @@ from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.rig import SkinRig
 from surface.readers.npzmesh import DAMAGED
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
-
 TABLE = Path(__file__).with_name("identities.toml")
 LEAST_MM = 0.01
-LID_V, ROWS = 0.03, 9  # how far a lid reaches outside the hole in the skin, in v; where it is looked at
-SHORT_MM = 1.0  # lids that have less far to go than this, at the corners, are changed less
-TRIES, STEP, LEEWAY = 14, 0.5, (-0.4, 0.8)  # of scaling a blink; by what share of the gap; how much at most
+LID_V, ROWS = 0.03, 9  # how far a lid reaches outside the hole in the skin, in v; samples across it
+SHORT_MM = 1.0  # lids whose way is shorter than this, at the corners, are changed less
+TRIES, STEP, RANGE = 14, 0.5, (-0.4, 0.8)  # of scaling a blink; share of the gap per step; least and most change
 NEAR = 8  # mesh vertices whose displacement a hair or a tooth follows
-SAME_FIT_MM = 0.5  # control points of a head that was fitted to another mesh lie further off than this, RMS
+SAME_FIT_MM = 0.5  # RMS distance from the mesh that only a head fitted to another mesh has
 
 
 @dataclass(frozen=True)
@@ -48,22 +46,20 @@ class Wanted:
 
     vertices: int
     longest: float
-    landmarks: NDArray[np.int64]
+    landmarks: Ints
     measures: dict[str, dict[str, Any]]
     identities: dict[str, dict[str, float]]
 
 
 def read_wanted(path: Path = TABLE) -> Wanted:
     """The table of variations."""
-    t = tomllib.loads(path.read_text(encoding="utf-8"))
-    return Wanted(t["vertices"], t["longest"], np.array(t["landmarks"]), t["measures"], t["identities"])
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    return Wanted(**table | {"landmarks": np.array(table["landmarks"])})
 
 
 def add_identities(head: str | Path, mesh_path: str | Path, modes_path: str | Path) -> list[str]:
     """Fit the table's variations to a head and keep them in its folder; returns their names.
 
-    Parameters
-    ----------
     head : a head folder that was fitted to the mesh. mesh_path : that mesh.
     modes_path : .npz with ``deltas (k, n, 3)``, displacements of the mesh's vertices per standard deviation.
 
@@ -105,14 +101,12 @@ def read_modes(path: Path, mesh: FitMesh, mesh_path: str | Path) -> Floats:
 
 def symmetric(vertices: Floats, modes: Floats) -> Floats:
     """Modes (k, n, 3) without their difference between left and right."""
-    from scipy.spatial import cKDTree  # takes a moment to import
-
     other = cKDTree(vertices).query(vertices * [-1.0, 1.0, 1.0])[1]
     return 0.5 * (modes + modes[:, other] * [-1.0, 1.0, 1.0])
 
 
 def mixes(vertices: Floats, modes: Floats, wanted: Wanted) -> list[Floats]:
-    """Displacements (n, 3) of every variation: shortest mix of modes that changes the measures as asked."""
+    """Displacements (n, 3) of every variation: shortest mix of modes that changes the measures as wanted."""
     at = wanted.landmarks
     base = measure(vertices[at], wanted.measures)
     per_mode = {n: np.array([measure(d, wanted.measures)[n] for d in modes[:, at]]) for n in base}
@@ -140,7 +134,7 @@ def fit_identities(
 ) -> list[Identity]:  # fmt: skip
     """Groups of control points that move the head as ``fields`` move the mesh."""
     base = prepare(mesh, recipe)
-    others = [prepare(mesh.moved(mesh.vertices + field, mesh.deltas), recipe) for field in fields.values()]
+    others = [prepare(replace(mesh, vertices=mesh.vertices + field), recipe) for field in fields.values()]
     shifts = np.stack([o.vertices - base.vertices for o in others])
     eyes = eyes_of(base, recipe)[0]
     eye_shifts = np.stack([eyes_of(o, recipe)[0] - eyes for o in others])
@@ -184,8 +178,8 @@ def _rims(mesh: FitMesh, chart: Chart, eye: Floats) -> tuple[Floats, Floats]:
 def close_lids(head: HeadData, identity: Identity, lids: list[tuple[Floats, Floats]]) -> Identity:
     """The identity with changes to the blinks, so that its lids close as those of the head itself do.
 
-    A blink is scaled along x by how much further the lids' edges have to go; found by trying, for the eyeball has its
-    say in where a lid ends.
+    A blink is scaled along x by how much further the lids' edges have to go; found by iteration, for where a lid ends
+    depends on the eyeball, too.
     """
     face = head.parts[0]
     net = Net(np.zeros((len(face.points), 4), np.int64), face.knots_u, face.knots_v)
@@ -200,13 +194,13 @@ def close_lids(head: HeadData, identity: Identity, lids: list[tuple[Floats, Floa
             wider = _edge_heights(trial, edges, len(upper), {name: 1.0})[1] - closed[1]
             if (off := float((wider + 0.2 * np.abs(wider)).max())) < least:
                 least, best = off, share
-            share = np.clip(share + STEP * wider * travel / (travel**2 + SHORT_MM**2), *LEEWAY)
+            share = np.clip(share + STEP * wider * travel / (travel**2 + SHORT_MM**2), *RANGE)
         identity = _with_change(head, identity, name, x, best)
     return identity
 
 
 def _edge_heights(head: HeadData, edges: csr_matrix, upper: int, pose: dict[str, float]) -> tuple[Floats, Floats]:
-    """x of the upper lid, and how far its lowest place stands above the highest of the lower one, in a pose."""
+    """x of the upper lid, and height of its lowest place above the highest of the lower one, in a pose."""
     values = np.array([pose.get(n, 0.0) for n in NAMES])
     at = (edges @ SkinRig(head.parts[0], head).apply(read_pose(values))).reshape(-1, ROWS, 3)
     x, top, bottom = at[:, :, 0].mean(axis=1), at[:upper, :, 1].min(axis=1), at[upper:, :, 1].max(axis=1)
@@ -242,9 +236,7 @@ def _solved(part: PartData, chart: Chart, rest: Floats, shifts: Floats, where: s
 
 
 def _followed(points: Floats, rest: Floats, shifts: Floats) -> Floats:
-    """(k, n, 3): hair and teeth go with the mesh around each of their points."""
-    from scipy.spatial import cKDTree
-
+    """(k, n, 3) displacements of hair and teeth: of the mesh around each of their points."""
     distance, nearest = cKDTree(rest).query(points, k=NEAR)
     weight = 1.0 / (distance + 0.5)
     weight /= weight.sum(axis=1, keepdims=True)
@@ -253,7 +245,7 @@ def _followed(points: Floats, rest: Floats, shifts: Floats) -> Floats:
 
 
 def _jaw_shift(head: HeadData, moves: dict[str, Floats]) -> Floats:
-    """(k, 3) how far the hinge goes: with what turns about it, so that the arc of lips and chin stays the same."""
+    """(k, 3) displacement of the hinge: that of what turns about it, so that its arc stays the same."""
     face = head.parts[0]
     total = face.jaw @ moves[face.name].transpose(1, 0, 2).reshape(len(face.jaw), -1)
     shift = total.reshape(-1, 3) / max(float(face.jaw.sum()), 1e-9)

@@ -5,19 +5,18 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Floats32
 from surface.base.errors import FitError, ViewError
+from surface.base.progress import Progress
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
-from surface.fit.points.report import Errors, FitReport, face_bounds
-from surface.fit.result import FitResult, FittedPart
+from surface.fit.points.report import Errors, FitReport, FitResult, FittedPart, face_bounds
 from surface.fit.source.chart import TILE
 from surface.head import Head
 
@@ -28,16 +27,14 @@ EXCLUDED = np.array([0.45, 0.05, 0.50])
 LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more; violet: inside folds, not counted"
 
 
-def write_report(result: FitResult, folder: str | Path, tell: Callable[[str, float], None]) -> None:
+def write_report(result: FitResult, folder: str | Path, progress: Progress) -> None:
     """Write the report of a fit, complete or not at all.
 
-    Raises
-    ------
-    FitError : the folder cannot be written to.
+    Raises FitError: the folder cannot be written to.
     """
     folder = Path(folder)
     nets = _nets(result)
-    tell("report", 0.5)
+    progress("report", 0.5)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
@@ -50,11 +47,11 @@ def write_report(result: FitResult, folder: str | Path, tell: Callable[[str, flo
                 shutil.move(file, folder / file.name)
     except OSError as e:
         raise FitError(f"{folder}: the report cannot be written ({e})", hint="choose another --report folder") from e
-    tell("report", 1.0)
+    progress("report", 1.0)
 
 
 def _nets(result: FitResult) -> list[UniformNet]:
-    """Uniform nets beside the face's own, on its first and largest tile."""
+    """The face's own net and uniform ones for its first and largest tile."""
     face = result.parts[0]
     own = face.chart.uv[:, 0] < TILE / 2
     counted = own & ~face.chart.folded
@@ -66,15 +63,9 @@ def _nets(result: FitResult) -> list[UniformNet]:
 def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
     """The report as plain values."""
     return {
-        "format": FORMAT,
-        "version": VERSION,
-        "head": report.name,
-        "scale": report.scale,
-        "control_points": report.points,
-        "parameters": report.parameters,
-        "missing": list(report.missing),
-        "left_out": list(report.left_out),
-        "notes": list(report.notes),
+        "format": FORMAT, "version": VERSION, "head": report.name, "scale": report.scale,
+        "control_points": report.points, "parameters": report.parameters,
+        "missing": list(report.missing), "left_out": list(report.left_out), "notes": list(report.notes),
         "parts": [
             {
                 "name": p.name, "control_points": p.points, "samples": p.samples, "excluded_samples": p.folded,
@@ -136,36 +127,26 @@ def _net_lines(nets: list[UniformNet]) -> list[str]:
 def _draw(result: FitResult, folder: Path) -> list[str]:
     """Pictures of the error at rest and of each sample's worst shape; none without OpenGL."""
     head = Head(result.head)
-    chosen = {"error_neutral.png": _neutral, "error_shapes.png": _worst_shape}
-    names = []
-    for name, values in chosen.items():
-        for part in head.parts:
-            part.attributes = {"albedo": np.full((len(part.vertices), 3), 0.35, np.float32)} | {
-                k: v for k, v in part.attributes.items() if k == "eye_local"
-            }
-        for fitted in result.parts:
+    for part in head.parts:
+        kept = {k: v for k, v in part.attributes.items() if k == "eye_local"}
+        part.attributes = {"albedo": np.full((len(part.vertices), 3), 0.35, np.float32), **kept}
+    errors = {
+        "error_neutral.png": [p.fitted.error for p in result.parts],
+        "error_shapes.png": [p.fitted.shape_error.max(axis=0, initial=0.0) for p in result.parts],
+    }
+    for name, values in errors.items():
+        for fitted, error in zip(result.parts, values, strict=True):
             part = head.part(fitted.name)
-            part.attributes["albedo"] = _colours(part.uv.astype(float), fitted, values(fitted))
+            part.attributes["albedo"] = _colours(part.uv.astype(float), fitted, error)
         try:
             _picture(head, folder / name)
         except ViewError:
             return []
-        names.append(name)
-    return names
+    return list(errors)
 
 
-def _neutral(part: FittedPart) -> Floats:
-    return part.fitted.error
-
-
-def _worst_shape(part: FittedPart) -> Floats:
-    return part.fitted.shape_error.max(axis=0) if len(part.fitted.shape_error) else np.zeros(len(part.fitted.error))
-
-
-def _colours(uv: Floats, part: FittedPart, error: Floats) -> NDArray[np.float32]:
+def _colours(uv: Floats, part: FittedPart, error: Floats) -> Floats32:
     """(m, 3) linear RGB of the error at vertices: the mean of the nearest samples; excluded ones violet."""
-    from scipy.spatial import cKDTree  # takes a moment to import
-
     nearest = cKDTree(part.chart.uv).query(uv, k=min(4, len(part.chart.uv)))[1].reshape(len(uv), -1)
     at = np.clip(error[nearest].mean(axis=1) / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)
     out = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=1)
@@ -173,7 +154,7 @@ def _colours(uv: Floats, part: FittedPart, error: Floats) -> NDArray[np.float32]
     return out.astype(np.float32)
 
 
-def _picture(head: Any, path: Path) -> None:
+def _picture(head: Head, path: Path) -> None:
     """Front, three-quarter, profile, and from below into the nostrils."""
     from surface.view.pictures.offscreen import Offscreen  # takes a moment to import; most fits draw nothing
     from surface.view.pictures.sheet import compose, write_png

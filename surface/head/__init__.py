@@ -1,4 +1,4 @@
-"""The head: parts, groups, parameters, and the file they are kept in.
+"""Heads: parts, groups, parameters, and the files that hold them.
 
 In: a head's folder and values of parameters. Out: vertices and normals of its parts. Imports base to dcp.
 """

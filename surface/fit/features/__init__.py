@@ -1,4 +1,4 @@
-"""What makes fitted surfaces a head: eyes, teeth, hair, seams, contacts, wrinkles, rigs.
+"""Make a head of fitted surfaces: eyes, teeth, hair, seams, contacts, wrinkles, rigs.
 
 In: a mesh, its charts and nets. Out: the parts of a head. Imports base to dcp, head, fit.source, fit.points.
 """

@@ -1,4 +1,4 @@
-"""Teeth: crowns are sampled by rays and fitted as one small patch each.
+"""Make charts of teeth: crowns are sampled by rays and fitted as one small patch each.
 
 A tooth's own texture is cut like a paper model; a patch wrapped around the crown needs a tenth of the points.
 (u, v) go evenly over the crown, about the tooth's left-right axis: v from the gum behind over the edge to the gum in
@@ -8,12 +8,12 @@ front, u from one neighbour to the next.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse import identity
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.points.strokes import evenly
 from surface.fit.source.chart import TILE, Chart
-from surface.fit.source.mesh import FitMesh, triangles
+from surface.fit.source.mesh import FitMesh, components, corners, intersect, renumbered, triangles
 
 GRID = (19, 31)  # samples along u and v
 RAYS = (41, 91)  # that they are found with
@@ -22,59 +22,47 @@ V_RANGE = (np.radians(165.0), np.radians(-165.0))
 TALL_MM = 10.0  # of a tooth, only this much below its tip is a crown
 
 
-def crown_chart(mesh: FitMesh, teeth: list[NDArray[np.int64]], upper: bool) -> tuple[Chart, FitMesh]:
+def crown_chart(mesh: FitMesh, teeth: list[Ints], upper: bool) -> tuple[Chart, FitMesh]:
     """A chart with one tile per tooth, and the sampled points as a mesh of its own.
 
-    Parameters
-    ----------
     teeth : face indices of each tooth.
     upper : upper teeth point down, lower ones up.
     """
-    from scipy.sparse import identity  # takes a moment to import
-
-    middle = np.mean([_centre(mesh, t) for t in teeth], axis=0)
+    middle = np.mean([_box_centre(mesh.vertices[renumbered(mesh.faces[t])[0]]) for t in teeth], axis=0)
     grids = [_sample(mesh, t, upper, middle) for t in teeth]
     s, t = (np.linspace(0.0, 1.0, k) for k in GRID)
     square = np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1).reshape(-1, 2)
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    loop = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     uv = np.concatenate([square + np.array([TILE * k, 0.0]) for k in range(len(teeth))])
     n = len(uv)
     chart = Chart(
         uv, identity(n, format="csr"), np.ones(n), np.tile([1 / (k - 1) for k in GRID], (n, 1)), np.zeros(n, bool),
-        [corners + np.array([TILE * k, 0.0]) for k in range(len(teeth))], [], [],
+        [loop + np.array([TILE * k, 0.0]) for k in range(len(teeth))], [], [],
     )  # fmt: skip
     points = np.concatenate(grids)
     empty = np.zeros((0, 4), np.int64)
     return chart, FitMesh(points, empty, uv, empty, (), np.zeros((0, n, 3)))
 
 
-def split_teeth(mesh: FitMesh, faces: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def split_teeth(mesh: FitMesh, faces: Ints) -> list[Ints]:
     """Face indices of every connected piece."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    f = mesh.faces[faces]
-    last = np.where(f[:, 3] < 0, f[:, 2], f[:, 3])
-    a, b = np.concatenate([f[:, 0]] * 3), np.concatenate([f[:, 1], f[:, 2], last])
-    n = len(mesh.vertices)
-    _, label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
-    of_face = label[f[:, 0]]
-    return [faces[of_face == i] for i in np.unique(of_face)]
+    a, *others = corners(mesh.faces[faces])
+    label = components(np.concatenate([a] * 3), np.concatenate(others), len(mesh.vertices))[a]
+    return [faces[label == i] for i in np.unique(label)]
 
 
-def _centre(mesh: FitMesh, faces: NDArray[np.int64]) -> Floats:
-    points = mesh.vertices[np.unique(mesh.faces[faces][mesh.faces[faces] >= 0])]
+def _box_centre(points: Floats) -> Floats:
     centre: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return centre
 
 
-def _sample(mesh: FitMesh, faces: NDArray[np.int64], upper: bool, middle: Floats) -> Floats:
+def _sample(mesh: FitMesh, faces: Ints, upper: bool, middle: Floats) -> Floats:
     """(grid, 3) points of one crown, u fastest last."""
     tri = mesh.vertices[triangles(mesh.faces[faces])]
     down = np.array([0.0, -1.0 if upper else 1.0, 0.0])
     gum = (tri @ down).max() - TALL_MM
     crown = tri.reshape(-1, 3)[(tri @ down).ravel() > gum]
-    centre = 0.5 * (crown.min(axis=0) + crown.max(axis=0))
+    centre = _box_centre(crown)
     outward = (centre - middle) * [1.0, 0.0, 1.0]
     length = float(np.linalg.norm(outward))
     outward = outward / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
@@ -82,31 +70,17 @@ def _sample(mesh: FitMesh, faces: NDArray[np.int64], upper: bool, middle: Floats
     a, b = np.meshgrid(np.linspace(*U_RANGE, RAYS[0]), np.linspace(*V_RANGE, RAYS[1]), indexing="ij")
     a, b = a[..., None], b[..., None]
     rays = np.cos(a) * across + np.sin(a) * (np.cos(b) * down - np.sin(b) * outward)
-    hits = centre + rays * _reach(tri, centre, rays.reshape(-1, 3)).reshape(*RAYS, 1)
-    # Rays crowd in some places and miss thin edges; samples shall not.
+    distance = np.nan_to_num(intersect(tri, centre, rays.reshape(-1, 3))[0], nan=np.inf).min(axis=1)
+    distance[np.isinf(distance)] = np.median(distance[np.isfinite(distance)])
+    hits = centre + rays * distance.reshape(*RAYS, 1)
+    # Rays are dense in some places and miss thin edges; samples are placed evenly.
     rows = np.stack([evenly(_below(row, row @ down > gum), GRID[1]) for row in hits])
     return np.stack([evenly(column, GRID[0]) for column in rows.swapaxes(0, 1)], axis=1).reshape(-1, 3)
 
 
-def _below(row: Floats, crown: NDArray[np.bool_]) -> Floats:
+def _below(row: Floats, crown: Bools) -> Floats:
     """Of a row of points (k, 3) about a tooth, those in the middle that are its crown's."""
     middle, outside = len(row) // 2, np.flatnonzero(~crown)
     start = outside[outside < middle].max(initial=-1) + 1
     end = outside[outside > middle].min(initial=len(row))
     return row[start:end]
-
-
-def _reach(tri: Floats, origin: Floats, rays: Floats) -> Floats:
-    """Distance (r,) to the first triangle that each ray hits (Moeller and Trumbore, 1997); gaps are filled."""
-    e1, e2, s = tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0], origin - tri[:, 0]
-    p = np.cross(rays[:, None], e2[None])
-    det = (p * e1).sum(axis=2)
-    inverse = 1.0 / np.where(np.abs(det) < 1e-12, np.inf, det)
-    a = (p * s).sum(axis=2) * inverse
-    q = np.cross(s, e1)
-    b = (rays @ q.T) * inverse
-    t = (q * e2).sum(axis=1) * inverse
-    hit = (a > -1e-6) & (b > -1e-6) & (a + b < 1 + 1e-6) & (t > 1e-6)
-    distance = np.where(hit, t, np.inf).min(axis=1)
-    filled: Floats = np.where(np.isfinite(distance), distance, np.median(distance[np.isfinite(distance)]))
-    return filled

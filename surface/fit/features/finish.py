@@ -1,27 +1,36 @@
-"""What is put on top of a fitted head: wrinkles, contacts of lips and lids, mends."""
+"""Finish a fitted head: add wrinkles, contacts of lips and lids, and corrective shapes."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from surface.fit.features.contacts import find_contacts
-from surface.fit.features.correctives import add_correctives
+from surface.base.arrays import Floats
+from surface.dcp import DCPSurface
 from surface.fit.features.rigging import DROOP, DROOP_RULE
 from surface.fit.features.wrinkles import add_wrinkles
 from surface.fit.points.recipe import Recipe
+from surface.fit.points.strokes import arc_length
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
-from surface.head.model.data import HeadData
+from surface.head.model.data import Contact, Group, HeadData, PartData, Rule
+from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import read_pose
 from surface.head.posing.rig import SkinRig
 
-SETTLINGS = 4  # each moves what is left by half
+SETTLINGS = 4  # each halves what contacts still move at rest
+COLUMNS, ROWS, FADE_ROWS = 21, 10, 5
+FINE_U, FINE_V = 61, 49  # grid that columns are interpolated in, along and across an opening
+NAMES = ("left_lids", "right_lids", "lips")
+LID_LINING, LIP_LINING = ("lashes", "sockets"), ("cavity",)
+MARGIN_U, WIDEST_V = 0.5, 0.25  # how far outside the opening (in its widths) and from its rim (in v) samples may be
+INSET = 0.03  # of the opening's width: place of its first column
 
 
 def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe: Recipe) -> HeadData:
-    """The head with wrinkles, contacts and mends; neutral becomes what contacts make of it."""
+    """The head with wrinkles, contacts and correctives; its points at rest are those that contacts leave unchanged."""
     face = next((p for p in head.parts if p.follows == "skin" and len(p.slits) and p.name in charts), None)
     if face is None:
         return head
@@ -30,14 +39,91 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     names = tuple(p.name for p in head.parts)
     contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names)
     parts = [wrinkled if p is face else p for p in head.parts]
-    head = add_correctives(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.mends)
+    head = add_correctives(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.correctives)
+    rest = read_pose(np.zeros(59))
     for _ in range(SETTLINGS):
-        head = _settled(head)
+        points = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
+        head = replace(head, parts=[replace(p, points=at) for p, at in zip(head.parts, points, strict=True)])
     return head
 
 
-def _settled(head: HeadData) -> HeadData:
-    """The head whose parts stand at rest where contacts put them."""
-    rest = read_pose(np.zeros(59))
-    settled = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
-    return replace(head, parts=[replace(p, points=at) for p, at in zip(head.parts, settled, strict=True)])
+def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:
+    """The head with corrective shapes: groups for pairs of shapes that do not add up, worth the product of the two.
+
+    wanted : tables with ``shapes``, two of them; ``subtract``, shares of displacements of shapes that are taken back
+        where both are whole.
+    """
+    for table in wanted:
+        first, second = table["shapes"]
+        rule = Rule(f"{first}*{second}", ({first: 1.0}, {second: 1.0}))
+        parts = [_corrected(p, rule.group, table["subtract"]) for p in head.parts]
+        head = replace(head, parts=parts, rules=[*head.rules, rule])
+    return head
+
+
+def _corrected(part: PartData, name: str, shares: dict[str, float]) -> PartData:
+    """The part with a group that takes back shares of others, if that moves anything."""
+    field = np.zeros((len(part.points), 3), np.float32)
+    for g in part.groups:
+        field[g.ids] -= np.float32(shares.get(g.name, 0.0)) * g.moves
+    ids = np.flatnonzero(np.abs(field).max(axis=1) > 1e-3).astype(np.int32)
+    return replace(part, groups=[*part.groups, Group(name, ids, field[ids])]) if len(ids) else part
+
+
+def find_contacts(face: PartData, eyes: Floats, radius: float, parts: tuple[str, ...]) -> list[Contact]:
+    """Contacts at the holes of a face that are cut by slits: lids where an eyeball is behind, else lips.
+
+    face : the part with the holes. eyes : (2, 3) centres; radius : 0 for a head without known eyes.
+    parts : names of all parts; those that line an opening or are rooted at it are its followers.
+    """
+    surface = make_surface(face)
+    out = []
+    for loop in face.loops[1:]:
+        if not any(loop[:, 0].min() - 1e-9 <= s and e <= loop[:, 0].max() + 1e-9 for _, s, e in face.slits):
+            continue
+        middle = surface.evaluate(loop).mean(axis=0)
+        near = [float(np.linalg.norm(middle - eye)) for eye in eyes] if radius > 0 else []
+        lids = bool(near) and min(near) < 1.5 * radius
+        eye = int(np.argmin(near)) if lids else -1
+        lining = [p for p in (LID_LINING if lids else LIP_LINING) if p in parts]
+        depth, reach, share = (0.58 * radius, 0.5 * radius, 0.8) if lids else (15.0, 12.0, 0.5)
+        places = sample_places(surface, loop, depth, reach)
+        out.append(Contact(NAMES[eye], face.name, tuple(lining), eye, reach, share, places))
+    return out
+
+
+def sample_places(surface: DCPSurface, loop: Floats, depth_mm: float, reach_mm: float) -> Floats:
+    """(2, COLUMNS, ROWS + FADE_ROWS, 2) in (u, v): from a hole's rim outwards at constant x, upper side first.
+
+    Rows go ``depth_mm`` along the skin, as far as the sides can meet, and FADE_ROWS further over ``reach_mm``.
+    """
+    rim = surface.evaluate(loop)
+    low, high = rim[:, 0].min(), rim[:, 0].max()
+    columns = np.linspace(low + INSET * (high - low), high - INSET * (high - low), COLUMNS)
+    fade = depth_mm + reach_mm * np.linspace(0.0, 1.0, FADE_ROWS + 1)[1:]
+    wanted = np.concatenate([np.linspace(0.0, depth_mm, ROWS), fade])
+    middle = 0.5 * (loop[:, 1].min() + loop[:, 1].max())
+    sides = []
+    for sign in (1.0, -1.0):
+        half = (loop[:, 1] - middle) * sign >= 0
+        order = np.argsort(rim[half, 0])
+        start = np.column_stack([np.interp(columns, rim[half, 0][order], loop[half, i][order]) for i in (0, 1)])
+        sides.append(_along(surface, loop, start, columns, sign, wanted))
+    return np.stack(sides)
+
+
+def _along(surface: DCPSurface, loop: Floats, start: Floats, x: Floats, sign: float, wanted: Floats) -> Floats:
+    """(COLUMNS, rows, 2) places ``wanted (rows,)`` mm along the skin from ``start (COLUMNS, 2)``, at constant x."""
+    width = np.ptp(loop[:, 0])
+    u = np.linspace(loop[:, 0].min() - MARGIN_U * width, loop[:, 0].max() + MARGIN_U * width, FINE_U)
+    middle = 0.5 * (loop[:, 1].min() + loop[:, 1].max())
+    v = middle + sign * np.linspace(1e-4, WIDEST_V, FINE_V)
+    at = surface.evaluate(np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)).reshape(FINE_V, FINE_U, 3)
+    out = np.empty((len(x), len(wanted), 2))
+    for k, place in enumerate(start):
+        beyond = (v - place[1]) * sign > 1e-3
+        trace = np.column_stack([[np.interp(x[k], np.maximum.accumulate(r[:, 0]), u) for r in at[beyond]], v[beyond]])
+        trace = np.concatenate([place[None], trace])
+        length = arc_length(surface.evaluate(trace))
+        out[k] = np.column_stack([np.interp(wanted, length, trace[:, i]) for i in (0, 1)])
+    return out

@@ -1,7 +1,7 @@
-"""Take a mesh apart that no recipe was made for: eyeballs, face, back of the head, what is inside the mouth.
+"""Split a mesh that has no recipe into parts: eyeballs, face, back of the head, what is inside the mouth.
 
-Pieces are what hangs together by vertices. Balls that stand mirrored are eyes; the largest of the others is skin; the
-rest is told by the names of its objects and materials.
+Pieces are connected by vertices. Two balls that mirror each other are eyes; the largest of the others is skin; the rest
+is identified by the names of its objects and materials.
 """
 
 from __future__ import annotations
@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.features.rigging import rigid_fit
 from surface.fit.points.lid_seating import fit_sphere
@@ -19,17 +18,16 @@ from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
 from surface.fit.source.frame import head_scale
-from surface.fit.source.islands import Island, find_islands
-from surface.fit.source.layout import lay_out, separate, signed_areas
-from surface.fit.source.mesh import FitMesh, triangles
-from surface.fit.source.relax import open_flat_holes
+from surface.fit.source.islands import Island, find_islands, signed_areas
+from surface.fit.source.layout import lay_out, open_flat_holes, separate
+from surface.fit.source.mesh import FitMesh, components, face_areas, renumbered, triangles
 from surface.mesh.tessellate import MOST_ROOTS
 
 WORDS = {  # in the name of an object or material -> material of the part; the first that fits
     "lash": "lash", "brow": "brow", "hair": "brow", "beard": "brow", "teeth": "teeth", "tooth": "teeth",
     "tongue": "tongue", "gum": "gums", "mouth": "mouth", "cavity": "mouth", "oral": "mouth",
 }  # fmt: skip
-KEPT = ("skin", "socket", "lid")  # what is called so is no part of an eyeball, however near it lies
+KEPT = ("skin", "socket", "lid")  # in the name of a piece that is no part of an eyeball, however near it is
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.9  # in spacings of the mesh; its triangles may be of any size, and the largest around a place count
@@ -39,35 +37,33 @@ LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one
 TOOTH_MM, TEETH = 24.0, 12  # so many pieces no larger than this are teeth
 ROUND = 0.07  # how far a ball may stray from a sphere, in radii
 BALL = (0.02, 0.14)  # radius of an eyeball, in heights of the mesh
-LIVELY = 0.4  # an island that this share of the liveliest one's shapes move belongs to the face
+MOVING = 0.4  # an island moved by at least this share of the shapes that move the most mobile one is the face's
 MOVES_MM = 1.0  # of a head of usual size: what moves less does not count as moved
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What an unknown mesh is fitted as.
+    """The parts that a mesh is fitted as.
 
     Attributes
     ----------
     parts : recipes and islands, ready to become charts.
     eyes : centres (2, 3), left first, and radius; radius 0 without eyes.
     hinge : about which the jaw turns; jaw : vertices that turn with it as a whole.
-    notes : what was left out or taken for something, in words.
+    notes : what was left out or guessed, in words.
     """
 
     parts: list[tuple[PartRecipe, list[Island]]]
     eyes: tuple[Floats, float]
     hinge: Floats
-    jaw: NDArray[np.int64]
+    jaw: Ints
     notes: list[str] = field(default_factory=list)
 
 
 def make_plan(mesh: FitMesh) -> Plan:
     """Sort the mesh's pieces; its shapes are named as ARKit's.
 
-    Raises
-    ------
-    FitError : nothing is left that could be skin.
+    Raises FitError: nothing is left that could be skin.
     """
     shapes = dict(zip(mesh.names, mesh.deltas, strict=True))
     scale = head_scale(mesh.vertices, shapes)
@@ -82,22 +78,15 @@ def make_plan(mesh: FitMesh) -> Plan:
     return Plan(parts, eyes, *_hinge(mesh, shapes, scale), notes)
 
 
-def _pieces(mesh: FitMesh) -> tuple[NDArray[np.int64], Floats]:
+def _pieces(mesh: FitMesh) -> tuple[Ints, Floats]:
     """(f,) which connected piece of one material a face belongs to, and each one's area."""
-    from scipy.sparse import coo_matrix  # takes a moment to import
-    from scipy.sparse.csgraph import connected_components
-
     kinds = np.array([_kind(name) for name in mesh.pieces] or ["skin"])
     known, kind_of = np.unique(kinds, return_inverse=True)
     kind = kind_of.ravel()[mesh.piece] if len(mesh.piece) else np.zeros(len(mesh.faces), np.int64)
     corner = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces) * len(known) + kind[:, None]
-    n = len(mesh.vertices) * len(known)
-    graph = coo_matrix((np.ones(3 * len(corner)), (corner[:, :3].ravel(), corner[:, 1:].ravel())), shape=(n, n))
-    label = connected_components(graph, directed=False)[1][corner[:, 0]]
+    label = components(corner[:, :3].ravel(), corner[:, 1:].ravel(), len(mesh.vertices) * len(known))[corner[:, 0]]
     label = np.unique(label, return_inverse=True)[1].ravel()
-    a, b, c, d = (mesh.vertices[mesh.faces[:, k]] for k in range(4))
-    area = 0.5 * np.linalg.norm(np.cross(c - a, np.where(mesh.faces[:, 3:] < 0, c, d) - b), axis=1)
-    return label.astype(np.int64), np.bincount(label, area).astype(np.float64)
+    return label.astype(np.int64), np.bincount(label, face_areas(mesh.vertices, mesh.faces)).astype(np.float64)
 
 
 def _kind(name: str) -> str:
@@ -110,15 +99,14 @@ def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats
     used = mesh.faces >= 0
     piece = np.zeros(len(mesh.vertices), np.int64)
     piece[mesh.faces[used]] = np.repeat(label, used.sum(axis=1))
-    moving = np.zeros(len(sizes))
+    moving = np.zeros(len(sizes))  # shapes that move each
     for delta in mesh.deltas:
         moving[np.unique(piece[np.abs(delta).max(axis=1) > MOVES_MM * scale])] += 1
     return sizes * (1.0 + moving)
 
 
-def _vertices(mesh: FitMesh, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    used = np.unique(mesh.faces[chosen])
-    return used[used >= 0]
+def _points(mesh: FitMesh, chosen: Bools) -> Floats:
+    return mesh.vertices[renumbered(mesh.faces[chosen])[0]]
 
 
 def _find_eyes(mesh: FitMesh, label: Ints, scale: float) -> tuple[tuple[Floats, float], set[int]]:
@@ -126,7 +114,7 @@ def _find_eyes(mesh: FitMesh, label: Ints, scale: float) -> tuple[tuple[Floats, 
     height, middle = float(np.ptp(mesh.vertices[:, 1])), _middle_x(mesh)
     balls = {}
     for k in np.unique(label):
-        points = mesh.vertices[_vertices(mesh, label == k)]
+        points = _points(mesh, label == k)
         if len(points) >= 12 and (ball := _ball(points, height)):
             balls[int(k)] = ball
     best: tuple[float, int, int] | None = None
@@ -159,19 +147,20 @@ def _ball(points: Floats, height: float) -> tuple[Floats, float] | None:
 def _within(mesh: FitMesh, label: Ints, eyes: Floats, radius: float) -> set[int]:
     """Pieces that lie in a ball a little larger than the eye, unless they are said to be skin or hair: cornea, iris."""
     near = (np.linalg.norm(mesh.vertices[:, None] - eyes, axis=2) < 1.3 * radius).any(axis=1)
-    inside = {int(k) for k in np.unique(label) if near[_vertices(mesh, label == k)].all()}
+    inside = {int(k) for k in np.unique(label) if near[renumbered(mesh.faces[label == k])[0]].all()}
     names = {k: mesh.piece_of(int(np.argmax(label == k))).lower() for k in inside}
     return {k for k in inside if _kind(names[k]) == "skin" and not any(w in names[k] for w in KEPT)}
 
 
-def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[PartRecipe, list[Island]]]:
-    """The face, and what of the same piece hardly moves, as a part of its own."""
-    islands = _spread(mesh, chosen)
+def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, list[Island]]]:
+    """The face, and, as a part of their own, islands of the same piece that hardly move."""
+    islands = _separated(mesh, chosen)
     if not islands:
         raise FitError("the skin's texture coordinates have no area", hint="unwrap the mesh first")
-    moved = np.array([_shapes_moving(mesh, i.vertex, scale) for i in islands])
-    lively = moved >= LIVELY * moved.max(initial=0)
-    face, rest = ([i for i, x in zip(islands, lively, strict=True) if x == wanted] for wanted in (True, False))
+    most = [np.abs(mesh.deltas[:, i.vertex]).max(axis=(1, 2), initial=0.0) for i in islands]
+    moved = np.array([(m > MOVES_MM * scale).sum() for m in most])
+    mobile = moved >= MOVING * moved.max(initial=0)
+    face, rest = ([i for i, x in zip(islands, mobile, strict=True) if x == wanted] for wanted in (True, False))
     area = sum(_area(mesh, i) for i in face)
     beyond = np.clip(area / (FACE_MM2 * scale**2) - 1.0, 0.0, 1.0)
     out = [_part("face", "skin", int(POINTS * (1.0 + beyond)), 0.1, 0.25, scale, face, mesh)]
@@ -182,16 +171,10 @@ def _skin(mesh: FitMesh, chosen: NDArray[np.bool_], scale: float) -> list[tuple[
     return out
 
 
-def _spread(mesh: FitMesh, chosen: NDArray[np.bool_]) -> list[Island]:
+def _separated(mesh: FitMesh, chosen: Bools) -> list[Island]:
     """Islands of the chosen faces, without overlap; those without area in (u, v) are dropped."""
     found = [part for island in find_islands(mesh, np.flatnonzero(chosen)) for part in separate(island)]
     return [i for i in found if np.ptp(i.uv, axis=0).min() > 1e-6 and np.abs(signed_areas(i)).sum() > 1e-12]
-
-
-def _shapes_moving(mesh: FitMesh, vertices: NDArray[np.int64], scale: float) -> int:
-    if not len(mesh.deltas):
-        return 0
-    return int((np.abs(mesh.deltas[:, vertices]).max(axis=(1, 2)) > MOVES_MM * scale).sum())
 
 
 def _part(
@@ -213,7 +196,7 @@ def _others(
     """All further pieces, one part for each object or material that they belong to."""
     out: list[tuple[PartRecipe, list[Island]]] = []
     for (name, material), own in _by_material(mesh, label, pieces, scale).items():
-        islands = _spread(mesh, np.isin(label, own))
+        islands = _separated(mesh, np.isin(label, own))
         if not 0 < len(islands) <= MOST_ISLANDS:
             why = f"{len(islands)} separate pieces are too many to fit" if islands else "no area in (u, v)"
             notes.append(f"{name!r}: left out: {why}")
@@ -233,7 +216,7 @@ def _by_material(mesh: FitMesh, label: Ints, pieces: list[int], scale: float) ->
     for k in pieces:
         name = mesh.piece_of(int(np.argmax(label == k)))
         material = _kind(name)
-        tiny = np.ptp(mesh.vertices[_vertices(mesh, label == k)], axis=0).max() < TOOTH_MM * scale
+        tiny = np.ptp(_points(mesh, label == k), axis=0).max() < TOOTH_MM * scale
         if material == "skin" and tiny:
             small.setdefault(name, []).append(k)
         else:
@@ -248,7 +231,7 @@ def _area(mesh: FitMesh, island: Island) -> float:
     return float(0.5 * np.linalg.norm(np.cross(tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0]), axis=1).sum())
 
 
-def _hinge(mesh: FitMesh, shapes: dict[str, Floats], scale: float) -> tuple[Floats, NDArray[np.int64]]:
+def _hinge(mesh: FitMesh, shapes: dict[str, Floats], scale: float) -> tuple[Floats, Ints]:
     """The axis about which the chin turns when the jaw opens, and the chin's vertices; none where it does not turn."""
     none = np.zeros(3), np.zeros(0, np.int64)
     if "jawOpen" not in shapes:

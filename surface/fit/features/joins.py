@@ -1,27 +1,24 @@
-"""Find the seams between fitted charts: runs of border edges that stand in two loops, or twice in one."""
+"""Find the seams between fitted charts: runs of mesh edges that occur in two border loops, or twice in one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import Chart
 from surface.head.model.data import Seam
 
 
-@dataclass(frozen=True)
-class _Loop:
+class _Loop(NamedTuple):
     part: str
-    vertices: NDArray[np.int64]
-    uv: NDArray[np.float64]
+    vertices: Ints
+    uv: Floats
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """One mesh edge in two places: edge ``i`` of loop ``a`` is edge ``j`` of loop ``b``, run through backwards if
-    ``back``."""
+class _Pair(NamedTuple):
+    """A mesh edge in two places: edge ``i`` of loop ``a`` is edge ``j`` of loop ``b``, in reverse if ``back``."""
 
     a: int
     i: int
@@ -37,9 +34,8 @@ def find_seams(charts: dict[str, Chart]) -> list[Seam]:
         for name, chart in charts.items()
         for vertices, uv in zip(chart.loop_vertices, chart.loops, strict=True)
     ]
-    pairs = _pairs(loops)
     runs: list[list[_Pair]] = []
-    for pair in pairs:
+    for pair in _pairs(loops):
         if runs and _follows(runs[-1][-1], pair, loops):
             runs[-1].append(pair)
         else:
@@ -48,17 +44,14 @@ def find_seams(charts: dict[str, Chart]) -> list[Seam]:
 
 
 def _pairs(loops: list[_Loop]) -> list[_Pair]:
-    """Edges that occur twice, in the order of the first loop they stand in."""
-    places: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    """Edges that occur twice, in the order of the first loop they are in."""
+    places: dict[tuple[int, ...], list[tuple[int, int]]] = {}
     for k, loop in enumerate(loops):
-        for i, (p, q) in enumerate(zip(loop.vertices.tolist(), np.roll(loop.vertices, -1).tolist(), strict=True)):
-            places.setdefault((min(p, q), max(p, q)), []).append((k, i))
-    out = []
-    for both in places.values():
-        if len(both) == 2:
-            (a, i), (b, j) = both
-            out.append(_Pair(a, i, b, j, bool(loops[a].vertices[i] != loops[b].vertices[j])))
-    return sorted(out, key=lambda p: (p.a, p.i))
+        edges = np.sort(np.column_stack([loop.vertices, np.roll(loop.vertices, -1)]), axis=1)
+        for i, edge in enumerate(edges.tolist()):
+            places.setdefault(tuple(edge), []).append((k, i))
+    twice = [(*both[0], *both[1]) for both in places.values() if len(both) == 2]
+    return sorted(_Pair(a, i, b, j, bool(loops[a].vertices[i] != loops[b].vertices[j])) for a, i, b, j in twice)
 
 
 def _follows(before: _Pair, after: _Pair, loops: list[_Loop]) -> bool:
@@ -71,15 +64,15 @@ def _follows(before: _Pair, after: _Pair, loops: list[_Loop]) -> bool:
 
 
 def _closed(runs: list[list[_Pair]], loops: list[_Loop]) -> list[list[_Pair]]:
-    """A run that goes on over its loop's first point is joined to the run that starts there."""
-    starts = {(run[0].a, run[0].i): k for k, run in enumerate(runs)}
-    gone = set()
-    for k, run in enumerate(runs):
-        other = starts.get((run[-1].a, (run[-1].i + 1) % len(loops[run[-1].a].vertices)))
-        if other is not None and other < k and _follows(run[-1], runs[other][0], loops):
-            runs[other] = run + runs[other]
-            gone.add(k)
-    return [run for k, run in enumerate(runs) if k not in gone]
+    """Runs, those that go on over their loop's first point joined to the run that starts there."""
+    out: list[list[_Pair]] = []
+    for run in runs:
+        other = next((k for k, o in enumerate(out) if _follows(run[-1], o[0], loops)), None)
+        if other is None:
+            out.append(run)
+        else:
+            out[other] = run + out[other]
+    return out
 
 
 def _seam(run: list[_Pair], loops: list[_Loop]) -> Seam:

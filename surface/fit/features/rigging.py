@@ -1,41 +1,37 @@
-"""From fitted displacements to a rig: groups, the jaw's path, shares of jaw, neck and lids."""
+"""Rig fitted displacements: groups, the jaw's path, shares of jaw and lids."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, Jaw, Rule
-from surface.head.model.parameters import TONGUE_NEEDS
+from surface.head.model.parameters import TONGUE_NEEDS, smoothstep
 from surface.head.posing.rig import jaw_path
 
 LEAST_MM = 0.004  # displacements smaller than this are dropped
-LEAST_GROUP_MM = 0.25  # a part in which a shape moves nothing further than this does not take part in it
+LEAST_GROUP_MM = 0.25  # a part gets no group for a shape that moves nothing in it further than this
 DROOP = "tongueDroop"
 DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
 TILTS = ("jawForward", "jawLeft", "jawRight")
 
 
-def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: NDArray[np.int64], hinge: Floats) -> Jaw:
+def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: Ints, hinge: Floats) -> Jaw:
     """The jaw's path out of the lower teeth, which are rigid: rotation about the hinge and what is left, a glide."""
     rest = mesh.vertices[teeth]
     if "jawOpen" not in sources or not len(teeth):
         return Jaw(tuple(hinge.tolist()), 0.0, (0.0, 0.0, 0.0))
-    turn, shift = rigid_fit(rest, rest + _total(mesh, sources["jawOpen"])[teeth])
+    moves = {n: mesh.deltas[sources[n]].sum(axis=0)[teeth] for n in ("jawOpen", *TILTS) if n in sources}
+    turn, shift = rigid_fit(rest, rest + moves.pop("jawOpen"))
     angle = float(np.arctan2(turn[2, 1], turn[1, 1]))
     glide = turn @ hinge + shift - hinge
     glide[0] = 0.0
-    tilts = {n: affine_fit(rest, _total(mesh, sources[n])[teeth]) for n in TILTS if n in sources}
+    tilts = {n: affine_fit(rest, move) for n, move in moves.items()}
     return Jaw(tuple(hinge.tolist()), angle, tuple(glide.tolist()), tilts)
-
-
-def _total(mesh: FitMesh, indices: list[int]) -> Floats:
-    total: Floats = mesh.deltas[indices].sum(axis=0)
-    return total
 
 
 def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
@@ -84,14 +80,10 @@ def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
     """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_NEEDS`: ``tongueOut``, straight
     ahead, and :data:`DROOP`, which lets it hang once it is out.
 
-    Parameters
-    ----------
     points : (n, 3) control points of the tongue at rest.
     path : (k, 7) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, how much
-        of its thickness and of its width is left, and how much further down it hangs.
+        of its thickness and of its width is left, and how much further down it hangs at :data:`DROOP` 1.
     """
-    from scipy.interpolate import PchipInterpolator  # takes a moment to import
-
     hanging = path[:, 1:6].copy()
     hanging[:, 1] -= path[:, 6]
     straight, hung = (
@@ -125,6 +117,6 @@ def lid_share(points: Floats, eyes: Floats, radius: float) -> Floats:
     for eye, sign in zip(eyes, (1.0, -1.0), strict=True):
         local = points - eye
         above = np.linalg.norm(local, axis=1) - radius
-        t = np.clip((8.0 - above) / 5.0, 0.0, 1.0) * np.clip(local[:, 2] / 3.0 + 1.0, 0.0, 1.0)
-        out += sign * t * t * (3.0 - 2.0 * t)
+        near = np.clip((8.0 - above) / 5.0, 0.0, 1.0) * np.clip(local[:, 2] / 3.0 + 1.0, 0.0, 1.0)
+        out += sign * smoothstep(near)
     return out

@@ -1,8 +1,7 @@
-"""Wrinkles: control points with small spans put in along lines of a fitted face, and groups that sink them.
+"""Add wrinkles to a fitted face: control points with small spans along lines, and groups that sink them.
 
-At rest they lie on the surface and move with every other group as the skin around them does, so that they change
-little: a sum with one more point on it is not quite the same sum. What sinks them is worked out by least squares, so
-that a furrow of the wanted depth and width comes out.
+At rest they lie on the surface and move with every other group as the skin around them does, so that they change it
+little. The displacements that sink them are solved by least squares for a furrow of the wanted depth and width.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
@@ -20,19 +18,19 @@ from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, PartData, Rule
 from surface.head.model.meshes import make_surface
+from surface.head.model.parameters import smoothstep
 
 PREFIX = "wrinkle"  # of their groups' names
 DEEPENED = 1.5
-STEPS = np.arange(-2.0, 3.0)
 ALONG = 1.8  # distance of the points along a line, in widths of its furrow
 SPAN = 0.62  # of a knot, in widths across a line; along it spans are as long as the points are apart
 TAPER = 0.3  # share of a line's length over which its ends run out
-STIFF = 0.03  # weight of moving no point, beside what the samples say of an average one
-RIDGE = 0.35  # of its depth: how far the skin beside a furrow rises
+REGULARISATION = 0.03  # weight of moving no point, relative to that of the samples of an average one
+RIDGE = 0.35  # height of the skin along both sides of a furrow, in its depths
 
 
 @dataclass(frozen=True)
-class Furrow:
+class WrinkleLine:
     """One line in the skin: places (k, 2) in (u, v), (k, 3) in mm; depth and width in mm; the group that sinks it."""
 
     group: str
@@ -47,28 +45,27 @@ def add_wrinkles(
 ) -> tuple[PartData, list[Rule]]:
     """The face with control points along the wanted lines, and what moves them.
 
-    Parameters
-    ----------
     wanted : tables with ``group``, ``terms``, ``depth`` and ``width`` in mm, ``lines`` of (x, y) seen from the front;
         with ``mirror`` the same on the right side, "Left" in names becoming "Right"; ``raised``, more lines, along
-        which the skin comes out by ``rise`` mm, as a cheek does beside its fold.
+        which the skin rises by ``rise`` mm, as a cheek does next to its fold.
     """
-    furrows, rules = [], []
+    lines, rules = [], []
     for table in wanted:
         for sided in (table, _mirrored(table)) if table.get("mirror") else (table,):
             rules.append(Rule(sided["group"], tuple(sided["terms"]), float(sided.get("power", 2.0))))
-            furrows += [_furrow(sided, np.array(line, float), chart, mesh) for line in sided["lines"]]
+            lines += [_wrinkle_line(sided, np.array(line, float), chart, mesh) for line in sided["lines"]]
             up = sided | {"depth": -sided.get("rise", 0.0)}
-            furrows += [_furrow(up, np.array(line, float), chart, mesh) for line in sided.get("raised", [])]
-    if not furrows:
+            lines += [_wrinkle_line(up, np.array(line, float), chart, mesh) for line in sided.get("raised", [])]
+    if not lines:
         return face, []
     surface = make_surface(face)
-    knots = [_knots(f, surface) for f in furrows]
+    knots = [_knots(f, surface) for f in lines]
     face = _with_points(face, surface, np.concatenate([k[0] for k in knots]), np.concatenate([k[1] for k in knots]))
     first = np.cumsum([surface.n, *(len(k[0]) for k in knots)])
     groups: dict[str, list[tuple[Ints, Floats]]] = {}
-    for f, a, b in zip(furrows, first, first[1:], strict=False):
-        groups.setdefault(f.group, []).append(_sunk(f, make_surface(face), np.arange(a, b)))
+    surface = make_surface(face)
+    for f, a, b in zip(lines, first, first[1:], strict=False):
+        groups.setdefault(f.group, []).append(_depth_moves(f, surface, np.arange(a, b)))
     made = [
         Group(name, np.concatenate([i for i, _ in own]).astype(np.int32),
               np.concatenate([m for _, m in own]).astype(np.float32))
@@ -77,7 +74,7 @@ def add_wrinkles(
     return replace(face, groups=[*face.groups, *made]), rules
 
 
-def deepened(part: PartData, points: Floats) -> Floats:
+def with_deep_wrinkles(part: PartData, points: Floats) -> Floats:
     """Control points (n, 3) with all of a part's wrinkles in them, deeper than they ever are: to cut it into triangles
     that are fine enough for their shading."""
     out = points.copy()
@@ -98,8 +95,8 @@ def _other(name: str) -> str:
     return name.replace("Left", "*").replace("Right", "Left").replace("*", "Right")
 
 
-def _furrow(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMesh) -> Furrow:
-    """A line seen from the front, laid onto the mesh, in points that are evenly apart."""
+def _wrinkle_line(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMesh) -> WrinkleLine:
+    """A line seen from the front, projected onto the mesh, in evenly spaced points."""
     smooth = smooth_line(line, closed=False)
     samples = chart.mix @ mesh.vertices
     near = ((samples[None, :, :2] - smooth[:, None]) ** 2).sum(axis=2) - 1e-3 * samples[:, 2] * np.abs(samples[:, 2])
@@ -107,17 +104,17 @@ def _furrow(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMesh) ->
     at = np.column_stack([smooth, np.convolve(np.pad(z, 3, mode="edge"), np.full(7, 1 / 7), "valid")])
     width = float(table["width"])
     at = evenly(at, max(3, round(arc_length(at)[-1] / (ALONG * width)) + 1))
-    return Furrow(table["group"], uv_of(chart, mesh, at), at, float(table["depth"]), width)
+    return WrinkleLine(table["group"], uv_of(chart, mesh, at), at, float(table["depth"]), width)
 
 
-def _knots(f: Furrow, surface: DCPSurface) -> tuple[Floats, Floats]:
+def _knots(f: WrinkleLine, surface: DCPSurface) -> tuple[Floats, Floats]:
     """Knots (k, 5) in u and in v: spans as wide as the furrow across it, as long as the points are apart along it."""
     _, su, sv = surface.derivatives(f.uv)
     along = np.abs(np.gradient(f.uv, axis=0))
     out = []
     for axis, slope in enumerate((su, sv)):
         span = np.maximum(SPAN * f.width / np.linalg.norm(slope, axis=1), along[:, axis])
-        out.append(f.uv[:, axis, None] + span[:, None] * STEPS)
+        out.append(f.uv[:, axis, None] + span[:, None] * np.arange(-2.0, 3.0))
     return out[0], out[1]
 
 
@@ -147,34 +144,28 @@ def _with_points(face: PartData, surface: DCPSurface, knots_u: Floats, knots_v: 
     )
 
 
-def _sunk(f: Furrow, surface: DCPSurface, ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
+def _depth_moves(f: WrinkleLine, surface: DCPSurface, ids: Ints) -> tuple[Ints, Floats]:
     """The furrow's points and how they move when it is whole: along the skin's normals, in least squares."""
     _, su, sv = surface.derivatives(f.uv)
     normal = np.cross(su, sv)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    across = np.linspace(-2.5, 2.5, 11)
-    samples, wanted = [], []
     t = np.linspace(0.0, 1.0, len(f.uv))
-    ends = np.clip(np.minimum(t, 1.0 - t) / TAPER, 0.0, 1.0)
-    ends = 0.15 + 0.85 * ends * ends * (3.0 - 2.0 * ends)
-    side = _aside(f, su, sv)
-    for x in across:
-        samples.append(f.uv + x * f.width * side)
-        profile = np.exp(-0.5 * (x / 0.5) ** 2) - RIDGE * np.exp(-0.5 * ((abs(x) - 1.3) / 0.5) ** 2)
-        wanted.append(-f.depth * profile * ends)
-    matrix = surface.basis_matrix(np.concatenate(samples)).tocsc()[:, ids].toarray()
+    ends = 0.15 + 0.85 * smoothstep(np.minimum(t, 1.0 - t) / TAPER)
+    x = np.linspace(-2.5, 2.5, 11)[:, None]  # across, in widths
+    profile = np.exp(-0.5 * (x / 0.5) ** 2) - RIDGE * np.exp(-0.5 * ((np.abs(x) - 1.3) / 0.5) ** 2)
+    samples = f.uv + (x * f.width)[..., None] * _sideways_step(f, su, sv)
+    matrix = surface.basis_matrix(samples.reshape(-1, 2)).tocsc()[:, ids].toarray()
     normal_matrix = matrix.T @ matrix
-    normal_matrix += STIFF * np.trace(normal_matrix) / len(ids) * np.eye(len(ids))
-    amount = np.linalg.solve(normal_matrix, matrix.T @ np.concatenate(wanted))
+    normal_matrix += REGULARISATION * np.trace(normal_matrix) / len(ids) * np.eye(len(ids))
+    amount = np.linalg.solve(normal_matrix, matrix.T @ (-f.depth * profile * ends).ravel())
     return ids, amount[:, None] * normal
 
 
-def _aside(f: Furrow, su: Floats, sv: Floats) -> Floats:
+def _sideways_step(f: WrinkleLine, su: Floats, sv: Floats) -> Floats:
     """(k, 2) step in (u, v) that is 1 mm of skin to the side of the line."""
     tangent = np.gradient(f.uv, axis=0)
     forward = tangent[:, :1] * su + tangent[:, 1:] * sv
     normal = np.cross(su, sv)
     left = np.cross(normal, forward)
     left /= np.linalg.norm(left, axis=1)[:, None]
-    jacobian = np.stack([su, sv], axis=2)
-    return np.stack([np.linalg.lstsq(j, x, rcond=None)[0] for j, x in zip(jacobian, left, strict=True)])
+    return (np.linalg.pinv(np.stack([su, sv], axis=2)) @ left[..., None])[..., 0]

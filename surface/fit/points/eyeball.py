@@ -1,4 +1,4 @@
-"""An eyeball as an exact rational surface: sclera and cornea are spheres, revolved about the optical axis."""
+"""Make eyeballs as exact rational surfaces: sclera and cornea are spheres, revolved about the optical axis."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from surface.dcp import DCPSurface
 
 IRIS = 0.49  # radius of the iris (limbus), in eyeball radii: 11.8 mm across at 24 mm
 CORNEA = 0.65  # radius of the cornea's sphere, in eyeball radii: 7.8 mm at 12 mm (Gullstrand)
+LIMBUS, CORNEA_EDGE = np.arcsin(IRIS), np.arcsin(IRIS / CORNEA)  # the limbus's angle from the axis, on either sphere
+CORNEA_AT = np.cos(LIMBUS) - CORNEA * np.cos(CORNEA_EDGE)  # of the cornea's centre along the axis, in eyeball radii
 LIMBUS_V = 0.5  # v of the limbus; the pole is at v = 0
 BACK = np.radians(140.0)  # how far round the sclera reaches from the optical axis
 
@@ -20,13 +22,9 @@ def eyeball_surface(centre: Floats, radius: float) -> DCPSurface:
     the cornea's apex (0) over the limbus (:data:`LIMBUS_V`) to the back (1). Both spheres are exact: degree 2 in
     both directions.
     """
-    limbus = np.arcsin(IRIS)
-    cornea_angle = np.arcsin(IRIS / CORNEA)
-    cornea_z = np.cos(limbus) - CORNEA * np.cos(cornea_angle)
-    middle = 0.5 * (limbus + BACK)
-    net, weight = _join(
-        [_arc(0.0, cornea_angle, CORNEA, cornea_z), _arc(limbus, middle, 1.0, 0.0), _arc(middle, BACK, 1.0, 0.0)]
-    )
+    middle = 0.5 * (LIMBUS + BACK)
+    arcs = [_arc(0.0, CORNEA_EDGE, CORNEA, CORNEA_AT), _arc(LIMBUS, middle, 1.0, 0.0), _arc(middle, BACK, 1.0, 0.0)]
+    net, weight = (np.concatenate([arcs[0][k][:1], *(arc[k][1:] for arc in arcs)]) for k in (0, 1))
     knots_v = [0, 0, 0, LIMBUS_V, LIMBUS_V, 0.75, 0.75, 1, 1, 1]
     ring, ring_weight = _circle()
     points = np.empty((len(ring), len(net), 3))
@@ -41,11 +39,9 @@ def eyeball_surface(centre: Floats, radius: float) -> DCPSurface:
 def surface_height(directions: Floats, gaze: Floats) -> Floats:
     """(m,) distance of an eyeball's surface from its centre, in radii, in unit directions (m, 3), while it looks along
     unit vectors ``gaze``, (3,) or (m, 3)."""
-    limbus, edge = np.arcsin(IRIS), np.arcsin(IRIS / CORNEA)
-    centre = np.cos(limbus) - CORNEA * np.cos(edge)
     along = (directions * gaze).sum(axis=1)
-    root = np.maximum(CORNEA**2 - centre**2 * (1.0 - along**2), 0.0)
-    return np.where(along > np.cos(limbus), centre * along + np.sqrt(root), 1.0)
+    root = np.maximum(CORNEA**2 - CORNEA_AT**2 * (1.0 - along**2), 0.0)
+    return np.where(along > np.cos(LIMBUS), CORNEA_AT * along + np.sqrt(root), 1.0)
 
 
 def _arc(start: float, end: float, radius: float, z: float) -> tuple[Floats, Floats]:
@@ -55,12 +51,6 @@ def _arc(start: float, end: float, radius: float, z: float) -> tuple[Floats, Flo
     reach = radius * np.array([1.0, 1.0 / np.cos(half), 1.0])
     points = np.column_stack([reach * np.sin(angles), z + reach * np.cos(angles)])
     return points, np.array([1.0, np.cos(half), 1.0])
-
-
-def _join(arcs: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
-    points = [arcs[0][0][:1], *(p[1:] for p, _ in arcs)]
-    weights = [arcs[0][1][:1], *(w[1:] for _, w in arcs)]
-    return np.concatenate(points), np.concatenate(weights)
 
 
 def _circle() -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Re-seat lids modelled on one eyeball onto another, and close parted lips: warps of the mesh before it is fitted.
+"""Warp a mesh before it is fitted: move lids from one eyeball onto another, close parted lips, strengthen shapes.
 
 A warp is applied to the neutral vertices and to every shape's moved vertices, so that lids which slid over the
 old eyeball slide over the new one.
@@ -6,17 +6,17 @@ old eyeball slide over the new one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.points.eyeball import surface_height
 from surface.fit.source.mesh import FitMesh
+from surface.head.model.parameters import smoothstep
 
 LID_MM = (0.1, 1.2)  # a lid that lies on the eyeball is this far above it: its inner edge, its skin
-LOOSE_MM = 1.6  # what stands further above it at rest may come off it; what lies nearer stays as near in every shape
+LOOSE_MM = 1.6  # points further above it at rest may come off it; those nearer stay as near in every shape
 AHEAD = np.array([0.0, 0.0, 1.0])
 FRONT_MM = (0.0, 5.0)  # in front of an eyeball's centre: where lids begin to lie on it, and where they do
 HELD = 0.93  # of the radius: further out a sphere's front is too steep to seat a lid on
@@ -38,12 +38,10 @@ def fit_sphere(points: Floats) -> tuple[Floats, float]:
 
 
 def seat_lids(
-    mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: NDArray[np.int64], gazes: Floats | None = None
+    mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: Ints, gazes: Floats | None = None
 ) -> FitMesh:  # fmt: skip
     """Move the chosen vertices so that what touched the old eyeballs touches the new ones, their corneas included.
 
-    Parameters
-    ----------
     gazes : (k, 2, 3) where the left and the right eye look in every shape; straight ahead if not given.
     """
     ahead = np.tile(AHEAD, (2, 1))
@@ -58,13 +56,17 @@ def seat_lids(
         at, gaze = vertices[moved], ahead if gazes is None else gazes[k]
         warped = _warp(mesh.vertices[at] + delta[at], old, new)
         deltas[k, at] = _lay(warped, new, gaze, thick[moved], most[moved]) - rest[at]
-    return mesh.moved(rest, deltas)
+    return replace(mesh, vertices=rest, deltas=deltas)
+
+
+def _mirror(points: Floats) -> Floats:
+    """(m, 3) factors of coordinates that mirror those on the right side, x < 0."""
+    return np.where(points[:, :1] >= 0, 1.0, [[-1.0, 1.0, 1.0]])
 
 
 def _from_eye(points: Floats, ball: Eyeball) -> tuple[Floats, Floats]:
     """Offsets (m, 3) of points from the eye on their side, and that eye's centre (m, 3)."""
-    side = np.where(points[:, 0] >= 0, 1.0, -1.0)
-    centre = np.array(ball.centre) * np.column_stack([side, np.ones_like(side), np.ones_like(side)])
+    centre = np.array(ball.centre) * _mirror(points)
     return points - centre, centre
 
 
@@ -82,22 +84,20 @@ def _lay(points: Floats, ball: Eyeball, gaze: Floats, least: Floats, most: Float
     ``most (m,)`` above it."""
     offset, centre = _from_eye(points, ball)
     above = _above(points, ball, gaze)
-    move = (np.clip(above, least, most) - above) * _smooth(offset[:, 2], *FRONT_MM)
+    move = (np.clip(above, least, most) - above) * smoothstep(offset[:, 2], *FRONT_MM)
     laid: Floats = centre + offset * (1.0 + move / np.maximum(np.linalg.norm(offset, axis=1), 1e-9))[:, None]
     return laid
 
 
 def _warp(points: Floats, old: Eyeball, new: Eyeball) -> Floats:
     """Shift along z by the distance between the two spheres' fronts, fading with the distance from the old one."""
-    side = np.where(points[:, 0] >= 0, 1.0, -1.0)
-    local = points * np.column_stack([side, np.ones_like(side), np.ones_like(side)])
-    across_old = np.linalg.norm(local[:, :2] - old.centre[:2], axis=1)
-    across_new = np.linalg.norm(local[:, :2] - new.centre[:2], axis=1)
+    local = points * _mirror(points)
+    across_old, across_new = (np.linalg.norm(local[:, :2] - ball.centre[:2], axis=1) for ball in (old, new))
     front_old = old.centre[2] + _bulge(across_old, old.radius)
     front_new = new.centre[2] + _bulge(across_new, new.radius)
     above = local[:, 2] - front_old
-    fade = 1.0 - _smooth(above, 1.5, 9.0)
-    fade *= 1.0 - _smooth(across_new, 1.05 * new.radius, 1.9 * new.radius)
+    fade = 1.0 - smoothstep(above, 1.5, 9.0)
+    fade *= 1.0 - smoothstep(across_new, 1.05 * new.radius, 1.9 * new.radius)
     out = points.copy()
     out[:, 2] += fade * (front_new - front_old)
     return out
@@ -110,11 +110,6 @@ def _bulge(across: Floats, radius: float) -> Floats:
     return np.sqrt(radius**2 - np.minimum(across - over, held) ** 2)
 
 
-def _smooth(x: Floats, low: float, high: float) -> Floats:
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
-
-
 def close_lips(mesh: FitMesh, share: float, shape: str = "mouthClose") -> FitMesh:
     """Bring parted lips together: the share of the closing shape becomes part of the neutral face."""
     if shape not in mesh.names or share == 0:
@@ -122,24 +117,22 @@ def close_lips(mesh: FitMesh, share: float, shape: str = "mouthClose") -> FitMes
     k = mesh.names.index(shape)
     deltas = mesh.deltas.copy()
     deltas[k] *= 1.0 - share
-    return mesh.moved(mesh.vertices + share * mesh.deltas[k], deltas)
+    return replace(mesh, vertices=mesh.vertices + share * mesh.deltas[k], deltas=deltas)
 
 
 def strengthen(mesh: FitMesh, prefix: str, factor: float) -> FitMesh:
     """Scale the shapes whose names begin with ``prefix``."""
     scale = np.array([factor if n.startswith(prefix) else 1.0 for n in mesh.names])
-    return mesh.moved(mesh.vertices, mesh.deltas * scale[:, None, None])
+    return replace(mesh, deltas=mesh.deltas * scale[:, None, None])
 
 
 def draw_brows(
     mesh: FitMesh, prefix: str, centre: tuple[float, float], reach: tuple[float, float], move: tuple[float, ...]
 ) -> FitMesh:
-    """Let the shapes whose names begin with ``prefix`` draw the heads of the brows further, as the corrugator does.
+    """Make shapes whose names begin with ``prefix`` move the inner ends of the brows further, as the corrugator does.
 
-    Parameters
-    ----------
-    centre : (x, y) of the left brow's head, mm; reach : how far around it skin follows, in x and y, mm.
-    move : (3,) of the left brow's head, mm; the right one's is its mirror image.
+    centre : (x, y) of the left brow's inner end, mm; reach : standard deviation of what follows, in x and y, mm.
+    move : (3,) of it, mm; the right one's is its mirror image.
     """
     deltas = mesh.deltas.copy()
     for k, name in enumerate(mesh.names):
@@ -147,9 +140,8 @@ def draw_brows(
             continue
         side = -1.0 if name.endswith(("_R", "Right")) else 1.0
         x = side * mesh.vertices[:, 0]
-        weight = np.exp(
-            -0.5 * (((x - centre[0]) / reach[0]) ** 2 + ((mesh.vertices[:, 1] - centre[1]) / reach[1]) ** 2)
-        )
-        weight *= _smooth(mesh.vertices[:, 2], 60.0, 90.0) * _smooth(x, -6.0, centre[0])
+        y = mesh.vertices[:, 1]
+        weight = np.exp(-0.5 * (((x - centre[0]) / reach[0]) ** 2 + ((y - centre[1]) / reach[1]) ** 2))
+        weight *= smoothstep(mesh.vertices[:, 2], 60.0, 90.0) * smoothstep(x, -6.0, centre[0])
         deltas[k] += weight[:, None] * np.array(move) * [side, 1.0, 1.0]
-    return mesh.moved(mesh.vertices, deltas)
+    return replace(mesh, deltas=deltas)

@@ -1,44 +1,49 @@
-"""Where the control points stand: a coarse net, refined by need, cut at slits.
+"""Place control points: a coarse net, refined where it is wanted, cut at slits.
 
 Level (a, b) of the net has spacing ``coarse / 2**a`` in u and ``coarse / 2**b`` in v. A control point has five
 equally spaced knots in u and in v (cubic blending, support four spans wide) and is kept when finer ones are
 added on top of it: the surface is rational, so any set of points that covers the chart will do. No net is finer
-than the samples are in that direction: on a lid they stand much closer across it than along it.
+than the samples are in that direction: on a lid they are much closer across it than along it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.chart import Cut
 
 STEPS = np.arange(-2.0, 3.0)
+CORNERS = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])  # of a cell of the net, from its lowest
 
 
 @dataclass(frozen=True)
 class Net:
     """Control points without positions.
 
-    Attributes
-    ----------
     place : (n, 4) int64: levels in u and v, then i and j in the net of that level.
     knots_u, knots_v : (n, 5) float64.
     """
 
-    place: NDArray[np.int64]
-    knots_u: NDArray[np.float64]
-    knots_v: NDArray[np.float64]
+    place: Ints
+    knots_u: Floats
+    knots_v: Floats
 
     def __len__(self) -> int:
         return len(self.place)
 
     @property
-    def centres(self) -> NDArray[np.float64]:
+    def centres(self) -> Floats:
         """(n, 2) float64, the means of the inner knots: inside the support, next to a slit too."""
         return np.column_stack([self.knots_u[:, 1:4].mean(axis=1), self.knots_v[:, 1:4].mean(axis=1)])
+
+    def take(self, chosen: NDArray[Any]) -> Net:
+        """Some of the points, by mask or by indices."""
+        return Net(*(a[chosen] for a in vars(self).values()))
 
     def joined(self, other: Net) -> Net:
         """This net with another's points after its own."""
@@ -46,7 +51,7 @@ class Net:
         return Net(*(np.concatenate(p) for p in pairs))
 
 
-def net_at(places: NDArray[np.int64], coarse: float, cuts: list[Cut], uv: NDArray[np.float64]) -> Net:
+def net_at(places: Ints, coarse: float, cuts: list[Cut], uv: Floats) -> Net:
     """Control points at the places (n, 4); those whose support holds no sample are left out."""
     places = np.asarray(places, np.int64).reshape(-1, 4)
     span = coarse / 2.0 ** places[:, :2]
@@ -54,7 +59,7 @@ def net_at(places: NDArray[np.int64], coarse: float, cuts: list[Cut], uv: NDArra
     net = Net(places, *knots)
     for cut in cuts:
         net = _cut(net, cut)
-    return _take(net, _reaches(net, uv))
+    return net.take(_reaches(net, uv))
 
 
 def _cut(net: Net, cut: Cut) -> Net:
@@ -62,17 +67,13 @@ def _cut(net: Net, cut: Cut) -> Net:
     ku, kv = net.knots_u, net.knots_v
     inside = (ku[:, 0] >= cut.start) & (ku[:, -1] <= cut.end)
     straddles = inside & (kv[:, 0] < cut.v) & (kv[:, -1] > cut.v)
-    rest, both = _take(net, ~straddles), _take(net, straddles)
+    rest, both = net.take(~straddles), net.take(straddles)
     above = Net(both.place, both.knots_u, np.maximum(both.knots_v, cut.v))
     below = Net(both.place, both.knots_u, np.minimum(both.knots_v, cut.v))
     return rest.joined(above).joined(below)
 
 
-def _take(net: Net, chosen: NDArray[np.bool_]) -> Net:
-    return Net(*(a[chosen] for a in vars(net).values()))
-
-
-def _reaches(net: Net, uv: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _reaches(net: Net, uv: Floats) -> Bools:
     """Does the support hold a sample, well inside?"""
     out = np.zeros(len(net), bool)
     order = np.argsort(uv[:, 0])
@@ -87,7 +88,7 @@ def _reaches(net: Net, uv: NDArray[np.float64]) -> NDArray[np.bool_]:
     return out
 
 
-def coarse_places(uv: NDArray[np.float64], coarse: float) -> NDArray[np.int64]:
+def coarse_places(uv: Floats, coarse: float) -> Ints:
     """All places of level 0 around the samples."""
     low = np.floor(uv.min(axis=0) / coarse).astype(int) - 2
     high = np.ceil(uv.max(axis=0) / coarse).astype(int) + 2
@@ -96,12 +97,10 @@ def coarse_places(uv: NDArray[np.float64], coarse: float) -> NDArray[np.int64]:
     return np.column_stack([none, none, i.ravel(), j.ravel()])
 
 
-def wanted_places(
-    net: Net, uv: NDArray[np.float64], caps: NDArray[np.int64], error: NDArray[np.float64], coarse: float
-) -> NDArray[np.int64]:
+def wanted_places(net: Net, uv: Floats, caps: Ints, error: Floats, coarse: float) -> Ints:
     """Places (k, 4) of new points, most wanted first.
 
-    Every sample with an error above 1 asks for the four points around it one level finer than what it has;
+    For every sample with an error above 1 these are the four points around it, one level finer than what it has;
     ``caps (m, 2)`` are the finest levels in u and v that the samples can decide.
     """
     bad = np.flatnonzero(error > 1)
@@ -110,43 +109,35 @@ def wanted_places(
     at = uv[bad] / (coarse / 2.0**level)
     cell = np.floor(at).astype(np.int64)
     fraction = at - cell
-    places, wants = [], []
-    for di in (0, 1):
-        for dj in (0, 1):
-            share = np.abs(1 - di - fraction[:, 0]) * np.abs(1 - dj - fraction[:, 1])
-            places.append(np.column_stack([level, cell + np.array([di, dj])]))
-            wants.append(share * error[bad] ** 2)
-    every = np.concatenate(places)
-    _, first, inverse = np.unique(_keys(every), return_index=True, return_inverse=True)
+    every = np.concatenate([np.column_stack([level, cell + corner]) for corner in CORNERS])
+    wants = [np.abs(1 - corner - fraction).prod(axis=1) * error[bad] ** 2 for corner in CORNERS]
+    _, first, inverse = np.unique(keys(every), return_index=True, return_inverse=True)
     want = np.bincount(inverse.ravel(), np.concatenate(wants), len(first))
     return every[first][np.argsort(-want, kind="stable")]
 
 
-def level_caps(spacing: NDArray[np.float64], coarse: float, deepest: int) -> NDArray[np.int64]:
+def level_caps(spacing: Floats, coarse: float, deepest: int) -> Ints:
     """(m, 2) finest level in u and v whose spacing is not below the samples' own ``spacing (m, 2)``."""
     finest = np.floor(np.log2(coarse / np.maximum(spacing, 1e-9)) + 1e-6)
     return np.clip(finest, 0, deepest).astype(np.int64)
 
 
-def _next_level(
-    net: Net, uv: NDArray[np.float64], caps: NDArray[np.int64], coarse: float
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _next_level(net: Net, uv: Floats, caps: Ints, coarse: float) -> tuple[Ints, Bools]:
     """The first level (m, 2) that does not have all four points around a sample, and whether there is one."""
-    have = np.unique(_keys(net.place))
+    have = keys(net.place)
     out, found = np.zeros((len(uv), 2), np.int64), np.zeros(len(uv), bool)
     for level in range(1, int(caps.max(initial=0)) + 1):
         left = np.flatnonzero(~found & (caps.max(axis=1) >= level))
         pair = np.minimum(level, caps[left])
         cell = np.floor(uv[left] * 2.0**pair / coarse).astype(np.int64)
         lacks = np.zeros(len(left), bool)
-        for corner in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            keys = _keys(np.column_stack([pair, cell + np.array(corner)]))
-            lacks |= have[np.searchsorted(have, keys) % len(have)] != keys
+        for corner in CORNERS:
+            lacks |= ~np.isin(keys(np.column_stack([pair, cell + corner])), have)
         out[left[lacks]], found[left[lacks]] = pair[lacks], True
     return out, found
 
 
-def _keys(places: NDArray[np.int64]) -> NDArray[np.int64]:
+def keys(places: Ints) -> Ints:
     """(n,) one number for each place: levels below 16, i and j within four million of the middle."""
     level, at = places[:, :2], places[:, 2:] + (1 << 22)
     return ((level[:, 0] * 16 + level[:, 1]) << 46) + (at[:, 0] << 23) + at[:, 1]

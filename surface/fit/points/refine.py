@@ -1,33 +1,30 @@
-"""Fit a chart: solve, measure neutral and every shape, add points where they are off, repeat."""
+"""Fit a chart: solve for control points, measure neutral and every shape, add points where they are off, repeat."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
-from surface.fit.points.net import Net, coarse_places, level_caps, net_at, wanted_places
+from surface.base.arrays import Floats
+from surface.fit.points.net import Net, coarse_places, keys, level_caps, net_at, wanted_places
 from surface.fit.points.solve import basis, solve
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
-
 
 @dataclass(frozen=True)
 class FitRequest:
-    """What a chart is fitted to.
+    """How finely and how smoothly a chart is fitted.
 
     Attributes
     ----------
     points : most control points; coarse : spacing of the first net, in tiles; deepest : its finest level.
     neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
-    growth : by how much the net grows between two solves, at most.
-    finest : how fine a net may be, in spacings of the mesh's vertices.
+    growth : most factor by which the net grows between two solves.
+    finest : least spacing of a net, in spacings of the mesh's vertices.
     """
 
     points: int
@@ -44,23 +41,21 @@ class FitRequest:
 class Fitted:
     """A fitted chart.
 
-    Attributes
-    ----------
     net : the knots; points : (n, 3); moves : (k, n, 3), one displacement field per shape.
     error : (m,) neutral error at the chart's samples, mm; shape_error : (k, m).
     """
 
     net: Net
-    points: NDArray[np.float64]
-    moves: NDArray[np.float64]
-    error: NDArray[np.float64]
-    shape_error: NDArray[np.float64]
+    points: Floats
+    moves: Floats
+    error: Floats
+    shape_error: Floats
 
 
 def fit_chart(
-    mesh: FitMesh, chart: Chart, request: FitRequest, tell: Callable[[float], None] = lambda _: None
+    mesh: FitMesh, chart: Chart, request: FitRequest, report: Callable[[float], None] = lambda _: None
 ) -> Fitted:
-    """Control points for neutral and shapes of one chart; ``tell`` hears the fraction done."""
+    """Control points for neutral and shapes of one chart; ``report`` is called with the fraction done."""
     targets = _targets(mesh, chart.mix)
     slopes = None
     if chart.slopes is not None:
@@ -69,7 +64,7 @@ def fit_chart(
     while True:
         b = basis(net, chart.uv)
         fitted = _measured(net, b, targets, solve(net, b, chart.weight, targets, request.fair, slopes))
-        tell(min(1.0, len(net) / request.points))
+        report(min(1.0, len(net) / request.points))
         room = request.points - len(net)
         if room <= 0:
             return fitted
@@ -78,31 +73,30 @@ def fit_chart(
             return fitted
 
 
-def _targets(mesh: FitMesh, mix: csr_matrix) -> NDArray[np.float64]:
+def _targets(mesh: FitMesh, mix: csr_matrix) -> Floats:
     """(m, 3 (1 + k)): neutral and shape displacements at rows of ``mix``."""
     return np.hstack([mix @ mesh.vertices, *(mix @ d for d in mesh.deltas)])
 
 
-def _measured(net: Net, b: csr_matrix, targets: NDArray[np.float64], x: NDArray[np.float64]) -> Fitted:
+def _measured(net: Net, b: csr_matrix, targets: Floats, x: Floats) -> Fitted:
     off = np.linalg.norm((b @ x - targets).reshape(len(targets), -1, 3), axis=2)
     x3 = x.reshape(len(net), -1, 3)
     return Fitted(net, x3[:, 0].copy(), x3[:, 1:].transpose(1, 0, 2).copy(), off[:, 0], off[:, 1:].T)
 
 
-def need(chart: Chart, fitted: Fitted, request: FitRequest) -> NDArray[np.float64]:
-    """(m,) how far each sample is off, 1 = just good enough; the worse of neutral and the worst shape."""
+def need(chart: Chart, fitted: Fitted, request: FitRequest) -> Floats:
+    """(m,) error of each sample, 1 = just good enough; the worse of neutral and the worst shape."""
     worst = fitted.shape_error.max(axis=0) if len(fitted.shape_error) else np.zeros_like(fitted.error)
     return np.minimum(chart.weight, 1.0) * np.maximum(fitted.error / request.neutral_mm, worst / request.shape_mm)
 
 
-def _grow(net: Net, chart: Chart, error: NDArray[np.float64], request: FitRequest, room: int) -> tuple[Net, bool]:
-    """Add the most wanted points, at most a share of what stands."""
+def _grow(net: Net, chart: Chart, error: Floats, request: FitRequest, room: int) -> tuple[Net, bool]:
+    """The net with the most wanted points, at most a share of those it has; and whether there were any."""
     caps = level_caps(request.finest * chart.spacing, request.coarse, request.deepest)
     places = wanted_places(net, chart.uv, caps, error, request.coarse)
     quota = min(room, max(12, int(len(net) * (request.growth - 1))))
-    standing = {tuple(p) for p in net.place.tolist()}
-    fresh = np.array([p for p in places.tolist() if tuple(p) not in standing], np.int64).reshape(-1, 4)
-    added = net_at(fresh[: 2 * quota], request.coarse, chart.cuts, chart.uv)
-    rank = {tuple(p): k for k, p in enumerate(fresh.tolist())}
-    chosen = np.argsort([rank[tuple(p)] for p in added.place.tolist()], kind="stable")[:quota]
-    return net.joined(Net(*(a[chosen] for a in vars(added).values()))), len(chosen) > 0
+    fresh = places[~np.isin(keys(places), keys(net.place))][: 2 * quota]
+    added = net_at(fresh, request.coarse, chart.cuts, chart.uv)
+    rank = dict(zip(keys(fresh).tolist(), range(len(fresh)), strict=True))
+    chosen = np.argsort([rank[k] for k in keys(added.place).tolist()], kind="stable")[:quota]
+    return net.joined(added.take(chosen)), len(chosen) > 0

@@ -1,17 +1,17 @@
-"""How well a fit fits: figures per part and per shape."""
+"""Measure how well a fit fits: errors per part and per shape, and what a fit returns."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.fit.points.refine import Fitted
 from surface.fit.source.chart import Chart
+from surface.head.model.data import HeadData
 
-# what a face on a head of usual size shall keep to, mm
-RMS_MM, P99_MM, SHAPES_MM = 0.25, 0.8, 0.08
+RMS_MM, P99_MM, SHAPES_MM = 0.25, 0.8, 0.08  # bounds for a face on a head of usual size
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Errors:
 class PartReport:
     """One part: its control points, the errors of neutral and of every shape it has.
 
-    Samples inside folds (nostrils, ear canals) are held only loosely and not counted; ``folded`` says how many.
+    Samples inside folds (nostrils, ear canals) are held only loosely and not counted; ``folded`` is their number.
     """
 
     name: str
@@ -47,11 +47,9 @@ class PartReport:
 class FitReport:
     """The whole head.
 
-    Attributes
-    ----------
     parameters : ARKit's names that the head has shapes for; missing : those it has none for.
     left_out : shapes of the mesh that mean none of them; notes : what was guessed or left out, in words.
-    scale : how large the head is beside the one that the bounds were set for.
+    scale : size of the head relative to the one that the bounds were set for.
     """
 
     name: str
@@ -68,26 +66,44 @@ class FitReport:
         return sum(p.points for p in self.parts)
 
 
+@dataclass(frozen=True)
+class FittedPart:
+    """One fitted chart of a head; ``targets`` (m, 3) are the mesh's positions at the chart's samples."""
+
+    name: str
+    chart: Chart
+    fitted: Fitted
+    targets: Floats
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """A fitted head: its data, the report, and the charts it was fitted in."""
+
+    head: HeadData
+    report: FitReport
+    parts: list[FittedPart]
+
+
 def face_bounds(report: FitReport) -> str:
-    """The face, which is the first part, beside its bounds; they grow with the head."""
+    """Errors of the face, which is the first part, and their bounds, which grow with the head."""
     face = report.parts[0]
     pairs = [("RMS", face.neutral.rms, RMS_MM), ("99 %", face.neutral.p99, P99_MM)]
     pairs += [("shapes", face.mean_shape_rms, SHAPES_MM)] if face.shapes else []
-    said = ", ".join(f"{name} {got:.3f} of {most * report.scale:.3f} mm" for name, got, most in pairs)
+    figures = ", ".join(f"{name} {got:.3f} of {most * report.scale:.3f} mm" for name, got, most in pairs)
     kept = all(got <= most * report.scale for _, got, most in pairs)
-    return f"{face.name}: {'within' if kept else 'beyond'} the bounds for its size ({report.scale:.2f}): {said}"
+    return f"{face.name}: {'within' if kept else 'beyond'} the bounds for its size ({report.scale:.2f}): {figures}"
 
 
 def measure(name: str, chart: Chart, fitted: Fitted, names: tuple[str, ...]) -> PartReport:
     """Errors of a fitted chart over all samples outside folds."""
     counted = ~chart.folded
     shapes = {n: _errors(e[counted]) for n, e in zip(names, fitted.shape_error, strict=False)}
-    return PartReport(
-        name, len(fitted.net), int(counted.sum()), int((~counted).sum()), _errors(fitted.error[counted]), shapes
-    )
+    samples = int(counted.sum())
+    return PartReport(name, len(fitted.net), samples, len(counted) - samples, _errors(fitted.error[counted]), shapes)
 
 
-def _errors(distance: NDArray[np.float64]) -> Errors:
+def _errors(distance: Floats) -> Errors:
     if not len(distance):
         return Errors(0.0, 0.0, 0.0)
     return Errors(float(np.sqrt((distance**2).mean())), float(np.percentile(distance, 99)), float(distance.max()))

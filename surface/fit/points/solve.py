@@ -1,24 +1,20 @@
-"""Least squares: positions and displacements of control points for given knots."""
+"""Solve for positions and displacements of control points with given knots, by least squares."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_matrix, identity
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
+from surface.base.jit import kernel
 from surface.dcp import DCPSurface
-from surface.fit.points.gram import add_normal
 from surface.fit.points.net import Net
-from surface.fit.source.slopes import Slopes
+from surface.fit.source.chart import Slopes
 from surface.spline.matrix import basis_matrices
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
 
-
-def basis(net: Net, uv: NDArray[np.float64]) -> csr_matrix:
+def basis(net: Net, uv: Floats) -> csr_matrix:
     """Rational weights (m, n) of all control points (weights 1) at the samples."""
     return _surface(net).basis_matrix(uv)
 
@@ -33,53 +29,57 @@ def fairness(net: Net) -> csr_matrix:
 
     A Laplacian in effect: it decides what the samples leave open, and damps waves between levels.
     """
-    from scipy.sparse import identity  # takes a moment to import
-
     return (identity(len(net)) - basis(net, net.centres)).tocsr()
 
 
-class System:
-    """Normal equations of a weighted least squares problem: upper half of a matrix (n, n), right-hand sides (n, c)."""
+@kernel
+def add_normal(
+    start: Ints, columns: Ints, data: Floats, weight: Floats, targets: Floats, matrix: Floats, right: Floats
+) -> None:
+    """Add rows' W rows to the upper half of ``matrix (n, n)`` and rows' W targets to ``right (n, c)``.
 
-    def __init__(self, n: int, columns: int) -> None:
-        self.matrix = np.zeros((n, n))
-        self.right = np.zeros((n, columns))
+    Control points overlap so much that the matrix is as good as full: a dense one is filled directly.
 
-    def add(self, rows: csr_matrix, weight: NDArray[np.float64], targets: NDArray[np.float64]) -> None:
-        """Ask for rows (m, n) @ x = targets (m, c), each row with its weight (m,)."""
-        matrix, right = np.zeros_like(self.matrix), np.zeros_like(self.right)
-        rows.sort_indices()
-        add_normal(rows.indptr, rows.indices, rows.data, weight, targets, matrix, right)
-        self.matrix += matrix
-        self.right += right
+    start (m + 1,), columns, data : the rows as CSR with sorted columns; weight (m,); targets (m, c).
+    """
+    for k in range(len(start) - 1):
+        for p in range(start[k], start[k + 1]):
+            share, i = data[p] * weight[k], columns[p]
+            for q in range(p, start[k + 1]):
+                matrix[i, columns[q]] += share * data[q]
+            for c in range(targets.shape[1]):
+                right[i, c] += share * targets[k, c]
+
+
+def normal_equations(rows: csr_matrix, weight: Floats, targets: Floats) -> tuple[Floats, Floats]:
+    """Upper half of the matrix (n, n) and right-hand sides (n, c) for rows (m, n) @ x = targets (m, c)."""
+    matrix, right = np.zeros((rows.shape[1], rows.shape[1])), np.zeros((rows.shape[1], targets.shape[1]))
+    rows.sort_indices()
+    add_normal(rows.indptr, rows.indices, rows.data, weight, targets, matrix, right)
+    return matrix, right
 
 
 def solve(
-    net: Net,
-    samples: csr_matrix,
-    weight: NDArray[np.float64],
-    targets: NDArray[np.float64],
-    fair: float,
-    slopes: tuple[Slopes, NDArray[np.float64], NDArray[np.float64]] | None = None,
-) -> NDArray[np.float64]:
+    net: Net, samples: csr_matrix, weight: Floats, targets: Floats, fair: float,
+    slopes: tuple[Slopes, Floats, Floats] | None = None,
+) -> Floats:  # fmt: skip
     """Control point coordinates (n, c) for all targets (m, c) at once.
 
     Minimises sum weight (B P - target)^2 + slopes + fair (m / n) |F P|^2 with F of :func:`fairness`; one
     factorisation serves every right-hand side. ``slopes`` come with their targets (f, c) in u and in v.
     """
-    from scipy.linalg import cho_factor, cho_solve
-
     n = len(net)
-    system = System(n, targets.shape[1])
-    system.add(samples, weight, targets)
+    normal, right = normal_equations(samples, weight, targets)
     if slopes is not None:
         where, *wanted = slopes
         for axis, slope in enumerate(basis_matrices(_surface(net), where.uv, [(1, 0), (0, 1)])):
             slope.data *= np.repeat(where.span[:, axis], np.diff(slope.indptr))
-            system.add(slope, where.weight, wanted[axis])
+            more, more_right = normal_equations(slope, where.weight, wanted[axis])
+            normal += more
+            right += more_right
     strength = weight.sum() / n
     f = fairness(net)
-    normal = system.matrix + (fair * strength * (f.T @ f)).toarray()
+    normal += (fair * strength * (f.T @ f)).toarray()
     normal[np.diag_indices(n)] += 1e-7 * strength
-    solved: Floats = cho_solve(cho_factor(normal, check_finite=False), system.right, check_finite=False)
+    solved: Floats = cho_solve(cho_factor(normal, check_finite=False), right, check_finite=False)
     return solved

@@ -1,13 +1,13 @@
-"""Paint of a recipe, given by mesh vertices, as lines in (u, v) of the fitted part."""
+"""Convert a recipe's paint, given by mesh vertices, to lines in (u, v) of the fitted part."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
 
@@ -34,14 +34,14 @@ def _layer(layer: dict[str, Any], chart: Chart, mesh: FitMesh) -> dict[str, Any]
     return out | {"lines": [np.round(line, 5).tolist() for line in lines]}
 
 
-def mirrored(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+def mirrored(chart: Chart, mesh: FitMesh, ids: Ints) -> Ints:
     """The chart's vertices on the other side of the face."""
     own = np.unique(chart.mix.indices)
-    flipped = mesh.vertices[ids] * [-1.0, 1.0, 1.0]
-    return np.array([own[np.argmin(((mesh.vertices[own] - p) ** 2).sum(axis=1))] for p in flipped])
+    nearest: Ints = own[cKDTree(mesh.vertices[own]).query(mesh.vertices[ids] * [-1.0, 1.0, 1.0])[1]]
+    return nearest
 
 
-def vertex_line(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64], *, closed: bool) -> Floats:
+def vertex_line(chart: Chart, mesh: FitMesh, ids: Ints, *, closed: bool) -> Floats:
     """A smooth line through vertices, in (u, v)."""
     if len(ids) > 2 and not closed:
         return uv_of(chart, mesh, smooth_line(mesh.vertices[ids], closed=False))
@@ -50,9 +50,7 @@ def vertex_line(chart: Chart, mesh: FitMesh, ids: NDArray[np.int64], *, closed: 
 
 
 def uv_of(chart: Chart, mesh: FitMesh, points: Floats) -> Floats:
-    """(m, 2) where points (m, 3) near the mesh lie in (u, v), from the samples around each."""
-    from scipy.spatial import cKDTree  # takes a moment to import
-
+    """(m, 2) places in (u, v) of points (m, 3) near the mesh, from the samples around each."""
     samples = chart.mix @ mesh.vertices
     distance, nearest = cKDTree(samples).query(points, k=6)
     weight = 1.0 / (distance**2 + 0.05)

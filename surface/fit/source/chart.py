@@ -1,31 +1,27 @@
-"""A chart: one or more islands laid out in their own (u, v) tiles, ready to be fitted.
+"""Make charts: one or more islands in their own (u, v) tiles, with samples to fit.
 
-Samples of a chart are its mesh vertices, face centres and border edge centres. Each is a fixed mix of mesh
-vertices, so the neutral face and every shape are sampled by one sparse product.
+Samples of a chart are its mesh vertices, face centres and border edge centres. Each is a fixed mix of mesh vertices, so
+the neutral face and every shape are sampled by one sparse product.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, identity, vstack
 
-from surface.base.arrays import Floats
-from surface.fit.source.islands import Island, boundary_loops, directed_edges
-from surface.fit.source.mesh import FitMesh
-from surface.fit.source.slopes import Slopes, face_slopes, join_slopes
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
+from surface.base.arrays import Bools, Floats, Ints
+from surface.fit.source.islands import Island, boundary_loops
+from surface.fit.source.mesh import FitMesh, directed_edges, face_areas
 
 TILE = 2.0  # distance between the tiles of two islands: supports of one cannot reach the next
 NARROW = 0.7  # a hole lower than this part of its width is a slit
 BORDER_WEIGHT = 8.0  # samples on a border hold the surface to its neighbour
 CLUTTER = (4.5, 7.0)  # stretch, in medians, where a fold of the mesh begins and where it is only held loosely
 CLUTTER_WEIGHT = 0.05
-SLOPE_WEIGHT = 2.0  # of a face's slope, beside a sample's position
+SLOPE_WEIGHT = 2.0  # of a face's slope, relative to a sample's position
 
 
 @dataclass(frozen=True)
@@ -46,42 +42,37 @@ class Chart:
     uv : (m, 2) float64, the samples.
     mix : (m, n) sparse, the samples out of the mesh's n vertices.
     weight : (m,) float64, of each sample in least squares.
-    spacing : (m, 2) float64, how far apart mesh vertices stand around each sample, in u and in v.
+    spacing : (m, 2) float64, distance of mesh vertices around each sample, in u and in v.
     folded : (m,) bool, samples inside folds (nostrils, ear canals) that are not measured.
     loops : closed polylines (k, 2) in (u, v); loop_vertices : the mesh vertex of each of their points.
-    cuts : slits of the chart; slopes : what the surface's derivatives should be, if asked for.
-    size : side of the square that one island fills in (u, v).
+    cuts : slits of the chart; slopes : what the surface's derivatives should be, if wanted.
     """
 
-    uv: NDArray[np.float64]
+    uv: Floats
     mix: csr_matrix
-    weight: NDArray[np.float64]
-    spacing: NDArray[np.float64]
-    folded: NDArray[np.bool_]
-    loops: list[NDArray[np.float64]]
-    loop_vertices: list[NDArray[np.int64]]
+    weight: Floats
+    spacing: Floats
+    folded: Bools
+    loops: list[Floats]
+    loop_vertices: list[Ints]
     cuts: list[Cut] = field(default_factory=list)
     slopes: Slopes | None = None
-    size: float = 1.0
 
 
 def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True, doubt_slivers: bool = False) -> Chart:
     """Lay the islands side by side and sample them.
 
     ``normalise=False`` keeps the mesh's own (u, v), for a single island that is known to fill the unit square.
-    ``doubt_slivers`` : faces may be of any form (see :func:`surface.fit.source.slopes.face_slopes`).
+    ``doubt_slivers`` : faces may be of any form (see :func:`surface.fit.source.chart.face_slopes`).
     """
     placed = [_place(island, k) if normalise else island for k, island in enumerate(islands)]
     pieces = [_piece(mesh, island, doubt_slivers=doubt_slivers) for island in placed]
-    from scipy.sparse import vstack  # takes a moment to import
-
-    return Chart(
-        np.concatenate([p.uv for p in pieces]), vstack([p.mix for p in pieces]).tocsr(),
-        np.concatenate([p.weight for p in pieces]), np.concatenate([p.spacing for p in pieces]),
-        np.concatenate([p.folded for p in pieces]), [x for p in pieces for x in p.loops],
-        [x for p in pieces for x in p.loop_vertices], [x for p in pieces for x in p.cuts],
-        join_slopes([p.slopes for p in pieces if p.slopes is not None]),
-    )  # fmt: skip
+    rows: dict[str, Any] = {
+        k: np.concatenate([getattr(p, k) for p in pieces]) for k in ("uv", "weight", "spacing", "folded")
+    }
+    lists: dict[str, Any] = {k: [x for p in pieces for x in getattr(p, k)] for k in ("loops", "loop_vertices", "cuts")}
+    slopes = join_slopes([p.slopes for p in pieces if p.slopes is not None])
+    return Chart(mix=vstack([p.mix for p in pieces]).tocsr(), slopes=slopes, **rows, **lists)
 
 
 def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
@@ -92,7 +83,7 @@ def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
     sampled = np.clip(rows @ fold, 0, 1)
     around = boundary_loops(island)
     return Chart(
-        rows @ island.uv, rows @ _pick(island.vertex, n),
+        rows @ island.uv, rows @ identity(n, format="csr")[island.vertex],
         _loosened(sampled) * np.where(on_border, BORDER_WEIGHT, 1.0), rows @ _spacing(island), sampled > 0.5,
         [island.uv[loop] for loop in around], [island.vertex[loop] for loop in around],
         [c for loop in around[1:] if (c := slit_of(island.uv[loop])) is not None],
@@ -100,12 +91,12 @@ def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
     )  # fmt: skip
 
 
-def _loosened(fold: NDArray[np.float64]) -> NDArray[np.float64]:
+def _loosened(fold: Floats) -> Floats:
     """Weights of points that lie in a fold by 0..1."""
     return CLUTTER_WEIGHT + (1 - CLUTTER_WEIGHT) * (1 - fold)
 
 
-def slit_of(loop: NDArray[np.float64]) -> Cut | None:
+def slit_of(loop: Floats) -> Cut | None:
     """The centre line of a low, wide hole; None for a hole of any other form."""
     (u0, v0), (u1, v1) = loop.min(axis=0), loop.max(axis=0)
     if v1 - v0 > NARROW * (u1 - u0):
@@ -114,45 +105,30 @@ def slit_of(loop: NDArray[np.float64]) -> Cut | None:
 
 
 def _place(island: Island, k: int) -> Island:
-    uv = island.uv * ([-1.0, 1.0] if _mirrored(island) else [1.0, 1.0])
+    a, b, c = (island.uv[island.faces[:, k]] for k in range(3))
+    clockwise = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() < 0  # normals would point inwards
+    uv = island.uv * ([-1.0, 1.0] if clockwise else [1.0, 1.0])
     low, high = uv.min(axis=0), uv.max(axis=0)
     uv = (uv - low) / max(float((high - low).max()), 1e-12) + [TILE * k, 0.0]
     return Island(island.vertex, uv, island.faces)
 
 
-def _mirrored(island: Island) -> bool:
-    """Do the faces run clockwise in (u, v)? Then normals would point inwards."""
-    a, b, c = (island.uv[island.faces[:, k]] for k in range(3))
-    return bool(((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() < 0)
-
-
-def _pick(vertex: NDArray[np.int64], n: int) -> csr_matrix:
-    from scipy.sparse import csr_matrix
-
-    return csr_matrix((np.ones(len(vertex)), (np.arange(len(vertex)), vertex)), shape=(len(vertex), n))
-
-
-def _sample_rows(island: Island) -> tuple[csr_matrix, NDArray[np.bool_]]:
+def _sample_rows(island: Island) -> tuple[csr_matrix, Bools]:
     """Rows over the island's points: vertices, face centres, border edge centres; and which lie on a border."""
-    from scipy.sparse import csr_matrix, identity, vstack
-
     m, f = len(island.uv), island.faces
     corners = np.where(f >= 0, f, 0)
     share = (f >= 0) / (f >= 0).sum(axis=1, keepdims=True)
     rows = np.repeat(np.arange(len(f)), 4)
     centres = csr_matrix((share.ravel(), (rows, corners.ravel())), shape=(len(f), m))
-    loops = boundary_loops(island)
-    a = np.concatenate(loops) if loops else np.zeros(0, np.int64)
-    b = np.concatenate([np.roll(x, -1) for x in loops]) if loops else a
+    loops, none = boundary_loops(island), np.zeros(0, np.int64)
+    a, b = np.concatenate([none, *loops]), np.concatenate([none, *(np.roll(x, -1) for x in loops)])
     at = np.concatenate([np.arange(len(a))] * 2)
     edges = csr_matrix((np.full(2 * len(a), 0.5), (at, np.concatenate([a, b]))), shape=(len(a), m))
-    border = np.zeros(m + len(f) + len(a), bool)
-    border[a] = True
-    border[m + len(f) :] = True
+    border = np.concatenate([np.isin(np.arange(m), a), np.zeros(len(f), bool), np.ones(len(a), bool)])
     return vstack([identity(m), centres, edges]).tocsr(), border
 
 
-def _spacing(island: Island) -> NDArray[np.float64]:
+def _spacing(island: Island) -> Floats:
     """(m, 2): the longest step in u and in v along any edge at each point."""
     a, b = directed_edges(island.faces)
     step = np.abs(island.uv[a] - island.uv[b])
@@ -162,10 +138,11 @@ def _spacing(island: Island) -> NDArray[np.float64]:
     return out
 
 
-def _fold(mesh: FitMesh, island: Island) -> NDArray[np.float64]:
+def _fold(mesh: FitMesh, island: Island) -> Floats:
     """How deep each point lies in a fold, 0..1: where little of (u, v) holds much surface."""
     f = island.faces
-    area3, area2 = _areas(mesh.vertices[island.vertex], f), _areas(np.pad(island.uv, ((0, 0), (0, 1))), f)
+    area3 = face_areas(mesh.vertices[island.vertex], f)
+    area2 = face_areas(np.pad(island.uv, ((0, 0), (0, 1))), f)
     stretch = np.sqrt(area3 / np.maximum(area2, 1e-12))
     low, high = np.array(CLUTTER) * np.median(stretch)
     depth = np.clip((stretch - low) / (high - low), 0, 1)
@@ -174,9 +151,47 @@ def _fold(mesh: FitMesh, island: Island) -> NDArray[np.float64]:
     return total / np.maximum(np.bincount(f[used], minlength=len(island.uv)), 1)
 
 
-def _areas(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Area of quads (f, 4) by their diagonals; a triangle's last corner is its third."""
-    last = np.where(faces[:, 3] < 0, faces[:, 2], faces[:, 3])
-    a, b, c = (points[faces[:, i]] for i in range(3))
-    areas: Floats = 0.5 * np.linalg.norm(np.cross(c - a, points[last] - b), axis=1)
-    return areas
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes at the faces of a chart.
+
+    uv : (f, 2) face centres; span : (f, 2) a face's extent in u and in v.
+    mix_u, mix_v : (f, n) sparse; times the mesh's n vertices: what a surface's S_u, S_v times span should be.
+    weight : (f,) in least squares.
+    """
+
+    uv: Floats
+    span: Floats
+    mix_u: csr_matrix
+    mix_v: csr_matrix
+    weight: Floats
+
+
+def face_slopes(island: Island, vertices: int, weight: Floats, *, doubt_slivers: bool = False) -> Slopes:
+    """Slopes of an island of a mesh with ``vertices`` vertices; ``weight (m,)`` of its points.
+
+    With ``doubt_slivers`` a face counts as far as its form decides its slope. Corners that lie nearly on one line in
+    (u, v) say next to nothing of the slope across it: their errors come out larger by the variance inflation factor
+    1 / (1 - r^2), r the correlation of u and v over them, and so the weight is multiplied by 1 - r^2.
+    """
+    used = island.faces >= 0
+    corner = np.where(used, island.faces, 0)
+    uv = island.uv[corner] * used[..., None]
+    centre = uv.sum(axis=1) / used.sum(axis=1)[:, None]
+    offset = (island.uv[corner] - centre[:, None]) * used[..., None]
+    moments = np.einsum("fki,fkj->fij", offset, offset)
+    moments += 1e-9 * np.trace(moments, axis1=1, axis2=2)[:, None, None] * np.eye(2) + 1e-18 * np.eye(2)
+    gradient = np.einsum("fij,fkj->fki", np.linalg.inv(moments), offset)
+    span = np.sqrt(np.einsum("fki,fki->fi", offset, offset))
+    place, shape = (np.repeat(np.arange(len(corner)), 4), island.vertex[corner].ravel()), (len(corner), vertices)
+    mix_u, mix_v = (csr_matrix(((gradient[..., i] * span[:, i, None]).ravel(), place), shape=shape) for i in (0, 1))
+    decided = np.linalg.det(moments)  # above 0 also without extent in u or v, where full weight does no harm
+    trust = decided / np.maximum((span**2).prod(axis=1), decided) if doubt_slivers else np.ones(len(corner))
+    return Slopes(centre, span, mix_u, mix_v, trust * np.where(used, weight[corner], np.inf).min(axis=1))
+
+
+def join_slopes(parts: list[Slopes]) -> Slopes:
+    """The slopes of several islands as one."""
+    mix_u, mix_v = (vstack([getattr(p, k) for p in parts]).tocsr() for k in ("mix_u", "mix_v"))
+    uv, span, weight = (np.concatenate([getattr(p, k) for p in parts]) for k in ("uv", "span", "weight"))
+    return Slopes(uv, span, mix_u, mix_v, weight)

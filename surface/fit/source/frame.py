@@ -1,4 +1,4 @@
-"""Which way a mesh looks and how large it is: its own shapes tell."""
+"""Find axes and unit of a mesh file: from options, else from the mesh's own shapes."""
 
 from __future__ import annotations
 
@@ -10,24 +10,18 @@ from surface.base.arrays import Floats
 from surface.base.errors import FitError
 
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-GUESSED: tuple[str, ...] = ("mm", "cm", "m")
-GUESSED_BY_EYES = (*GUESSED, "in")  # heads differ less in their eyes than in how much neck comes with them
+GUESSED = ("mm", "cm", "m")  # by the height; by the eyes inches, too: the height depends on how much neck there is
 AXES = {f"{sign}{'xyz'[i]}": (i, -1.0 if sign else 1.0) for i in range(3) for sign in ("", "-")}
-HEAD_HEIGHT_MM = 250.0  # a head with neck; only tells metres, centimetres and millimetres apart
+HEAD_HEIGHT_MM = 250.0  # a head with neck; enough to distinguish metres, centimetres and millimetres
 EYES_MM = 65.4  # between the middles of what blinks, on the head that the bounds were set for
 HEIGHT_MM = 338.0  # of that head
-BEHIND = -0.15  # of the mesh's depth: shapes further behind its middle mean that left and right are exchanged
+BEHIND = -0.15  # of the mesh's depth: shapes further behind its middle mean that left and right are swapped
 
 
 @dataclass(frozen=True)
 class Frame:
-    """How a file's axes and unit become millimetres, y up, z forward, x to the subject's left.
-
-    Attributes
-    ----------
-    turn : (3, 3) rotation; scale : millimetres per unit of the file.
-    notes : what was guessed, in words.
-    """
+    """Transformation of a file's coordinates to millimetres, y up, z forward, x to the subject's left: rotation
+    ``turn`` (3, 3) and ``scale`` in mm per unit. ``notes`` say what was guessed."""
 
     turn: Floats
     scale: float
@@ -42,16 +36,12 @@ def find_frame(
     vertices: Floats, shapes: dict[str, Floats], *, unit: str | None = None, up: str | None = None,
     forward: str | None = None,
 ) -> Frame:  # fmt: skip
-    """Settle axes and unit: as told, else by the shapes, else y up, z forward and a head's usual height.
+    """Find axes and unit: as given, else by the shapes, else y up, z forward and a head's usual height.
 
-    Parameters
-    ----------
     shapes : displacements (n, 3) by ARKit's names.
     unit : one of :data:`UNITS`; up, forward : x, y, z, -x, -y or -z.
 
-    Raises
-    ------
-    FitError : an unknown word, or up and forward along one axis.
+    Raises FitError: an unknown word, or up and forward along one axis.
     """
     notes: list[str] = []
     turn = _turn(vertices, shapes, up, forward, notes)
@@ -60,25 +50,21 @@ def find_frame(
             raise FitError(f"--unit {unit}: is not one of {', '.join(UNITS)}", hint="--unit cm")
         return Frame(turn, UNITS[unit], tuple(notes))
     turned = vertices @ turn.T
-    measure, usual, units = eye_distance(turned, shapes), EYES_MM, GUESSED_BY_EYES
-    height = float(np.ptp(turned[:, 1]))
-    if not measure:
-        measure, usual, units = height, HEAD_HEIGHT_MM, GUESSED
+    eyes, height = eye_distance(turned, shapes), float(np.ptp(turned[:, 1]))
+    measure, usual, units = (eyes, EYES_MM, (*GUESSED, "in")) if eyes else (height, HEAD_HEIGHT_MM, GUESSED)
     guess = min(units, key=lambda u: abs(np.log(max(measure * UNITS[u], 1e-12) / usual)))
     notes.append(f"unit taken for {guess}: all of it is {UNITS[guess] * height:.0f} mm high (say --unit otherwise)")
     return Frame(turn, UNITS[guess], tuple(notes))
 
 
 def eye_distance(vertices: Floats, shapes: dict[str, Floats]) -> float:
-    """Distance between the middles of what blinks; 0 where that is not known."""
-    if not {"eyeBlinkLeft", "eyeBlinkRight"} <= set(shapes):
-        return 0.0
-    left, right = (_middle(vertices, shapes[n]) for n in ("eyeBlinkLeft", "eyeBlinkRight"))
+    """Distance between the centres of both blink shapes; 0 where one is missing."""
+    left, right = (_middle(vertices, shapes.get(n)) for n in ("eyeBlinkLeft", "eyeBlinkRight"))
     return float(np.linalg.norm(left - right)) if left is not None and right is not None else 0.0
 
 
 def head_scale(vertices: Floats, shapes: dict[str, Floats]) -> float:
-    """How large a head (mm) is beside the one that the bounds were set for: by its eyes, else by its height."""
+    """Size of a head (mm) relative to the one that the bounds were set for: by its eyes, else by its height."""
     between = eye_distance(vertices, shapes)
     return between / EYES_MM if between else float(np.ptp(vertices[:, 1])) / HEIGHT_MM
 
@@ -89,8 +75,8 @@ def _turn(vertices: Floats, shapes: dict[str, Floats], up: str | None, forward: 
     if forward:
         z = _axis("--forward", forward)
     else:
-        default = np.array([0.0, 0.0, 1.0]) if abs(y[2]) < 0.5 else np.array([0.0, -1.0, 0.0])
-        z = default if guessed_left is None or abs(guessed_left @ y) > 0.5 else np.cross(guessed_left, y)
+        usual = np.array([0.0, 0.0, 1.0]) if abs(y[2]) < 0.5 else np.array([0.0, -1.0, 0.0])
+        z = usual if guessed_left is None or abs(guessed_left @ y) > 0.5 else np.cross(guessed_left, y)
         z = _seen(vertices, shapes, z, notes)
     if abs(y @ z) > 0.5:
         raise FitError("--up and --forward lie along one axis", hint="--up z --forward -y, for example")
@@ -110,12 +96,11 @@ def _axis(option: str, name: str) -> Floats:
 
 
 def _shape_axes(vertices: Floats, shapes: dict[str, Floats]) -> tuple[Floats | None, Floats | None]:
-    """Up, against the opening jaw; and left, from right shapes to left ones. None where shapes do not tell."""
+    """Up, against the opening jaw; and left, from right shapes to left ones. None where shapes do not determine it."""
     left = np.zeros(3)
-    for name, move in shapes.items():
-        other = shapes.get(name.replace("Left", "Right")) if "Left" in name and name[:3] not in ("jaw", "mou") else None
-        if other is not None:
-            a, b = _middle(vertices, move), _middle(vertices, other)
+    for name in shapes:
+        if "Left" in name and name[:3] not in ("jaw", "mou"):
+            a, b = (_middle(vertices, shapes.get(n)) for n in (name, name.replace("Left", "Right")))
             left += a - b if a is not None and b is not None else 0.0
     up = -shapes["jawOpen"].sum(axis=0) if "jawOpen" in shapes else np.zeros(3)
     x = _nearest_axis(left)
@@ -126,8 +111,7 @@ def _shape_axes(vertices: Floats, shapes: dict[str, Floats]) -> tuple[Floats | N
 
 def _seen(vertices: Floats, shapes: dict[str, Floats], z: Floats, notes: list[str]) -> Floats:
     """``z``, or its opposite where the face moves far behind the mesh's middle: then sides are named the other way."""
-    every = [_middle(vertices, move) for move in shapes.values()]
-    middles = [m for m in every if m is not None]
+    middles = [m for move in shapes.values() if (m := _middle(vertices, move)) is not None]
     if not middles:
         return z
     depth = vertices @ z
@@ -138,7 +122,10 @@ def _seen(vertices: Floats, shapes: dict[str, Floats], z: Floats, notes: list[st
     return -z
 
 
-def _middle(vertices: Floats, move: Floats) -> Floats | None:
+def _middle(vertices: Floats, move: Floats | None) -> Floats | None:
+    """Mean of the vertices, weighted by how far a shape moves them; None for one that moves nothing."""
+    if move is None:
+        return None
     weight = np.linalg.norm(move, axis=1)
     return weight @ vertices / weight.sum() if weight.sum() > 0 else None
 

@@ -1,4 +1,4 @@
-"""Read a mesh of any known kind, check it, and bring it into head space."""
+"""Read a mesh file of any known format, check it, and transform it into head space."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from surface.base.arrays import Bools
 from surface.base.errors import FitError
 from surface.fit.source.frame import find_frame
-from surface.fit.source.mesh import FitMesh, check_mesh
+from surface.fit.source.mesh import FitMesh, check_mesh, renumbered
 from surface.fit.source.names import NameMap, map_names, read_names, to_arkit
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MeshData
@@ -21,10 +22,8 @@ SUFFIXES = (".glb", ".gltf", ".obj", ".npz")
 
 @dataclass(frozen=True)
 class LoadOptions:
-    """How a mesh file is to be understood; what is not told is guessed.
+    """How to interpret a mesh file; what is not given is guessed.
 
-    Attributes
-    ----------
     shapes : folder with one OBJ a shape; names : TOML table of shape names.
     unit, up, forward : see :func:`surface.fit.source.frame.find_frame`.
     without : objects or materials to leave out; a part of the name will do.
@@ -50,10 +49,8 @@ class Loaded:
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     """Read and check a mesh.
 
-    Raises
-    ------
-    FitError : the file is missing, damaged or too large, has no texture coordinates, holds NaN, or its arrays do not
-        fit together; names file and element.
+    Raises FitError: the file is missing, damaged or too large, has no texture coordinates, holds NaN, or its arrays do
+    not fit together; names file and element.
     """
     path = Path(path)
     raw = _read(path, options.shapes)
@@ -61,10 +58,11 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     mesh = _without(mesh, options.without, str(path))
     check_mesh(mesh, str(path))
     named = map_names(mesh.names, read_names(options.names) if options.names else None)
-    told = to_arkit(mesh, named)
-    shapes = dict(zip(told.names, told.deltas, strict=True))
+    arkit = to_arkit(mesh, named)
+    shapes = dict(zip(arkit.names, arkit.deltas, strict=True))
     frame = find_frame(mesh.vertices, shapes, unit=options.unit, up=options.up, forward=options.forward)
-    return Loaded(mesh.moved(frame.points(mesh.vertices), frame.points(mesh.deltas)), named, frame.notes)
+    mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
+    return Loaded(mesh, named, frame.notes)
 
 
 def _read(path: Path, shapes: Path | None) -> MeshData:
@@ -92,13 +90,10 @@ def _without(mesh: FitMesh, words: tuple[str, ...], where: str) -> FitMesh:
     return keep_faces(mesh, ~out[mesh.piece]) if len(words) else mesh
 
 
-def keep_faces(mesh: FitMesh, kept: np.ndarray) -> FitMesh:
+def keep_faces(mesh: FitMesh, kept: Bools) -> FitMesh:
     """The mesh with some faces (f,) bool and the vertices they use."""
-    faces = mesh.faces[kept]
-    used, inverse = np.unique(faces, return_inverse=True)
-    local = inverse.reshape(faces.shape) - int(len(used) > 0 and used[0] < 0)
-    used = used[used >= 0]
+    used, faces = renumbered(mesh.faces[kept])
     return replace(
-        mesh, vertices=mesh.vertices[used], faces=local, face_uv=mesh.face_uv[kept], deltas=mesh.deltas[:, used],
+        mesh, vertices=mesh.vertices[used], faces=faces, face_uv=mesh.face_uv[kept], deltas=mesh.deltas[:, used],
         piece=mesh.piece[kept] if len(mesh.piece) else mesh.piece,
     )  # fmt: skip

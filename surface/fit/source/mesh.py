@@ -1,12 +1,15 @@
-"""The mesh a head is fitted to: vertices, faces, texture coordinates and expression shapes."""
+"""The mesh a head is fitted to: its arrays, checks of them, and operations on its faces."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
+from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 
 LARGE, SMALL = 1e7, 1e-7  # in any unit: no vertex of a head lies further out, no head is smaller
@@ -25,26 +28,18 @@ class FitMesh:
     piece : (f,) int64 into ``pieces``, names of the objects that faces belong to; empty where there are none.
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    uv: NDArray[np.float64]
-    face_uv: NDArray[np.int64]
+    vertices: Floats
+    faces: Ints
+    uv: Floats
+    face_uv: Ints
     names: tuple[str, ...]
-    deltas: NDArray[np.float64]
-    piece: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    deltas: Floats
+    piece: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     pieces: tuple[str, ...] = ()
 
     def piece_of(self, face: int) -> str:
         """Name of the object that a face belongs to."""
         return self.pieces[self.piece[face]] if self.pieces else ""
-
-    def moved(self, warp_vertices: NDArray[np.float64], warp_deltas: NDArray[np.float64]) -> FitMesh:
-        """The same mesh with other vertices (n, 3) and deltas (k, n, 3)."""
-        return replace(self, vertices=warp_vertices, deltas=warp_deltas)
-
-    def with_shapes(self, names: tuple[str, ...], deltas: NDArray[np.float64]) -> FitMesh:
-        """The same mesh with other shapes, (k, n, 3)."""
-        return replace(self, names=names, deltas=deltas)
 
 
 def check_mesh(mesh: FitMesh, where: str) -> None:
@@ -61,8 +56,10 @@ def check_mesh(mesh: FitMesh, where: str) -> None:
     if f == 0:
         raise FitError(f"{where}: faces is empty", hint="export the mesh with its polygons")
     _check_mapped(where, mesh)
-    _check_indices(where, "faces", mesh.faces, n)
-    _check_indices(where, "face_uv", mesh.face_uv, len(mesh.uv))
+    for key, index, count in (("faces", mesh.faces, n), ("face_uv", mesh.face_uv, len(mesh.uv))):
+        bad = np.argwhere((index >= count) | (index < -1) | ((index < 0) & (np.arange(4) < 3)))
+        if len(bad):
+            raise FitError(f"{where}: {key}[{bad[0, 0]}] points at {index[tuple(bad[0])]}, but there are {count}")
     if ((mesh.faces < 0) != (mesh.face_uv < 0)).any():
         raise FitError(f"{where}: faces and face_uv have other corners", hint="export all arrays from one mesh")
     _check_finite(where, mesh)
@@ -78,59 +75,89 @@ def _check_mapped(where: str, mesh: FitMesh) -> None:
                    hint="unwrap it first: omote fits in (u, v); or leave the object out: --without NAME")  # fmt: skip
 
 
+def _check_finite(where: str, mesh: FitMesh) -> None:
+    """No number may be as large as only damage makes it."""
+    rows = [("neutral[{}]", mesh.vertices, "mesh"), ("uv[{}]", mesh.uv, "mesh")]
+    rows += [(f"shape {name!r}, vertex {{}}", d, "shape") for name, d in zip(mesh.names, mesh.deltas, strict=True)]
+    for element, array, what in rows:
+        bad = np.flatnonzero(~(np.abs(array) < LARGE).all(axis=1))
+        if len(bad):
+            raise FitError(f"{where}: {element.format(bad[0])} is not a finite number of usable size",
+                           hint=f"repair the {what} and export again")  # fmt: skip
+    if not np.ptp(mesh.vertices, axis=0).max() > SMALL:
+        raise FitError(f"{where}: all vertices are in one place", hint="export the mesh again")
+
+
 def check_manifold(mesh: FitMesh, where: str) -> None:
     """Raise FitError, naming the edge, where more than two faces meet or two neighbours run opposite ways round."""
-    used = mesh.faces >= 0
-    following = np.roll(mesh.faces, -1, axis=1)
-    following[mesh.faces[:, 3] < 0, 2] = mesh.faces[mesh.faces[:, 3] < 0, 0]
-    a, b = mesh.faces[used], following[used]
+    a, b = directed_edges(mesh.faces)
     n = len(mesh.vertices)
-    face = np.repeat(np.arange(len(mesh.faces)), used.sum(axis=1))
     edge = np.minimum(a, b) * n + np.maximum(a, b)
-    _, first, inverse, count = np.unique(edge, return_index=True, return_inverse=True, return_counts=True)
-    if count.max() > 2:
-        at = first[np.argmax(count > 2)]
-        why = f"belongs to {count[inverse[at]]} faces, a surface has two at most"
-        raise _edge_error(mesh, where, a[at], b[at], face[at], why, "delete inner and doubled faces")
-    _, first, count = np.unique(a * n + b, return_index=True, return_counts=True)
-    if count.max() > 1:
-        at = first[np.argmax(count > 1)]
-        why = "is run through twice in one direction"
-        raise _edge_error(mesh, where, a[at], b[at], face[at], why, "make all faces look outwards")
+    for keys, most, why, hint in (
+        (edge, 2, "belongs to {} faces, a surface has two at most", "delete inner and doubled faces"),
+        (a * n + b, 1, "is run through twice in one direction", "make all faces look outwards"),
+    ):
+        _, first, count = np.unique(keys, return_index=True, return_counts=True)
+        if count.max() > most:
+            bad = np.argmax(count > most)
+            at = first[bad]
+            face = np.repeat(np.arange(len(mesh.faces)), (mesh.faces >= 0).sum(axis=1))[at]
+            part = f" of {mesh.piece_of(face)!r}" if mesh.pieces else ""
+            edge_name = f"the edge between vertices {a[at]} and {b[at]}{part}"
+            raise FitError(f"{where}: not a manifold: {edge_name} {why.format(count[bad])}", hint=hint)
 
 
-def _edge_error(mesh: FitMesh, where: str, a: int, b: int, face: int, why: str, hint: str) -> FitError:
-    part = f" of {mesh.piece_of(face)!r}" if mesh.pieces else ""
-    return FitError(f"{where}: not a manifold: the edge between vertices {a} and {b}{part} {why}", hint=hint)
-
-
-def _check_indices(where: str, key: str, index: NDArray[np.integer], n: int) -> None:
-    bad = np.argwhere((index >= n) | (index < -1) | ((index < 0) & (np.arange(4) < 3)))
-    if len(bad):
-        raise FitError(f"{where}: {key}[{bad[0, 0]}] points at {index[tuple(bad[0])]}, but there are {n}")
-
-
-def _check_finite(where: str, mesh: FitMesh) -> None:
-    for key, a in (("neutral", mesh.vertices), ("uv", mesh.uv)):
-        bad = np.flatnonzero(~_usable(a))
-        if len(bad):
-            raise FitError(f"{where}: {key}[{bad[0]}] is not a finite number of usable size",
-                           hint="repair the mesh and export again")  # fmt: skip
-    for name, d in zip(mesh.names, mesh.deltas, strict=True):
-        bad = np.flatnonzero(~_usable(d))
-        if len(bad):
-            raise FitError(f"{where}: shape {name!r}, vertex {bad[0]} is not a finite number of usable size",
-                           hint="repair the shape and export again")  # fmt: skip
-    if not np.ptp(mesh.vertices, axis=0).max() > SMALL:
-        raise FitError(f"{where}: all vertices stand in one place", hint="export the mesh again")
-
-
-def _usable(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n,) whether a row's numbers are finite, and not as large as only damage makes them."""
-    return np.asarray((np.abs(rows) < LARGE).all(axis=1))
-
-
-def triangles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def triangles(faces: Ints) -> Ints:
     """Quads (f, 4) with -1 for triangles, cut into triangles (t, 3)."""
     quads = faces[faces[:, 3] >= 0]
     return np.concatenate([faces[:, :3], quads[:, [0, 2, 3]]])
+
+
+def corners(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+    """The four corners (f,) of all faces; a triangle's last is its third."""
+    last = np.where(faces[:, 3] < 0, faces[:, 2], faces[:, 3])
+    return faces[:, 0], faces[:, 1], faces[:, 2], last
+
+
+def face_areas(points: Floats, faces: Ints) -> Floats:
+    """(f,) areas of faces over points (n, 3), by their diagonals."""
+    a, b, c, d = (points[i] for i in corners(faces))
+    areas: Floats = 0.5 * np.linalg.norm(np.cross(c - a, d - b), axis=1)
+    return areas
+
+
+def directed_edges(faces: Ints) -> tuple[Ints, Ints]:
+    """Directed edges of quads and triangles, face by face."""
+    following = np.roll(faces, -1, axis=1)
+    following[faces[:, 3] < 0, 2] = faces[faces[:, 3] < 0, 0]
+    used = faces >= 0
+    return faces[used], following[used]
+
+
+def renumbered(faces: Ints) -> tuple[Ints, Ints]:
+    """The vertices that faces use, rising, and the faces as indices into these; -1 stays."""
+    used, inverse = np.unique(faces, return_inverse=True)
+    return used[used >= 0], inverse.reshape(faces.shape) - int((used < 0).any())
+
+
+def components(a: NDArray[np.integer], b: NDArray[np.integer], n: int) -> Ints:
+    """(n,) the number of the connected component of each of n nodes with edges from ``a (e,)`` to ``b (e,)``."""
+    label: Ints = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
+    return label
+
+
+def intersect(tri: Floats, origins: Floats, rays: Floats) -> tuple[Floats, Floats, Floats]:
+    """Distance (r, t) along each ray to each triangle, NaN where it misses, and the shares (r, t) of the triangle's
+    second and third corner there (Moeller and Trumbore, 1997).
+
+    tri : (t, 3, 3); origins : (r, 3), or (3,) of all rays; rays : (r, 3) directions.
+    """
+    e1, e2, s = tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0], origins[..., None, :] - tri[:, 0]
+    p, q = np.cross(rays[:, None], e2), np.cross(s, e1)
+    det = (p * e1).sum(axis=-1)
+    inverse = 1.0 / np.where(np.abs(det) < 1e-12, np.inf, det)
+    a = (p * s).sum(axis=-1) * inverse
+    b = (q @ rays[:, :, None])[..., 0] * inverse
+    t = (q * e2).sum(axis=-1) * inverse
+    hit = (a > -1e-6) & (b > -1e-6) & (a + b < 1 + 1e-6) & (t > 1e-6)
+    return np.where(hit, t, np.nan), a, b

@@ -1,4 +1,4 @@
-"""Shape names of other heads, as ARKit's 52.
+"""Map shape names of other heads to ARKit's 52.
 
 The table is ``names.toml`` beside this module; a user's own table comes before it::
 
@@ -11,12 +11,11 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surface.base.errors import FitError
 from surface.fit.source.mesh import FitMesh
@@ -40,8 +39,6 @@ class Source:
 class NameMap:
     """Which shapes of a mesh make which of ARKit's 52.
 
-    Attributes
-    ----------
     sources : parameter -> the shapes that add up to it, in the order of ARKit's list.
     missing : parameters that no shape makes; left_out : shapes of the mesh that make none.
     """
@@ -59,29 +56,25 @@ def sources_of(names: tuple[str, ...]) -> dict[str, list[int]]:
 
 def map_names(names: tuple[str, ...], own: Mapping[str, str] | None = None) -> NameMap:
     """Find ARKit's 52 among shape names; ``own`` maps further names and comes first."""
-    start = len(_common(names))
-    exact = {n: i for i, n in enumerate(names) if n in SHAPES and n not in (own or {})}
-    given = {own[n]: i for i, n in enumerate(names) if n in own} if own else {}
+    own, start = own or {}, len(_common(names))
+    exact = {n: i for i, n in enumerate(names) if n in SHAPES and n not in own}
+    exact |= {own[n]: i for i, n in enumerate(names) if n in own}
     found: dict[str, dict[str, int]] = {}
-    read = [None if n in (own or {}) else _read(n[start:]) or _read(n) for n in names]
-    for i, (key, side) in _by_plainness(read):
+    read = [(i, _read(n[start:]) or _read(n)) for i, n in enumerate(names) if n not in own]
+    understood = [(i, r) for i, r in read if r is not None]
+    for i, (key, side, _) in sorted(understood, key=lambda x: not x[1][2]):  # ARKit's own words before other ways
         found.setdefault(key, {}).setdefault(side, i)
-    sources = {}
-    for shape in SHAPES:
-        if shape in given:
-            sources[shape] = [Source(given[shape])]
-        elif shape in exact:
-            sources[shape] = [Source(exact[shape])]
-        elif made := _made(shape, found):
-            sources[shape] = made
-    used = {s.index for every in sources.values() for s in every}
+    every = {s: [Source(exact[s])] if s in exact else _made(s, found) for s in SHAPES}
+    sources = {shape: made for shape, made in every.items() if made}
+    used = {s.index for made in sources.values() for s in made}
     missing = tuple(s for s in SHAPES if s not in sources)
     return NameMap(sources, missing, tuple(n for i, n in enumerate(names) if i not in used))
 
 
 def _made(shape: str, found: dict[str, dict[str, int]]) -> list[Source]:
-    """What makes a parameter: a shape of its own, two halves, or a half of a shape for both sides."""
-    key, side = _split(shape)
+    """Sources of a parameter: a shape of its own, two halves, or a half of a shape for both sides."""
+    side = next((s for s in ("Left", "Right") if shape.endswith(s)), "")
+    key = shape.removesuffix(side)
     by_side = found.get(key, {})
     if side in by_side:
         return [Source(by_side[side])]
@@ -92,15 +85,6 @@ def _made(shape: str, found: dict[str, dict[str, int]]) -> list[Source]:
     return []
 
 
-def _split(shape: str) -> tuple[str, str]:
-    """One of ARKit's names as its key in the table and its side."""
-    for side in ("Left", "Right"):
-        base = shape.removesuffix(side)
-        if base != shape:
-            return base, side
-    return shape, ""
-
-
 @cache
 def _table() -> dict[str, dict[str, list[str]]]:
     return tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
@@ -109,23 +93,14 @@ def _table() -> dict[str, dict[str, list[str]]]:
 @cache
 def _keys() -> dict[str, str]:
     """Every way to say it, without spaces and sides -> key of the table."""
-    out: dict[str, str] = {}
-    for group in _table().values():
-        for key, ways in group.items():
-            out |= {w.replace(" ", ""): key for w in (key.lower(), *ways)}
-    return out
-
-
-def _by_plainness(read: list[tuple[str, str, bool] | None]) -> list[tuple[int, tuple[str, str]]]:
-    """Index, key and side of every name that was understood; ARKit's own words before other ways to say it."""
-    plain = [(i, r) for i, r in enumerate(read) if r is not None]
-    return [(i, (key, side)) for i, (key, side, own) in sorted(plain, key=lambda x: not x[1][2])]
+    every = [(key, way) for group in _table().values() for key, ways in group.items() for way in (key.lower(), *ways)]
+    return {way.replace(" ", ""): key for key, way in every}
 
 
 def _read(name: str) -> tuple[str, str, bool] | None:
     """Key of the table and side that a name means, and whether it is ARKit's own word.
 
-    What stands before the last dot or colon is passed over.
+    Everything before the last dot or colon is ignored.
     """
     words = [w.lower() for w in WORDS.findall(re.split(r"[.:|](?=[^.:|]{3})", name)[-1])]
     sides = [SIDES[w] for w in words if w in SIDES]
@@ -146,9 +121,7 @@ def _common(names: tuple[str, ...]) -> str:
 def read_names(path: Path) -> dict[str, str]:
     """A user's table of names.
 
-    Raises
-    ------
-    FitError : the file cannot be read, or maps to something that is not one of ARKit's 52.
+    Raises FitError: the file cannot be read, or maps to something that is not one of ARKit's 52.
     """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8")).get("names")
@@ -163,18 +136,13 @@ def read_names(path: Path) -> dict[str, str]:
 
 
 def to_arkit(mesh: FitMesh, mapped: NameMap) -> FitMesh:
-    """The mesh with ARKit's shapes alone: halves added up, shapes for both sides cut in two."""
-    share = {"": np.ones(len(mesh.vertices)), **_halves(mesh.vertices)}
+    """The mesh with only ARKit's shapes: halves added up, shapes for both sides cut in two down the middle."""
+    x = mesh.vertices[:, 0]
+    t = np.clip((x - 0.5 * (x.min() + x.max())) / (MIDDLE * max(x.max() - x.min(), 1e-9)), -1.0, 1.0)
+    left = 0.5 + 0.25 * t * (3.0 - t * t)
+    share = {"": np.ones(len(mesh.vertices)), "Left": left, "Right": 1.0 - left}
     deltas = np.zeros((len(mapped.sources), len(mesh.vertices), 3))
     for row, every in zip(deltas, mapped.sources.values(), strict=True):
         for source in every:
             row += share[source.side][:, None] * mesh.deltas[source.index]
-    return mesh.with_shapes(tuple(mapped.sources), deltas)
-
-
-def _halves(vertices: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """(n,) share of each side; they add up to one."""
-    low, high = vertices[:, 0].min(), vertices[:, 0].max()
-    t = np.clip((vertices[:, 0] - 0.5 * (low + high)) / (MIDDLE * max(high - low, 1e-9)), -1.0, 1.0)
-    left = 0.5 + 0.25 * t * (3.0 - t * t)
-    return {"Left": left, "Right": 1.0 - left}
+    return replace(mesh, names=tuple(mapped.sources), deltas=deltas)

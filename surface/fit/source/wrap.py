@@ -1,5 +1,4 @@
-"""A tongue: its texture is cut into a back and an underside that part where it bends, so that one skin is wrapped
-round both.
+"""Make the chart of a tongue by wrapping one skin round it: its texture is cut into a back and an underside.
 
 (u, v) go along the tongue, from its root over its length to the tip, and around it, from below over the right, the
 top and the left. Rays from a line in its middle find the mesh; what they hit is a mix of a triangle's corners, so that
@@ -8,25 +7,21 @@ shapes are sampled by the same rows.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import BORDER_WEIGHT, CLUTTER_WEIGHT, Chart
 from surface.fit.source.islands import Island
-from surface.fit.source.mesh import FitMesh, triangles
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
+from surface.fit.source.mesh import FitMesh, intersect, triangles
 
 STATIONS, FAN, AROUND = 20, 18, 41  # rays along the line, over its tip, around it
 OVERLAP = 0.125  # of the way around, on either side, is sampled twice, so that slopes match where the skin is sewn
 ROOT, TIP_SHARE = 0.12, 0.22  # of the length: where the line begins, and how far before the tip it ends
 HEIGHT = 0.5  # of the line between the lowest and the highest place
 BOW = np.radians(45.0)  # how far below straight ahead the last ray points, so that the pole lies under the tip
-END = 0.997  # of u: the pole at the tip is left out by a hair, so that normals are defined everywhere
+END = 0.997  # of u: a tiny hole at the tip's pole is left out, so that normals are defined everywhere
 
 
 def wrap_chart(mesh: FitMesh, islands: list[Island]) -> Chart:
@@ -60,31 +55,19 @@ def _rays(points: Floats) -> tuple[Floats, Floats, Floats]:
     return np.repeat(origins, AROUND, axis=0), rays.reshape(-1, 3), uv
 
 
-def _hits(tri: Floats, origins: Floats, rays: Floats) -> tuple[NDArray[np.int64], Floats]:
+def _hits(tri: Floats, origins: Floats, rays: Floats) -> tuple[Ints, Floats]:
     """The furthest triangle (r,) of ``tri (t, 3, 3)`` that each ray meets, -1 for none, and the shares of its corners
-    (r, 3) (Moeller and Trumbore, 1997)."""
-    e1, e2 = tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0]
-    which, shares = np.full(len(rays), -1), np.zeros((len(rays), 3))
-    for k, (origin, ray) in enumerate(zip(origins, rays, strict=True)):
-        p, s = np.cross(ray, e2), origin - tri[:, 0]
-        det = (p * e1).sum(axis=1)
-        inverse = 1.0 / np.where(np.abs(det) < 1e-12, np.inf, det)
-        a, q = (p * s).sum(axis=1) * inverse, np.cross(s, e1)
-        b, t = (q @ ray) * inverse, (q * e2).sum(axis=1) * inverse
-        hit = np.flatnonzero((a > -1e-6) & (b > -1e-6) & (a + b < 1 + 1e-6) & (t > 1e-6))
-        if len(hit):
-            which[k] = hit[np.argmax(t[hit])]
-            shares[k] = 1.0 - a[which[k]] - b[which[k]], a[which[k]], b[which[k]]
-    return which, shares
+    (r, 3)."""
+    distance, *shares = intersect(tri, origins, rays)
+    which = np.where(np.isnan(distance), -1.0, distance).argmax(axis=1)
+    a, b = (np.take_along_axis(share, which[:, None], axis=1)[:, 0] for share in shares)
+    missed = np.isnan(distance).min(axis=1, keepdims=True)
+    which = np.where(missed[:, 0], -1, which)
+    return which, np.where(missed, 0.0, np.column_stack([1.0 - a - b, a, b]))
 
 
-def _filled(
-    which: NDArray[np.int64], shares: Floats, corners: NDArray[np.int64], uv: Floats, n: int
-) -> csr_matrix:  # fmt: skip
+def _filled(which: Ints, shares: Floats, corners: Ints, uv: Floats, n: int) -> csr_matrix:
     """(r, n) samples as mixes of vertices; a ray that meets nothing takes the sample that is nearest in (u, v)."""
-    from scipy.sparse import csr_matrix  # takes a moment to import
-    from scipy.spatial import cKDTree
-
     met = np.flatnonzero(which >= 0)
     _, near = cKDTree(uv[met]).query(uv)
     source = met[near]

@@ -1,4 +1,4 @@
-"""What a head is made of, as data, and the files it is kept in.
+"""A head's data and the files that hold it.
 
 In: files of a head's folder. Out: tables of parts, groups, rules and parameters. Imports base to dcp.
 """

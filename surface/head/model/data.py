@@ -1,4 +1,4 @@
-"""What a head consists of, as plain arrays: the content of ``head.toml`` and ``head.npz``."""
+"""Data classes for everything a head's files hold: parts, groups, seams, jaw, neck, contacts, rules."""
 
 from __future__ import annotations
 
@@ -8,23 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.base.arrays import Array, Floats
+from surface.base.arrays import Array, Floats, Floats32, Ints
+from surface.head.model.parameters import smoothstep
 
 
 @dataclass(frozen=True)
 class Group:
-    """A named set of control points of one part that move together.
-
-    Attributes
-    ----------
-    name : the parameter that moves it.
-    ids : (k,) int32, control points of the part.
-    moves : (k, 3) float32, displacement per unit of the parameter, mm.
-    """
+    """Control points of one part, ``ids (k,)``, and their displacements per unit of the parameter ``name``,
+    ``moves (k, 3)``, mm."""
 
     name: str
     ids: NDArray[np.int32]
-    moves: NDArray[np.float32]
+    moves: Floats32
 
 
 @dataclass(frozen=True)
@@ -33,7 +28,6 @@ class PartData:
 
     Attributes
     ----------
-    name, material : as the picture needs them.
     follows : "skin" (control points move one by one), or what it is fixed to: "skull", "jaw", "left_eye",
         "right_eye".
     points (n, 3), weights (n,), knots_u, knots_v (n, w), degrees (n, 2) : the surface, padded as in
@@ -41,9 +35,9 @@ class PartData:
     loops : closed polylines (k, 2) in (u, v) that trim it; slits : (s, 3) v, u from, u to.
     budget : (max_points per cell, chord_error in mm, max_depth) for the tessellation.
     groups : displacements of its control points.
-    jaw : (n,) how much of the jaw's rotation each point follows.
+    jaw : (n,) share of the jaw's rotation that each point follows.
     lids : (n,) signed: how closely a point keeps to the left (+) or right (-) eyeball when lids move.
-    mesh : the kept tessellation as arrays (see :mod:`surface.head.model.meshes`); may be empty.
+    mesh : the stored tessellation as arrays (see :mod:`surface.head.model.meshes`); may be empty.
     """
 
     name: str
@@ -53,7 +47,7 @@ class PartData:
     weights: Floats
     knots_u: Floats
     knots_v: Floats
-    degrees: NDArray[np.int64]
+    degrees: Ints
     loops: list[Floats]
     slits: Floats
     budget: tuple[int, float, int]
@@ -75,9 +69,9 @@ class Seam:
 
 @dataclass(frozen=True)
 class Jaw:
-    """The jaw's path: rotation about the x axis through ``centre`` by ``angle_rad`` per unit, and a glide.
+    """The jaw's path: rotation about the x axis through ``centre`` by ``angle_rad`` per unit, and a glide, mm.
 
-    ``tilts`` holds for the sideways and forward shapes the affine move of the lower teeth, (3, 4) per unit.
+    ``tilts`` are the affine displacements (3, 4) of the lower teeth per unit of the sideways and forward shapes.
     """
 
     centre: tuple[float, float, float]
@@ -88,13 +82,8 @@ class Jaw:
 
 @dataclass(frozen=True)
 class Neck:
-    """How the head turns on the shoulders.
-
-    Attributes
-    ----------
-    pivot : (3,) mm. What lies, at rest, above y + slope * z = ``whole`` turns with the head, what lies below
-        ``still`` stays, and the neck between bends.
-    """
+    """How the head turns about ``pivot``, mm: points with y + slope * z above ``whole`` at rest follow fully, those
+    below ``still`` not at all, and the neck between bends."""
 
     pivot: tuple[float, float, float]
     slope: float = 0.35
@@ -102,10 +91,8 @@ class Neck:
     whole: float = -78.0
 
     def share(self, points: Floats) -> Floats:
-        """(n,) how much of the head's rotation each point at rest (n, 3) follows, 0..1."""
-        height = points[:, 1] + self.slope * points[:, 2]
-        t = np.clip((height - self.still) / (self.whole - self.still), 0.0, 1.0)
-        return t * t * (3.0 - 2.0 * t)
+        """(n,) share of the head's rotation that each point at rest (n, 3) follows, 0..1."""
+        return smoothstep(points[:, 1] + self.slope * points[:, 2], self.still, self.whole)
 
 
 @dataclass(frozen=True)
@@ -114,12 +101,11 @@ class Contact:
 
     Attributes
     ----------
-    name : for people; part : whose opening it is.
-    followers : other parts that yield with it; they come after ``part``.
-    eye : 0 or 1 for the lids of the left or right eye, whose heights go round the eyeball; -1 for lips.
-    reach_mm : how far from the rim what gives way fades out. share : how much of it the upper side does, 0..1.
+    part : the one with the opening; followers : parts after it that move along with its sides.
+    eye : 0 or 1 for the lids of the left or right eye, whose heights are arcs round the eyeball; -1 for lips.
+    reach_mm : distance from the rim at which the correction has faded out. share : the upper side's part of it, 0..1.
     places : (2, columns, rows, 2) samples in (u, v), the upper side first, columns in the order of x, rows from the
-        rim on; two thirds of the rows can meet the other side, in the rest motion fades out.
+        rim on; two thirds of the rows can touch the other side, in the rest the correction fades out.
     """
 
     name: str
@@ -133,13 +119,8 @@ class Contact:
 
 @dataclass(frozen=True)
 class Rule:
-    """What moves a group that is no parameter: the product of its terms.
-
-    Attributes
-    ----------
-    group : its name. terms : each a mix of parameters, by name, that counts up to 1.
-    power : each term is raised to it; 2 sets in softly.
-    """
+    """Amount of a group that is no parameter: the product of ``terms``, each a weighted sum of parameters by name,
+    clipped to 0..1, raised to ``power`` (2 sets in softly)."""
 
     group: str
     terms: tuple[dict[str, float], ...]
@@ -150,11 +131,8 @@ class Rule:
 class HeadData:
     """All of a head.
 
-    Attributes
-    ----------
-    name : short name; provenance : free text by key (source, licence, how it was made).
+    provenance : free text by key (source, licence, how it was made).
     eyes : centres (2, 3), left then right, mm; eye_radius : mm.
-    contacts : openings whose sides meet; rules : what moves groups that are no parameters.
     """
 
     name: str

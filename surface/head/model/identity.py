@@ -1,8 +1,5 @@
-"""Identities: variations of a head as groups of control points, kept beside it in ``identities.npz``.
-
-A head with identities mixed in is another head at rest: parts, eyes and the jaw's hinge stand elsewhere, and all shapes
-go on from there.
-"""
+"""Identities: named variations of a head's rest shape (control points, eyes, jaw hinge), read from ``identities.npz``
+in its folder and mixed into it before it moves."""
 
 from __future__ import annotations
 
@@ -13,15 +10,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Array, Floats
+from surface.base.arrays import Array, Floats, Floats32
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Group, HeadData, PartData
-from surface.head.model.sidecar import Sidecar, beside, read_sidecar, write_sidecar
+from surface.head.model.sidecar import Sidecar, read_sidecar, sidecar_path, write_sidecar
 
 FILE = "identities.npz"
-Arrays = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -30,9 +25,9 @@ class Identity:
 
     Attributes
     ----------
-    name : what a user calls it. groups : part name -> control points and how far they stand away, mm.
+    groups : part name -> displacements of control points at rest, mm.
     changes : part name -> what is added to groups of the head, so that lids of another height still close.
-    eyes : (2, 3) shift of the eyeballs' centres, jaw : (3,) of the hinge, mm.
+    eyes : (2, 3) shift of the eyeballs' centres; jaw : (3,) of the hinge, mm.
     fit : :func:`fingerprint` of the head it was made for.
     """
 
@@ -45,7 +40,7 @@ class Identity:
 
 
 def fingerprint(head: HeadData) -> int:
-    """A number that changes when a head's control points stand elsewhere in (u, v)."""
+    """CRC-32 over the knots of all control points of a head."""
     out = 0
     for part in head.parts:
         for knots in (part.knots_u, part.knots_v):
@@ -54,33 +49,40 @@ def fingerprint(head: HeadData) -> int:
 
 
 def load_identities(head: str | Path) -> dict[str, Identity]:
-    """The identities of a head, by name; empty where it has none.
+    """The identities of a head, given by its folder or its head.toml, by name; empty where it has none.
 
-    Parameters
-    ----------
-    head : the head's folder or its head.toml.
-
-    Raises
-    ------
-    HeadFileError : the file is damaged or of a newer version.
+    Raises HeadFileError: the file is damaged or of a newer version.
     """
     hint = "make it again: omote fit MESH -o FOLDER --keep --identities FILE"
-    return read_sidecar(identities_path(head), _identities, hint) or {}
+    return read_sidecar(sidecar_path(head, FILE), _identities, hint) or {}
 
 
-def _identities(kept: Sidecar) -> dict[str, Identity]:
-    """By name, as a file has them."""
-    z = kept.arrays
+def _identities(file: Sidecar) -> dict[str, Identity]:
+    z = file.arrays
     names = [str(n) for n in z["names"]]
     eyes, jaw = _finite(z["eyes"], (len(names), 2, 3)), _finite(z["jaw"], (len(names), 3))
-    fit = int(z["fit"])
-    return {n: Identity(n, _groups(z, k, n), _changes(z, k), eyes[k], jaw[k], fit) for k, n in enumerate(names)}
+    out = {}
+    for k, name in enumerate(names):
+        groups = {part: Group(name, *rows) for part, rows in _moves(z, f"{k}/ids/", f"{k}/moves/").items()}
+        changes: dict[str, list[Group]] = {}
+        for key, rows in _moves(z, f"{k}/change_ids/", f"{k}/change_moves/").items():
+            part, shape = key.rsplit("/", 1)
+            changes.setdefault(part, []).append(Group(shape, *rows))
+        out[name] = Identity(name, groups, changes, eyes[k], jaw[k], int(z["fit"]))
+    return out
 
 
-def _indices(a: Array) -> NDArray[np.int32]:
-    if a.ndim != 1 or a.dtype.kind not in "iu" or a.min(initial=0) < 0:
-        raise ValueError("an array of control points holds something else")
-    return a.astype(np.int32)
+def _moves(z: Mapping[str, Array], ids_prefix: str, moves_prefix: str) -> dict[str, tuple[Array, Floats32]]:
+    """Control points and their displacements, by what follows the prefixes of their keys."""
+    out = {}
+    for key in z:
+        if key.startswith(ids_prefix):
+            name, ids = key.removeprefix(ids_prefix), z[key]
+            if ids.ndim != 1 or ids.dtype.kind not in "iu" or ids.min(initial=0) < 0:
+                raise ValueError("an array of control points holds something else")
+            moves = _finite(z[moves_prefix + name], (len(ids), 3)).astype(np.float32)
+            out[name] = ids.astype(np.int32), moves
+    return out
 
 
 def _finite(a: Array, shape: tuple[int, ...]) -> Floats:
@@ -89,29 +91,8 @@ def _finite(a: Array, shape: tuple[int, ...]) -> Floats:
     return a.astype(np.float64)
 
 
-def _groups(z: Arrays, k: int, name: str) -> dict[str, Group]:
-    out = {}
-    for key in z:
-        if key.startswith(f"{k}/ids/"):
-            part = key.split("/", 2)[2]
-            ids = _indices(z[key])
-            out[part] = Group(name, ids, _finite(z[f"{k}/moves/{part}"], (len(ids), 3)).astype(np.float32))
-    return out
-
-
-def _changes(z: Arrays, k: int) -> dict[str, list[Group]]:
-    out: dict[str, list[Group]] = {}
-    for key in z:
-        if key.startswith(f"{k}/change_ids/"):
-            part, shape = key.split("/", 2)[2].rsplit("/", 1)
-            ids = _indices(z[key])
-            moves = _finite(z[f"{k}/change_moves/{part}/{shape}"], (len(ids), 3)).astype(np.float32)
-            out.setdefault(part, []).append(Group(shape, ids, moves))
-    return out
-
-
 def save_identities(head: str | Path, identities: list[Identity]) -> Path:
-    """Keep identities beside a head; returns the file's path."""
+    """Write identities to the head's folder; returns the file's path."""
     arrays: dict[str, Array] = {
         "fit": np.array(identities[0].fit if identities else 0, np.int64),
         "names": np.array([i.name for i in identities]),
@@ -124,20 +105,13 @@ def save_identities(head: str | Path, identities: list[Identity]) -> Path:
         for part, changes in identity.changes.items():
             for g in changes:
                 arrays |= {f"{k}/change_ids/{part}/{g.name}": g.ids, f"{k}/change_moves/{part}/{g.name}": g.moves}
-    return write_sidecar(identities_path(head), arrays)
-
-
-def identities_path(head: str | Path) -> Path:
-    """Where a head's identities are kept."""
-    return beside(head, FILE)
+    return write_sidecar(sidecar_path(head, FILE), arrays)
 
 
 def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mapping[str, float], where: str) -> HeadData:
     """The head with identities mixed in, each by 0 to 1.
 
-    Raises
-    ------
-    HeadFileError : no identity of that name, an amount out of range, or identities that were made for another fit.
+    Raises HeadFileError: no identity of that name, an amount out of range, or one that was made for another fit.
     """
     eyes, jaw = head.eyes.copy(), np.array(head.jaw.centre, float)
     parts = {p.name: p for p in head.parts}
@@ -152,7 +126,9 @@ def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mappi
         eyes += amount * identity.eyes
         jaw += amount * identity.jaw
         for part, group in identity.groups.items():
-            parts[part] = _moved(parts[part], group, amount)
+            points = parts[part].points.copy()
+            points[group.ids] += amount * group.moves
+            parts[part] = replace(parts[part], points=points)
         for part, changes in identity.changes.items():
             for group in changes:
                 parts[part] = _changed(parts[part], group, amount)
@@ -169,19 +145,13 @@ def _check_fit(head: HeadData, identity: Identity, where: str) -> None:
                             hint="make it again: omote fit MESH -o FOLDER --keep --identities FILE")  # fmt: skip
 
 
-def _moved(part: PartData, group: Group, amount: float) -> PartData:
-    points = part.points.copy()
-    points[group.ids] += amount * group.moves
-    return replace(part, points=points)
-
-
 def _changed(part: PartData, change: Group, amount: float) -> PartData:
-    """The part with something added to its group of the same name."""
+    """The part with a multiple of ``change`` added to its group of the same name."""
     total = np.zeros((len(part.points), 3), np.float32)
     total[change.ids] += np.float32(amount) * change.moves
-    groups = [g for g in part.groups if g.name != change.name]
     for g in part.groups:
         if g.name == change.name:
             total[g.ids] += g.moves
     ids = np.flatnonzero(np.abs(total).max(axis=1) > 0).astype(np.int32)
-    return replace(part, groups=[*groups, Group(change.name, ids, total[ids])])
+    others = [g for g in part.groups if g.name != change.name]
+    return replace(part, groups=[*others, Group(change.name, ids, total[ids])])

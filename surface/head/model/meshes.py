@@ -1,6 +1,6 @@
-"""The tessellation of a part, kept in the head file so that a face starts at once.
+"""Tessellate parts, and store their meshes in the head file so that loading need not tessellate again.
 
-A head without it, or with another budget than it was made with, is tessellated when it is loaded.
+A part without a stored mesh, or with another budget than it was made with, is tessellated when it is loaded.
 """
 
 from __future__ import annotations
@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Array
+from surface.base.arrays import Array, Floats
 from surface.dcp import DCPSurface
 from surface.head.model.data import PartData, Seam
 from surface.mesh.domain import Domain
@@ -42,8 +41,8 @@ def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) 
         )
 
 
-def _ends(seams: Sequence[Seam], part: str) -> NDArray[np.float64]:
-    """(k, 2) where seams of a part begin and end: three borders or more meet there. Closed seams have no ends."""
+def _ends(seams: Sequence[Seam], part: str) -> Floats:
+    """(k, 2) ends of a part's seams, where three borders or more meet; closed seams have none."""
     lines = [uv for s in seams for name, uv in ((s.part_a, s.uv_a), (s.part_b, s.uv_b)) if name == part]
     ends = [line[k] for line in lines for k in (0, -1) if not np.array_equal(line[0], line[-1])]
     return np.unique(np.array(ends, float).reshape(-1, 2), axis=0)
@@ -57,7 +56,7 @@ def domain_of(data: PartData) -> Domain:
 
 
 def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
-    """Arrays to keep; positions and normals are left out, the surface gives them."""
+    """The mesh as arrays to store, without positions and normals, which the surface gives."""
     return {
         "mesh_uv": mesh.uv,
         "mesh_triangles": mesh.triangles.astype(np.int32),
@@ -72,10 +71,10 @@ def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
 def unpack(
     arrays: dict[str, Array], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool
 ) -> Mesh | None:
-    """The kept mesh, or None if it is absent, made with another budget, or does not fit the surface.
+    """The stored mesh, or None if it is absent, made with another budget, or does not fit the surface.
 
-    ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex then stands
-    in the middle of its cell's control points.
+    ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex is put in the middle
+    of its cell's control points.
     """
     if any(key not in arrays for key in KEYS):
         return None
@@ -84,7 +83,7 @@ def unpack(
     start, list_start, ids = (arrays[k] for k in ("mesh_cell_start", "mesh_list_start", "mesh_list_ids"))
     if made.shape != (5,) or tuple(made[:3]) != tuple(map(float, budget)):
         return None
-    if not _sound(uv, triangles, start, list_start, ids, surface.n):
+    if not _indices_valid(uv, triangles, start, list_start, ids, surface.n):
         return None
     side = arrays["mesh_side"].astype(np.int64)
     cell = np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start))
@@ -100,8 +99,8 @@ def unpack(
     )  # fmt: skip
 
 
-def _sound(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
-    """Do all indices point at something?"""
+def _indices_valid(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
+    """Are all indices in range?"""
     if uv.ndim != 2 or triangles.ndim != 2 or not len(triangles) or len(start) != len(list_start):
         return False
     whole = start[0] == 0 and start[-1] == len(uv) and list_start[0] == 0 and list_start[-1] == len(ids)

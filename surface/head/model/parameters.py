@@ -1,7 +1,7 @@
-"""The parameters a head understands, and what they mean for eyes and head.
+"""Parameters of a head: their names, and how their values become a pose of shapes, jaw, gaze and head rotation.
 
-Expression parameters run from 0 to 1, angles from -1 to 1. Gaze can be given in two ways, as an angle and as
-eyeLook shapes; both add up to one gaze, which turns the eyeball and moves the lids.
+Expression parameters run from 0 to 1, angles from -1 to 1. Gaze may be given as angles and as eyeLook shapes, which are
+added; it turns the eyeball and moves the lids.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from math import atan2, cos, hypot, sin
 
 import numpy as np
-from numpy.typing import NDArray
+
+from surface.base.arrays import Floats
 
 SIDES = ("Left", "Right")
 _EYE = ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")
@@ -34,40 +35,38 @@ _LOOK = np.array([[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] f
 _BLINK = np.array([_AT[f"eyeBlink{s}"] for s in SIDES])
 _OPENERS = np.array([[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES])
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
-TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # how far the jaw opens at least to let the whole tongue out
+TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # jawOpen at least, for the whole tongue; how much earlier the jaw opens
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
 
 
 @dataclass
 class Pose:
-    """What a parameter vector asks of the head.
+    """A parameter vector as amounts and angles.
 
     Attributes
     ----------
-    shapes : (52,) float64, how far each group is moved; lids already follow the gaze.
-    jaw : how far the jaw is open, 0..1; closed : how much of that the lips make up for, 0..1.
+    shapes : (52,) amount of each group; lids already follow the gaze.
+    jaw : how far the jaw is open, 0..1; closed : share of it that mouthClose takes back, 0..1.
     head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
-    pushes : by the name of a contact, what moved at it, mm, from
-        :class:`surface.head.posing.contact.ContactSolver`; the part that has the opening fills it in for later parts.
+    pushes : corrections at contacts by their names, mm, from :class:`surface.head.posing.contact.ContactSolver`; the
+        part with the opening sets them for parts after it.
     """
 
-    shapes: NDArray[np.float64]
+    shapes: Floats
     jaw: float
     closed: float
-    head: NDArray[np.float64]
-    gaze: NDArray[np.float64]
-    pushes: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    head: Floats
+    gaze: Floats
+    pushes: dict[str, Floats] = field(default_factory=dict)
 
 
-def read_pose(values: NDArray[np.float64]) -> Pose:
+def read_pose(values: Floats) -> Pose:
     """Parameter values (59,) in the order of NAMES, clipped, as a pose.
 
     mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
     opens the jaw as far as it needs, ahead of the tongue, and keeps the lips off it.
 
-    Raises
-    ------
-    ValueError : wrong shape, or a value that is not a number (names the parameter).
+    Raises ValueError: wrong shape, or a value that is not a number (names the parameter).
     """
     v = np.asarray(values, float)
     if v.shape != (len(NAMES),):
@@ -96,7 +95,13 @@ def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float
     return min(max(yaw, -1.0), 1.0), min(max(pitch, -1.0), 1.0)
 
 
-def rotation(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]:
+def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
+    """Hermite step 3 t^2 - 2 t^3 of ``x``, 0 at ``low`` and 1 at ``high``, constant beyond them."""
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def rotation(yaw: float, pitch: float, roll: float = 0.0) -> Floats:
     """(3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
     cy, cp, cr, sy, sp, sr = cos(yaw), cos(pitch), cos(roll), sin(yaw), sin(pitch), sin(roll)
     return np.array(
@@ -108,7 +113,7 @@ def rotation(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]
     )
 
 
-def rotation_vector(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def rotation_vector(matrix: Floats) -> Floats:
     """(3,) axis times angle of a rotation by less than 180 degrees."""
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     axis = (h - f, c - g, d - b)

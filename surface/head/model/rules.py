@@ -1,4 +1,4 @@
-"""What moves groups that are no parameters: creases of the skin, and mends where two shapes do not add up."""
+"""Amounts of all groups of a pose: those of the shapes, and products of them for wrinkles and corrective shapes."""
 
 from __future__ import annotations
 
@@ -11,15 +11,9 @@ from surface.head.model.parameters import SHAPES
 
 
 class Drivers:
-    """Amounts of all groups: the shapes' own, and those of rules.
+    """Computes amounts of all groups: the 52 shapes, then those of ``rules``, in order; ``where`` names the file.
 
-    Parameters
-    ----------
-    rules : their groups stand behind the 52 shapes, in order; where : the file, for messages.
-
-    Raises
-    ------
-    HeadFileError : a rule names something that is no shape.
+    Raises HeadFileError: a rule names something that is no shape.
     """
 
     def __init__(self, rules: list[Rule], where: str = "head") -> None:
@@ -37,10 +31,8 @@ class Drivers:
         self._of: Floats | None = None
 
     def amounts(self, shapes: Floats) -> Floats:
-        """(52 + r,) from the shapes (52,); the array is overwritten each time.
-
-        Asked again for the very same array, as by the parts of one head, it gives what it has.
-        """
+        """(52 + r,) from the shapes (52,), overwritten by the next call; computed once for all parts of a head, which
+        pass the same array."""
         if shapes is self._of:
             return self._amounts
         self._of = shapes

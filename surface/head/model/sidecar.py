@@ -1,4 +1,4 @@
-"""Arrays in a file of their own beside a head, as shade, decimated triangles and identities are kept."""
+"""Read and write .npz files that lie beside a head's own: baked shade, decimated triangles and identities."""
 
 from __future__ import annotations
 
@@ -10,74 +10,59 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Array
 from surface.base.errors import HeadFileError
 
 Made = TypeVar("Made")
 VERSION = 1
-OWN = "omote/"  # names of what stands in every such file beside its arrays
-_DAMAGE = (
-    ValueError, TypeError, OverflowError, EOFError, KeyError, IndexError, zipfile.BadZipFile, zlib.error,
+META = "omote/"  # keys that begin so are about the file, the others are its arrays
+FORMAT, CHECK = f"{META}format", f"{META}checksum/"
+DAMAGED = (
+    OSError, ValueError, TypeError, OverflowError, EOFError, KeyError, IndexError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-FORMAT, CHECK = f"{OWN}format", f"{OWN}checksum/"
+"""What reading a damaged .npz file may raise."""
 
 
-def beside(head: str | Path, file: str) -> Path:
-    """Where a head keeps ``file``; ``head`` is its folder or its head.toml."""
+def sidecar_path(head: str | Path, file: str) -> Path:
+    """Path of ``file`` beside a head, which is given by its folder or its head.toml."""
     folder = Path(head)
     return (folder.parent if folder.suffix == ".toml" else folder) / file
 
 
 @dataclass(frozen=True)
 class Sidecar:
-    """What such a file holds.
-
-    Attributes
-    ----------
-    path : the file
-    arrays : by name
-    checks : checksums of what each part's arrays depend on, by part; empty in files of before there were any
-    """
+    """Contents of such a file: arrays by name, and checksums of each part's mesh (none in files without them)."""
 
     path: Path
-    arrays: dict[str, NDArray[Any]]
+    arrays: dict[str, Array]
     checks: dict[str, int]
 
 
 def read_sidecar(path: Path, make: Callable[[Sidecar], Made], hint: str) -> Made | None:
-    """What ``make`` makes of the arrays of a file; None where there is no such file.
+    """Return ``make`` of the file's contents; None where there is no such file. A file without a version is read.
 
-    Raises
-    ------
-    HeadFileError : the file is damaged or of a newer version, or ``make`` raised KeyError or ValueError over what it
-        holds.
+    Raises HeadFileError: the file is damaged or of a newer version, or ``make`` raised one of :data:`DAMAGED`.
     """
     if not path.is_file():
         return None
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             every = {name: stored[name] for name in stored.files}
-        _check_version(path, every)
+        version = int(every[FORMAT][0]) if FORMAT in every else 0
+        if version > VERSION:
+            why = f"is of version {version}, this omote reads up to {VERSION}"
+            raise HeadFileError(f"{path}: {why}", hint="update omote")
         checks = {name.removeprefix(CHECK): int(array[0]) for name, array in every.items() if name.startswith(CHECK)}
-        return make(Sidecar(path, {k: v for k, v in every.items() if not k.startswith(OWN)}, checks))
-    except (OSError, *_DAMAGE) as error:
+        return make(Sidecar(path, {k: v for k, v in every.items() if not k.startswith(META)}, checks))
+    except DAMAGED as error:
         raise HeadFileError(f"{path}: {error}", hint=hint) from error
 
 
-def _check_version(path: Path, stored: Mapping[str, NDArray[Any]]) -> None:
-    """HeadFileError for a file of a later omote; those without a version are from before there was one."""
-    version = int(stored[FORMAT][0]) if FORMAT in stored else 0
-    if version > VERSION:
-        raise HeadFileError(f"{path}: is of version {version}, this omote reads up to {VERSION}", hint="update omote")
+def write_sidecar(path: Path, arrays: Mapping[str, Array], checks: Mapping[str, int] | None = None) -> Path:
+    """Write arrays by name, all or none of them, and checksums by part; returns the file's path.
 
-
-def write_sidecar(path: Path, arrays: Mapping[str, NDArray[Any]], checks: Mapping[str, int] | None = None) -> Path:
-    """Keep arrays by name, all or none of them, and checksums by part; returns the file's path.
-
-    Raises
-    ------
-    HeadFileError : the file cannot be written, or the disk is full.
+    Raises HeadFileError: the file cannot be written, or the disk is full.
     """
     new = path.with_suffix(".npz.new")
     packed: dict[str, Any] = {**arrays, FORMAT: np.array([VERSION], np.int64)}

@@ -1,30 +1,29 @@
-"""Loops over the two sides of an opening, compiled."""
+"""Compiled loops of contacts: sample an opening, find overlap and heights above an eyeball, move control points."""
 
 # mypy: disable-error-code="call-arg, var-annotated"
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Floats32
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.base.jit import kernel
 from surface.spline.lanes import fma, load, store3, zero
 
-# The cornea stands out of the eyeball: its sphere's centre and radius, in eyeball radii, as
+# The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
 
 
 @kernel
 def place_samples(
-    start: NDArray[np.int64], ids: NDArray[np.int64], share: Floats32, points: Floats, eye: Floats, radius: float,
+    start: Ints, ids: Ints, share: Floats32, points: Floats, eye: Floats, radius: float,
     room: Floats32, out: Floats,
 ) -> None:  # fmt: skip
     """Samples ``out (s, 3)`` of a surface as (x, height, depth), from control points ``points (n, 3)``.
 
     Eight samples at a time: those of tile t are the sums of eight ``share`` each times the points ``ids`` between
-    ``start[t]`` and ``start[t + 1]``; ``room (24,)`` is for them. Height and depth are y and z, or, with a ``radius``
-    > 0, the arc above the eyeball's middle and the distance from it.
+    ``start[t]`` and ``start[t + 1]``; ``room (24,)`` is scratch space. Height and depth are y and z, or, with a
+    ``radius`` > 0, the arc above the eyeball's middle and the distance from it.
     """
     for tile in range(len(start) - 1):
         x, y, z = zero(), zero(), zero()
@@ -71,11 +70,11 @@ def deepest(heights: Floats, depths: Floats, others: Floats, at: Floats, sign: f
 
 @kernel
 def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> None:
-    """How far the sides of an opening must give way, ``push (2, k)``, from ``samples (2, k, m, 3)``.
+    """How far the sides of an opening must move apart, ``push (2, k)``, from ``samples (2, k, m, 3)``.
 
-    Side 0 is the upper one. Every column of a side is held against the other side at the same x; where the two
-    profiles lie at one depth, the upper must not be lower by more than ``press`` mm; ``soft`` mm before that they
-    begin to give way.
+    Side 0 is the upper one. Every column of a side is compared with the other side at the same x; where the two
+    profiles have the same depth, the upper must not be lower by more than ``press`` mm; correction sets in softly from
+    ``soft`` mm before that to ``soft`` mm beyond.
     """
     _, columns, rows, _ = samples.shape
     heights, depths = np.empty(rows), np.empty(rows)
@@ -103,7 +102,7 @@ def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> No
 def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) -> None:
     """How high samples (s, 3) as (x, height, depth) lie above an eyeball of radius ``size``: ``heights (s,)``.
 
-    The eye looks along ``axis (3,)``; its cornea stands out.
+    The eye looks along ``axis (3,)``; its cornea protrudes.
     """
     for s in range(len(samples)):
         x, depth = samples[s, 0], max(samples[s, 2], 1e-6)
@@ -118,30 +117,28 @@ def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) ->
 
 
 @kernel
-def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, eager: float, lifts: Floats) -> float:
-    """How far samples that lie at ``heights (s,)`` must be lifted or, below 0, laid down: ``lifts (s,)``.
+def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, gain: float, lifts: Floats) -> float:
+    """How far samples at ``heights (s,)`` must be lifted or, below 0, laid down: ``lifts (s,)``.
 
-    Below ``least (s,)`` they lack height, above ``most (s,)`` they have too much, of which the share ``hold (s,)``
-    counts; they move ``eager`` times as far as they are off. Returns how far the furthest is off.
+    The error is what is missing to ``least (s,)`` or, times ``hold (s,)``, exceeds ``most (s,)``; samples move by
+    ``gain`` times it. Returns the largest error.
     """
     worst = 0.0
     for s in range(len(heights)):
         lifts[s], h = 0.0, heights[s]
         if h < least[s]:
-            lifts[s] = eager * (least[s] - h)
+            lifts[s] = gain * (least[s] - h)
             worst = max(worst, least[s] - h)
         elif h > most[s] and hold[s] > 0.0:
-            lifts[s] = eager * hold[s] * (most[s] - h)
+            lifts[s] = gain * hold[s] * (most[s] - h)
             worst = max(worst, hold[s] * (h - most[s]))
     return worst
 
 
 @kernel
-def lift_points(
-    ids: NDArray[np.int64], lifts: Floats, samples: Floats, size: float, table: Floats32, points: Floats
-) -> None:
+def lift_points(ids: Ints, lifts: Floats, samples: Floats, size: float, table: Floats32, points: Floats) -> None:
     """Move ``points (n, 3)`` with the numbers ``ids (k,)`` by ``lifts (s,) @ table (s, k)``, mm, each lift away from
-    the eyeball of radius ``size`` where its sample (s, 3) as (x, height, depth) stands."""
+    the eyeball of radius ``size`` at its sample (s, 3) as (x, height, depth)."""
     count = len(ids)
     x, y, z = np.zeros(count, np.float32), np.zeros(count, np.float32), np.zeros(count, np.float32)
     for s in range(len(lifts)):
@@ -165,7 +162,7 @@ def lift_points(
 
 @kernel
 def move_points(
-    ids: NDArray[np.int64], amounts: Floats, table: Floats, eye: Floats, radius: float, outward: bool, points: Floats
+    ids: Ints, amounts: Floats, table: Floats, eye: Floats, radius: float, outward: bool, points: Floats
 ) -> None:
     """Move ``points (n, 3)`` with the numbers ``ids (k,)`` up by ``amounts (s,) @ table (s, k)``, mm.
 

@@ -1,7 +1,7 @@
-"""A head in a hurry: only the vertices that its decimated triangles have, of all parts in one array, posed in one go.
+"""Pose a head's decimated triangles: only the vertices that they use, of all parts, in one array.
 
-Where a picture moves, most of a pose's time goes to vertices that nobody draws and to asking each part for itself. So
-all parts that deform share one rig here, and of each only the vertices are summed that are drawn or read.
+Where a picture moves, most of a pose's time goes to vertices that are not drawn and to calls for each part. Here all
+parts that deform share one rig, and only vertices that are drawn or wanted are summed.
 """
 
 from __future__ import annotations
@@ -17,22 +17,20 @@ from surface.deform.deformation import Deformation
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.parameters import Pose, read_pose, rotation
 from surface.head.posing.head import Head
-from surface.head.posing.kernels import carry, turn_head, zip_border
+from surface.head.posing.kernels import move_rigid, stitch_border
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
-from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
-from surface.head.posing.seams import Zipper
+from surface.head.posing.rig import SkinRig, motion_key, rigid_motion
+from surface.head.posing.seams import SeamStitch
 from surface.mesh.mesh import Mesh
-
-Ranges = list[tuple[int, int]]
 
 
 class DecimatedPart:
-    """A part's share of a decimated head.
+    """A part's vertices among those of a decimated head.
 
     Attributes
     ----------
     part : the head's own.
-    first, last : its vertices among the decimated head's are those from ``first`` to before ``last``.
+    first, last : its vertices are those from ``first`` to before ``last``.
     kept : (m,) int64, which vertices of the part they are, rising.
     triangles : (t, 3) int32, of these.
     changed : ranges [start, stop) of these that the last pose touched.
@@ -42,7 +40,7 @@ class DecimatedPart:
         self.part, self.kept = part, kept
         self.first, self.last = first, first + len(kept)
         self.triangles = np.searchsorted(kept, triangles).astype(np.int32)
-        self.changed: Ranges = [(0, len(kept))]
+        self.changed: list[tuple[int, int]] = [(0, len(kept))]
 
     @property
     def own(self) -> Ints:
@@ -50,7 +48,7 @@ class DecimatedPart:
         return self.kept[: int(np.searchsorted(self.kept, len(self.part.mesh.uv)))]
 
     def rows(self, ids: NDArray[np.integer]) -> Ints:
-        """Where vertices ``ids (k,)`` of the part stand among the decimated head's; all of them must be kept."""
+        """Rows among the decimated head's vertices of the part's vertices ``ids (k,)``; all of them must be kept."""
         return self.first + np.searchsorted(self.kept, ids)
 
 
@@ -61,9 +59,9 @@ class DecimatedHead:
 
     Parameters
     ----------
-    head : the head; parts : its parts, in the order their vertices shall stand in.
+    parts : the head's, in the order of their vertices here.
     level : "full" or "fast"; a part without decimated triangles keeps all.
-    wanted : other vertices that are asked for, by part.
+    wanted : other vertices to pose, by part.
 
     Attributes
     ----------
@@ -82,9 +80,7 @@ class DecimatedHead:
         skins = [(decimated, decimated.part) for decimated in self.parts if isinstance(decimated.part, SkinPart)]
         self._rig = JoinedRig([part for _, part in skins], head.data)
         self._skins = [_Skin(decimated, part, self._rig.rows[part.name]) for decimated, part in skins]
-        rigid = [decimated for decimated in self.parts if isinstance(decimated.part, RigidPart)]
-        follows = sorted({decimated.part.follows for decimated in rigid})
-        self._rigids = [_Rigid(name, [r for r in rigid if r.part.follows == name], head.data) for name in follows]
+        self._rigids = [_Rigid(part, head.data) for part in self.parts if isinstance(part.part, RigidPart)]
         self._seams = _Seams(head.zippers, self.parts)
         self._turn: Turn | None = None
         self.pose(np.zeros(len(head.parameters)))
@@ -113,7 +109,7 @@ class JoinedRig(SkinRig):
 
     Parameters
     ----------
-    parts : whose points at rest it takes, now and whenever they change, and whose contacts it shares.
+    parts : whose points at rest it takes, now and whenever they change, and whose contacts it applies.
 
     Attributes
     ----------
@@ -126,24 +122,24 @@ class JoinedRig(SkinRig):
         ends = np.cumsum([0, *(len(part.rig.rest) for part in parts)]).tolist()
         self.rows = {part.name: slice(a, b) for part, a, b in zip(parts, ends, ends[1:], strict=False)}
         self._rigs = [(part.rig, self.rows[part.name]) for part in parts]
-        self._woken: list[int] = []
+        self._seen: list[int] = []
 
     def apply(self, pose: Pose) -> Floats:
-        woken = [rig.woken for rig, _ in self._rigs]
-        if woken != self._woken:
-            self._woken = woken
+        invalidations = [rig.invalidations for rig, _ in self._rigs]
+        if invalidations != self._seen:
+            self._seen = invalidations
             for rig, rows in self._rigs:
                 self.rest[rows] = rig.rest
-            self.wake()
+            self.invalidate()
         return super().apply(pose)
 
-    def _asks(self, pose: Pose) -> tuple[object, ...]:
-        return *super()._asks(pose), pose.gaze.tobytes()
+    def _pose_key(self, pose: Pose) -> tuple[object, ...]:
+        return *super()._pose_key(pose), pose.gaze.tobytes()
 
-    def _express(self, pose: Pose) -> None:
-        super()._express(pose)
+    def _evaluate(self, pose: Pose) -> None:
+        super()._evaluate(pose)
         for rig, rows in self._rigs:
-            rig.meet(pose, self.points[rows])
+            rig.apply_contacts(pose, self.points[rows])
 
 
 def _joined(parts: Sequence[PartData]) -> PartData:
@@ -155,29 +151,29 @@ def _joined(parts: Sequence[PartData]) -> PartData:
             groups.setdefault(group.name, []).append((first, group))
         first += len(part.points)
     together = [
-        replace(
-            found[0][1],
-            ids=np.concatenate([np.asarray(g.ids) + at for at, g in found]),
-            moves=np.concatenate([g.moves for _, g in found]),
+        Group(
+            name,
+            np.concatenate([np.asarray(g.ids) + at for at, g in found]),
+            np.concatenate([g.moves for _, g in found]),
         )
-        for found in groups.values()
+        for name, found in groups.items()
     ]
     points, jaw, lids = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "jaw", "lids"))
     return replace(parts[0], name="", points=points, jaw=jaw, lids=lids, groups=together)
 
 
 class _Skin:
-    """Moves the vertices of a part that deforms."""
+    """Moves the vertices of a part that deforms, in its rows of ``vertices`` and ``normals`` (m, 3)."""
 
     def __init__(self, decimated: DecimatedPart, part: SkinPart, rows: slice) -> None:
         self._decimated, self._rows, self._version = decimated, rows, 0
         self._share = part.share[decimated.own]
-        self._deformation = Deformation(part.surface, thinned(part.mesh, decimated.own))
+        self._deformation = Deformation(part.surface, submesh(part.mesh, decimated.own))
 
     def pose(
         self, points: Floats, version: int, turn: Turn, turned: bool, vertices: Floats32, normals: Floats32
     ) -> None:
-        """Bring the part's rows of ``vertices`` and ``normals`` (m, 3) to control ``points`` (n, 3)."""
+        """Move to control ``points`` (n, 3) of the whole head."""
         own, first = self._deformation, self._decimated.first
         self._decimated.changed = []
         if self._version != version:
@@ -186,62 +182,46 @@ class _Skin:
             self._decimated.changed = own.changed
         if turned:
             self._decimated.changed = [(0, len(self._share))]
-        for start, stop in self._decimated.changed:
-            if turn.none:
-                vertices[first + start : first + stop] = own.vertices[start:stop]
-                normals[first + start : first + stop] = own.normals[start:stop]
-            else:
-                turn_head(own.vertices, own.normals, self._share, turn.matrix, turn.vector, turn.pivot, start, stop,
-                          vertices[first:], normals[first:])  # fmt: skip
+        for rows in self._decimated.changed:
+            turn.rotate(own, self._share, rows, vertices[first:], normals[first:])
 
 
 class _Rigid:
-    """Moves the vertices of all parts that are fixed to the same thing."""
+    """Moves the vertices of a rigid part, in its rows of ``vertices`` and ``normals`` (m, 3)."""
 
-    def __init__(self, follows: str, parts: Sequence[DecimatedPart], head: HeadData) -> None:
-        self._follows, self._head = follows, head
-        self._rest = [(decimated, *_rest(decimated)) for decimated in parts]
-        self._asked: tuple[object, ...] = ()
+    def __init__(self, decimated: DecimatedPart, head: HeadData) -> None:
+        self._decimated, self._head = decimated, head
+        mesh, own = decimated.part.mesh, decimated.own
+        self._rest = mesh.vertices[own].astype(np.float32), mesh.normals[own].astype(np.float32)
+        self._last_key: tuple[object, ...] | None = None
 
     def pose(self, pose: Pose, turn: Turn, turned: bool, vertices: Floats32, normals: Floats32) -> None:
-        """Bring the parts' rows of ``vertices`` and ``normals`` (m, 3) to the pose."""
-        asked = motion_asks(self._follows, self._head, pose)
-        still = asked == self._asked and not turned
-        self._asked = asked
-        for decimated, rest, _ in self._rest:
-            decimated.changed = [] if still else [(0, len(rest))]
-        if still:
-            return
-        linear, shift = rigid_motion(self._follows, self._head, pose)
-        shift = (turn.matrix @ (shift - turn.pivot) + turn.pivot).astype(np.float32)
-        linear = (turn.matrix @ linear).astype(np.float32)
-        for decimated, rest, rest_normals in self._rest:
-            carry(rest, rest_normals, linear, shift, vertices[decimated.first :], normals[decimated.first :])
-
-
-def _rest(decimated: DecimatedPart) -> tuple[Floats32, Floats32]:
-    """Positions and normals at rest of the vertices that the part's own surface has, (k, 3) each."""
-    mesh, own = decimated.part.mesh, decimated.own
-    return mesh.vertices[own].astype(np.float32), mesh.normals[own].astype(np.float32)
+        follows, first = self._decimated.part.follows, self._decimated.first
+        key = motion_key(follows, self._head, pose)
+        moves = turned or key != self._last_key
+        self._last_key = key
+        self._decimated.changed = [(0, len(self._rest[0]))] if moves else []
+        if moves:
+            motion = turn.after(*rigid_motion(follows, self._head, pose))
+            move_rigid(*self._rest, *motion, vertices[first:], normals[first:])
 
 
 class _Seams:
     """All seams of a head, closed in one go, one after the other."""
 
-    def __init__(self, zippers: Sequence[Zipper], parts: Sequence[DecimatedPart]) -> None:
+    def __init__(self, stitches: Sequence[SeamStitch], parts: Sequence[DecimatedPart]) -> None:
         by_name = {decimated.part.name: decimated for decimated in parts}
         self._pairs: list[tuple[DecimatedPart, DecimatedPart]] = []
-        ids, low, high, share = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [_NO_SHARE]
-        for zipper in zippers:
-            one, two = by_name[zipper.first.name], by_name[zipper.second.name]
-            drawn = np.isin(zipper.ids, two.kept)
+        none = np.zeros(0, np.int64)
+        rows = [(none, none, none, np.zeros(0, np.float32))]
+        for stitch in stitches:
+            one, two = by_name[stitch.first.name], by_name[stitch.second.name]
+            drawn = np.isin(stitch.ids, two.kept)
             if drawn.any():
                 self._pairs.append((one, two))
-                ids.append(two.rows(zipper.ids[drawn]))
-                low.append(one.rows(zipper.low[drawn]))
-                high.append(one.rows(zipper.high[drawn]))
-                share.append(zipper.share[drawn])
-        self._rows = *(np.concatenate(rows) for rows in (ids, low, high)), np.concatenate(share)
+                low, high = one.rows(stitch.low[drawn]), one.rows(stitch.high[drawn])
+                rows.append((two.rows(stitch.ids[drawn]), low, high, stitch.share[drawn]))
+        self._rows = [np.concatenate(column) for column in zip(*rows, strict=True)]
 
     def close(self, vertices: Floats32, normals: Floats32) -> None:
         """Put borders onto each other among ``vertices`` and ``normals`` (m, 3)."""
@@ -250,36 +230,25 @@ class _Seams:
             if one.changed or two.changed:  # by the pose, or by a seam before
                 two.changed, touched = [(0, len(two.kept))], True
         if touched:
-            zip_border(vertices, normals, vertices, normals, *self._rows)
-
-
-_NO_SHARE = np.zeros(0, np.float32)
+            stitch_border(vertices, normals, vertices, normals, *self._rows)
 
 
 def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
-    """Which vertices are drawn or asked for, by part, with those that seams put them between."""
+    """Which vertices are drawn or wanted, by part, with those that seams put them between."""
     kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
-    for zipper in reversed(head.zippers):  # what an earlier one gives, a later one may take
-        drawn = np.isin(zipper.ids, kept[zipper.second.name])
-        between = [kept[zipper.first.name], zipper.low[drawn], zipper.high[drawn]]
-        kept[zipper.first.name] = np.unique(np.concatenate(between))
+    for stitch in reversed(head.zippers):  # a later seam may take what an earlier one moves
+        drawn = np.isin(stitch.ids, kept[stitch.second.name])
+        between = [kept[stitch.first.name], stitch.low[drawn], stitch.high[drawn]]
+        kept[stitch.first.name] = np.unique(np.concatenate(between))
     return kept
 
 
-def thinned(mesh: Mesh, ids: Ints) -> Mesh:
+def submesh(mesh: Mesh, ids: Ints) -> Mesh:
     """Of a mesh only vertices ``ids (k,)``, rising, and the cells that have any; no triangles."""
     cells, cell = np.unique(mesh.cell[ids], return_inverse=True)
     lists = [mesh.points_of(c) for c in cells.tolist()]
     return Mesh(
-        mesh.vertices[ids],
-        mesh.normals[ids],
-        np.zeros((0, 3), np.int32),
-        mesh.uv[ids],
-        mesh.side[ids],
-        cell.astype(np.int32),
-        np.searchsorted(cell, np.arange(len(cells) + 1)),
-        np.cumsum([0, *map(len, lists)]),
-        np.concatenate([np.zeros(0, np.int32), *lists]),
-        len(cells),
-        mesh.flip,
-    )
+        mesh.vertices[ids], mesh.normals[ids], np.zeros((0, 3), np.int32), mesh.uv[ids], mesh.side[ids],
+        cell.astype(np.int32), np.searchsorted(cell, np.arange(len(cells) + 1)), np.cumsum([0, *map(len, lists)]),
+        np.concatenate([np.zeros(0, np.int32), *lists]), len(cells), mesh.flip,
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The head: load it, pose it, read vertices and normals of its parts."""
+"""Load and pose a head: vertices and normals of all its parts."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surface.base.arrays import Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data
@@ -15,11 +15,10 @@ from surface.head.model.identity import load_identities, with_identities
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.parameters import NAMES, read_pose, rotation
 from surface.head.model.rules import Drivers
-from surface.head.posing.decimation import apply_decimated, read_decimated
+from surface.head.posing.baked import apply_decimated, apply_shade, read_decimated, read_shade
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
-from surface.head.posing.seams import Zipper
-from surface.head.posing.shade import apply_shade, read_shade
+from surface.head.posing.seams import SeamStitch
 
 RIGID = ("skull", "jaw", "left_eye", "right_eye")
 
@@ -29,8 +28,6 @@ class Head:
 
     Use :meth:`load`. One object belongs to one thread at a time.
 
-    Parameters
-    ----------
     data : everything a head file holds; where : its path, for messages.
     """
 
@@ -41,23 +38,19 @@ class Head:
         drivers = Drivers(data.rules, where)
         self.parts: tuple[HeadPart, ...] = tuple(_make_part(p, data, drivers, where) for p in data.parts)
         by_name = {p.name: p for p in self.parts}
-        self._zippers = [Zipper(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams]
-        for zipper in self._zippers:
-            zipper.close()
+        self._stitches = tuple(SeamStitch(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams)
+        for stitch in self._stitches:
+            stitch.close()
         self._at = {name: i for i, name in enumerate(self.parameters)}
 
     @classmethod
     def load(cls, path: str | Path, identity: Mapping[str, float] | None = None) -> Head:
         """Read a head from its folder or its head.toml.
 
-        Parameters
-        ----------
         identity : variations of the head to mix in, by name, each by 0 to 1.
 
-        Raises
-        ------
-        HeadFileError : a file is missing, damaged, cut short, of another version or made for another mesh; names file
-            and key. Or the head has no identity of that name.
+        Raises HeadFileError: a file is missing, damaged, cut short, of another version or made for another mesh (names
+        file and key), or the head has no identity of that name.
         """
         data = load_data(path)
         if identity:
@@ -80,9 +73,9 @@ class Head:
         raise KeyError(f"no part {name!r}; there are {', '.join(p.name for p in self.parts)}")
 
     @property
-    def zippers(self) -> tuple[Zipper, ...]:
+    def zippers(self) -> tuple[SeamStitch, ...]:
         """The head's seams, in the order in which they are closed."""
-        return tuple(self._zippers)
+        return self._stitches
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -93,42 +86,36 @@ class Head:
     def group(self, name: str) -> dict[str, Group]:
         """The group of that name: part name -> control points and their displacements per unit.
 
-        Raises
-        ------
-        KeyError : no group of that name.
+        Raises KeyError: no group of that name.
         """
         found = {p.name: g for p in self.data.parts for g in p.groups if g.name == name}
         if not found:
             raise KeyError(f"no group {name!r}; there are {', '.join(self.groups)}")
         return found
 
-    def values(self, given: Mapping[str, float]) -> NDArray[np.float64]:
+    def values(self, given: Mapping[str, float]) -> Floats:
         """A parameter vector (P,) from names and values, 0 elsewhere; KeyError for an unknown name."""
         out = np.zeros(len(self.parameters))
         for name, value in given.items():
             out[self._at[name]] = value
         return out
 
-    def pose(self, values: NDArray[np.float64]) -> None:
+    def pose(self, values: Floats) -> None:
         """Move all parts to parameter values (P,) in the order of :attr:`parameters`; values are clipped.
 
-        Raises
-        ------
-        ValueError : wrong shape or a value that is not a number; the head keeps its pose.
+        Raises ValueError: wrong shape or a value that is not a number; the head keeps its pose.
         """
         pose = read_pose(values)
         turn = Turn(rotation(*pose.head), self.data.neck.pivot)
         for part in self.parts:
             part.pose(pose, turn)
-        for zipper in self._zippers:
-            zipper.close()
+        for stitch in self._stitches:
+            stitch.close()
 
-    def place_points(self, values: NDArray[np.float64]) -> tuple[list[NDArray[np.float64]], Turn]:
-        """As :meth:`pose`, but only what vertices are summed from; they and their normals stay.
+    def place_points(self, values: Floats) -> tuple[list[Floats], Turn]:
+        """As :meth:`pose`, but only the points that vertices are summed from; vertices and normals stay.
 
-        Returns
-        -------
-        (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
+        Returns (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
         :class:`surface.head.posing.influence.Influence`.
         """
         pose = read_pose(values)
@@ -147,7 +134,9 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
     except ValueError as e:
         raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e
     attributes = paint_part(head.paint, part.name, mesh.uv, where)
-    attributes |= _eye_directions(part, head, mesh.vertices)
+    if part.follows in ("left_eye", "right_eye"):  # in the eye's frame, in radii, +z through the pupil
+        local = (mesh.vertices - head.eyes[int(part.follows == "right_eye")]) / head.eye_radius
+        attributes["eye_local"] = local.astype(np.float32)
     made: HeadPart = (
         SkinPart(part, head, mesh, surface, attributes, drivers)
         if part.follows == "skin"
@@ -155,11 +144,3 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
     )
     made.stored = kept is not None
     return made
-
-
-def _eye_directions(part: PartData, head: HeadData, vertices: NDArray[np.floating]) -> dict[str, NDArray[np.float32]]:
-    """``eye_local`` (m, 3): where a vertex of an eyeball lies in the eye's own frame, in radii, +z the pupil."""
-    if part.follows not in ("left_eye", "right_eye"):
-        return {}
-    local = (vertices - head.eyes[int(part.follows == "right_eye")]) / head.eye_radius
-    return {"eye_local": local.astype(np.float32)}

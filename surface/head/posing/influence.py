@@ -1,4 +1,4 @@
-"""Every vertex of a head as sums over control points, for whoever evaluates the surfaces elsewhere.
+"""Express every vertex of a head as sums over control points, to evaluate the surfaces on a graphics processor.
 
 Weights do not change while a face moves, so the division of Eq. (1) can be done beforehand. With W the sum of all
 b w, a vertex is the sum of c P with c = b w / W, and by the quotient rule its derivative in u, times a positive
@@ -11,15 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Floats32
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.deform.lists import LANES, Lists, build_lists
 from surface.head.posing.head import Head
 from surface.head.posing.part import HeadPart, SkinPart
-from surface.head.posing.seams import Zipper
+from surface.head.posing.seams import SeamStitch
 
-Row = tuple[NDArray[np.int64], Floats]
+Row = tuple[Ints, Floats]
 _RIGID_POINTS = 4
 
 
@@ -47,9 +46,9 @@ class Influence:
         self.points = first
         self.part_start = np.cumsum([0, *(len(part.vertices) for part in head.parts)])
         at = {part.name: i for i, part in enumerate(head.parts)}
-        for zipper in head.zippers:
-            one, two = at[zipper.first.name], at[zipper.second.name]
-            _zip(zipper, rows[one], rows[two], shares[one], shares[two])
+        for stitch in head.zippers:
+            one, two = at[stitch.first.name], at[stitch.second.name]
+            _stitch_rows(stitch, rows[one], rows[two], shares[one], shares[two])
         every = [row for part_rows in rows for row in part_rows]
         self.start = np.cumsum([0, *(len(ids) for ids, _ in every)])
         self.ids = np.concatenate([ids for ids, _ in every])
@@ -58,10 +57,7 @@ class Influence:
 
 
 def _rows(part: HeadPart) -> tuple[list[Row], int]:
-    """Sums of one part's vertices over its own points, and how many points it has.
-
-    Vertices that a seam has added get an empty sum; the seam fills it.
-    """
+    """Sums of one part's vertices over its own points, empty for those that a seam has added; and how many points."""
     if isinstance(part, SkinPart):
         lists = build_lists(part.surface, part.mesh, True)
         rows, count = _skin_rows(lists, -1.0 if part.mesh.flip else 1.0), part.surface.n
@@ -86,7 +82,7 @@ def _skin_rows(lists: Lists, sign: float) -> list[Row]:
     return rows
 
 
-def _block(lists: Lists, cell: int, count: int) -> tuple[NDArray[np.int64], Floats]:
+def _block(lists: Lists, cell: int, count: int) -> tuple[Ints, Floats]:
     """Points (r,) of a cell, and b w, b_u w and b_v w (count, r, 3) of its vertices."""
     tiles = int(lists.tile_start[cell + 1] - lists.tile_start[cell])
     rows, room, at = (int(x[cell]) for x in (lists.rows, lists.room, lists.at))
@@ -102,8 +98,8 @@ def _rigid_rows(part: HeadPart) -> list[Row]:
     """Sums over the columns of a rigid motion and its shift; derivatives are any two directions along the surface."""
     mesh = part.mesh
     vertices, normals = np.asarray(mesh.vertices, float), np.asarray(mesh.normals, float)
-    aside = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    along = np.cross(aside, normals)
+    sideways = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    along = np.cross(sideways, normals)
     weights = np.zeros((len(vertices), _RIGID_POINTS, 3))
     weights[:, :3] = np.stack([vertices, along, np.cross(normals, along)], axis=2)
     weights[:, 3, 0] = 1.0
@@ -111,18 +107,18 @@ def _rigid_rows(part: HeadPart) -> list[Row]:
     return [(ids, own) for own in weights]
 
 
-def _share(part: HeadPart) -> NDArray[np.float32]:
-    """How much of the head's rotation each of a part's vertices takes; 1 for those that a seam has added."""
+def _share(part: HeadPart) -> Floats32:
+    """Share of the head's rotation of each of a part's vertices; 1 for those that a seam has added."""
     share = np.ones(len(part.vertices), np.float32)
     share[: len(part.share)] = part.share
     return share
 
 
-def _zip(zipper: Zipper, first: Sequence[Row], second: list[Row], one: Floats32, two: Floats32) -> None:
+def _stitch_rows(stitch: SeamStitch, first: Sequence[Row], second: list[Row], one: Floats32, two: Floats32) -> None:
     """Sums and shares of a seam's vertices in the second part, from those of the first."""
-    if not len(zipper.ids):
+    if not len(stitch.ids):
         return
-    for vertex, low, high, share in zip(zipper.ids, zipper.low, zipper.high, zipper.share, strict=True):
+    for vertex, low, high, share in zip(stitch.ids, stitch.low, stitch.high, stitch.share, strict=True):
         (ids_a, a), (ids_b, b) = first[low], first[high]
         second[vertex] = np.concatenate([ids_a, ids_b]), np.concatenate([(1.0 - share) * a, share * b])
-    two[zipper.ids] = (1.0 - zipper.share) * one[zipper.low] + zipper.share * one[zipper.high]
+    two[stitch.ids] = (1.0 - stitch.share) * one[stitch.low] + stitch.share * one[stitch.high]

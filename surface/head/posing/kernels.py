@@ -1,17 +1,16 @@
-"""Loops over control points, compiled."""
+"""Compiled loops of posing: group displacements, jaw, lids, head rotation, seams and distances from polylines."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Floats32
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.base.jit import kernel
 
 
 @kernel
 def add_moves(
-    amounts: Floats, group: NDArray[np.int64], first: NDArray[np.int64], start: NDArray[np.int64], moves: Floats32,
+    amounts: Floats, group: Ints, first: Ints, start: Ints, moves: Floats32,
     points: Floats,
 ) -> None:  # fmt: skip
     """Add to the numbers ``points (m,)`` runs of ``moves``: the r-th, from ``start[r]`` to ``start[r + 1]``, by
@@ -39,7 +38,7 @@ def mix_rows(amounts: Floats, rows: Floats, rest: Floats, least: Floats, out: Fl
 
 
 @kernel
-def carry(
+def move_rigid(
     rest: Floats32, rest_normals: Floats32, linear: Floats32, shift: Floats32, vertices: Floats32, normals: Floats32
 ) -> None:
     """Write ``linear (3, 3) @ p + shift (3,)`` of every row of ``rest (m, 3)``, and its normal's ``linear @ n``."""
@@ -56,7 +55,7 @@ def swing_jaw(
     rest: Floats, share: Floats, turn: Floats, shift: Floats, full_turn: Floats, full_shift: Floats,
     amount: float, undo: Floats, points: Floats,
 ) -> None:  # fmt: skip
-    """Add to ``points (n, 3)`` each point's ``share`` of the jaw's motion from where it rests.
+    """Add to ``points (n, 3)`` each point's ``share`` of the jaw's motion from its place at rest.
 
     ``undo (n,)`` takes back the difference between the arc and the straight way, for lips that mouthClose
     (a straight displacement) brings together.
@@ -74,7 +73,7 @@ def swing_jaw(
 
 
 @kernel
-def keep_on_eyeball(ids: NDArray[np.int64], eye: Floats, hold: Floats, radius: Floats, points: Floats) -> None:
+def keep_on_eyeball(ids: Ints, eye: Floats, hold: Floats, radius: Floats, points: Floats) -> None:
     """Set the distance of points ``ids (k,)`` from ``eye (k, 3)`` to ``radius (k,)``, by the share ``hold (k,)``.
 
     Straight displacements would cut through the eyeball half-way; distances that are mixed like the
@@ -145,9 +144,9 @@ def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at
 
 
 @kernel
-def zip_border(
-    vertices: Floats32, normals: Floats32, to_vertices: Floats32, to_normals: Floats32, ids: NDArray[np.int64],
-    low: NDArray[np.int64], high: NDArray[np.int64], share: Floats32,
+def stitch_border(
+    vertices: Floats32, normals: Floats32, to_vertices: Floats32, to_normals: Floats32, ids: Ints,
+    low: Ints, high: Ints, share: Floats32,
 ) -> None:  # fmt: skip
     """Put rows ``ids`` of ``to_vertices (m, 3)`` between rows ``low`` and ``high`` of ``vertices``, at ``share`` of
     the way; normals alike, to length 1 where they have any."""

@@ -1,4 +1,4 @@
-"""Static colours painted in (u, v): lips, brows, cheeks, shade in folds; data of head.toml.
+"""Paint static attributes of vertices in (u, v), such as colours of lips and cheeks, from the layers of head.toml.
 
 A layer of paint names a part, an attribute, a value and a field between 0 and 1 in (u, v):
 
@@ -6,7 +6,7 @@ A layer of paint names a part, an attribute, a value and a field between 0 and 1
 ``region``   inside closed polygons, fading to 0 over ``feather`` outside
 ``spots``    round ``points``, fading to 0 over ``feather`` from ``width`` on
 
-Layers are laid on in order: attribute = attribute + amount * field * (value - attribute).
+Layers are applied in order: attribute = attribute + amount * field * (value - attribute).
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Floats32
 from surface.base.errors import HeadFileError
+from surface.head.model.parameters import smoothstep
 from surface.head.posing.kernels import nearest_on_line
+from surface.mesh.loops import inside
 
 BASE: dict[str, tuple[float, ...]] = {
     "albedo": (0.60, 0.37, 0.28),
@@ -28,12 +29,10 @@ BASE: dict[str, tuple[float, ...]] = {
 }
 
 
-def paint_part(layers: list[dict[str, Any]], part: str, uv: Floats, where: str) -> dict[str, NDArray[np.float32]]:
+def paint_part(layers: list[dict[str, Any]], part: str, uv: Floats, where: str) -> dict[str, Floats32]:
     """Attributes (m, k) of one part at its vertices ``uv (m, 2)``.
 
-    Raises
-    ------
-    HeadFileError : a layer lacks a key or has a wrong one; names ``where`` and the layer.
+    Raises HeadFileError: a layer lacks a key or has a wrong one; names ``where`` and the layer.
     """
     out: dict[str, Floats] = {}
     for i, layer in enumerate(layers):
@@ -64,28 +63,13 @@ def _field(layer: dict[str, Any], uv: Floats) -> Floats:
     width, feather = float(layer.get("width", 0.0)), float(layer["feather"])
     if kind not in ("band", "region", "spots"):
         raise ValueError(f"kind {kind!r} is not one of all, band, region, spots")
-    closed = kind == "region"
-    distance = np.min([_distance(uv, line, closed) for line in lines], axis=0)
-    if closed:
-        inside = np.any([_inside(uv, line) for line in lines], axis=0)
-        distance = np.where(inside, 0.0, distance)
-    t = np.clip((distance - width) / max(feather, 1e-9), 0.0, 1.0)
-    cover: Floats = 1.0 - t * t * (3.0 - 2.0 * t)
-    return cover
-
-
-def _distance(uv: Floats, line: Floats, closed: bool) -> Floats:
-    """Distance (m,) of points from a polyline; a single point counts as one."""
-    distance, at = np.empty(len(uv)), np.empty(len(uv))
-    nearest_on_line(np.ascontiguousarray(uv), np.ascontiguousarray(line), closed, distance, at)
-    return distance
-
-
-def _inside(uv: Floats, ring: Floats) -> NDArray[np.bool_]:
-    """Even-odd rule."""
-    odd = np.zeros(len(uv), bool)
-    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-        crosses = (a[1] > uv[:, 1]) != (b[1] > uv[:, 1])
-        height = b[1] - a[1] if b[1] != a[1] else 1e-18
-        odd ^= crosses & (uv[:, 0] < a[0] + (uv[:, 1] - a[1]) / height * (b[0] - a[0]))
-    return odd
+    if not lines:
+        raise ValueError("lines is empty")
+    uv, least = np.ascontiguousarray(uv), np.full(len(uv), np.inf)
+    distance, along = np.empty(len(uv)), np.empty(len(uv))
+    for line in lines:
+        nearest_on_line(uv, line, kind == "region", distance, along)
+        np.minimum(least, distance, out=least)
+        if kind == "region":
+            least[inside(np.hstack([line, np.roll(line, -1, axis=0)]), uv)] = 0.0
+    return 1.0 - smoothstep((least - width) / max(feather, 1e-9))

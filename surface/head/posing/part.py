@@ -1,21 +1,22 @@
-"""Parts of a head as the picture sees them: arrays that are current after every pose."""
+"""Parts of a head as the picture sees them: vertices and normals that are current after every pose."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Floats32
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.dcp import DCPSurface
 from surface.deform.deformation import Deformation
 from surface.head.model.data import HeadData, PartData
 from surface.head.model.meshes import make_surface as make_surface
 from surface.head.model.parameters import Pose, rotation_vector
 from surface.head.model.rules import Drivers
-from surface.head.posing.kernels import carry, turn_head
-from surface.head.posing.rig import SkinRig, motion_asks, rigid_motion
+from surface.head.posing.kernels import move_rigid, turn_head
+from surface.head.posing.rig import SkinRig, motion_key, rigid_motion
 from surface.mesh.mesh import Mesh, border_edges
 
 
@@ -26,21 +27,38 @@ class Turn:
         self.matrix, self.vector, self.pivot = matrix, rotation_vector(matrix), np.array(pivot)
         self.none = not self.vector.any()
 
+    def rotate(
+        self, source: Deformation[Any], share: Floats32, rows: tuple[int, int], vertices: Floats32, normals: Floats32
+    ) -> None:
+        """Write rows [start, stop) of a deformation, turned by each one's share, to ``vertices`` and ``normals``."""
+        start, stop = rows
+        if self.none:
+            vertices[start:stop] = source.vertices[start:stop]
+            normals[start:stop] = source.normals[start:stop]
+        else:
+            turn_head(source.vertices, source.normals, share, self.matrix, self.vector, self.pivot, start, stop,
+                      vertices, normals)  # fmt: skip
+
+    def after(self, linear: Floats, shift: Floats) -> tuple[Floats32, Floats32]:
+        """Linear part (3, 3) and shift (3,) of an affine motion followed by the whole rotation."""
+        turned = self.matrix @ (shift - self.pivot) + self.pivot
+        return (self.matrix @ linear).astype(np.float32), turned.astype(np.float32)
+
 
 class HeadPart:
     """One surface of the head, tessellated.
 
     Attributes
     ----------
-    name, material : str.
+    name, material, follows : str.
     triangles : (t, 3) int32; uv : (m, 2) float32.
     vertices, normals : (m, 3) float32, current, in head space including the head's rotation.
     changed : vertex ranges [start, stop) that the last pose touched.
     attributes : static per-vertex arrays (m, k) float32 by name.
-    decimated : fewer triangles over the same vertices, by level; see :mod:`surface.head.posing.decimation`.
+    decimated : fewer triangles over the same vertices, by level; see :mod:`surface.head.posing.baked`.
     borders : (k, 2) directed edges that only one triangle of the tessellation has.
     surface : the DCP surface at rest. mesh : its tessellation.
-    stored : was the tessellation kept in the head's file? Else it was made when the head was loaded.
+    stored : was the tessellation in the head's file? Else it was made when the head was loaded.
     """
 
     stored = False
@@ -61,32 +79,16 @@ class HeadPart:
 
     def pose(self, pose: Pose, turn: Turn) -> None:
         """Move to a pose; ``turn`` is the head's rotation."""
-        ranges, vertices, normals = self._express(pose)
-        if not np.array_equal(turn.matrix, self._turn.matrix):
-            ranges = [(0, len(vertices))]
-        self._turn, self.changed = turn, ranges
-        for start, stop in ranges:
-            if turn.none:
-                self.vertices[start:stop] = vertices[start:stop]
-                self.normals[start:stop] = normals[start:stop]
-            else:
-                turn_head(vertices, normals, self._share, turn.matrix, turn.vector, turn.pivot, start, stop,
-                          self.vertices, self.normals)  # fmt: skip
-
-    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
-        """Everything but the head's rotation: ranges that changed, vertices, normals."""
         raise NotImplementedError
 
     @property
     def control_points(self) -> Floats:
-        """(n, 3) where the control points stand now, before the head turns."""
+        """(n, 3) control points of the last pose, before the head turns."""
         raise NotImplementedError
 
     def place_points(self, pose: Pose) -> Floats:
-        """What :class:`surface.head.posing.influence.Influence` sums over, (k, 3), before the head turns.
-
-        Vertices and normals stay where they are.
-        """
+        """What :class:`surface.head.posing.influence.Influence` sums over, (k, 3), before the head turns; vertices and
+        normals are left as they are."""
         raise NotImplementedError
 
     @property
@@ -96,14 +98,12 @@ class HeadPart:
 
     @property
     def share(self) -> Floats32:
-        """(m,) how much of the head's rotation each vertex of the mesh takes, 0..1."""
+        """(m,) share of the head's rotation that each vertex of the mesh takes, 0..1."""
         return self._share
 
-    def append(self, like: NDArray[np.int64], triangles: NDArray[np.int32]) -> None:
-        """Add vertices that look like others, ids ``like (k,)``, and triangles that may use them.
-
-        The new vertices stand behind the part's own; whoever adds them moves them.
-        """
+    def append(self, like: Ints, triangles: NDArray[np.int32]) -> None:
+        """Add copies of vertices ``like (k,)`` behind the part's own, and triangles that may use them; the caller moves
+        the copies."""
         for name in ("vertices", "normals", "uv"):
             array = getattr(self, name)
             setattr(self, name, np.concatenate([array, array[like]]))
@@ -119,27 +119,26 @@ class SkinPart(HeadPart):
     """A part whose control points move one by one; vertices follow by Eq. (2)."""
 
     def __init__(
-        self,
-        data: PartData,
-        head: HeadData,
-        mesh: Mesh,
-        surface: DCPSurface,
-        attributes: Mapping[str, Floats32],
+        self, data: PartData, head: HeadData, mesh: Mesh, surface: DCPSurface, attributes: Mapping[str, Floats32],
         drivers: Drivers | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         super().__init__(data, mesh, surface, attributes)
         self.rig, self._version = SkinRig(data, head, drivers), 0
         self.deformation = Deformation(surface, mesh)
         self.vertices[:], self.normals[:] = self.deformation.vertices, self.deformation.normals
         self._share[:] = head.neck.share(self.vertices.astype(np.float64))
 
-    def _express(self, pose: Pose) -> tuple[list[tuple[int, int]], Floats32, Floats32]:
-        points = self.rig.apply(pose)
-        if self._version == self.rig.version:
-            return [], self.deformation.vertices, self.deformation.normals
-        self._version = self.rig.version
-        self.deformation.set_points(points)
-        return self.deformation.changed, self.deformation.vertices, self.deformation.normals
+    def pose(self, pose: Pose, turn: Turn) -> None:
+        points, ranges = self.rig.apply(pose), []
+        if self._version != self.rig.version:
+            self._version = self.rig.version
+            self.deformation.set_points(points)
+            ranges = self.deformation.changed
+        if not np.array_equal(turn.matrix, self._turn.matrix):
+            ranges = [(0, len(self.deformation.vertices))]
+        self._turn, self.changed = turn, ranges
+        for rows in ranges:
+            turn.rotate(self.deformation, self._share, rows, self.vertices, self.normals)
 
     @property
     def control_points(self) -> Floats:
@@ -152,8 +151,8 @@ class SkinPart(HeadPart):
 class RigidPart(HeadPart):
     """A part fixed to skull, jaw or eye.
 
-    A rational surface is carried along exactly by an affine map of its control points, so the map is applied
-    to the vertices themselves.
+    An affine map of the control points of a rational surface moves the surface by the same map, which is applied to the
+    vertices themselves.
     """
 
     def __init__(
@@ -162,24 +161,22 @@ class RigidPart(HeadPart):
         super().__init__(data, mesh, surface, attributes)
         self._head = head
         self._rest, self._rest_normals = self.vertices.copy(), self.normals.copy()
-        self._linear, self._shift = np.eye(3), np.zeros(3)
-        self._asked: tuple[object, ...] = ()
+        self._motion = np.eye(3), np.zeros(3)
+        self._last_key: tuple[object, ...] = ()
 
     def pose(self, pose: Pose, turn: Turn) -> None:
-        """Move to a pose; ``turn`` is the head's rotation, which a rigid part takes as a whole."""
-        asked = (*motion_asks(self.follows, self._head, pose), turn.matrix.tobytes())
+        key = (*motion_key(self.follows, self._head, pose), turn.matrix.tobytes())
         self._turn, self.changed = turn, []
-        if asked == self._asked:
+        if key == self._last_key:
             return
-        self._asked, self.changed = asked, [(0, len(self._rest))]
-        self._linear, self._shift = rigid_motion(self.follows, self._head, pose)
-        linear = (turn.matrix @ self._linear).astype(np.float32)
-        shift = (turn.matrix @ (self._shift - turn.pivot) + turn.pivot).astype(np.float32)
-        carry(self._rest, self._rest_normals, linear, shift, self.vertices, self.normals)
+        self._last_key, self.changed = key, [(0, len(self._rest))]
+        self._motion = rigid_motion(self.follows, self._head, pose)
+        move_rigid(self._rest, self._rest_normals, *turn.after(*self._motion), self.vertices, self.normals)
 
     @property
     def control_points(self) -> Floats:
-        return self.surface.points @ self._linear.T + self._shift
+        linear, shift = self._motion
+        return self.surface.points @ linear.T + shift
 
     def place_points(self, pose: Pose) -> Floats:
         linear, shift = rigid_motion(self.follows, self._head, pose)

@@ -1,28 +1,65 @@
-"""From a pose to control points: group displacements, the jaw's arc, lids on the eyeball."""
+"""Compute a part's control points for a pose: group displacements, the jaw's arc, lids on the eyeball, contacts."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from surface.base.arrays import Floats
-from surface.head.model.data import HeadData, Jaw, PartData
+from surface.base.arrays import Floats, Floats32, Ints
+from surface.head.model.data import Group, HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers
-from surface.head.posing.contact import LID_MM, ContactSolver, Follower, Lining
-from surface.head.posing.kernels import keep_on_eyeball, mix_rows, swing_jaw
-from surface.head.posing.moves import Moves
+from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
+from surface.head.posing.kernels import add_moves, keep_on_eyeball, mix_rows, swing_jaw
 
-LINING_GRID = (72, 36)  # places looked at all over what lines the lids, along u and v
-LINED = 1.4  # in radii: so near to an eye what lines its lids is kept out of it
+GAP = 16  # so many points that a group does not move may lie between two of one run
+CLEARANCE_GRID = (72, 36)  # samples all over what lines the lids, along u and v
+CLEARANCE_RADII = 1.4  # distance from an eye's centre, in its radii, within which what lines the lids is kept out of it
+UNDONE_MM = 20.0  # displacement by mouthClose that takes back the whole motion of the jaw
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
 
 
-class SkinRig:
-    """Control points of one deforming part.
+class Moves:
+    """Displacements of one part's groups; ``used (g,)`` are the indices into ``names`` of those that are among them."""
 
-    Apply functions write into buffers made here; nothing grows while a face runs. What a pose asks of the part is
-    worked out again only where it differs from the pose before.
+    def __init__(self, part: PartData, names: tuple[str, ...]) -> None:
+        place = {name: i for i, name in enumerate(names)}
+        groups = [g for g in part.groups if g.name in place]
+        self.used = np.array([place[g.name] for g in groups], np.int64)
+        self._n = len(part.points)
+        runs = [run for g, group in enumerate(groups) for run in _runs(g, group)]
+        self._group, self._first = (np.array([run[i] for run in runs], np.int64) for i in (0, 1))
+        self._start = np.cumsum([0, *(run[2].size for run in runs)])
+        self._rows = np.concatenate([np.zeros(0, np.float32), *(run[2].ravel() for run in runs)])
+
+    def add(self, amounts: Floats, points: Floats) -> None:
+        """Add the displacements by ``amounts (g,)`` of the groups to ``points (n, 3)``, contiguous."""
+        add_moves(amounts, self._group, self._first, self._start, self._rows, points.reshape(-1))
+
+    def at(self, ids: Ints) -> Floats32:
+        """(g, k, 3) displacements of the points ``ids (k,)``."""
+        dense = np.zeros((len(self.used), 3 * self._n), np.float32)
+        for group, first, start, stop in zip(self._group, self._first, self._start, self._start[1:], strict=False):
+            dense[group, first : first + stop - start] = self._rows[start:stop]
+        return dense.reshape(len(self.used), self._n, 3)[:, ids]
+
+
+def _runs(index: int, group: Group) -> list[tuple[int, int, Floats32]]:
+    """A group's displacements as runs of points: its index, the first coordinate of a run, and its rows (k, 3)."""
+    order = np.argsort(group.ids, kind="stable")
+    ids, moves = np.asarray(group.ids, np.int64)[order], np.asarray(group.moves, np.float32)[order]
+    cuts = np.flatnonzero(np.diff(ids) > GAP) + 1
+    found = []
+    for own, rows in zip(np.split(ids, cuts), np.split(moves, cuts), strict=True):
+        if len(own):
+            run = np.zeros((own[-1] - own[0] + 1, 3), np.float32)
+            np.add.at(run, own - own[0], rows)
+            found.append((index, 3 * int(own[0]), run))
+    return found
+
+
+class SkinRig:
+    """Control points of one deforming part; they are computed again only where a pose differs from the one before.
 
     Parameters
     ----------
@@ -32,69 +69,68 @@ class SkinRig:
 
     Attributes
     ----------
-    rest : (n, 3) float64, control points at rest; whoever changes them calls :meth:`wake`.
-    points : (n, 3) float64, control points of the last pose.
-    version : grows whenever ``points`` is worked out anew.
-    woken : grows with every :meth:`wake`.
+    rest : (n, 3) float64, control points at rest; whoever changes them calls :meth:`invalidate`.
+    points : (n, 3) float64, control points of the last pose; the same array for every pose.
+    version : grows whenever ``points`` is computed; invalidations : grows with every :meth:`invalidate`.
     """
 
     def __init__(self, part: PartData, head: HeadData, drivers: Drivers | None = None) -> None:
-        n = len(part.points)
         self.rest = np.ascontiguousarray(part.points, np.float64)
         self._drivers = drivers or Drivers(head.rules)
         self._moves = Moves(part, self._drivers.names)
         self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
         self._swings, self._whole = bool(self._open.any()), jaw_path(head.jaw, 1.0)
         self._undo = _undo_share(part)
-        self._feelers, self._followers = _contacts(part, head)
-        self._linings = _linings(part, head)
+        own = [c for c in head.contacts if c.part == part.name]
+        others = [c for c in head.contacts if c.part != part.name and part.name in c.followers]
+        surfaces = {p.name: make_surface(p) for p in head.parts if p.name in {c.part for c in (*own, *others)}}
+        self._solvers = [ContactSolver(c, surfaces[c.part], head) for c in own]
+        self._followers = [(c.name, Follower(c, part.points, surfaces[c.part], head)) for c in others]
+        self._clearances = _clearances(part, head)
         self._lids = Lids(part, head, self._moves)
         self._amounts = np.zeros(len(self._moves.used))
-        self._asked: tuple[object, ...] = ()
+        self._last_key: tuple[object, ...] = ()
         self._pushes: dict[str, Floats] = {}
-        self.points = np.zeros((n, 3))
-        self.version = self.woken = 0
+        self.points = np.zeros_like(self.rest)
+        self.version = self.invalidations = 0
 
     def apply(self, pose: Pose) -> Floats:
-        """Positions (n, 3) of all control points before the head turns.
-
-        The array is the rig's own and is overwritten each time. A part whose opening has contacts leaves what
-        they ask for in ``pose.pushes``.
-        """
+        """Positions (n, 3) of all control points before the head turns, overwritten by the next call; corrections at
+        the part's own contacts are put into ``pose.pushes``."""
         np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
-        asked = self._asks(pose)
-        if asked != self._asked:
-            self._asked = asked
-            self._express(pose)
+        key = self._pose_key(pose)
+        if key != self._last_key:
+            self._last_key = key
+            self._evaluate(pose)
             self.version += 1
         pose.pushes.update(self._pushes)
         return self.points
 
-    def wake(self) -> None:
-        """Work everything out anew at the next pose: the points at rest have been changed."""
-        self._asked = ()
-        self.woken += 1
+    def invalidate(self) -> None:
+        """Compute everything again at the next pose: the points at rest have been changed."""
+        self._last_key = ()
+        self.invalidations += 1
 
-    def meet(self, pose: Pose, points: Floats) -> None:
-        """Let the part's own openings close, and what goes with others' openings follow, in control points (n, 3) that
-        everything else has moved; what the openings ask for is left in ``pose.pushes``. The rig's own pose stays."""
-        for feeler in self._feelers:
-            axis = optical_axis(pose.gaze[max(feeler.contact.eye, 0)])
-            pose.pushes[feeler.contact.name] = feeler.apply(axis, points)
+    def apply_contacts(self, pose: Pose, points: Floats) -> None:
+        """Correct control points (n, 3), moved by everything else, at the part's own contacts and at those it follows;
+        corrections at its own are put into ``pose.pushes``."""
+        for solver in self._solvers:
+            axis = optical_axis(pose.gaze[max(solver.contact.eye, 0)])
+            pose.pushes[solver.contact.name] = solver.apply(axis, points)
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)
-        for eye, lining in self._linings:
-            lining.apply(optical_axis(pose.gaze[eye]), points)
+        for eye, clearance in self._clearances:
+            clearance.apply(optical_axis(pose.gaze[eye]), points)
 
-    def _asks(self, pose: Pose) -> tuple[object, ...]:
-        """All that the part's points depend on, to compare with the pose before."""
+    def _pose_key(self, pose: Pose) -> tuple[object, ...]:
+        """Everything in a pose that the part's points depend on."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
-        gaze = pose.gaze.tobytes() if self._feelers or self._linings else b""
+        gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
         return self._amounts.tobytes(), jaw, gaze, *pushes
 
-    def _express(self, pose: Pose) -> None:
+    def _evaluate(self, pose: Pose) -> None:
         """Groups, jaw, lids and contacts, one after the other."""
         np.copyto(self.points, self.rest)
         self._moves.add(self._amounts, self.points)
@@ -105,18 +141,13 @@ class SkinRig:
             swing_jaw(self.rest, self._open, turn, shift, full_turn * pose.jaw, full_shift * pose.jaw,
                       pose.jaw, undo, self.points)  # fmt: skip
         self._lids.apply(self._amounts, self.points)
-        self.meet(pose, self.points)
-        own = (feeler.contact.name for feeler in self._feelers)
-        self._pushes = {name: pose.pushes[name].copy() for name in own}  # others may use the feelers meanwhile
+        self.apply_contacts(pose, self.points)
+        own = (solver.contact.name for solver in self._solvers)
+        self._pushes = {name: pose.pushes[name].copy() for name in own}  # others may use the solvers meanwhile
 
 
 class Lids:
-    """Keeps the lids of one part at their distance from the eyeballs while they slide.
-
-    Parameters
-    ----------
-    part : its ``lids`` say which points and how closely; head : the eyes; moves : what its groups do.
-    """
+    """Keeps the lids of one part, its points with ``lids``, at their distance from the eyeballs while they slide."""
 
     def __init__(self, part: PartData, head: HeadData, moves: Moves) -> None:
         self._ids = np.flatnonzero(part.lids).astype(np.int64)
@@ -140,45 +171,32 @@ def optical_axis(gaze: Floats) -> Floats:
     return np.ascontiguousarray(rotation(*gaze)[:, 2])
 
 
-def _contacts(part: PartData, head: HeadData) -> tuple[list[ContactSolver], list[tuple[str, Follower]]]:
-    """What keeps the part's own openings from crossing, and what moves its points with other parts' openings."""
-    feelers, followers = [], []
-    for contact in head.contacts:
-        if contact.part == part.name:
-            feelers.append(ContactSolver(contact, part, make_surface(part), head))
-        elif part.name in contact.followers:
-            opening = next(p for p in head.parts if p.name == contact.part)
-            follower = Follower(contact, part.points, make_surface(opening), head)
-            followers.append((contact.name, follower))
-    return feelers, followers
-
-
-def _linings(part: PartData, head: HeadData) -> list[tuple[int, Lining]]:
-    """What keeps the part out of the eyeballs, if it is sewn to lids from behind."""
+def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballClearance]]:
+    """By eye, what keeps the part out of the eyeball; none unless it is sewn to lids from behind."""
     lids = [c for c in head.contacts if c.eye >= 0 and part.name in c.followers]
     if not any(s.part_b == part.name and s.part_a == c.part for s in head.seams for c in lids):
         return []
     domain, surface = domain_of(part), make_surface(part)
     u0, u1, v0, v1 = domain.rect
-    grid = np.stack(np.meshgrid(np.linspace(u0, u1, LINING_GRID[0]), np.linspace(v0, v1, LINING_GRID[1])), axis=-1)
-    places = grid.reshape(-1, 2)[domain.inside(grid.reshape(-1, 2))]
+    columns, rows = CLEARANCE_GRID
+    grid = np.stack(np.meshgrid(np.linspace(u0, u1, columns), np.linspace(v0, v1, rows)), axis=-1).reshape(-1, 2)
+    places = grid[domain.inside(grid)]
     at, out = surface.evaluate(places), []
     for eye in (c.eye for c in lids):
         local = at - head.eyes[eye]
-        near = (np.linalg.norm(local, axis=1) < LINED * head.eye_radius) & (local[:, 2] > 0.0)
+        near = (np.linalg.norm(local, axis=1) < CLEARANCE_RADII * head.eye_radius) & (local[:, 2] > 0.0)
         if near.any():
-            out.append((eye, Lining(surface, places[near], head.eyes[eye], head.eye_radius)))
+            out.append((eye, EyeballClearance(surface, places[near], head.eyes[eye], head.eye_radius)))
     return out
 
 
 def _undo_share(part: PartData) -> Floats:
-    """(n,) how much of the jaw's motion mouthClose takes back at each point, 0..1."""
+    """(n,) share of the jaw's motion that mouthClose takes back at each point, 0..1."""
     close = np.zeros_like(part.points)
     for g in part.groups:
         if g.name == "mouthClose":
             close[g.ids] = g.moves
-    share: Floats = np.clip(np.linalg.norm(close, axis=1) / 20.0, 0.0, 1.0)
-    return share
+    return np.clip(np.linalg.norm(close, axis=1) / UNDONE_MM, 0.0, 1.0)  # type: ignore[no-any-return]
 
 
 def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
@@ -191,8 +209,8 @@ def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
     return turn, centre - turn @ centre + amount * np.array(jaw.glide)
 
 
-def motion_asks(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
-    """All that the motion of a part fixed to skull, jaw or an eye depends on, before the head turns."""
+def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
+    """Everything in a pose that :func:`rigid_motion` depends on."""
     if follows == "jaw":
         return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))
     if follows in ("left_eye", "right_eye"):

@@ -1,6 +1,6 @@
 """Fewer triangles for pictures in a hurry: a software renderer spends more on small triangles than on pixels.
 
-Done once when a head is made and kept in its file; see :mod:`surface.head.posing.decimation`.
+Done once when a head is made and kept in its file; see :mod:`surface.head.posing.baked`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from surface.head import Head, load_data
-from surface.head.posing.decimation import write_decimated
+from surface.head.posing.baked import write_decimated
 from surface.head.posing.part import HeadPart
 from surface.mesh.collapse import Collapse
 from surface.view.draw.materials import attribute, of, strip_uv

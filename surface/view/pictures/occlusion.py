@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.head import Head, load_data
-from surface.head.posing.shade import shade_path, write_shade
+from surface.head.posing.baked import shade_path, write_shade
 from surface.view.draw.programs import build, put
 from surface.view.pictures.offscreen import open_context
 from surface.view.scene.parts import ViewHead, ViewPart

@@ -1,11 +1,17 @@
 """From a mesh file to a head folder."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from slit_sheet import slit_sheet, write_npz
 
 from surface.base.errors import FitError
 from surface.fit import fit_head
+from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
+from surface.fit.points.recipe import PartRecipe, Recipe
+from surface.fit.points.refine import FitRequest
+from surface.fit.source.mesh import FitMesh
 from surface.head import Head
 
 
@@ -72,3 +78,76 @@ def test_nothing_is_written_for_a_bad_mesh(tmp_path):
     with pytest.raises(FitError):
         fit_head(path, tmp_path / "head", name="bad")
     assert not (tmp_path / "head").exists()
+
+
+def sphere(centre: np.ndarray, radius: float) -> np.ndarray:
+    a, b = (x.ravel() for x in np.meshgrid(np.linspace(0.1, 1.4, 6), np.linspace(0, 2 * np.pi, 9)))
+    return centre + radius * np.column_stack([np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)])
+
+
+def part(name: str, vertices: list[tuple[int, int]], **other) -> PartRecipe:
+    return PartRecipe(name, "skin", "skin", vertices, FitRequest(200, coarse=0.2), (0, 0.5, 4), **other)
+
+
+def test_a_head_nothing_is_known_of_gets_a_neck_in_its_lower_quarter(fitted):
+    folder, report, _ = fitted
+    data = Head.load(folder).data
+    z = slit_sheet().vertices[:, 2]
+    assert data.neck.pivot == pytest.approx((0.0, -40.0, 0.5 * (z.min() + z.max())))
+    assert (data.neck.slope, data.neck.still, data.neck.whole) == pytest.approx((0.0, -96.0, -60.0))
+    assert data.eye_radius == 0.0 and not data.eyes.any() and list(data.provenance) == ["made"]
+    assert report.scale == pytest.approx(200.0 / 338.0)
+    assert "eyeBlinkLeft" in report.missing and "jawOpen" not in report.missing
+
+
+def test_a_mesh_is_kept_for_the_face_so_that_it_starts_at_once(fitted):
+    assert all(p.stored for p in Head.load(fitted[0]).parts)
+
+
+def test_a_recipe_names_its_eyes_neck_and_source():
+    mesh = slit_sheet()
+    ball = sphere(np.array([30.0, 20.0, 60.0]), 15.0)
+    vertices = np.vstack([mesh.vertices, ball])
+    mesh, n = replace(mesh, vertices=vertices, deltas=np.zeros((2, len(vertices), 3))), len(vertices)
+    recipe = Recipe([], ball=(n - len(ball), n), ball_inset=0.5, eye_shift=(1.0, -2.0, 3.0), eye_radius=12.0)
+    eyes, radius = eyes_of(mesh, recipe)
+    np.testing.assert_allclose(eyes, [[31.0, 18.0, 63.0], [-31.0, 18.0, 63.0]], atol=1e-6)
+    assert radius == 12.0
+    old, new = recipe.eyeballs(mesh)
+    assert old.radius == pytest.approx(14.5) and new.radius == 12.0
+    assert eyes_of(mesh, Recipe([]))[1] == 0.0 and Recipe([]).eyeballs(mesh) is None
+
+
+def test_preparing_without_a_recipe_changes_nothing_and_with_one_strengthens_blinks_and_closes_lips():
+    mesh = replace(slit_sheet(), names=("mouthClose", "eyeBlink_L"))
+    same = prepare(mesh, Recipe([]))
+    np.testing.assert_array_equal(same.vertices, mesh.vertices)
+    np.testing.assert_array_equal(same.deltas, mesh.deltas)
+    made = prepare(mesh, Recipe([], lips_close=0.25, blink=1.5))
+    np.testing.assert_allclose(made.vertices, mesh.vertices + 0.25 * mesh.deltas[0])
+    np.testing.assert_allclose(made.deltas, [0.75 * mesh.deltas[0], 1.5 * mesh.deltas[1]])
+
+
+def whole_sheet() -> FitMesh:
+    """A sheet of 4 x 4 quads without a hole, over the unit square."""
+    s = np.linspace(0, 1, 5)
+    uv = np.stack(np.meshgrid(s, s, indexing="ij"), axis=-1).reshape(-1, 2)
+    at = np.arange(25).reshape(5, 5)
+    faces = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return FitMesh(np.column_stack([100 * uv, 0 * uv[:, 0]]), faces, uv, faces.copy(), (), np.zeros((0, 25, 3)))
+
+
+def test_parts_of_a_recipe_get_their_islands_and_those_without_are_left_out():
+    mesh = whole_sheet()
+    recipe = Recipe([part("face", [(0, 5), (12, 13)]), part("none", [(13, 99)])], jaw_teeth=(3, 7), hinge=[0, 6, 12])
+    plan = recipe_plan(mesh, recipe)
+    assert [(p.name, p.tiled, len(islands)) for p, islands in plan.parts] == [("face", False, 1)]
+    assert plan.jaw.tolist() == [3, 4, 5, 6] and plan.hinge.tolist() == [0, 6, 12] and plan.eyes[1] == 0.0
+    for uv in (mesh.uv * 0.6, mesh.uv + 0.1, mesh.uv - 0.1, mesh.uv * [1.0, 0.6]):  # not the whole unit square
+        assert recipe_plan(replace(mesh, uv=uv), recipe).parts[0][0].tiled
+    assert not recipe_plan(replace(mesh, uv=0.8 * mesh.uv + 0.1), recipe).parts[0][0].tiled
+    half = replace(mesh, uv=0.8 * mesh.uv)
+    kept, islands = recipe_plan(half, recipe).parts[0]
+    tiled, _ = recipe_plan(replace(mesh, uv=0.6 * mesh.uv), recipe).parts[0]
+    assert part_chart(half, kept, islands).uv.max() == pytest.approx(0.8)
+    assert part_chart(half, tiled, islands).uv.max() == pytest.approx(1.0)

@@ -4,14 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from slit_sheet import slit_sheet, write_npz
 from small_head import small_head
 
 from surface.base.errors import FitError
-from surface.fit.identities import Wanted, add_identities, measure, mixes, read_wanted, symmetric
+from surface.fit.api import part_chart, recipe_plan
+from surface.fit.features.pieces import HeadRig, skin_part
+from surface.fit.identities import (
+    Wanted,
+    add_identities,
+    fit_identities,
+    measure,
+    mixes,
+    read_modes,
+    read_wanted,
+    symmetric,
+)
+from surface.fit.points.recipe import PartRecipe, Recipe
+from surface.fit.points.refine import FitRequest, fit_chart
+from surface.fit.points.solve import basis
 from surface.head import Head
-from surface.head.model.data import HeadData
+from surface.head.model.data import HeadData, Jaw
 from surface.head.model.file import load_data, save_data
-from surface.head.model.identity import load_identities, with_identities
+from surface.head.model.identity import fingerprint, load_identities, with_identities
 
 MEASURES = {"width": {"axis": "x", "to": [0], "from": [1]}, "height": {"axis": "y", "to": [2], "from": [0, 1]}}
 
@@ -53,8 +68,6 @@ def test_the_table_asks_only_for_measures_it_has():
 
 
 def test_another_mesh_or_modes_are_refused(tmp_path):
-    from slit_sheet import slit_sheet, write_npz
-
     save_data(tmp_path / "head", small_head())
     mesh = write_npz(tmp_path / "m.npz", slit_sheet())
     with pytest.raises(FitError, match="no variations are known for this mesh"):
@@ -108,3 +121,58 @@ def lid_gap(head: Head, side: int) -> float:
     opening = eye_opening(head, side, 0.2)[0]
     head.pose(head.values({}))
     return opening
+
+
+def test_control_points_follow_the_mesh_and_so_does_the_hinge():
+    mesh = slit_sheet()
+    part = PartRecipe("face", "skin", "skin", [(0, 9999)], FitRequest(300, coarse=0.2), (0, 0.5, 4))
+    recipe = Recipe([part])
+    ((own, islands),) = recipe_plan(mesh, recipe).parts
+    chart = part_chart(mesh, own, islands)
+    fit = fit_chart(mesh, chart, part.request)
+    rig = HeadRig({"jawOpen": [0]}, Jaw((0.0, 6.0, 12.0), 0.2, (0.0, 0.0, 0.0)), np.zeros((2, 3)), 0.0)
+    face = skin_part(own, chart, fit, rig)
+    hair = replace(face, name="hair", points=face.points[::9] + np.array([0, 0, 1.0]))
+    head = small_head(parts=[face, hair], seams=[], paint=[])
+    x = mesh.vertices[:, :1]
+    forward = np.tile([0.0, 1.0, 5.0], (len(mesh.vertices), 1))
+    fields = {"forward": forward, "wide": 0.1 * x * [1.0, 0.0, 0.0]}
+    made = {i.name: i for i in fit_identities(head, mesh, recipe, fields, "head")}
+    assert list(made) == ["forward", "wide"] and made["wide"].fit == fingerprint(head)
+    b = basis(fit.net, chart.uv)
+    for name, field in fields.items():
+        moves = np.zeros((len(face.points), 3))
+        moves[made[name].groups["face"].ids] = made[name].groups["face"].moves
+        np.testing.assert_allclose(b @ moves, chart.mix @ field, atol=0.1)
+    near = np.zeros((len(hair.points), 3))
+    near[made["forward"].groups["hair"].ids] = made["forward"].groups["hair"].moves
+    np.testing.assert_allclose(near, np.tile([0.0, 1.0, 5.0], (len(near), 1)), atol=2e-3)
+    np.testing.assert_allclose(made["forward"].jaw, [0.0, 1.0, 5.0], atol=0.05)
+    assert made["wide"].jaw[0] == 0.0 and not made["wide"].eyes.any()
+    with pytest.raises(FitError, match="head: part 'face' was not fitted to this mesh"):
+        fit_identities(head, replace(mesh, vertices=mesh.vertices + np.array([0, 0, 0.6])), recipe, fields, "head")
+    fit_identities(
+        head, replace(mesh, vertices=mesh.vertices + np.array([0, 0, 0.2])), recipe, {"forward": forward}, "head"
+    )
+
+
+def test_modes_come_in_the_unit_of_the_mesh(tmp_path):
+    mesh = slit_sheet()
+    file = write_npz(tmp_path / "m.npz", replace(mesh, vertices=mesh.vertices / 10))
+    deltas = np.random.default_rng(1).normal(size=(3, len(mesh.vertices), 3))
+    np.savez(tmp_path / "modes.npz", deltas=deltas)
+    np.testing.assert_allclose(read_modes(tmp_path / "modes.npz", mesh, file), 10 * deltas)
+    broken = np.where(np.arange(3)[:, None, None] == 1, np.nan, deltas)
+    cases = (
+        (deltas[:, 1:], r"expected \(k, 625, 3\)"),
+        (deltas[0], "deltas has shape"),
+        (broken, r"deltas\[1\] holds"),
+    )
+    for wrong, message in cases:
+        np.savez(tmp_path / "modes.npz", deltas=wrong)
+        with pytest.raises(FitError, match=message):
+            read_modes(tmp_path / "modes.npz", mesh, file)
+    np.savez(tmp_path / "modes.npz", other=deltas)
+    with pytest.raises(FitError, match=r"cannot be read as \.npz with deltas") as caught:
+        read_modes(tmp_path / "modes.npz", mesh, file)
+    assert caught.value.hint == "give the identity modes of this mesh"

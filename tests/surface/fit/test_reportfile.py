@@ -1,6 +1,7 @@
 """The report of a fit: figures, tables, pictures, and the uniform net beside it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,8 +22,8 @@ from surface.fit.source.names import map_names
 def result():
     mesh = slit_sheet()
     pit = 1200 * np.maximum(0.0, 1 - np.linalg.norm(mesh.uv - [0.3, 0.3], axis=1) / 0.08)
-    mesh = mesh.moved(mesh.vertices - pit[:, None] * [0, 0, 1.0], mesh.deltas)
-    mesh = mesh.with_shapes((*mesh.names, "odd"), np.concatenate([mesh.deltas, mesh.deltas[:1]]))
+    mesh = replace(mesh, vertices=mesh.vertices - pit[:, None] * [0, 0, 1.0])
+    mesh = replace(mesh, names=(*mesh.names, "odd"), deltas=np.concatenate([mesh.deltas, mesh.deltas[:1]]))
     return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken for mm",)), "sheet", lambda part, done: None)
 
 

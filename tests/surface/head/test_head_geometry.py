@@ -172,14 +172,14 @@ def mixture(rng: np.random.Generator) -> np.ndarray:
 
 
 def test_every_vertex_on_a_seam_is_sewn(head):
-    for seam, zipper in zip(head.data.seams, head.zippers, strict=True):
-        part, line = zipper.second, seam.uv_b
-        if part is zipper.first:  # behind the lips
+    for seam, stitch in zip(head.data.seams, head.zippers, strict=True):
+        part, line = stitch.second, seam.uv_b
+        if part is stitch.first:  # behind the lips
             continue
         ids = np.unique(border_edges(part.mesh.triangles))
         steps = np.linspace(line[:-1], line[1:], 24).reshape(-1, 2)
         on = ids[cKDTree(steps).query(part.mesh.uv[ids])[0] < 1e-3]
-        assert len(on) > 3 and set(on.tolist()) <= set(zipper.ids.tolist()), (seam.part_a, seam.part_b)
+        assert len(on) > 3 and set(on.tolist()) <= set(stitch.ids.tolist()), (seam.part_a, seam.part_b)
 
 
 def test_no_seam_opens_in_random_mixtures(head):

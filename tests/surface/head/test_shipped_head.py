@@ -8,9 +8,7 @@ import pytest
 
 from surface.head import Head
 from surface.head.model.sidecar import read_sidecar
-from surface.head.posing.decimation import LEVELS
-from surface.head.posing.order import checksums
-from surface.head.posing.shade import read_shade
+from surface.head.posing.baked import LEVELS, checksums, read_shade
 from surface.view.draw import materials
 
 

@@ -1,13 +1,24 @@
 """What is put on top of a fitted head."""
 
 import numpy as np
+import pytest
+from face_measures import lips_gap
 from slit_sheet import slit_sheet
-from small_head import small_head
+from small_head import all_points, part, small_head
 
-from surface.fit.features.finish import finish_head
+from surface.fit.features.finish import (
+    COLUMNS,
+    FADE_ROWS,
+    ROWS,
+    add_correctives,
+    find_contacts,
+    finish_head,
+    sample_places,
+)
 from surface.fit.points.recipe import Recipe
 from surface.head import Head
 from surface.head.model.file import load_data
+from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import SHAPES
 
 
@@ -21,11 +32,85 @@ def test_the_shipped_head_stands_at_rest_where_its_contacts_put_it(root):
     before = {p.name: p.vertices.copy() for p in head.parts}
     head.pose(head.values({"jawOpen": 1.0, "eyeBlinkLeft": 1.0}))
     head.pose(head.values({}))
-    for part in head.parts:
-        assert np.abs(part.vertices - before[part.name]).max() < 0.3, part.name
+    for p in head.parts:
+        assert np.abs(p.vertices - before[p.name]).max() < 0.3, p.name
 
 
 def test_the_shipped_head_has_a_rule_for_every_group_that_is_no_parameter(root):
     data = load_data(root / "configs" / "heads" / "ict")
     extra = {g.name for p in data.parts for g in p.groups if g.name not in SHAPES}
     assert extra == {r.group for r in data.rules}
+
+
+LEFT, UP = (4.0, 0.0, 0.0), (0.0, 6.0, 0.0)
+
+
+@pytest.fixture
+def mended():
+    groups = [all_points("mouthLeft", LEFT), all_points("mouthShrugLower", UP)]
+    head = small_head(parts=[part("a", -40, groups=groups), part("b", 0.5)], seams=[])
+    return add_correctives(head, [{"shapes": ["mouthLeft", "mouthShrugLower"], "subtract": {"mouthShrugLower": 0.4}}])
+
+
+@pytest.mark.parametrize(("one", "other"), [(0, 0), (1, 0), (0, 1), (1, 1), (0.5, 0.5), (0.25, 1)])
+def test_a_share_is_taken_back_by_the_product(mended, one, other):
+    head = Head(mended)
+    rest = head.part("a").control_points.copy()
+    head.pose(head.values({"mouthLeft": one, "mouthShrugLower": other}))
+    wanted = np.array(LEFT) * one + np.array(UP) * (other - 0.4 * one * other)
+    np.testing.assert_allclose(head.part("a").control_points - rest, np.tile(wanted, (25, 1)), atol=1e-5)
+
+
+def test_parts_that_neither_shape_moves_get_no_group(mended):
+    assert [g.name for g in mended.parts[0].groups][-1] == "mouthLeft*mouthShrugLower"
+    assert mended.parts[1].groups == []
+    assert [(r.group, r.power) for r in mended.rules] == [("mouthLeft*mouthShrugLower", 1.0)]
+
+
+def test_rolled_lips_stay_together(root):
+    head = Head.load(root / "configs" / "heads" / "ict")
+    head.pose(head.values({"mouthRollLower": 1.0, "mouthRollUpper": 1.0}))
+    assert lips_gap(head) < 0.45
+
+
+@pytest.fixture(scope="module")
+def data(root):
+    return load_data(root / "configs" / "heads" / "ict")
+
+
+@pytest.fixture(scope="module")
+def contacts(data):
+    return find_contacts(data.parts[0], data.eyes, data.eye_radius, tuple(p.name for p in data.parts))
+
+
+def test_every_opening_is_found_with_what_lines_it(contacts):
+    assert {c.name: (c.eye, c.followers) for c in contacts} == {
+        "lips": (-1, ("cavity",)), "left_lids": (0, ("lashes", "sockets")), "right_lids": (1, ("lashes", "sockets")),
+    }  # fmt: skip
+
+
+def test_a_head_without_eyes_has_lips_only_at_its_slits(data):
+    names = [c.eye for c in find_contacts(data.parts[0], np.zeros((2, 3)), 0.0, ("face",))]
+    assert set(names) == {-1}
+
+
+def test_samples_begin_at_the_rim_and_go_along_the_skin(data, contacts):
+    surface = make_surface(data.parts[0])
+    for contact in contacts:
+        assert contact.places.shape == (2, COLUMNS, ROWS + FADE_ROWS, 2)
+        at = surface.evaluate(contact.places.reshape(-1, 2)).reshape(*contact.places.shape[:3], 3)
+        assert np.isfinite(at).all()
+        assert (np.diff(at[..., 0].mean(axis=2), axis=1) > 0).all()  # columns side by side, from right to left
+        length = np.linalg.norm(np.diff(at, axis=2), axis=3).sum(axis=2)
+        middle = length[:, COLUMNS // 4 : -COLUMNS // 4]
+        wanted = (15.0 if contact.eye < 0 else 0.58 * data.eye_radius) + contact.reach_mm
+        np.testing.assert_allclose(middle, wanted, rtol=0.35)
+        upper, lower = at[0, COLUMNS // 2], at[1, COLUMNS // 2]
+        assert upper[-1, 1] > upper[0, 1] and lower[-1, 1] < lower[0, 1]
+
+
+def test_columns_keep_their_place_across_the_opening(data):
+    surface, loop = make_surface(data.parts[0]), data.parts[0].loops[1]
+    places = sample_places(surface, loop, 6.0, 4.0)
+    x = surface.evaluate(places.reshape(-1, 2)).reshape(*places.shape[:3], 3)[..., 0]
+    assert np.abs(x - x[..., :1])[:, 3:-3].max() < 1.5

@@ -77,7 +77,7 @@ def test_a_row_of_small_pieces_is_teeth():
 def test_one_skin_for_face_and_back_gets_points_by_its_area():
     mesh = slit_sheet()
     around = {n: np.array([0, 0, 1.0]) * (np.abs(mesh.vertices[:, :1] - x) < 12) for n, x in EYES.items()}
-    mesh = mesh.with_shapes(tuple(around), np.stack(list(around.values())))
+    mesh = replace(mesh, names=tuple(around), deltas=np.stack(list(around.values())))
     (small, _), (large, _) = (make_plan(replace(mesh, vertices=mesh.vertices * [1, k, 1])).parts[0] for k in (1, 6))
     assert (small.request.points, large.request.points) == (POINTS, pytest.approx(1.85 * POINTS, rel=0.05))
 
@@ -97,10 +97,10 @@ def test_the_chin_tells_the_hinge():
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
     below = mesh.vertices[:, 1] < 0
     swing = np.where(below[:, None], (mesh.vertices - hinge) @ turn.T + hinge - mesh.vertices, 0.0)
-    plan = make_plan(mesh.with_shapes(("jawOpen",), swing[None]))
+    plan = make_plan(replace(mesh, names=("jawOpen",), deltas=swing[None]))
     np.testing.assert_allclose(plan.hinge, hinge, atol=1e-6)
     assert len(plan.jaw) >= 12 and below[plan.jaw].all()
-    assert len(make_plan(mesh.with_shapes((), mesh.deltas[:0])).jaw) == 0
+    assert len(make_plan(replace(mesh, names=(), deltas=mesh.deltas[:0])).jaw) == 0
 
 
 def test_texture_coordinates_without_area_are_refused():

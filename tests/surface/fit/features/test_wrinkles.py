@@ -8,7 +8,7 @@ from slit_sheet import slit_sheet
 from small_head import part
 
 from surface import DCPSurface
-from surface.fit.features.wrinkles import DEEPENED, add_wrinkles, deepened
+from surface.fit.features.wrinkles import DEEPENED, add_wrinkles, with_deep_wrinkles
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
 from surface.head.model.data import Group
@@ -114,7 +114,7 @@ def test_raised_lines_come_out():
 def test_deepened_points_are_for_cutting_triangles_only(wrinkled):
     part, _ = wrinkled
     fold = group(part, "wrinkleTestLeft")
-    out = deepened(part, part.points)
+    out = with_deep_wrinkles(part, part.points)
     np.testing.assert_allclose(out[fold.ids] - part.points[fold.ids], DEEPENED * fold.moves, atol=1e-9)
     assert out is not part.points
 

@@ -76,3 +76,23 @@ def test_how_large_a_head_is():
 def test_wrong_words_are_refused(options, message):
     with pytest.raises(FitError, match=message):
         find_frame(face()[0], {}, **options)
+
+
+def test_without_eyes_the_height_tells_the_size():
+    vertices, shapes = face()
+    height = np.ptp(vertices[:, 1])
+    assert head_scale(vertices, {}) == pytest.approx(height / 338.0)
+    blinks = {n: s for n, s in shapes.items() if "Blink" in n}
+    one_still = {"eyeBlinkLeft": blinks["eyeBlinkLeft"], "eyeBlinkRight": 0 * blinks["eyeBlinkRight"]}
+    assert eye_distance(vertices, one_still) == 0.0
+    assert head_scale(vertices, one_still) == pytest.approx(height / 338.0)
+    assert find_frame(vertices, one_still).scale == 1.0
+
+
+@pytest.mark.parametrize("unit", [0.001, 0.1, 1.0])
+def test_a_height_near_a_heads_tells_the_unit_and_is_noted(unit):
+    vertices, _ = face()
+    frame = find_frame(unit * vertices, {})
+    assert frame.scale == pytest.approx(1 / unit)
+    (note,) = frame.notes
+    assert note.endswith("all of it is 200 mm high (say --unit otherwise)") and note.startswith("unit taken for ")

@@ -7,7 +7,16 @@ from slit_sheet import slit_sheet, write_npz
 from surface.base.errors import FitError
 from surface.fit.source.frame import find_frame
 from surface.fit.source.load import load_mesh
-from surface.fit.source.mesh import triangles
+from surface.fit.source.mesh import (
+    FitMesh,
+    check_manifold,
+    components,
+    directed_edges,
+    face_areas,
+    intersect,
+    renumbered,
+    triangles,
+)
 
 
 def refused(tmp_path, **other) -> FitError:
@@ -83,3 +92,53 @@ def test_an_index_out_of_range_is_refused(tmp_path):
 def test_quads_are_cut_in_two_and_triangles_kept():
     faces = np.array([[0, 1, 2, 3], [4, 5, 6, -1]])
     assert {tuple(t) for t in triangles(faces).tolist()} == {(0, 1, 2), (0, 2, 3), (4, 5, 6)}
+
+
+def flat(faces: list[list[int]], points: int = 9, **other) -> FitMesh:
+    rows = np.array(faces)
+    vertices = np.random.default_rng(0).random((points, 3))
+    return FitMesh(vertices, rows, np.zeros((1, 2)), 0 * rows, (), np.zeros((0, points, 3)), **other)
+
+
+def test_a_sheet_is_a_manifold_and_a_fan_of_three_faces_is_not():
+    check_manifold(slit_sheet(), "m")
+    check_manifold(flat([[0, 1, 2, -1], [2, 1, 3, -1], [3, 1, 4, 5]]), "m")
+    with pytest.raises(FitError, match=r"m: not a manifold: the edge between vertices 1 and 2 belongs to 3 faces") as e:
+        check_manifold(flat([[0, 1, 2, -1], [2, 1, 3, -1], [5, 6, 7, 8], [2, 1, 4, -1]]), "m")
+    assert e.value.hint == "delete inner and doubled faces"
+
+
+def test_neighbours_that_run_opposite_ways_are_named_with_their_object():
+    twice = flat([[5, 6, 7, 8], [0, 1, 2, -1], [1, 2, 3, -1]], piece=np.array([0, 1, 1]), pieces=("hat", "face"))
+    with pytest.raises(FitError, match=r"edge between vertices 1 and 2 of 'face' is run through twice") as e:
+        check_manifold(twice, "m")
+    assert e.value.hint == "make all faces look outwards"
+
+
+def test_faces_are_renumbered_over_the_vertices_they_use():
+    used, faces = renumbered(np.array([[7, 3, 9, -1], [9, 3, 5, 4]]))
+    assert used.tolist() == [3, 4, 5, 7, 9] and faces.tolist() == [[3, 0, 4, -1], [4, 0, 2, 1]]
+    used, faces = renumbered(np.array([[9, 3, 5, 4]]))
+    assert used.tolist() == [3, 4, 5, 9] and faces.tolist() == [[3, 0, 2, 1]]
+
+
+def test_areas_edges_and_components_of_faces():
+    points = np.array([[0.0, 0, 0], [2, 0, 0], [2, 3, 0], [0, 3, 0], [0, 0, 4]])
+    faces = np.array([[0, 1, 2, 3], [0, 1, 4, -1]])
+    np.testing.assert_allclose(face_areas(points, faces), [6.0, 4.0])
+    a, b = directed_edges(faces)
+    edges = list(zip(a.tolist(), b.tolist(), strict=True))
+    assert edges == [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1), (1, 4), (4, 0)]
+    label = components(np.array([0, 3]), np.array([1, 4]), 6)
+    assert label[0] == label[1] != label[3] == label[4] and len(set(label.tolist())) == 4
+
+
+def test_rays_meet_triangles_where_they_should():
+    tri = np.array([[[0.0, 0, 5], [4, 0, 5], [0, 4, 5]], [[0.0, 0, 9], [4, 0, 9], [0, 4, 9]]])
+    rays = np.array([[0.0, 0, 1], [0, 0, -1], [0.6, 0, 0.8]])
+    distance, a, b = intersect(tri, np.array([1.0, 2.0, 0.0]), rays)
+    np.testing.assert_allclose(distance[0], [5.0, 9.0])
+    np.testing.assert_allclose((a[0], b[0]), [[0.25, 0.25], [0.5, 0.5]])
+    assert np.isnan(distance[1:]).all()  # behind, and beside
+    each, _, _ = intersect(tri, np.array([[1.0, 2, 0], [1, 2, 7], [0.2, 1, 8]]), rays)
+    np.testing.assert_allclose(each, [[5.0, 9.0], [2.0, np.nan], [np.nan, 1.25]])

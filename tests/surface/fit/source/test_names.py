@@ -1,5 +1,7 @@
 """Shape names of other heads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from slit_sheet import slit_sheet
@@ -56,7 +58,7 @@ def test_exact_names_win_over_others_and_sides_over_both():
 def test_a_shape_for_both_sides_is_cut_down_the_middle():
     mesh = slit_sheet()
     field = np.ones_like(mesh.deltas[:1])
-    mesh = mesh.with_shapes(("eyeBlink",), field)
+    mesh = replace(mesh, names=("eyeBlink",), deltas=field)
     found = map_names(mesh.names)
     assert found.sources["eyeBlinkLeft"] == [Source(0, "Left")]
     made = to_arkit(mesh, found)
@@ -67,7 +69,7 @@ def test_a_shape_for_both_sides_is_cut_down_the_middle():
 
 
 def test_halves_add_up():
-    mesh = slit_sheet().with_shapes(("cheekPuff_L", "cheekPuff_R"), slit_sheet().deltas)
+    mesh = replace(slit_sheet(), names=("cheekPuff_L", "cheekPuff_R"))
     np.testing.assert_allclose(to_arkit(mesh, map_names(mesh.names)).deltas[0], slit_sheet().deltas.sum(axis=0))
 
 

@@ -66,3 +66,21 @@ def test_its_two_long_sides_are_one_line_without_a_crease(wrapped):
     (seam,) = find_seams({"tongue": chart})
     assert seam.part_a == seam.part_b == "tongue"
     assert sorted({seam.uv_a[0, 1], seam.uv_b[0, 1]}) == [0.0, 1.0]
+
+
+def test_samples_are_as_far_apart_as_the_rays_and_those_at_the_tip_count_more(wrapped):
+    _, chart, _ = wrapped
+    u, v = (np.unique(x.round(9)) for x in chart.uv.T)
+    np.testing.assert_allclose(chart.spacing, np.tile([u[1] - u[0], v[1] - v[0]], (len(chart.uv), 1)))
+    assert (v.min(), v.max(), len(v), len(u)) == (-0.125, 1.125, 41, 38)
+    tip = chart.uv[:, 0] == 1.0
+    assert (chart.weight[tip & ~chart.folded] == 8.0).all() and (chart.weight[~tip & ~chart.folded] == 1.0).all()
+
+
+def test_rays_that_meet_nothing_take_their_nearest_neighbour_and_are_not_counted():
+    mesh, islands = body()
+    holed = [Island(i.vertex, i.uv, i.faces[:-40] if k else i.faces) for k, i in enumerate(islands)]
+    chart = wrap_chart(mesh, holed)
+    assert 0 < chart.folded.sum() < 0.2 * len(chart.uv)
+    assert (chart.weight[chart.folded & (chart.uv[:, 0] < 1.0)] == 0.05).all()
+    np.testing.assert_allclose(chart.mix.sum(axis=1), 1.0)

@@ -51,3 +51,33 @@ def test_a_mesh_that_does_not_fit_is_made_anew(key, value):
 
 def test_an_absent_mesh_is_made_anew():
     assert unpack({}, SURFACE, BUDGET, rough=False) is None
+
+
+def changed(key: str, at: int, value: int) -> dict[str, np.ndarray]:
+    arrays = {k: a.copy() for k, a in pack(MESH, BUDGET).items()}
+    arrays[key].reshape(-1)[at] = value
+    return arrays
+
+
+@pytest.mark.parametrize(
+    ("key", "at", "bad", "good"),
+    [
+        ("mesh_triangles", 0, len(MESH.uv), len(MESH.uv) - 1), ("mesh_triangles", 0, -1, 0),
+        ("mesh_list_ids", 0, SURFACE.n, SURFACE.n - 1), ("mesh_list_ids", 0, -1, 0),
+        ("mesh_cell_start", 0, 1, 0), ("mesh_cell_start", -1, len(MESH.uv) - 1, len(MESH.uv)),
+        ("mesh_list_start", 0, 1, 0), ("mesh_list_start", -1, len(MESH.list_ids) - 1, len(MESH.list_ids)),
+        ("mesh_cell_start", 1, 0, MESH.cell_start[1]), ("mesh_list_start", 1, 0, MESH.list_start[1]),
+    ],
+)  # fmt: skip
+def test_indices_are_checked_up_to_the_last_that_is_there(key, at, bad, good):
+    assert unpack(changed(key, at, bad), SURFACE, BUDGET, rough=True) is None
+    assert unpack(changed(key, at, good), SURFACE, BUDGET, rough=True) is not None
+
+
+def test_normals_of_a_flipped_mesh_are_turned():
+    arrays = pack(MESH, BUDGET)
+    arrays["mesh_made"] = arrays["mesh_made"].copy()
+    arrays["mesh_made"][4] = not MESH.flip
+    got = unpack(arrays, SURFACE, BUDGET, rough=False)
+    assert got is not None and got.flip != MESH.flip and got.leaves == MESH.leaves
+    np.testing.assert_allclose(got.normals, -MESH.normals, atol=1e-5)

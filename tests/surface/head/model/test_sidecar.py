@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from surface.base.errors import HeadFileError
-from surface.head.model.sidecar import FORMAT, VERSION, beside, read_sidecar, write_sidecar
+from surface.head.model.sidecar import FORMAT, VERSION, read_sidecar, sidecar_path, write_sidecar
 
 
 def test_arrays_come_back_and_nothing_else_is_left(tmp_path: Path) -> None:
-    path = beside(tmp_path / "head.toml", "more.npz")
-    assert path == beside(tmp_path, "more.npz") == tmp_path / "more.npz"
+    path = sidecar_path(tmp_path / "head.toml", "more.npz")
+    assert path == sidecar_path(tmp_path, "more.npz") == tmp_path / "more.npz"
     assert read_sidecar(path, lambda kept: kept, "") is None
     write_sidecar(path, {"a/b": np.arange(3), "c": np.ones((2, 2))})
     found = read_sidecar(path, lambda kept: kept, "")
@@ -63,3 +63,11 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, full_disk: Callable[[in
     with pytest.raises(HeadFileError, match=r"more\.npz: cannot be written \(.*File too large"):
         write_sidecar(path, {"a": np.random.default_rng(1).random(9999)})
     assert [entry.name for entry in tmp_path.iterdir()] == ["more.npz"] and path.stat().st_size < 2000
+
+
+def test_the_version_and_checksums_are_kept_apart_from_the_arrays(tmp_path: Path) -> None:
+    path = write_sidecar(tmp_path / "more.npz", {"a": np.arange(3)}, {"p": 7})
+    with np.load(path) as stored:
+        assert {k: stored[k].tolist() for k in stored.files} == {
+            "a": [0, 1, 2], "omote/format": [1], "omote/checksum/p": [7],
+        }  # fmt: skip

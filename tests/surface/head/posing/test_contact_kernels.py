@@ -5,8 +5,15 @@ import pytest
 from face_measures import eye_height
 
 from surface.fit.points.eyeball import surface_height
-from surface.head.posing.contact import LID_MM, TOUCH_MM, Cushion
-from surface.head.posing.contact_kernels import find_heights, find_lifts, lift_points, place_samples
+from surface.head.posing.contact import LID_MM, TOUCH_MM, HeightLimits
+from surface.head.posing.contact_kernels import (
+    find_heights,
+    find_lifts,
+    find_overlap,
+    lift_points,
+    move_points,
+    place_samples,
+)
 from surface.head.posing.rig import optical_axis
 
 RADIUS = 12.1
@@ -69,7 +76,7 @@ def test_what_lay_on_the_ball_follows_the_cornea_and_what_stood_off_does_not():
     way = np.array([[0.0, 0.1, 1.0], [0.0, 0.1, 1.0], [0.0, 0.1, 1.0]]) / np.hypot(0.1, 1.0)
     ground = RADIUS * eye_height(way, ahead)
     rest = samples_at(way * (ground + np.array([0.3, LID_MM, 4.0]))[:, None])
-    cushion = Cushion(rest, RADIUS, held=True)
+    cushion = HeightLimits(rest, RADIUS, held=True)
     assert cushion.find(rest, ahead) == pytest.approx(0.0, abs=1e-9)
     fall = ground[0] - RADIUS * eye_height(way, aside)[0]
     assert fall > 0.9  # the cornea turned away
@@ -80,7 +87,93 @@ def test_what_lay_on_the_ball_follows_the_cornea_and_what_stood_off_does_not():
 def test_a_lining_only_keeps_out():
     way = np.array([[0.0, 0.3, 1.0]]) / np.hypot(0.3, 1.0)
     ground = RADIUS * eye_height(way, optical_axis(np.zeros(2)))
-    cushion = Cushion(samples_at(way * (ground + 0.5)[:, None]), RADIUS, held=False)
+    cushion = HeightLimits(samples_at(way * (ground + 0.5)[:, None]), RADIUS, held=False)
     for height, wanted in ((2.0, 0.0), (0.1, 0.0), (-0.4, 0.4 + TOUCH_MM)):
         off = cushion.find(samples_at(way * (ground + height)[:, None]), optical_axis(np.zeros(2)))
         assert off == pytest.approx(wanted, abs=5e-3)
+
+
+PRESS, SOFT = 0.3, 0.1
+DEPTHS = np.array([0.0, 2.0, 4.0, 6.0, 8.0])
+
+
+def opening(overlap: float, columns: int = 4, slant: float = 0.0, shift: float = 0.0) -> np.ndarray:
+    """(2, columns, 5, 3): profiles that are nearest at depth 0, the lower one higher by ``overlap`` there; the lower
+    rim rises by ``slant`` a column, and its columns lie ``shift`` columns beside the upper ones."""
+    out = np.zeros((2, columns, 5, 3))
+    for k in range(columns):
+        out[0, k] = np.column_stack([np.full(5, float(k)), 0.5 * DEPTHS, DEPTHS])
+        height = overlap + slant * (k + shift) - 0.5 * DEPTHS
+        out[1, k] = np.column_stack([np.full(5, k + shift), height, DEPTHS])
+    return out
+
+
+@pytest.mark.parametrize(
+    ("overlap", "wanted"),
+    [(-2.0, 0.0), (0.0, 0.0), (PRESS - SOFT, 0.0), (PRESS - SOFT / 2, SOFT / 16), (PRESS, SOFT / 4),
+     (PRESS + SOFT, SOFT), (PRESS + 1.0, 1.0)],
+)  # fmt: skip
+def test_sides_give_way_to_overlap_beyond_what_is_allowed(overlap, wanted):
+    push = np.full((2, 4), 9.0)
+    find_overlap(opening(overlap), PRESS, SOFT, push)
+    np.testing.assert_allclose(push, wanted, atol=1e-9)
+
+
+def test_sides_at_different_depths_do_not_overlap():
+    samples, push = opening(1.0), np.full((2, 4), 9.0)
+    samples[1, :, :, 2] += 9.0
+    find_overlap(samples, PRESS, SOFT, push)
+    assert not push.any()
+
+
+def test_overlap_is_found_between_the_samples_of_a_profile():
+    samples, push = opening(-9.0), np.zeros((2, 4))
+    samples[1, :, :, 2] = [1.0, 1.0, 1.0, 1.0, 3.0]  # a lip that reaches up at depth 1 and 3, between samples
+    samples[1, :, :, 1] = [-9.0, -9.0, -9.0, 2.0, 2.5]
+    find_overlap(samples, PRESS, SOFT, push)
+    np.testing.assert_allclose(push, 1.5 - PRESS, atol=1e-9)  # the upper is at 0.5 at depth 1, at 1.5 at depth 3
+
+
+def test_sides_are_compared_at_the_same_x():
+    push = np.zeros((2, 4))
+    find_overlap(opening(1.0, slant=0.5, shift=0.25), PRESS, SOFT, push)
+    np.testing.assert_allclose(push[0, 1:], 1.0 + 0.5 * np.arange(1, 4) - PRESS, atol=1e-9)
+    np.testing.assert_allclose(push[0, 0], 1.125 - PRESS)  # nothing further left: the first column counts
+    np.testing.assert_allclose(push[1], 1.0 + 0.5 * (np.arange(4) + 0.25) - PRESS, atol=1e-9)
+
+
+def test_points_move_up_straight_or_round_the_eyeball_or_away_from_it():
+    rng = np.random.default_rng(5)
+    table, amounts, ids = rng.random((3, 2)), np.array([0.5, 0.0, -1.5]), np.array([3, 1])
+    rest, eye = rng.normal(size=(5, 3)) + np.array([0.0, 0.0, 12.0]), np.array([0.5, -0.5, 1.0])
+    moves = amounts @ table
+    straight, around, outward = rest.copy(), rest.copy(), rest.copy()
+    move_points(ids, amounts, table, eye, 0.0, False, straight)
+    np.testing.assert_allclose(straight[ids] - rest[ids], np.column_stack([0 * moves, moves, 0 * moves]))
+    move_points(ids, amounts, table, eye, RADIUS, False, around)
+    local, was = around[ids] - eye, rest[ids] - eye
+    np.testing.assert_allclose(np.linalg.norm(local, axis=1), np.linalg.norm(was, axis=1))
+    angle = np.arctan2(local[:, 1], local[:, 2]) - np.arctan2(was[:, 1], was[:, 2])
+    np.testing.assert_allclose(angle, moves / RADIUS)
+    move_points(ids, amounts, table, eye, RADIUS, True, outward)
+    np.testing.assert_allclose(np.linalg.norm(outward[ids] - eye, axis=1), np.linalg.norm(was, axis=1) + moves)
+    for points in (straight, around, outward):
+        np.testing.assert_array_equal(points[[0, 2, 4]], rest[[0, 2, 4]])
+    move_points(ids, 0.0 * amounts, table, eye, RADIUS, True, around := rest.copy())
+    np.testing.assert_array_equal(around, rest)
+
+
+@pytest.mark.parametrize("radius", [0.0, RADIUS])
+def test_samples_are_sums_of_points_by_tiles_of_eight(radius):
+    rng = np.random.default_rng(6)
+    points, eye = rng.normal(size=(4, 3)) + np.array([0.0, 3.0, 12.0]), np.array([1.0, 2.0, 3.0])
+    start, ids = np.array([0, 2, 3]), np.array([1, 3, 0])
+    share = rng.random((3, 8)).astype(np.float32)
+    out = np.empty((11, 3))
+    place_samples(start, ids, share.ravel(), points, eye, radius, np.empty(24, np.float32), out)
+    local = points - eye
+    sums = np.concatenate([share[:2].T @ local[[1, 3]], np.outer(share[2], local[0])])[:11]
+    if radius:
+        x, y, z = sums.T
+        sums = np.column_stack([x, radius * np.arctan2(y, z), np.linalg.norm(sums, axis=1)])
+    np.testing.assert_allclose(out, sums, rtol=1e-4, atol=1e-4)

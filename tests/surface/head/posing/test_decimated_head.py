@@ -77,11 +77,11 @@ def test_points_at_rest_that_are_changed_are_seen(head: Head, decimated: Decimat
     decimated.pose(values)
     try:
         rig.rest[:, 1] += 2.0
-        rig.wake()
+        rig.invalidate()
         head.pose(values)
         decimated.pose(values)
         assert_alike(decimated)
     finally:
         rig.rest[:] = before
-        rig.wake()
+        rig.invalidate()
         head.pose(head.values({}))

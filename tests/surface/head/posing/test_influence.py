@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_head import small_head
@@ -42,10 +44,37 @@ def test_weights_of_a_position_add_up_and_of_a_derivative_cancel() -> None:
 def test_a_vertex_of_a_seam_takes_the_share_of_those_it_lies_between() -> None:
     head = Head(small_head())
     sums = Influence(head)
-    zipper = head.zippers[0]
-    own = sums.share[sums.part_start[1] + zipper.ids]
+    stitch = head.zippers[0]
+    own = sums.share[sums.part_start[1] + stitch.ids]
     first = sums.share[: sums.part_start[1]]
-    low, high = first[zipper.low], first[zipper.high]
+    low, high = first[stitch.low], first[stitch.high]
     assert len(own) > 5
     assert (own >= np.minimum(low, high) - 1e-6).all()
     assert (own <= np.maximum(low, high) + 1e-6).all()
+
+
+def test_sums_of_every_vertex_run_over_the_points_of_its_part() -> None:
+    head = Head(small_head())
+    sums = Influence(head)
+    assert sums.points == 25 + 25 + 4
+    assert sums.part_start.tolist() == np.cumsum([0, *(len(p.vertices) for p in head.parts)]).tolist()
+    assert len(sums.start) == sums.part_start[-1] + 1 and sums.start[-1] == len(sums.ids) == len(sums.weights)
+    seam = set((sums.part_start[1] + head.zippers[0].ids).tolist())
+    for part, (low, high) in enumerate([(0, 25), (25, 50), (50, 54)]):
+        for vertex in range(sums.part_start[part], sums.part_start[part + 1]):
+            ids = sums.ids[sums.start[vertex] : sums.start[vertex + 1]]
+            assert len(ids) and (vertex in seam or (low <= ids.min() and ids.max() < high))
+            if vertex not in seam:
+                assert len(np.unique(ids)) == len(ids)
+                assert np.abs(sums.weights[sums.start[vertex] : sums.start[vertex + 1]]).max(axis=1).min() > 0.0
+    tooth = sums.start[sums.part_start[2] : -1]
+    assert (sums.weights[tooth + 3] == [1.0, 0.0, 0.0]).all()
+
+
+def test_normals_of_a_flipped_mesh_point_the_other_way() -> None:
+    data = small_head(seams=[])
+    flipped = replace(data.parts[0], points=data.parts[0].points * [-1.0, 1.0, 1.0])
+    for part in (data.parts[0], flipped):
+        head = Head(replace(data, parts=[part], paint=[]))
+        _, normals = summed(head, Influence(head), head.values({}))
+        assert (normals * head.parts[0].normals).sum(axis=1).min() > 0.999

@@ -14,12 +14,6 @@ def head() -> Head:
     return Head(small_head(seams=[], neck=Neck((0.0, -50.0, 0.0), 0.0, -18.0, 10.0)))
 
 
-def test_the_neck_bends_between_chin_and_shoulders():
-    chin, nape, chest = [0, -80, 95.0], [0, -50, -75.0], [0, -190.0, 30]
-    share = Neck((0.0, -55.0, 0.0)).share(np.array([chin, nape, chest]))
-    assert share[0] == 1 and share[1] > 0.95 and share[2] == 0
-
-
 def test_what_is_above_turns_whole_and_what_is_below_stays(head):
     p = head.part("a")
     rest, normals = p.vertices.copy(), p.normals.copy()
@@ -57,3 +51,38 @@ def test_a_turned_head_still_changes_little_by_little(head):
 def test_borders_are_edges_of_one_triangle():
     triangles = np.array([[0, 1, 2], [2, 1, 3]], np.int32)
     assert {tuple(e) for e in border_edges(triangles).tolist()} == {(0, 1), (2, 0), (1, 3), (3, 2)}
+
+
+def test_what_changed_is_reported_in_whole_and_once(head):
+    tooth, sheet = head.part("tooth"), head.part("a")
+    head.pose(head.values({"jawOpen": 0.5}))
+    assert tooth.changed == [(0, len(tooth.vertices))] and sheet.changed == []
+    head.pose(head.values({"jawOpen": 0.5}))
+    assert tooth.changed == [] and sheet.changed == []
+    head.pose(head.values({"jawOpen": 0.5, "headRoll": 0.2}))
+    assert tooth.changed == [(0, len(tooth.vertices))] and sheet.changed == [(0, len(sheet.vertices))]
+    np.testing.assert_allclose(tooth.turn, rotation(0.0, 0.0, 0.2 * HEAD_RAD[2]))
+    head.pose(head.values({"jawForward": 1.0}))
+    head.pose(head.values({"jawForward": 0.5}))
+    assert tooth.changed
+
+
+def test_control_points_are_those_of_the_pose(head):
+    tooth, sheet = head.part("tooth"), head.part("a")
+    head.pose(head.values({"jawForward": 0.5, "headYaw": 0.4}))
+    np.testing.assert_allclose(tooth.control_points - tooth.surface.points, np.tile([0.0, 0.0, 4.0], (25, 1)))
+    np.testing.assert_array_equal(sheet.control_points, sheet.surface.points)
+    head.pose(head.values({"mouthPucker": 1.0}))
+    moved = np.linalg.norm(sheet.control_points - sheet.surface.points, axis=1)
+    assert np.flatnonzero(moved).tolist() == [11, 12, 13] and moved[12] == pytest.approx(6.0)
+
+
+def test_added_vertices_are_copies_behind_the_parts_own(head):
+    part = head.part("a")
+    count, triangles = len(part.vertices), len(part.triangles)
+    part.append(np.array([3, 1]), np.array([[0, 1, count]]))
+    for name in ("vertices", "normals", "uv"):
+        array = getattr(part, name)
+        np.testing.assert_array_equal(array[count:], array[[3, 1]])
+    assert {k: len(a) for k, a in part.attributes.items()} == {"albedo": count + 2}
+    assert len(part.triangles) == triangles + 1 and part.triangles[-1].tolist() == [0, 1, count]

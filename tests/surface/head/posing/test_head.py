@@ -210,13 +210,13 @@ def test_gaze_turns_the_eyeballs_only_about_their_centres(head):
 def test_seams_do_not_gape(head):
     for values in ({}, {"jawOpen": 1}, {"mouthSmileLeft": 1, "cheekPuff": 1}, {"headYaw": 1, "headPitch": -1}):
         head.pose(head.values(values))
-        for zipper in head._zippers:
-            if not len(zipper.ids):
+        for stitch in head._stitches:
+            if not len(stitch.ids):
                 continue
-            a, b = zipper.first.vertices, zipper.second.vertices
-            want = a[zipper.low] + zipper.share[:, None] * (a[zipper.high] - a[zipper.low])
-            if zipper.first is not zipper.second:
-                assert np.abs(b[zipper.ids] - want).max() < 1e-3
+            a, b = stitch.first.vertices, stitch.second.vertices
+            want = a[stitch.low] + stitch.share[:, None] * (a[stitch.high] - a[stitch.low])
+            if stitch.first is not stitch.second:
+                assert np.abs(b[stitch.ids] - want).max() < 1e-3
 
 
 def test_only_what_moves_is_reported(head):

@@ -1,0 +1,67 @@
+"""surface.fit.points.report: errors outside folds, and bounds that grow with the head."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from surface.fit.points.net import Net
+from surface.fit.points.refine import Fitted
+from surface.fit.points.report import P99_MM, RMS_MM, SHAPES_MM, Errors, FitReport, PartReport, face_bounds, measure
+from surface.fit.source.chart import Chart
+
+
+def fitted(error: np.ndarray, shapes: np.ndarray) -> Fitted:
+    net = Net(np.zeros((7, 4), np.int64), np.zeros((7, 5)), np.zeros((7, 5)))
+    return Fitted(net, np.zeros((7, 3)), np.zeros((len(shapes), 7, 3)), error, shapes)
+
+
+def chart(folded: np.ndarray) -> Chart:
+    n = len(folded)
+    return Chart(np.zeros((n, 2)), None, np.ones(n), np.ones((n, 2)), folded, [], [])
+
+
+def test_errors_are_measured_outside_folds():
+    error = np.array([3.0, 4.0, 100.0, 0.0])
+    shapes = np.array([[1.0, 1.0, 50.0, 1.0], [0.0, 0.0, 50.0, 6.0]])
+    report = measure("face", chart(np.array([False, False, True, False])), fitted(error, shapes), ("a", "b"))
+    assert (report.name, report.points, report.samples, report.folded) == ("face", 7, 3, 1)
+    assert report.neutral == Errors(pytest.approx(np.sqrt(25 / 3)), pytest.approx(3.98), 4.0)
+    assert report.shapes["a"] == Errors(1.0, 1.0, 1.0)
+    assert report.shapes["b"] == Errors(pytest.approx(np.sqrt(12.0)), pytest.approx(5.88), 6.0)
+    assert report.mean_shape_rms == pytest.approx((1.0 + np.sqrt(12.0)) / 2)
+
+
+def test_a_part_without_samples_or_shapes_has_no_errors():
+    report = measure("tooth", chart(np.array([True])), fitted(np.array([5.0]), np.zeros((0, 1))), ())
+    assert report.neutral == Errors(0.0, 0.0, 0.0) and report.shapes == {} and report.mean_shape_rms == 0.0
+
+
+def face(rms: float, p99: float, shape: float | None) -> FitReport:
+    shapes = {} if shape is None else {"jawOpen": Errors(shape, 1.0, 1.0)}
+    part = PartReport("face", 5, 1, 0, Errors(rms, p99, 1.0), shapes)
+    return FitReport("h", [part, replace(part, points=8, neutral=Errors(9.0, 9.0, 9.0))], [])
+
+
+def test_the_bounds_of_a_face():
+    assert (RMS_MM, P99_MM, SHAPES_MM) == (0.25, 0.8, 0.08)
+
+
+def test_the_points_of_all_parts_are_counted():
+    assert face(0, 0, 0).points == 13
+
+
+@pytest.mark.parametrize(
+    ("report", "verdict"),
+    [
+        (face(RMS_MM, P99_MM, SHAPES_MM), "within"), (face(RMS_MM + 1e-9, P99_MM, SHAPES_MM), "beyond"),
+        (face(RMS_MM, P99_MM + 1e-9, SHAPES_MM), "beyond"), (face(RMS_MM, P99_MM, SHAPES_MM + 1e-9), "beyond"),
+        (face(RMS_MM, P99_MM, None), "within"), (replace(face(0.5, 1.6, 0.16), scale=2.0), "within"),
+        (replace(face(0.2, 0.7, 0.07), scale=0.5), "beyond"),
+    ],
+)  # fmt: skip
+def test_the_face_is_held_to_bounds_that_grow_with_the_head(report, verdict):
+    text = face_bounds(report)
+    assert text.startswith(f"face: {verdict} the bounds for its size ({report.scale:.2f}): RMS ")
+    assert ("shapes" in text) == bool(report.parts[0].shapes)
+    assert f"{report.parts[0].neutral.p99:.3f} of {0.8 * report.scale:.3f} mm" in text

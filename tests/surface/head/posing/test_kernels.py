@@ -1,0 +1,116 @@
+"""surface.head.posing.kernels, against the same arithmetic in numpy or scipy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from surface.head.posing.kernels import (
+    add_moves,
+    keep_on_eyeball,
+    mix_rows,
+    move_rigid,
+    nearest_on_line,
+    stitch_border,
+    swing_jaw,
+    turn_head,
+)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(4)
+
+
+def test_runs_of_moves_are_added_by_the_amounts_of_their_groups(rng: np.random.Generator) -> None:
+    moves = rng.normal(size=9).astype(np.float32)
+    points = rng.normal(size=12)
+    want = points.copy()
+    want[3:6] += 0.5 * moves[:3]
+    want[0:6] += -2.0 * moves[3:9]
+    group, first, start = np.array([2, 0, 1]), np.array([3, 0, 5]), np.array([0, 3, 9, 9])
+    add_moves(np.array([-2.0, 0.0, 0.5]), group, first, start, moves, points)
+    np.testing.assert_allclose(points, want, atol=1e-12)
+
+
+def test_rows_are_mixed_and_kept_above_the_least(rng: np.random.Generator) -> None:
+    rows, rest, out = rng.normal(size=(3, 6)), rng.normal(size=6), np.full(6, 9.0)
+    amounts = np.array([1.0, 0.0, -0.5])
+    least = np.array([-9.0, -9.0, -9.0, 5.0, -9.0, 5.0])
+    mix_rows(amounts, rows, rest, least, out)
+    np.testing.assert_allclose(out, np.maximum(rest + amounts @ rows, least))
+    assert out[3] == out[5] == 5.0
+
+
+def test_a_rigid_motion_shifts_points_and_only_turns_normals(rng: np.random.Generator) -> None:
+    rest, normals = (rng.normal(size=(7, 3)).astype(np.float32) for _ in range(2))
+    linear, shift = rng.normal(size=(3, 3)).astype(np.float32), np.array([1.0, -2.0, 3.0], np.float32)
+    out, out_normals = np.zeros_like(rest), np.zeros_like(rest)
+    move_rigid(rest, normals, linear, shift, out, out_normals)
+    np.testing.assert_allclose(out, rest @ linear.T + shift, atol=1e-5)
+    np.testing.assert_allclose(out_normals, normals @ linear.T, atol=1e-5)
+
+
+def test_points_swing_by_their_share_and_take_the_straight_way_where_undone(rng: np.random.Generator) -> None:
+    rest, points = rng.normal(size=(4, 3)), rng.normal(size=(4, 3))
+    turn, shift = rng.normal(size=(3, 3)), rng.normal(size=3)
+    full_turn, full_shift, amount = rng.normal(size=(3, 3)), rng.normal(size=3), 0.4
+    share, undo = np.array([1.0, 0.5, 0.0, 1.0]), np.array([0.0, 0.25, 1.0, 1.0])
+    arc = rest @ turn.T + shift - rest
+    line = rest @ full_turn.T + full_shift - amount * rest
+    want = points + share[:, None] * (arc + undo[:, None] * (line - arc))
+    swing_jaw(rest, share, turn, shift, full_turn, full_shift, amount, undo, points)
+    np.testing.assert_allclose(points, want, atol=1e-12)
+
+
+def test_lids_go_to_their_distance_from_the_eye_by_their_hold(rng: np.random.Generator) -> None:
+    points = rng.normal(size=(5, 3)) + 10.0
+    eye, before = np.array([[1.0, 2.0, 3.0]] * 3), points.copy()
+    points[4] = before[4] = eye[2]  # in the very middle: it has no direction to go to
+    ids, hold, radius = np.array([0, 3, 4]), np.array([1.0, 0.5, 1.0]), np.array([12.0, 20.0, 5.0])
+    keep_on_eyeball(ids, eye, hold, radius, points)
+    length = np.linalg.norm(before[ids] - eye, axis=1)
+    after = np.linalg.norm(points[ids] - eye, axis=1)
+    assert after[0] == pytest.approx(12.0) and after[1] == pytest.approx(0.5 * (length[1] + 20.0))
+    way = (before[ids[:2]] - eye[:2]) / length[:2, None]
+    np.testing.assert_allclose((points[ids[:2]] - eye[:2]) / after[:2, None], way, atol=1e-12)
+    np.testing.assert_array_equal(points[[1, 2, 4]], before[[1, 2, 4]])
+
+
+def test_vertices_turn_by_their_share_of_the_angle_about_the_pivot(rng: np.random.Generator) -> None:
+    vertices, normals = (rng.normal(size=(6, 3)).astype(np.float32) for _ in range(2))
+    share = np.array([0.0, 0.3, 1.0, 0.7, 1.0, 0.5], np.float32)
+    vector, pivot = np.array([0.3, -0.7, 0.2]), np.array([1.0, 2.0, -3.0])
+    out, out_normals = np.full((6, 3), 9.0, np.float32), np.full((6, 3), 9.0, np.float32)
+    matrix = Rotation.from_rotvec(vector).as_matrix()
+    turn_head(vertices, normals, share, matrix, vector, pivot, 1, 6, out, out_normals)
+    turns = Rotation.from_rotvec(share[:, None] * vector)
+    np.testing.assert_allclose(out[1:], (turns.apply(vertices - pivot) + pivot)[1:], atol=1e-5)
+    np.testing.assert_allclose(out_normals[1:], turns.apply(normals)[1:], atol=1e-5)
+    assert (out[0] == 9.0).all() and (out_normals[0] == 9.0).all()
+
+
+def test_the_nearest_place_of_a_polyline_open_and_closed() -> None:
+    line = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]])
+    uv = np.array([[1.0, 2.0], [5.0, -1.0], [4.5, 3.0], [-3.0, -4.0], [1.0, 1.0]])
+    distance, at = np.empty(5), np.empty(5)
+    nearest_on_line(uv, line, False, distance, at)
+    np.testing.assert_allclose(distance, [2.0, np.sqrt(2.0), 0.5, 5.0, 1.0])
+    np.testing.assert_allclose(at, [0.25, 1.0, 1.75, 0.0, 0.25])
+    nearest_on_line(uv, line, True, distance, at)  # back from (4, 4) to (0, 0)
+    np.testing.assert_allclose(distance, [np.sqrt(0.5), np.sqrt(2.0), 0.5, 5.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(at[[0, 4]], [2.625, 2.75])
+    nearest_on_line(uv[:1], line[:1], False, distance[:1], at[:1])
+    assert distance[0] == pytest.approx(np.sqrt(5.0)) and at[0] == 0.0
+
+
+def test_a_border_is_put_between_vertices_with_unit_normals() -> None:
+    vertices = np.array([[0, 0, 0], [4, 0, 8], [1, 1, 1]], np.float32)
+    normals = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0]], np.float32)
+    to, to_normals = np.full((3, 3), 7.0, np.float32), np.full((3, 3), 7.0, np.float32)
+    ids, low, high = np.array([0, 2]), np.array([0, 0]), np.array([1, 2])
+    stitch_border(vertices, normals, to, to_normals, ids, low, high, np.array([0.25, 0.5], np.float32))
+    np.testing.assert_allclose(to, [[1, 0, 2], [7, 7, 7], [0.5, 0.5, 0.5]])
+    np.testing.assert_allclose(to_normals[0], np.array([3.0, 1.0, 0.0]) / np.sqrt(10.0), atol=1e-6)
+    np.testing.assert_array_equal(to_normals[2], 0.0)  # opposite ones cancel
