@@ -1,4 +1,4 @@
-"""Trim curves in space brought back to (u, v)."""
+"""Inversion of trim curves: the (u, v) on a surface of points in space near it, by Gauss-Newton steps."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 
-STARTS = 24  # samples along u and v, in every quarter, that the search may begin at
-ROUNDS = 40
-MOST = 1024  # points along one edge
+STARTS = 24  # samples along u and v, in every quarter, where the search may begin
+ITERATIONS = 40
+MOST_POINTS = 1024  # points along one edge
 
 
 def polyline(point: Callable[[float], Floats], start: float, end: float, error: float) -> Floats:
-    """(k, 3): points of a curve whose chords stray from it by less than ``error``, or :data:`MOST` points."""
+    """(k, 3): points of a curve whose chords deviate from it by less than ``error``, or :data:`MOST_POINTS` points."""
     count = 8
     while True:
         fine = np.array([point(t) for t in np.linspace(start, end, 2 * count + 1)])
-        stray = np.linalg.norm(fine[1::2] - (fine[:-2:2] + fine[2::2]) / 2, axis=1).max()
-        if stray < error or count >= MOST:
-            return fine[::2] if stray < error else fine
+        deviation = np.linalg.norm(fine[1::2] - (fine[:-2:2] + fine[2::2]) / 2, axis=1).max()
+        if deviation < error or count >= MOST_POINTS:
+            return fine[::2] if deviation < error else fine
         count *= 2
 
 
@@ -29,7 +29,7 @@ def invert(surface: DCPSurface, points: Floats) -> tuple[Floats, Floats]:
     """The nearest (u, v) of points near the surface.
 
     Gauss-Newton steps from the nearest of a grid of samples, in each quarter of the rectangle: where a surface
-    closes, the nearest sample may stand at the wrong end.
+    closes, the nearest sample may lie at the wrong end.
 
     Parameters
     ----------
@@ -44,19 +44,19 @@ def invert(surface: DCPSurface, points: Floats) -> tuple[Floats, Floats]:
     for a, b in ((u0, (u0 + u1) / 2), ((u0 + u1) / 2, u1)):
         for c, d in ((v0, (v0 + v1) / 2), ((v0 + v1) / 2, v1)):
             grid = np.stack(np.meshgrid(np.linspace(a, b, STARTS), np.linspace(c, d, STARTS)), axis=-1).reshape(-1, 2)
-            there = surface.evaluate(grid)
-            starts = np.array([grid[np.nanargmin(((there - xyz) ** 2).sum(axis=1))] for xyz in points])
-            found.append(_descend(surface, points, starts))
-    best = np.argmin([distance for _, distance in found], axis=0)
-    rows = np.arange(len(points))
-    return np.array([uv for uv, _ in found])[best, rows], np.array([distance for _, distance in found])[best, rows]
+            samples = surface.evaluate(grid)
+            starts = np.array([grid[np.nanargmin(((samples - xyz) ** 2).sum(axis=1))] for xyz in points])
+            found.append(_gauss_newton(surface, points, starts))
+    uv, distance = (np.array(each) for each in zip(*found, strict=True))
+    best = np.argmin(distance, axis=0), np.arange(len(points))
+    return uv[best], distance[best]
 
 
-def _descend(surface: DCPSurface, points: Floats, uv: Floats) -> tuple[Floats, Floats]:
+def _gauss_newton(surface: DCPSurface, points: Floats, uv: Floats) -> tuple[Floats, Floats]:
     """Gauss-Newton steps that stay in the rectangle; (u, v) and distances."""
     u0, u1, v0, v1 = surface.rect
     low, high = np.array([u0, v0]), np.array([u1, v1])
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         s, su, sv = surface.derivatives(uv)
         r = points - s
         a, b, c = (su * su).sum(1), (su * sv).sum(1), (sv * sv).sum(1)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from surface import DCPSurface, SurfaceFileError
-from surface.readers.named import Place
+from surface.readers.common import Location
 from surface.readers.trims import invert, polyline
 from tests.surface import shapes
 
@@ -76,7 +76,9 @@ def face(monkeypatch: pytest.MonkeyPatch, centre: float) -> Any:
     loops = [[SimpleNamespace(EdgeIndex=i, IsReversed=back) for i, back in trims] for trims in (outer, [(3, False)])]
     made = [SimpleNamespace(TrimCount=len(trims), Trims=trims) for trims in loops]
     shape = SimpleNamespace(Loops=made, UnderlyingSurface=lambda: None)
-    return rhino._face(Place(Path("a.3dm"), "object 0, face 0"), SimpleNamespace(Edges=[low, high, seam, hole]), shape)
+    return rhino._face(
+        Location(Path("a.3dm"), "object 0, face 0"), SimpleNamespace(Edges=[low, high, seam, hole]), shape
+    )
 
 
 def test_a_hole_in_a_closed_face_is_a_hole(monkeypatch: pytest.MonkeyPatch) -> None:
