@@ -15,16 +15,16 @@ suffix content                                     module
 from __future__ import annotations
 
 import os
-from importlib import import_module
 from pathlib import Path
 
+from . import gismo, plain, rhino, tsm
 from .common import Location, NamedSurface, summary
 from .plain import is_plain, write_surfaces
 
 __all__ = ["SUFFIXES", "NamedSurface", "is_plain", "read_surface", "summary", "write_surfaces"]
 
-_MODULES = {".json": "plain", ".3dm": "rhino", ".xml": "gismo", ".tsm": "tsm"}
-SUFFIXES = tuple(_MODULES)
+_READERS = {".json": plain.read, ".3dm": rhino.read, ".xml": gismo.read, ".tsm": tsm.read}
+SUFFIXES = tuple(_READERS)
 
 
 def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
@@ -43,11 +43,10 @@ def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
     """
     file = Path(path)
     suffix = file.suffix.lower()
-    if suffix not in _MODULES:
+    if suffix not in _READERS:
         hint = f"use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         raise Location(file).error(f"no surface file: its name ends in {suffix or 'nothing'}", hint=hint)
-    reader = import_module(f"{__name__}.{_MODULES[suffix]}")  # loads only the reader that is needed
-    surfaces: list[NamedSurface] = reader.read(file)
+    surfaces = _READERS[suffix](file)
     if not surfaces:
         raise Location(file).error("holds no surface", hint="export at least one surface into it")
     return surfaces
