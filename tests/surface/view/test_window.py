@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from ball_head import BallHead, values
 
 from surface.base.errors import ViewError
 from surface.view import run_window
+from surface.view.draw.renderer import Renderer
 from surface.view.scene.viewpoint import Viewpoint
 from surface.view.window import WindowReport, _Window
 
@@ -137,20 +139,28 @@ def test_a_kiosk_covers_the_screen(root: Path, tmp_path: Path, display: str) -> 
     assert np.load(tmp_path / "shot.npy").shape[:2] == (480, 640)
 
 
+class Minimised:
+    """What imgui reports of a minimised window."""
+
+    def get_io(self) -> SimpleNamespace:
+        size = SimpleNamespace(x=0.0, y=0.0)
+        return SimpleNamespace(display_size=size, display_framebuffer_scale=size)
+
+
 def test_a_minimised_window_still_asks_and_rests(monkeypatch: pytest.MonkeyPatch) -> None:
-    window = _Window(BallHead(), lambda: values(), Viewpoint(), "fast", "skin", "auto")
-    closed: list[bool] = []
-    rested: list[float] = []
-    monkeypatch.setattr(window, "close", lambda: closed.append(True))
-    monkeypatch.setattr("surface.view.window._pixels", lambda: (0, 0))
-    monkeypatch.setattr("surface.view.window.time.sleep", rested.append)
+    window = _Window(Minimised(), lambda: values(), Viewpoint(), Renderer, "fast")
+    window.params = SimpleNamespace(app_shall_exit=False)
+    slept: list[float] = []
+    monkeypatch.setattr("surface.view.window.time.sleep", slept.append)
     answers = iter([True, True, False])
     window.keep_going = lambda: next(answers)
+    closed = []
     for _ in range(3):
-        window.ask()
-    assert len(rested) == 2
-    assert min(rested) >= 0.01
-    assert closed == [True]
+        window.check()
+        closed.append(window.params.app_shall_exit)
+    assert len(slept) == 2
+    assert min(slept) >= 0.01
+    assert closed == [False, False, True]
 
 
 def test_report_rate() -> None:

@@ -11,7 +11,7 @@ from small_head import small_head
 from surface.head import Head
 from surface.head.posing.part import border_edges
 from surface.view import Camera, Offscreen
-from surface.view.draw.decimate import decimated_triangles, gathered
+from surface.view.draw.decimate import decimated_triangles, grouped_in_patches
 
 SHAPES: tuple[dict[str, float], ...] = (
     {"jawOpen": 1.0, "mouthUpperUpLeft": 1.0},
@@ -61,13 +61,15 @@ def test_where_parts_meet_all_vertices_stay_and_other_borders_thin_out() -> None
         assert len(kept) < len(rim)
 
 
-def test_gathered_triangles_are_the_same_and_share_more_vertices_with_those_drawn_with_them(head: Head) -> None:
+def test_triangles_in_patches_are_the_same_and_share_more_vertices_with_those_drawn_with_them(
+    head: Head,
+) -> None:
     triangles = head.part("face").decimated["fast"]
     shuffled = np.random.default_rng(2).permutation(triangles)
-    made = gathered(shuffled)
+    made = grouped_in_patches(shuffled)
     assert np.array_equal(np.unique(made, axis=0), np.unique(triangles, axis=0))
     assert worked_out(made) < 1.4 * len(np.unique(triangles)) < 0.5 * worked_out(shuffled)
-    assert worked_out(triangles) <= 1.02 * worked_out(made), "the shipped ones are gathered"
+    assert worked_out(triangles) <= 1.02 * worked_out(made), "the shipped ones are grouped_in_patches"
 
 
 def worked_out(triangles: np.ndarray, at_once: int = 341) -> int:

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from ball_head import skin
 
-from surface.view.draw.materials import MATERIALS, attribute, detail_uv, of, order, strip_uv
+from surface.view.draw.materials import MATERIALS, attribute, detail_uv, of, strip_uv
 from surface.view.scene.openings import Openings
 from surface.view.scene.theme import THEMES
 
 
 def test_skin_is_drawn_before_what_it_hides() -> None:
-    assert order("skin") < order("eye") < order("teeth") < order("mouth")
+    assert of("skin").order < of("eye").order < of("teeth").order < of("mouth").order
 
 
 def test_an_unknown_material_draws_as_skin() -> None:

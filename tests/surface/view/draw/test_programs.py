@@ -9,7 +9,7 @@ import pytest
 
 from surface.base.errors import ViewError
 from surface.view.draw import materials
-from surface.view.draw.programs import assemble, build, put, source
+from surface.view.draw.programs import assemble, build, set_uniforms, source
 from surface.view.pictures.offscreen import open_context
 from surface.view.scene.theme import THEMES
 
@@ -46,7 +46,7 @@ def test_matrices_arrive_as_written_and_unknown_names_pass(gl: None) -> None:
     try:
         program = build(ctx, ("light.glsl", "hair.vert"), ("flat.frag",))
         matrix = np.arange(16.0).reshape(4, 4)
-        put(program, {"view_projection": matrix, "no_such_uniform": 1.0, "albedo": (1, 2, 3)})
+        set_uniforms(program, {"view_projection": matrix, "no_such_uniform": 1.0, "albedo": (1, 2, 3)})
         held = np.frombuffer(program["view_projection"].read(), np.float32).reshape(4, 4)
         assert pytest.approx(matrix) == held.T
         assert program["albedo"].value == (1, 2, 3)

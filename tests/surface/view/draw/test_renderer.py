@@ -12,9 +12,9 @@ from ball_head import RADII, BallHead, BallPart, ball, values
 from surface.base.errors import ViewError
 from surface.head import Head
 from surface.view import Camera, Offscreen, Theme
-from surface.view.draw.renderer import light_direction, theme_named
+from surface.view.draw.renderer import light_direction
 from surface.view.scene.bounds import Bands
-from surface.view.scene.theme import THEMES, Light
+from surface.view.scene.theme import THEMES, Light, find_theme
 
 SIZE = (200, 160)
 
@@ -134,9 +134,9 @@ def test_themes_differ(gl: None) -> None:
 
 def test_names_that_do_not_exist(gl: None) -> None:
     with pytest.raises(ViewError, match="'clown'") as caught:
-        theme_named("clown")
+        find_theme("clown")
     assert "skin" in caught.value.hint
-    assert theme_named(Theme(gloss=2.0)).gloss == 2.0
+    assert find_theme(Theme(gloss=2.0)).gloss == 2.0
     with pytest.raises(ValueError, match="'best'"):
         Offscreen(BallHead(), SIZE, quality="best")
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from surface.base.errors import ViewError
 from surface.view import Camera, contact_sheet, write_png
-from surface.view.pictures.sheet import closer, compose
+from surface.view.pictures.sheet import compose, zoom_to_head
 
 
 def plain(colour: tuple[int, int, int], size: tuple[int, int] = (60, 80)) -> np.ndarray:
@@ -73,6 +73,6 @@ def test_write_png_round_trips(tmp_path: Path) -> None:
 
 
 def test_a_profile_is_seen_from_further_than_a_front() -> None:
-    front, side = closer(Camera.front()), closer(Camera.profile())
+    front, side = zoom_to_head(Camera.front()), zoom_to_head(Camera.profile())
     assert front.distance < side.distance / 1.1
     assert side.distance < Camera.profile().distance

@@ -26,8 +26,8 @@ def buffers_of(ctx: moderngl.Context, part: BallPart) -> PartBuffers:
 
 
 def held(buffers: PartBuffers) -> tuple[np.ndarray, np.ndarray]:
-    assert buffers._own is not None
-    position, normal = buffers._own.positions.read(), buffers._own.normals.read()
+    assert buffers._dynamic is not None
+    position, normal = buffers._dynamic.positions.read(), buffers._dynamic.normals.read()
     return np.frombuffer(position, np.float32).reshape(-1, 3), np.frombuffer(normal, np.float32).reshape(-1, 3)
 
 

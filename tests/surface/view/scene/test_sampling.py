@@ -1,4 +1,4 @@
-"""surface.view.scene.pace"""
+"""surface.view.scene.sampling"""
 
 from __future__ import annotations
 
@@ -7,52 +7,52 @@ from ball_head import BallHead, values
 
 from surface.view import Offscreen
 from surface.view.pictures.offscreen import open_context
-from surface.view.scene.pace import BUDGET_S, SCALE, Pace, is_software
+from surface.view.scene.sampling import BUDGET_S, SCALE, AdaptiveSampling, is_software
 
 SLOW, QUICK = 2 * BUDGET_S, 0.5 * BUDGET_S
 
 
-def run(pace: Pace, seconds: float, frames: int = 100) -> int:
-    pace.begin_live()
+def run(sampling: AdaptiveSampling, seconds: float, frames: int = 100) -> int:
+    sampling.start_live()
     for _ in range(frames):
-        pace.note(seconds)
-    return pace.samples
+        sampling.add_frame(seconds)
+    return sampling.settings[0]
 
 
 def test_stills_take_all_samples() -> None:
-    assert Pace("full", software=True).samples == 4
-    assert Pace("fast").samples == 1
+    assert AdaptiveSampling("full", software=True).settings[0] == 4
+    assert AdaptiveSampling("fast").settings[0] == 1
 
 
 def test_live_pictures_begin_with_one_sample_in_software() -> None:
-    assert run(Pace("full", software=True), 0.0, 0) == 1
-    assert run(Pace("full"), 0.0, 0) == 4
+    assert run(AdaptiveSampling("full", software=True), 0.0, 0) == 1
+    assert run(AdaptiveSampling("full"), 0.0, 0) == 4
 
 
 def test_a_live_fast_picture_is_drawn_smaller_in_software() -> None:
     for quality, software, scale in (("fast", True, SCALE), ("fast", False, 1.0), ("full", True, 1.0)):
-        pace = Pace(quality, software=software)
-        assert pace.wanted[1] == 1.0
-        pace.begin_live()
-        assert pace.wanted == (pace.samples, scale)
+        sampling = AdaptiveSampling(quality, software=software)
+        assert sampling.settings[1] == 1.0
+        sampling.start_live()
+        assert sampling.settings == (sampling.settings[0], scale)
 
 
 @pytest.mark.parametrize(("seconds", "samples"), [(SLOW, 1), (QUICK, 4)])
 def test_elsewhere_they_fall_back_only_when_slow(seconds: float, samples: int) -> None:
-    assert run(Pace("full"), seconds) == samples
+    assert run(AdaptiveSampling("full"), seconds) == samples
 
 
 def test_a_single_slow_frame_is_forgiven() -> None:
-    pace = Pace("full")
-    pace.begin_live()
+    sampling = AdaptiveSampling("full")
+    sampling.start_live()
     for k in range(60):
-        pace.note(3 * BUDGET_S if k % 15 == 7 else QUICK)
-    assert pace.samples == 4
+        sampling.add_frame(3 * BUDGET_S if k % 15 == 7 else QUICK)
+    assert sampling.settings[0] == 4
 
 
 @pytest.mark.parametrize("samples", [1, 2, 4])
 def test_samples_asked_for_are_kept(samples: int) -> None:
-    assert run(Pace("full", samples, software=True), SLOW) == samples
+    assert run(AdaptiveSampling("full", samples, software=True), SLOW) == samples
 
 
 def test_a_live_picture_changes_its_target(gl: None) -> None:
