@@ -15,8 +15,8 @@ from small_head import all_points, part, small_head
 import surface
 from surface.base.errors import ExportError
 from surface.export import API, SUFFIXES, Exporter, export_head, exporters
-from surface.export.png import png_bytes
-from surface.export.shapes import pieces_of
+from surface.export.glb import png_bytes
+from surface.export.shapes import export_parts
 from surface.fit.source.load import load_mesh
 from surface.head import Head
 from surface.readers.gltfmesh import read_gltf
@@ -89,16 +89,18 @@ def test_what_is_read_back_is_what_the_head_shows(tmp_path, head):
 
 
 def test_normals_have_length_one(head):
-    for piece in pieces_of(head):
-        for turned in (piece.normals, *(piece.normals + t for t in piece.turns.values())):
+    for piece in export_parts(head):
+        for turned in (piece.normals, *(piece.normals + t for t in piece.normal_changes.values())):
             np.testing.assert_allclose(np.linalg.norm(turned, axis=1), 1.0, atol=1e-3)
 
 
 def test_closing_lips_are_written_as_what_they_add_to_an_open_jaw():
     groups = [all_points("mouthClose", (0, 5, 0)), all_points("jawOpen", (0, -7, 0))]
     head = Head(small_head(parts=[part("a", -40, groups=groups)], seams=[]))
-    (piece,) = pieces_of(head)
-    np.testing.assert_allclose(piece.moves["mouthClose"], np.tile([0, 5, 0], (len(piece.vertices), 1)), atol=0.01)
+    (piece,) = export_parts(head)
+    np.testing.assert_allclose(
+        piece.displacements["mouthClose"], np.tile([0, 5, 0], (len(piece.vertices), 1)), atol=0.01
+    )
 
 
 def test_eyeballs_turn_about_their_own_node(tmp_path):
