@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.view.draw.programs import build
-from surface.view.scene.apertures import LID_POINTS
-from surface.view.scene.openings import Openings
+from surface.view.scene.openings import LID_POINTS, Openings
 from surface.view.scene.parts import ViewPart
 from surface.view.scene.theme import Theme
 
