@@ -60,3 +60,39 @@ def test_shaders_stay_within_glsl_140(root: Path) -> None:
     for file in files:
         assert "layout(" not in source(file.name)
         assert "#version" not in source(file.name)
+
+
+def test_uniforms_of_every_kind(gl: None) -> None:
+    ctx = open_context()
+    try:
+        program = ctx.program(
+            vertex_shader="#version 140\nin vec3 at; uniform mat3 turn; uniform vec3 lids[2]; uniform float amount;"
+            "uniform int unit; uniform vec3 colour; out vec3 sum;"
+            "void main() { sum = turn * at + lids[1] * amount + colour * float(unit); gl_Position = vec4(0.0); }",
+            varyings=["sum"],
+        )
+        ctx.clear_errors()
+        turn, lids = np.arange(9.0).reshape(3, 3), np.array([[9.0, 9, 9], [1, 2, 4]])
+        set_uniforms(program, {"turn": turn, "lids": lids, "amount": 0.5, "unit": 2, "colour": (10.0, 20.0, 40.0)})
+        out = ctx.buffer(reserve=12)
+        ctx.framebuffer([ctx.renderbuffer((1, 1), 4)]).use()
+        array = ctx.vertex_array(program, [(ctx.buffer(np.float32([1, 10, 100]).tobytes()), "3f", "at")])
+        array.transform(out, vertices=1)
+        got = np.frombuffer(out.read(), np.float32)
+        assert got == pytest.approx(turn @ [1, 10, 100] + 0.5 * lids[1] + 2 * np.array([10, 20, 40]))
+    finally:
+        ctx.release()
+
+
+def test_a_program_without_fragments_fills_a_buffer(gl: None) -> None:
+    ctx = open_context()
+    try:
+        made = build(ctx, ("place.vert",), (), outputs=("out_position", "out_normal"), defines={"WIDTH": 64})
+        assert {"first", "count", "share"} <= set(made)
+    finally:
+        ctx.release()
+
+
+def test_defines_come_before_every_file() -> None:
+    text = assemble(("flat.frag",), {"INSIDE": "0.25", "B": 2})
+    assert text == "#version 140\n#define INSIDE 0.25\n#define B 2\n" + source("flat.frag")

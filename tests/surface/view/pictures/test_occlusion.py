@@ -139,3 +139,53 @@ def test_skin_gets_its_sky_and_its_thinness(gl: None) -> None:
     assert (face.min() >= 0.0, face.max() <= 1.0) == (True, True)
     assert baked["face/thin"].shape == (len(face), 1)
     assert "teeth/visible" not in baked
+
+
+@pytest.mark.parametrize(("apart", "thin"), [(1.1, 0.9), (5.5, 0.5), (10.9, 0.1 / 11), (11.1, 0.0), (30.0, 0.0)])
+def test_thinness_falls_from_touching_to_eleven_millimetres(apart: float, thin: float) -> None:
+    front, back = plate("a", apart, 40.0), plate("b", 0.0, 40.0)
+    both = BallPart(
+        "both",
+        "skin",
+        np.concatenate([front.triangles, back.triangles + len(front.rest)]),
+        np.concatenate([front.rest, back.rest]),
+        np.concatenate([front.normals, -back.normals]),
+    )
+    assert thinness(both) == pytest.approx(np.full((len(both.rest), 1), thin), abs=1e-4)
+    both.normals[:] = -both.normals  # a gap, not a plate
+    assert (thinness(both) == 0.0).all()
+
+
+def test_neighbours_share_half_of_their_mean_in_each_pass() -> None:
+    triangles, values = np.array([[0, 1, 2]]), np.array([[0.0], [1.0], [5.0], [9.0]])
+    assert smoothed(values, triangles, 1)[:, 0] == pytest.approx([1.5, 1.75, 2.75, 9.0])
+    assert smoothed(values, triangles)[:, 0] == pytest.approx([1.875, 1.9375, 2.1875, 9.0])
+
+
+def test_a_sky_that_is_all_open_is_one_in_every_direction() -> None:
+    one = np.column_stack([np.ones(300), sphere_directions(300)])
+    normal = (one[:, :, None] * one[:, None, :]).sum(axis=0)[None]
+    sky = fit_sky(normal, one.sum(axis=0)[None])[0]
+    assert sky == pytest.approx([1 / 1.02, 0, 0, 0], abs=1e-3)
+    assert fit_sky(normal, 100 * one.sum(axis=0)[None])[0, 0] == 2.0
+    assert fit_sky(0 * normal, 0 * one.sum(axis=0)[None])[0].tolist() == [0, 0, 0, 0]
+
+
+def test_an_orthographic_view_fills_its_cube_with_a_margin() -> None:
+    points = np.random.default_rng(3).normal(size=(50, 3)) * [10, 30, 20]
+    for direction in np.vstack([sphere_directions(7), [[0, 1, 0], [1, 0, 0]]]):
+        box, matrix, span = orthographic(points, direction)
+        assert box.min(axis=0) == pytest.approx(0.02 / 1.04) and box.max(axis=0) == pytest.approx(1.02 / 1.04)
+        clip = np.column_stack([points, np.ones(50)]) @ matrix.T
+        assert clip[:, :3] == pytest.approx(2 * box - 1) and (clip[:, 3] == 1).all()
+        assert span == pytest.approx(1.04 * np.ptp(points @ direction))
+        assert np.argmax(box[:, 2]) == np.argmin(points @ direction)
+
+
+def test_parts_of_no_group_stay_open_and_skin_gets_three_arrays(gl: None) -> None:
+    share = bake([plate("brow", 0.0, 9.0, "brow"), plate("lid", 8.0, 90.0)], directions=8, resolution=32)
+    assert share["brow"].dtype == np.float32 and (share["brow"] == [1, 1, 0, 0, 0]).all()
+    made = bake_head(BallHead(), values(), directions=8, resolution=32)
+    assert set(made) == {"face", "face/visible", "face/thin", "left_eye", "right_eye", "teeth", "mouth"}
+    assert made["face/visible"].shape[1] == 4 and made["face/thin"].shape[1] == 1
+    assert made["face/visible"].min() >= 0.0 and made["face/visible"].max() <= 1.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 from ball_head import BallHead, values
 
@@ -71,3 +73,36 @@ def test_software_is_known_by_the_drivers_name(gl: None) -> None:
         assert is_software(ctx) == any(word in name.lower() for word in ("llvmpipe", "softpipe", "software"))
     finally:
         ctx.release()
+
+
+def test_the_budget_is_a_mean_of_fifteen_frames() -> None:
+    for share, samples in ((0.99, 4), (1.01, 1)):
+        sampling = AdaptiveSampling("full")
+        sampling.start_live()
+        for _ in range(14):
+            sampling.add_frame(share * BUDGET_S)
+        assert sampling.settings == (4, 1.0)
+        sampling.add_frame(share * BUDGET_S)
+        assert sampling.settings == (samples, 1.0)
+
+
+def test_the_mean_begins_again_after_fifteen_frames() -> None:
+    sampling = AdaptiveSampling("full")
+    sampling.start_live()
+    for k in range(30):
+        sampling.add_frame(1.9 * BUDGET_S if k % 15 < 7 else 0.0)
+    assert sampling.settings == (4, 1.0)
+
+
+def test_only_live_adaptive_pictures_in_software_are_simplified() -> None:
+    for samples, software, simplified in ((None, True, True), (None, False, False), (2, True, False)):
+        sampling = AdaptiveSampling("fast", samples, software=software)
+        assert not sampling.simplified and not sampling.live
+        sampling.start_live()
+        assert sampling.live and sampling.simplified == simplified
+
+
+@pytest.mark.parametrize("name", ["llvmpipe (LLVM 15)", "SwiftShader", "Microsoft software rasterizer", "softpipe"])
+def test_software_renderers_by_name(name: str) -> None:
+    assert is_software(SimpleNamespace(info={"GL_RENDERER": name}))
+    assert not is_software(SimpleNamespace(info={"GL_RENDERER": "NVIDIA GeForce"}))
