@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from meshfiles import FLOAT, UINT, GlbBuilder, glb, triangulated
+from scipy.spatial.transform import Rotation
 from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
@@ -243,3 +244,97 @@ def test_flipped_bits_give_one_kind_of_error(tmp_path):
         except FitError:
             errors += 1
     assert errors > 50
+
+
+def moved(tmp_path, **node) -> np.ndarray:
+    """(3, 4): the matrix that a node applies."""
+    builder = GlbBuilder()
+    points = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    index = builder.accessor(np.uint32([0, 1, 2, 0, 1, 3]), UINT, "SCALAR")
+    attributes = {"POSITION": builder.accessor(points, FLOAT, "VEC3")}
+    builder.document["meshes"] = [{"primitives": [{"attributes": attributes, "indices": index}]}]
+    builder.document["nodes"] = [{"mesh": 0, **node}]
+    got = read_gltf(write(tmp_path, builder)).vertices
+    return np.column_stack([*(got[1:] - got[0]), got[0]])
+
+
+def test_any_rotation_and_scale_is_that_of_the_specification(tmp_path):
+    rotation = Rotation.from_euler("xyz", [20, -35, 70], degrees=True)
+    scale, shift = np.array([2.0, 3.0, 0.5]), [1.0, -2.0, 4.0]
+    got = moved(tmp_path, rotation=rotation.as_quat().tolist(), scale=scale.tolist(), translation=shift)
+    np.testing.assert_allclose(got, np.column_stack([rotation.as_matrix() * scale, shift]), atol=1e-6)
+    whole = np.eye(4)
+    whole[:3] = np.column_stack([rotation.as_matrix() * scale, shift])
+    np.testing.assert_allclose(moved(tmp_path, matrix=whole.T.ravel().tolist()), whole[:3], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("node", "why"),
+    [
+        ({"matrix": [1.0] * 15}, "matrix: needs 16 finite numbers"),
+        ({"rotation": [0, 0, "x", 1]}, "rotation: holds something that is not a number"),
+        ({"translation": [0, 0]}, "translation: needs 3 finite numbers"),
+        ({"scale": 3}, "scale: '3' is no list"),
+    ],
+)
+def test_wrong_matrices_are_refused(tmp_path, node, why):
+    with pytest.raises(FitError, match=rf"nodes\[0\]\.{why}"):
+        moved(tmp_path, **node)
+
+
+def test_without_scenes_all_roots_are_read_in_order(tmp_path):
+    builder = glb(slit_sheet())
+    del builder.document["scenes"], builder.document["scene"]
+    builder.document["nodes"] = [
+        {"mesh": 0, "name": "child", "translation": [0, 5, 0]}, {"children": [0, 2], "name": "root"},
+        {"mesh": 0, "name": "second", "translation": [0, 9, 0]}, {"mesh": 0, "name": "last"},
+    ]  # fmt: skip
+    assert read_gltf(write(tmp_path, builder)).pieces == ("child", "second", "last")
+
+
+def test_shapes_of_several_primitives_are_joined_by_name(tmp_path):
+    builder = glb(slit_sheet())
+    first = builder.document["meshes"][0]["primitives"][0]
+    other = {**first, "targets": first["targets"][::-1]}
+    builder.document["meshes"].append({"primitives": [other], "extras": {"targetNames": ["x", slit_sheet().names[0]]}})
+    builder.document["nodes"] = [{"mesh": 0}, {"mesh": 1, "translation": [7.0, 0, 0]}]
+    builder.document["scenes"] = [{"nodes": [0, 1]}]
+    got = read_gltf(write(tmp_path, builder))
+    assert got.names == (*slit_sheet().names, "x") and set(got.piece) == {0, 1}
+    far = got.vertices[:, 0] > 3
+    assert np.abs(got.deltas[2, ~far]).max() == 0 < np.abs(got.deltas[2, far]).max()
+    assert np.abs(got.deltas[1, far]).max() == 0 < np.abs(got.deltas[1, ~far]).max()
+    np.testing.assert_allclose(np.sort(got.deltas[0, far], axis=0), np.sort(got.deltas[0, ~far], axis=0), atol=1e-7)
+
+
+def test_skin_weights_blend_joints_and_need_not_sum_to_one(tmp_path):
+    builder = GlbBuilder()
+    points = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    attributes = {
+        "POSITION": builder.accessor(points, FLOAT, "VEC3"),
+        "JOINTS_0": builder.accessor(np.tile(np.uint8([0, 1, 0, 0]), (3, 1)), 5121, "VEC4"),
+        "WEIGHTS_0": builder.accessor(np.float32([[2, 0, 0, 0], [0, 3, 0, 0], [1, 3, 0, 0]]), FLOAT, "VEC4"),
+    }
+    builder.document |= {
+        "meshes": [{"primitives": [{"attributes": attributes}]}], "skins": [{"joints": [1, 2]}],
+        "nodes": [{"mesh": 0, "skin": 0}, {"translation": [4.0, 0, 0]}, {"translation": [0, 8.0, 0]}],
+        "scenes": [{"nodes": [0, 1, 2]}],
+    }  # fmt: skip
+    got = read_gltf(write(tmp_path, builder)).vertices
+    np.testing.assert_allclose(got, points + np.array([[4, 0, 0], [0, 8, 0], [1, 6, 0]]), atol=1e-6)
+    builder.document["skins"] = [{"joints": [1]}]
+    assert "joints and weights do not fit" in refused(write(tmp_path, builder))
+    builder.document["skins"] = [{"joints": [1, 9]}]
+    assert "names a joint that is not in the scene" in refused(write(tmp_path, builder))
+
+
+@pytest.mark.parametrize(("gap", "count"), [(0.5e-6, 4), (2e-6, 6)])
+def test_vertices_are_welded_up_to_a_millionth_of_the_mesh(tmp_path, gap, count):
+    builder = GlbBuilder()
+    far = np.float32(gap)
+    points = np.float32([[0, 0, 0], [0, 1, 0], [1, 0, 0], [far, 0, 0], [far, 1, 0], [-0.0, -0.5, 0]])
+    points = np.concatenate([points[:3], points[[3, 4]], [[-0.5, 0.5, 0]]]).astype(np.float32)
+    index = builder.accessor(np.uint32([0, 2, 1, 3, 4, 5]), UINT, "SCALAR")
+    attributes = {"POSITION": builder.accessor(points, FLOAT, "VEC3")}
+    builder.document["meshes"] = [{"primitives": [{"attributes": attributes, "indices": index}]}]
+    assert len(read_gltf(write(tmp_path, builder)).vertices) == count
