@@ -7,12 +7,12 @@
        "points": [
          {"position": [x, y, z], "weight": 1.0, "degree": [3, 3], "knots_u": [0, 0, 0, 1, 2], "knots_v": [...]},
          ...],
-       "closed_u": [start, end],                       (left out where not joined; also "closed_v")
-       "domain": {"rect": [u0, u1, v0, v1],            (left out: everywhere)
-                  "loops": [[[u, v], ...], ...],       (left out: none)
+       "closed_u": [start, end],                       (only where joined; also "closed_v")
+       "domain": {"rect": [u0, u1, v0, v1],            (optional: everywhere)
+                  "loops": [[[u, v], ...], ...],       (optional: none)
                   "slits": [{"axis": "u", "at": v, "start": u0, "end": u1}, ...]}}]}
 
-Each point has its own degree and degree + 2 knots in each direction; "weight" may be left out (1), and so may
+Each point has its own degree and degree + 2 knots in each direction; "weight" is optional (1), and so is
 "degree", which follows from the knots. Numbers are written so that they read back the same to the last bit.
 """
 

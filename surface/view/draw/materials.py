@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import moderngl
 
 Arrays = dict[str, np.ndarray]
-#: Tiles of the detail texture once round the head; whole, so that its seam at the back of the head does not show.
+#: Tiles of the detail texture around the head; a whole number, so that its seam at the back of the head is invisible.
 _DETAIL_TILES = 18
 #: Centre of the sphere that the detail is wrapped on, mm.
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)

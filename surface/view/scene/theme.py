@@ -32,7 +32,7 @@ class Theme:
     ----------
     albedo : skin of heads without a painted albedo.
     use_painted : whether the head's own albedo is used.
-    wrap : how far light bends round the terminator per channel, 0..1; red far, blue little, for skin.
+    wrap : how far light bends around the terminator per channel, 0..1; red far, blue little, for skin.
     gloss : scale of the skin's highlights.
     iris, sclera, brow, lash : colours.
     key, fill, rim : the three lights.
