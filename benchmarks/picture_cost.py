@@ -57,7 +57,7 @@ class Bench:
         """One frame without the parts of a material, and wait for it."""
         self.renderer._parts = [p for p in self.parts if p.part.material != leave_out and leave_out != "everything"]
         self.renderer.draw(self.camera, self.target._drawn, bands or self.bands)
-        self.target._kick.clear()
+        self.target._flush.clear()
         self.screen.ctx.finish()
         self.renderer._parts = self.parts
 

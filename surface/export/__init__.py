@@ -1,8 +1,8 @@
-"""Heads for other programs, one module an exporter: GLB with morph targets, OBJ with a folder of shapes.
+"""Exporters of heads to other programs: GLB with morph targets, OBJ with a folder of shapes.
 
 In: a head and a pose, exporters from other packages. Out: files. Imports base and head.
 
-A module of this folder that defines ``EXPORTER``, an :class:`surface.export.exporter.Exporter`, is found by itself.
+Every module of this folder that defines ``EXPORTER``, an :class:`surface.export.exporter.Exporter`, is used.
 """
 
 from __future__ import annotations
@@ -67,12 +67,12 @@ def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
 def export_head(
     head: Head, path: str | Path, pose: Mapping[str, float] | None = None, extra: Iterable[Exporter] = ()
 ) -> list[Path]:
-    """Write a head to a file that other programs open; the suffix says which kind (:func:`exporters` has all of them).
+    """Write a head to a file for other programs; the suffix chooses the exporter (see :func:`exporters`).
 
     Parameters
     ----------
-    pose : values by parameter. A .glb stands in this pose when it is opened, its shapes can still be moved; an .obj is
-        written in it, without shapes.
+    pose : values by parameter. A .glb opens in this pose and keeps its shapes; an .obj is written in it, without
+        shapes.
     extra : exporters from other packages.
 
     Returns

@@ -1,4 +1,4 @@
-"""What an exporter is: one module, or one object from another package, that writes a head in one kind of file."""
+"""Definition of an exporter: the object by which a module or another package writes heads in one file format."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from pathlib import Path
 from surface.head import Head
 
 API = 1
-"""Version of what an exporter must keep: this module and :class:`surface.head.Head`."""
+"""Version of the interface of exporters: this module and :class:`surface.head.Head`."""
 Write = Callable[[Head, Path, Mapping[str, float]], list[Path]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Exporter:
-    """One kind of file.
+    """One file format.
 
     Attributes
     ----------
-    api : version it is made for; see :data:`API`
+    api : version of the interface it uses; see :data:`API`
     kind : a short name, as "glb"; the module's own for the exporters of this folder
-    title : what the file will hold, in half a sentence
-    suffixes : what names of such files end in, in lower case, as (".glb",)
-    install : what ``pip install`` takes where a package is missing
+    title : short description of the file's content
+    suffixes : of such files, in lower case, as (".glb",)
+    install : argument of ``pip install`` for a missing package
     write : is called with the head, the path and a pose (values by parameter, empty at rest) and returns the paths
-        written. It leaves nothing half-written, and raises ExportError, or OSError where a place cannot be written to
+        written. It leaves no incomplete files, and raises ExportError, or OSError if a path cannot be written to
     """
 
     api: int

@@ -3,7 +3,7 @@
 In: paths of files. Out: surfaces with names and domains, or an error that names the line. Imports base to dcp.
 
 ====== =========================================== =================================
-suffix what                                        module
+suffix content                                     module
 ====== =========================================== =================================
 .json  omote's own plain format, read and written  :mod:`surface.readers.plain`
 .3dm   openNURBS: surfaces and trimmed faces       :mod:`surface.readers.rhino`
@@ -17,12 +17,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .named import NamedSurface, Place, summary
+from . import gismo, plain, rhino, tsm
+from .common import Location, NamedSurface, summary
 from .plain import is_plain, write_surfaces
 
 __all__ = ["SUFFIXES", "NamedSurface", "is_plain", "read_surface", "summary", "write_surfaces"]
 
-SUFFIXES = (".json", ".3dm", ".xml", ".tsm")
+_READERS = {".json": plain.read, ".3dm": rhino.read, ".xml": gismo.read, ".tsm": tsm.read}
+SUFFIXES = tuple(_READERS)
 
 
 def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
@@ -30,7 +32,7 @@ def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
 
     Parameters
     ----------
-    path : its suffix says what it is: one of :data:`SUFFIXES`
+    path : its suffix chooses the format: one of :data:`SUFFIXES`
 
     Raises
     ------
@@ -40,22 +42,11 @@ def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
         for .3dm where rhino3dm is not installed.
     """
     file = Path(path)
-    kind = file.suffix.lower()
-    if kind == ".json":
-        from .plain import read  # of the readers only the one that is needed is loaded
-    elif kind == ".3dm":
-        from .rhino import read  # the same
-    elif kind == ".xml":
-        from .gismo import read  # the same
-    elif kind == ".tsm":
-        from .tsm import read  # the same
-    else:
-        raise Place(file).error(f"no surface file: its name ends in {kind or 'nothing'}", hint="use " + _kinds())
-    surfaces = read(file)
+    suffix = file.suffix.lower()
+    if suffix not in _READERS:
+        hint = f"use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
+        raise Location(file).error(f"no surface file: its name ends in {suffix or 'nothing'}", hint=hint)
+    surfaces = _READERS[suffix](file)
     if not surfaces:
-        raise Place(file).error("holds no surface", hint="export at least one surface into it")
+        raise Location(file).error("holds no surface", hint="export at least one surface into it")
     return surfaces
-
-
-def _kinds() -> str:
-    return ", ".join(SUFFIXES[:-1]) + f" or {SUFFIXES[-1]}"

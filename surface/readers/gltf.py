@@ -1,8 +1,8 @@
-"""glTF 2.0 files: the container and its accessors, every index and length checked before it is used.
+"""Reader of glTF 2.0 containers and accessors; every index and length is checked before it is used.
 
 Reads ``.glb`` and ``.gltf`` with buffers inside, beside or in data URIs; accessors of all component types, normalised,
-interleaved and sparse (glTF 2.0 specification, sections 3.6, 4.4 and 5.1). What a file says is never trusted: a wrong
-one raises :class:`surface.base.errors.FitError` with the path and the element.
+interleaved and sparse (glTF 2.0 specification, sections 3.6, 4.4 and 5.1). Wrong content raises
+:class:`surface.base.errors.FitError` with the path and the element.
 """
 
 from __future__ import annotations
@@ -16,16 +16,15 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surface.base.arrays import Array
+from surface.base.arrays import Array, Floats, Ints
 from surface.base.errors import FitError
+from surface.readers.meshdata import read_bytes
 
-MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+MAGIC, JSON_CHUNK, BIN_CHUNK = b"glTF", 0x4E4F534A, 0x004E4942
 TYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"}
-MOST_BYTES = 2**31  # of one file
 MOST_ELEMENTS = 20_000_000  # of one accessor
 
 
@@ -43,121 +42,118 @@ class Gltf:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._buffers: dict[int, bytes] = {}
         raw = read_bytes(path)
-        if raw[:4] != b"glTF" and raw.lstrip()[:1] != b"{":
+        binary = raw.startswith(MAGIC)
+        if not binary and raw.lstrip()[:1] != b"{":
             why = "is no glTF file: neither its binary form nor JSON" if raw else "is empty"
             raise FitError(f"{path}: {why}", hint="export the head as .glb")
-        text, self._chunk = self._chunks(raw) if raw[:4] == b"glTF" else (raw, None)
+        text, self._chunk = self._chunks(raw) if binary else (raw, None)
         try:
             self.document = json.loads(text.decode("utf-8"))
         except (UnicodeDecodeError, ValueError, RecursionError) as e:
-            raise self.bad("JSON", f"cannot be read ({e})") from e
+            raise self.error("JSON", f"cannot be read ({e})") from e
         if not isinstance(self.document, dict):
-            raise self.bad("JSON", "is no object")
-        self._check_version()
-        self._buffers: dict[int, bytes] = {}
+            raise self.error("JSON", "is no object")
+        version = self.value(self.value(self.document, "asset", dict, "JSON"), "version", str, "asset")
+        if not version.startswith("2."):
+            raise self.error("asset.version", f"is {version!r}", "export it as glTF 2.0")
+        unread = [x for x in self.document.get("extensionsRequired") or [] if x not in UNDERSTOOD]
+        if unread:
+            hint = "export without compression (Draco, meshopt)"
+            raise self.error("extensionsRequired", f"{unread[0]!r} is not read here", hint)
 
-    def bad(self, where: str, why: str, hint: str = "export the file again") -> FitError:
+    def error(self, where: str, why: str, hint: str = "export the file again") -> FitError:
         """The error for an element of the file."""
         return FitError(f"{self.path}: {where}: {why}", hint=hint)
 
     def _chunks(self, raw: bytes) -> tuple[bytes, bytes | None]:
         """JSON text and binary chunk of a .glb."""
         if len(raw) < 20:
-            raise self.bad("header", "the file is cut short")
+            raise self.error("header", "the file is cut short")
         _, version, length = struct.unpack_from("<III", raw)
         if version != 2:
-            raise self.bad("header", f"is glTF version {version}", "export it as glTF 2.0")
+            raise self.error("header", f"is glTF version {version}", "export it as glTF 2.0")
         if length > len(raw):
-            raise self.bad("header", f"the file is cut short: {len(raw)} of {length} bytes")
+            raise self.error("header", f"the file is cut short: {len(raw)} of {length} bytes")
         found: dict[int, bytes] = {}
         at = 12
         while at + 8 <= length:
             size, kind = struct.unpack_from("<II", raw, at)
             if at + 8 + size > length:
-                raise self.bad(f"chunk at byte {at}", f"says {size} bytes, {length - at - 8} are left")
+                raise self.error(f"chunk at byte {at}", f"says {size} bytes, {length - at - 8} are left")
             found.setdefault(kind, raw[at + 8 : at + 8 + size])
             at += 8 + size
         if JSON_CHUNK not in found:
-            raise self.bad("header", "there is no JSON chunk")
+            raise self.error("header", "there is no JSON chunk")
         return found[JSON_CHUNK], found.get(BIN_CHUNK)
-
-    def _check_version(self) -> None:
-        version = str(self.value(self.value(self.document, "asset", dict, "JSON"), "version", str, "asset"))
-        if not version.startswith("2."):
-            raise self.bad("asset.version", f"is {version!r}", "export it as glTF 2.0")
-        unread = [x for x in self.document.get("extensionsRequired") or [] if x not in UNDERSTOOD]
-        if unread:
-            raise self.bad("extensionsRequired", f"{unread[0]!r} is not read here",
-                           "export without compression (Draco, meshopt)")  # fmt: skip
 
     def value(self, table: dict[str, Any], key: str, kind: type, where: str, default: Any = None) -> Any:
         """``table[key]``, which must be of the kind; without a default it must be there."""
         found = table.get(key, default)
         if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
-            raise self.bad(
-                f"{where}.{key}", "is missing" if found is None else f"{str(found)[:40]!r} is no {_word(kind)}"
-            )
+            word = {dict: "object", list: "list", int: "number", str: "text"}[kind]
+            why = "is missing" if found is None else f"{str(found)[:40]!r} is no {word}"
+            raise self.error(f"{where}.{key}", why)
         return found
 
     def items(self, key: str) -> list[Any]:
-        """A list of the document; empty where there is none."""
+        """A list of the document; empty if it is missing."""
         return list(self.value(self.document, key, list, "JSON", []))
 
     def item(self, key: str, index: Any, where: str) -> dict[str, Any]:
-        """``document[key][index]``, an object; ``where`` is who asks."""
+        """``document[key][index]``, an object; ``where`` is the element that refers to it."""
         found = self.items(key)
         if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(found):
-            raise self.bad(where, f"points at {key}[{str(index)[:20]}], but there are {len(found)}")
-        one: dict[str, Any] = found[index]
-        if not isinstance(one, dict):
-            raise self.bad(f"{key}[{index}]", "is no object")
-        return one
+            raise self.error(where, f"points at {key}[{str(index)[:20]}], but there are {len(found)}")
+        if not isinstance(found[index], dict):
+            raise self.error(f"{key}[{index}]", "is no object")
+        return dict(found[index])
 
-    def floats(self, index: Any, width: int, where: str) -> NDArray[np.float64]:
-        """(n, width) float64 of an accessor; finite."""
-        out = self._scaled(index, width, where)
+    def floats(self, index: Any, width: int, where: str) -> Floats:
+        """(n, width) float64 of an accessor, integers scaled where it is normalised; all finite."""
+        raw = self._accessor(index, width, where)
+        out = raw.astype(np.float64)
+        if raw.dtype.kind != "f" and self.item("accessors", index, where).get("normalized", False):
+            out = np.maximum(out / np.iinfo(raw.dtype).max, -1.0)
         wrong = np.flatnonzero(~np.isfinite(out).all(axis=1))
         if len(wrong):
-            raise self.bad(f"{where}, element {wrong[0]}", "is not a finite number", "repair the mesh and export again")
+            hint = "repair the mesh and export again"
+            raise self.error(f"{where}, element {wrong[0]}", "is not a finite number", hint)
         return out
 
-    def _scaled(self, index: Any, width: int, where: str) -> NDArray[np.float64]:
-        raw = self._accessor(index, width, where)
-        values = raw.astype(np.float64)
-        if raw.dtype.kind == "f" or not self.item("accessors", index, where).get("normalized", False):
-            return values
-        return np.maximum(values / np.iinfo(raw.dtype).max, -1.0)
-
-    def integers(self, index: Any, where: str, width: int = 1) -> NDArray[np.int64]:
+    def integers(self, index: Any, where: str, width: int = 1) -> Ints:
         """(n, width) int64 of an accessor of unsigned numbers."""
         raw = self._accessor(index, width, where)
         if raw.dtype.kind != "u":
-            raise self.bad(where, f"holds {raw.dtype}, not unsigned numbers")
+            raise self.error(where, f"holds {raw.dtype}, not unsigned numbers")
         return raw.astype(np.int64)
 
     def _accessor(self, index: Any, width: int, where: str) -> Array:
         accessor, name = self.item("accessors", index, where), f"accessors[{index}] ({where})"
-        if WIDTHS.get(str(accessor.get("type"))) != width:
-            raise self.bad(name, f"is of type {str(accessor.get('type'))[:20]!r}, which has not {width} numbers")
-        kind = self._kind(accessor, name)
+        shape = str(accessor.get("type"))
+        if WIDTHS.get(shape) != width:
+            raise self.error(name, f"is of type {shape[:20]!r}, which has not {width} numbers")
+        kind = self._component_type(accessor, name)
         count = self.value(accessor, "count", int, name)
         if not 0 <= count <= MOST_ELEMENTS:
-            raise self.bad(name, f"says {count} elements; {MOST_ELEMENTS} are the most", "take a smaller mesh")
+            raise self.error(name, f"says {count} elements; {MOST_ELEMENTS} are the most", "take a smaller mesh")
         if "bufferView" in accessor:
             out = self._view(accessor, kind, count, width, name)
         else:
             out = np.zeros((count, width), kind)
-        return self._sparse(accessor, out, name) if "sparse" in accessor else out
+        if "sparse" in accessor:
+            self._replace_sparse(self.value(accessor, "sparse", dict, name), out, f"{name}.sparse")
+        return out
 
-    def _kind(self, table: dict[str, Any], name: str) -> np.dtype:
+    def _component_type(self, table: dict[str, Any], name: str) -> np.dtype:
         code = self.value(table, "componentType", int, name)
         if code not in TYPES:
-            raise self.bad(f"{name}.componentType", f"{code} is unknown")
+            raise self.error(f"{name}.componentType", f"{code} is unknown")
         return np.dtype(TYPES[code]).newbyteorder("<")
 
     def _view(self, table: dict[str, Any], kind: np.dtype, count: int, width: int, name: str) -> Array:
-        """(count, width) elements out of a buffer view, which may be interleaved."""
+        """A copy (count, width) of elements in a buffer view, which may be interleaved."""
         index = table["bufferView"]
         view = self.item("bufferViews", index, name)
         where = f"bufferViews[{index}]"
@@ -165,11 +161,11 @@ class Gltf:
         size = self._length(view, "byteLength", where)
         data = self._buffer(view.get("buffer"), where)
         if start + size > len(data):
-            raise self.bad(where, f"ends at byte {start + size}, but the buffer has {len(data)}: it is cut short")
+            raise self.error(where, f"ends at byte {start + size}, but the buffer has {len(data)}: it is cut short")
         offset, each = self._length(table, "byteOffset", name, 0), kind.itemsize * width
         stride = self._length(view, "byteStride", where, 0) or each
         if stride < each or (count and offset + stride * (count - 1) + each > size):
-            raise self.bad(name, f"{count} elements do not fit into the {size} bytes of {where}")
+            raise self.error(name, f"{count} elements do not fit into the {size} bytes of {where}")
         if not count:
             return np.zeros((0, width), kind)
         return np.ndarray((count, width), kind, data, start + offset, (stride, kind.itemsize)).copy()
@@ -177,71 +173,43 @@ class Gltf:
     def _length(self, table: dict[str, Any], key: str, where: str, default: int | None = None) -> int:
         found = int(self.value(table, key, int, where, default))
         if found < 0:
-            raise self.bad(f"{where}.{key}", f"is {found}")
+            raise self.error(f"{where}.{key}", f"is {found}")
         return found
 
-    def _sparse(self, accessor: dict[str, Any], out: Array, name: str) -> Array:
-        """The elements that a sparse accessor replaces."""
-        sparse, where = self.value(accessor, "sparse", dict, name), f"{name}.sparse"
+    def _replace_sparse(self, sparse: dict[str, Any], out: Array, where: str) -> None:
+        """Replace the elements of ``out`` that a sparse accessor gives."""
         count = self._length(sparse, "count", where)
-        at, new = (self.value(sparse, key, dict, where) for key in ("indices", "values"))
+        indices, values = (self.value(sparse, key, dict, where) for key in ("indices", "values"))
         if count > len(out):
-            raise self.bad(where, f"replaces {count} of {len(out)} elements")
-        for key, table in (("indices", at), ("values", new)):
+            raise self.error(where, f"replaces {count} of {len(out)} elements")
+        for key, table in (("indices", indices), ("values", values)):
             if "bufferView" not in table:
-                raise self.bad(f"{where}.{key}.bufferView", "is missing")
-        ids = self._view(at, self._kind(at, where), count, 1, where).ravel().astype(np.int64)
+                raise self.error(f"{where}.{key}.bufferView", "is missing")
+        ids = self._view(indices, self._component_type(indices, where), count, 1, where).ravel().astype(np.int64)
         if len(ids) and (ids.min() < 0 or ids.max() >= len(out)):
-            raise self.bad(where, f"replaces element {ids.max()}, but there are {len(out)}")
-        out[ids] = self._view(new, out.dtype, count, out.shape[1], where)
-        return out
+            raise self.error(where, f"replaces element {ids.max()}, but there are {len(out)}")
+        out[ids] = self._view(values, out.dtype, count, out.shape[1], where)
 
     def _buffer(self, index: Any, where: str) -> bytes:
         table = self.item("buffers", index, where)
         if index not in self._buffers:
-            self._buffers[index] = self._load(table, f"buffers[{index}]", index)
+            self._buffers[index] = self._load(table.get("uri"), f"buffers[{index}]", index)
         return self._buffers[index]
 
-    def _load(self, table: dict[str, Any], where: str, index: int) -> bytes:
-        uri = table.get("uri")
+    def _load(self, uri: Any, where: str, index: int) -> bytes:
+        """The bytes of a buffer: the binary chunk, a data URI, or a file in the folder of this one."""
         if uri is None:
             if index != 0 or self._chunk is None:
-                raise self.bad(where, "has neither a uri nor a binary chunk")
+                raise self.error(where, "has neither a uri nor a binary chunk")
             return self._chunk
         if not isinstance(uri, str):
-            raise self.bad(f"{where}.uri", "is no text")
+            raise self.error(f"{where}.uri", "is no text")
         if uri.startswith("data:"):
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
             except (binascii.Error, ValueError) as e:
-                raise self.bad(f"{where}.uri", f"is damaged ({e})") from e
-        return read_bytes(self._beside(uri, where))
-
-    def _beside(self, uri: str, where: str) -> Path:
-        """A file in the folder of this one; nothing else is opened."""
+                raise self.error(f"{where}.uri", f"is damaged ({e})") from e
         name = unquote(uri)
         if "://" in name or "\0" in name or Path(name).is_absolute() or ".." in Path(name).parts:
-            raise self.bad(f"{where}.uri", f"{uri[:60]!r} is not beside the file", "export as .glb")
-        return self.path.parent / name
-
-
-def read_bytes(path: Path) -> bytes:
-    """All of a file that is not too large.
-
-    Raises
-    ------
-    FitError : missing, unreadable or above :data:`MOST_BYTES`.
-    """
-    try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise FitError(f"{path}: {size / 1e9:.1f} GB is more than a head needs", hint="export the head alone")
-        return path.read_bytes()
-    except FileNotFoundError as e:
-        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh") from e
-    except (OSError, ValueError) as e:
-        raise FitError(f"{path}: cannot be read ({e})", hint="check the path and its permissions") from e
-
-
-def _word(kind: type) -> str:
-    return {dict: "object", list: "list", int: "number", str: "text"}.get(kind, kind.__name__)
+            raise self.error(f"{where}.uri", f"{uri[:60]!r} is not beside the file", "export as .glb")
+        return read_bytes(self.path.parent / name)

@@ -1,50 +1,68 @@
-"""What mesh readers give back, before units and axes are settled."""
+"""Mesh data as read from a file, before units and axes are known, with checks of file and mesh size."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 
+MOST_BYTES = 2**31  # of one file
 MOST_VERTICES = 400_000
 MOST_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
 
 
 @dataclass(frozen=True)
 class MeshData:
-    """A mesh as its file has it.
+    """A mesh in the unit and axes of its file.
 
     Attributes
     ----------
-    vertices : (n, 3) float64, in the file's unit and axes.
+    vertices : (n, 3) float64.
     faces : (f, 4) int64, -1 fills the last place of a triangle.
     uv : (t, 2) float64, v up; face_uv : (f, 4) int64 into ``uv``; all -1 where a face has no texture coordinates.
     names : k shape names; deltas : (k, n, 3) float64.
     piece : (f,) int64 into ``pieces``, the names of the objects or materials that faces belong to.
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    uv: NDArray[np.float64]
-    face_uv: NDArray[np.int64]
+    vertices: Floats
+    faces: Ints
+    uv: Floats
+    face_uv: Ints
     names: tuple[str, ...]
-    deltas: NDArray[np.float64]
-    piece: NDArray[np.int64]
+    deltas: Floats
+    piece: Ints
     pieces: tuple[str, ...]
 
 
 def check_size(where: str, vertices: int, shapes: int) -> None:
-    """Refuse a mesh that would not fit into memory, before anything is made for it.
+    """Refuse a mesh that would not fit into memory, before arrays are allocated for it.
 
     Raises
     ------
-    FitError : naming the file and what is too much.
+    FitError : naming the file and the number that is too large.
     """
     if vertices > MOST_VERTICES:
         raise FitError(f"{where}: {vertices} vertices; {MOST_VERTICES} are the most", hint="decimate the mesh first")
     if vertices * shapes > MOST_MOVES:
         raise FitError(f"{where}: {shapes} shapes of {vertices} vertices are too many",
                        hint="leave out shapes that are not ARKit's, or decimate the mesh")  # fmt: skip
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a file that is not too large.
+
+    Raises
+    ------
+    FitError : missing, unreadable or above :data:`MOST_BYTES`.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise FitError(f"{path}: {size / 1e9:.1f} GB is more than a head needs", hint="export the head alone")
+        return path.read_bytes()
+    except FileNotFoundError as e:
+        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh") from e
+    except (OSError, ValueError) as e:
+        raise FitError(f"{path}: cannot be read ({e})", hint="check the path and its permissions") from e

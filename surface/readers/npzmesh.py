@@ -1,4 +1,4 @@
-"""Meshes in the NPZ layout of ICT-FaceKit (Light)::
+"""Reader of meshes in the NPZ layout of ICT-FaceKit (Light)::
 
 neutral (n, 3)   deltas (k, n, 3)   names (k,)   faces (f, 4), the last index of a triangle is -1
 uv (t, 2)        face_uv (f, 4), texture coordinates per face corner
@@ -33,29 +33,20 @@ def read_npz(path: Path) -> MeshData:
     FitError : the file is missing or damaged, lacks a key, or holds an array of another kind or shape.
     """
     raw = _arrays(path)
-    n, f, k = (len(np.atleast_1d(raw[key])) for key in ("neutral", "faces", "names"))
-    wanted = {
-        "neutral": (n, 3), "faces": (f, 4), "uv": (len(np.atleast_1d(raw["uv"])), 2), "face_uv": (f, 4),
-        "deltas": (k, n, 3), "names": (k,),
-    }  # fmt: skip
-    for key, want in wanted.items():
-        if raw[key].shape != want:
-            raise FitError(f"{path}: {key} has shape {raw[key].shape}, expected {want}",
-                           hint="export all arrays from one mesh")  # fmt: skip
-        kinds = "US" if key == "names" else "iu" if "face" in key else "fiu"
-        if raw[key].dtype.kind not in kinds:
-            raise FitError(f"{path}: {key} holds {raw[key].dtype}", hint="export all arrays from one mesh")
+    n, f, k, t = (len(np.atleast_1d(raw[key])) for key in ("neutral", "faces", "names", "uv"))
+    shapes = {"neutral": (n, 3), "faces": (f, 4), "uv": (t, 2), "face_uv": (f, 4), "deltas": (k, n, 3), "names": (k,)}
+    for key, shape in shapes.items():
+        why = "" if raw[key].shape == shape else f"has shape {raw[key].shape}, expected {shape}"
+        if raw[key].dtype.kind not in ("US" if key == "names" else "iu" if "face" in key else "fiu"):
+            why = why or f"holds {raw[key].dtype}"
+        if why:
+            raise FitError(f"{path}: {key} {why}", hint="export all arrays from one mesh")
     check_size(str(path), n, k)
     with np.errstate(invalid="ignore"):
-        numbers = {key: raw[key].astype(float) for key in ("neutral", "uv", "deltas")}
-    return MeshData(
-        numbers["neutral"], raw["faces"].astype(np.int64), numbers["uv"], raw["face_uv"].astype(np.int64),
-        tuple(_text(x) for x in raw["names"]), numbers["deltas"], np.zeros(f, np.int64), ("mesh",),
-    )  # fmt: skip
-
-
-def _text(name: Array | bytes | str) -> str:
-    return name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
+        neutral, uv, deltas = (raw[key].astype(float) for key in ("neutral", "uv", "deltas"))
+    names = tuple(x.decode("utf-8", "replace") if isinstance(x, bytes) else str(x) for x in raw["names"])
+    faces, face_uv = raw["faces"].astype(np.int64), raw["face_uv"].astype(np.int64)
+    return MeshData(neutral, faces, uv, face_uv, names, deltas, np.zeros(f, np.int64), ("mesh",))
 
 
 def _arrays(path: Path) -> dict[str, Array]:
@@ -65,22 +56,20 @@ def _arrays(path: Path) -> dict[str, Array]:
         with path.open("rb") as f:
             if f.read(2) != b"PK":
                 raise FitError(f"{path}: is no .npz archive", hint=f"save {', '.join(KEYS)} with numpy.savez")
-        with path.open("rb") as f, np.load(f, allow_pickle=False) as z:
-            missing = [k for k in KEYS if k not in z.files]
-            if missing:
-                raise FitError(
-                    f"{path}: key {missing[0]!r} is missing (found: {', '.join(z.files)})",
-                    hint=f"the layout needs {', '.join(KEYS)}",
-                )
-            _check_declared(path, z)
-            return {k: z[k] for k in KEYS}
+            f.seek(0)
+            with np.load(f, allow_pickle=False) as z:
+                missing = [k for k in KEYS if k not in z.files]
+                if missing:
+                    why = f"key {missing[0]!r} is missing (found: {', '.join(z.files)})"
+                    raise FitError(f"{path}: {why}", hint=f"the layout needs {', '.join(KEYS)}")
+                _check_declared_sizes(path, z)
+                return {k: z[k] for k in KEYS}
     except DAMAGED as e:
         raise FitError(f"{path}: cannot be read as .npz ({type(e).__name__}: {e})", hint="save the mesh again") from e
 
 
-def _check_declared(path: Path, archive: np.lib.npyio.NpzFile) -> None:
+def _check_declared_sizes(path: Path, archive: np.lib.npyio.NpzFile) -> None:
     """Refuse arrays that would not fit into memory before they are unpacked."""
-    most = 24 * (MOST_MOVES + MOST_VERTICES)
     for info in archive.zip.infolist() if archive.zip is not None else []:
-        if info.file_size > most:
+        if info.file_size > 24 * (MOST_MOVES + MOST_VERTICES):
             raise FitError(f"{path}: {info.filename} is {info.file_size / 1e9:.1f} GB", hint="decimate the mesh first")

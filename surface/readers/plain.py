@@ -1,4 +1,4 @@
-"""omote's own surface format: plain JSON, read and written without loss.
+"""Reader and writer of omote's own surface format: plain JSON, without loss.
 
 ::
 
@@ -7,13 +7,13 @@
        "points": [
          {"position": [x, y, z], "weight": 1.0, "degree": [3, 3], "knots_u": [0, 0, 0, 1, 2], "knots_v": [...]},
          ...],
-       "closed_u": [start, end],                       (left out where not joined; also "closed_v")
-       "domain": {"rect": [u0, u1, v0, v1],            (left out: everywhere)
-                  "loops": [[[u, v], ...], ...],       (left out: none)
+       "closed_u": [start, end],                       (only where joined; also "closed_v")
+       "domain": {"rect": [u0, u1, v0, v1],            (optional: everywhere)
+                  "loops": [[[u, v], ...], ...],       (optional: none)
                   "slits": [{"axis": "u", "at": v, "start": u0, "end": u1}, ...]}}]}
 
-Each point has its own degree and degree + 2 knots in each direction; "weight" may be left out (1), and so may
-"degree", which the knots already tell. Numbers are written so that they read back the same to the last bit.
+Each point has its own degree and degree + 2 knots in each direction; "weight" is optional (1), and so is
+"degree", which follows from the knots. Numbers are written so that they read back the same to the last bit.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ import numpy as np
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain, Slit
 
-from .named import NamedSurface, Place, read_text
+from .common import Location, NamedSurface, read_text
 
 FORMAT, VERSION = "omote surface", 1
 LARGEST = sys.float_info.max
 
 
 def is_plain(path: Path) -> bool:
-    """Does the file say that it is of this format? (Speech takes are JSON files, too.)"""
+    """Whether a file declares this format (speech takes are JSON files, too)."""
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -47,113 +47,102 @@ def is_plain(path: Path) -> bool:
 
 def read(path: Path) -> list[NamedSurface]:
     """The surfaces of a file; ``SurfaceFileError`` names line or element."""
-    place = Place(path)
-    table = _load(place, read_text(path))
+    file = Location(path)
+    table = _parse(file, read_text(path))
     if not isinstance(table, dict) or table.get("format") != FORMAT:
-        raise place.error(f'"format" must be "{FORMAT}"')
+        raise file.error(f'"format" must be "{FORMAT}"')
     if table.get("version") != VERSION:
         why = f"must be {VERSION}, not {table.get('version')!r}"
-        raise place.at("version").error(why, hint="update omote, or write the file again with this one")
-    return [_surface(place, f"surfaces[{i}]", row) for i, row in enumerate(_list(place, table, "", "surfaces"))]
+        raise file.at("version").error(why, hint="update omote, or write the file again with this one")
+    return [_surface(file.at(f"surfaces[{i}]"), row) for i, row in enumerate(_list(file, table, "surfaces"))]
 
 
-def _load(place: Place, text: str) -> Any:
+def _parse(file: Location, text: str) -> Any:
     def refuse(word: str) -> NoReturn:
         line = text[: text.index(word)].count("\n") + 1
-        raise place.at(f"line {line}").error(f"{word} is not a number a surface can have")
+        raise file.at(f"line {line}").error(f"{word} is not a number a surface can have")
 
     try:
         return json.loads(text, parse_constant=refuse)
     except json.JSONDecodeError as error:
-        raise place.at(f"line {error.lineno} column {error.colno}").error(f"is not JSON: {error.msg}") from error
+        raise file.at(f"line {error.lineno} column {error.colno}").error(f"is not JSON: {error.msg}") from error
     except RecursionError as error:
-        raise place.error("is not JSON a surface can have: nested too deep") from error
+        raise file.error("is not JSON a surface can have: nested too deep") from error
 
 
-def _surface(place: Place, where: str, row: Any) -> NamedSurface:
+def _surface(here: Location, row: Any) -> NamedSurface:
     """One entry of "surfaces"."""
     if not isinstance(row, dict):
-        raise place.at(where).error(f"must be a table, not {row!r:.40}")
-    points = _list(place, row, where, "points")
-    columns: dict[str, list[Any]] = {"position": [], "weight": [], "knots_u": [], "knots_v": []}
-    for i, point in enumerate(points):
-        for key, value in _point(place, f"{where}.points[{i}]", point).items():
-            columns[key].append(value)
-    closed = {key: tuple(_numbers(place, row[key], f"{where}.{key}", 2)) for key in _closed_keys(row)}
+        raise here.error(f"must be a table, not {row!r:.40}")
+    points = [_point(here.child(f".points[{i}]"), point) for i, point in enumerate(_list(here, row, "points"))]
+    columns = zip(*points, strict=True) if points else ([], [], [], [])
+    closed = {key: row[key] for key in ("closed_u", "closed_v") if row.get(key) is not None}
+    closed = {key: tuple(_numbers(here.child(f".{key}"), ends, 2)) for key, ends in closed.items()}
     try:
-        surface = DCPSurface(*columns.values(), **closed)  # type: ignore[arg-type]
+        surface = DCPSurface(*map(list, columns), **closed)
     except ValueError as error:
-        raise place.at(where).error(str(error)) from error
-    return NamedSurface(str(row.get("name", where)), surface, _domain(place, f"{where}.domain", row.get("domain")))
+        raise here.error(str(error)) from error
+    return NamedSurface(str(row.get("name", here.where)), surface, _domain(here.child(".domain"), row.get("domain")))
 
 
-def _closed_keys(row: dict[str, Any]) -> list[str]:
-    return [key for key in ("closed_u", "closed_v") if row.get(key) is not None]
-
-
-def _point(place: Place, where: str, point: Any) -> dict[str, Any]:
-    """Position, weight and knots of one control point."""
+def _point(here: Location, point: Any) -> tuple[list[float], float, list[float], list[float]]:
+    """Position, weight and both knot vectors of one control point."""
     if not isinstance(point, dict):
-        raise place.at(where).error(f"must be a table, not {point!r:.40}")
+        raise here.error(f"must be a table, not {point!r:.40}")
     missing = [key for key in ("position", "knots_u", "knots_v") if key not in point]
     if missing:
-        raise place.at(where).error(f'has no "{missing[0]}"')
-    out: dict[str, Any] = {"position": _numbers(place, point["position"], f"{where}.position", 3)}
-    out["weight"] = _numbers(place, [point.get("weight", 1.0)], f"{where}.weight", 1)[0]
-    for key in ("knots_u", "knots_v"):
-        out[key] = _numbers(place, point[key], f"{where}.{key}")
-    found = [len(out["knots_u"]) - 2, len(out["knots_v"]) - 2]
-    if point.get("degree", found) != found:
-        raise place.at(f"{where}.degree").error(f"{point['degree']} does not fit the knots, which tell {found}")
-    return out
+        raise here.error(f'has no "{missing[0]}"')
+    position = _numbers(here.child(".position"), point["position"], 3)
+    (weight,) = _numbers(here.child(".weight"), [point.get("weight", 1.0)], 1)
+    u, v = (_numbers(here.child(f".{key}"), point[key]) for key in ("knots_u", "knots_v"))
+    degrees = [len(u) - 2, len(v) - 2]
+    if point.get("degree", degrees) != degrees:
+        raise here.child(".degree").error(f"{point['degree']} does not fit the knots, which make it {degrees}")
+    return position, weight, u, v
 
 
-def _domain(place: Place, where: str, row: Any) -> Domain | None:
+def _domain(here: Location, row: Any) -> Domain | None:
     if row is None:
         return None
     if not isinstance(row, dict) or "rect" not in row:
-        raise place.at(where).error('must be a table with "rect"')
-    u0, u1, v0, v1 = _numbers(place, row["rect"], f"{where}.rect", 4)
-    loops = [
-        [
-            _numbers(place, uv, f"{where}.loops[{i}][{k}]", 2)
-            for k, uv in enumerate(_items(place, loop, f"{where}.loops[{i}]"))
-        ]
-        for i, loop in enumerate(_items(place, row.get("loops", []), f"{where}.loops"))
-    ]
-    slits = _items(place, row.get("slits", []), f"{where}.slits")
+        raise here.error('must be a table with "rect"')
+    u0, u1, v0, v1 = _numbers(here.child(".rect"), row["rect"], 4)
+    loops = []
+    for i, loop in enumerate(_items(here.child(".loops"), row.get("loops", []))):
+        at = here.child(f".loops[{i}]")
+        loops.append([_numbers(at.child(f"[{k}]"), uv, 2) for k, uv in enumerate(_items(at, loop))])
+    slits = enumerate(_items(here.child(".slits"), row.get("slits", [])))
     try:
-        return Domain((u0, u1, v0, v1), loops, [_slit(place, f"{where}.slits[{i}]", x) for i, x in enumerate(slits)])
+        return Domain((u0, u1, v0, v1), loops, [_slit(here.child(f".slits[{i}]"), slit) for i, slit in slits])
     except ValueError as error:
-        raise place.at(where).error(str(error)) from error
+        raise here.error(str(error)) from error
 
 
-def _slit(place: Place, where: str, row: Any) -> Slit:
+def _slit(here: Location, row: Any) -> Slit:
     if not isinstance(row, dict) or set(row) != {"axis", "at", "start", "end"}:
-        raise place.at(where).error("must be a table of axis, at, start and end")
-    at, start, end = _numbers(place, [row[key] for key in ("at", "start", "end")], where, 3)
-    return Slit(str(row["axis"]), at, start, end)
+        raise here.error("must be a table of axis, at, start and end")
+    return Slit(str(row["axis"]), *_numbers(here, [row[key] for key in ("at", "start", "end")], 3))
 
 
-def _list(place: Place, table: dict[str, Any], where: str, key: str) -> list[Any]:
-    path = f"{where}.{key}" if where else key
+def _list(here: Location, table: dict[str, Any], key: str) -> list[Any]:
+    at = here.child(f".{key}") if here.where else here.at(key)
     if key not in table:
-        raise place.at(path).error("is missing")
-    return _items(place, table[key], path)
+        raise at.error("is missing")
+    return _items(at, table[key])
 
 
-def _items(place: Place, value: Any, where: str) -> list[Any]:
+def _items(here: Location, value: Any) -> list[Any]:
     if not isinstance(value, list):
-        raise place.at(where).error(f"must be a list, not {value!r:.40}")
+        raise here.error(f"must be a list, not {value!r:.40}")
     return value
 
 
-def _numbers(place: Place, value: Any, where: str, count: int | None = None) -> list[float]:
+def _numbers(here: Location, value: Any, count: int | None = None) -> list[float]:
     """A list of finite numbers, ``count`` of them if given."""
-    row = _items(place, value, where)
+    row = _items(here, value)
     good = all(isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) <= LARGEST for x in row)
     if not good or (count is not None and len(row) != count):
-        raise place.at(where).error(f"must be {count or 'degree + 2'} finite numbers, not {value!r:.60}")
+        raise here.error(f"must be {count or 'degree + 2'} finite numbers, not {value!r:.60}")
     return [float(x) for x in row]
 
 
@@ -170,30 +159,21 @@ def write_surfaces(path: str | os.PathLike[str], surfaces: Sequence[NamedSurface
     try:
         Path(path).write_text(text + "\n", encoding="utf-8")
     except OSError as error:
-        raise Place(Path(path)).error(f"cannot be written: {error.strerror}", hint="choose another place") from error
+        raise Location(Path(path)).error(f"cannot be written: {error.strerror}", hint="choose another place") from error
 
 
 def _row(item: NamedSurface) -> dict[str, Any]:
     s = item.surface
-    columns = zip(s.points, s.weights, *s.degrees, s.knots_u, s.knots_v, strict=True)
-    points = [
-        {
-            "position": xyz.tolist(),
-            "weight": float(w),
-            "degree": [int(pu), int(pv)],
-            "knots_u": ku.tolist(),
-            "knots_v": kv.tolist(),
-        }
-        for xyz, w, pu, pv, ku, kv in columns
-    ]
+    keys = ("position", "weight", "degree", "knots_u", "knots_v")
+    degrees = np.column_stack(s.degrees).tolist()
+    columns = zip(s.points.tolist(), s.weights.tolist(), degrees, s.knots_u, s.knots_v, strict=True)
+    points = [dict(zip(keys, (*own, ku.tolist(), kv.tolist()), strict=True)) for *own, ku, kv in columns]
     row: dict[str, Any] = {"name": item.name, "points": points}
-    row.update({f"closed_{axis}": list(ends) for axis, ends in zip("uv", s.closed, strict=True) if ends is not None})
+    row |= {f"closed_{axis}": list(ends) for axis, ends in zip("uv", s.closed, strict=True) if ends is not None}
     if item.domain is not None:
-        row["domain"] = _domain_row(item.domain)
+        slits = [
+            {"axis": x.axis, "at": float(x.at), "start": float(x.start), "end": float(x.end)} for x in item.domain.slits
+        ]
+        loops = [np.asarray(loop).tolist() for loop in item.domain.loops]
+        row["domain"] = {"rect": [float(x) for x in item.domain.rect], "loops": loops, "slits": slits}
     return row
-
-
-def _domain_row(domain: Domain) -> dict[str, Any]:
-    loops = [np.asarray(loop).tolist() for loop in domain.loops]
-    slits = [{"axis": x.axis, "at": float(x.at), "start": float(x.start), "end": float(x.end)} for x in domain.slits]
-    return {"rect": [float(x) for x in domain.rect], "loops": loops, "slits": slits}

@@ -1,18 +1,18 @@
-"""Hierarchical B-splines as control points with local knots, exactly.
+"""Truncated hierarchical B-splines (THB-splines) as control points with local knots, exactly.
 
-A hierarchy is a sequence of nested tensor-product spline spaces with nested regions: region l is where level l or
-finer is wanted. A function of level l is active where its support lies in region l but not in region l + 1
-(Vuong, Giannelli, Jüttler and Simeon 2011). A truncated function (Giannelli, Jüttler and Speleers 2012) is its
-sum of finer B-splines without those that lie in the finer region, level after level. Every such sum is finite with
-positive coefficients a_k, so a control point (c, 1) over a truncated function is the control points (c, a_k)
-over plain B-splines, and these are DCPs. The truncated functions sum to 1, so Eq. (1)'s division changes nothing.
-Pieces over equal knots are joined at their weighted mean; functions that no finer region cuts stay whole.
+A hierarchy is a sequence of nested tensor-product spline spaces with nested regions: region l holds the places of level
+l or finer. A function of level l is active where its support lies in region l but not in region l + 1 (Vuong,
+Giannelli, Jüttler and Simeon 2011). A truncated function (Giannelli, Jüttler and Speleers 2012) is its sum of finer
+B-splines without those that lie in the finer region, level after level. Every such sum is finite with positive
+coefficients a_k, so a control point (c, 1) over a truncated function is the control points (c, a_k) over plain
+B-splines, and these are DCPs. The truncated functions sum to 1, so Eq. (1)'s division changes nothing. Pieces over
+equal knots are joined at their weighted mean; functions that no finer region cuts stay whole.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -41,21 +41,18 @@ class Level:
         nu, nv = (len(t) - p - 1 for t, p in zip(self.knots, self.degrees, strict=True))
         return nu, nv
 
-    def window(self, axis: int, index: int) -> Floats:
+    def local_knots(self, axis: int, index: int) -> Floats:
         """The degree + 2 knots of a function."""
         return self.knots[axis][index : index + self.degrees[axis] + 2]
 
 
-def halved(level: Level) -> Level:
-    """The next level of a dyadic hierarchy: one knot more in the middle of every span."""
-    parts = []
-    for t in level.knots:
-        distinct = np.unique(t)
-        parts.append(np.sort(np.concatenate([t, (distinct[1:] + distinct[:-1]) / 2])))
-    return Level(level.degrees, (parts[0], parts[1]))
+def dyadic_refinement(level: Level) -> Level:
+    """The next level of a dyadic hierarchy: one more knot in the middle of every span."""
+    u, v = (np.sort(np.append(t, (np.unique(t)[1:] + np.unique(t)[:-1]) / 2)) for t in level.knots)
+    return Level(level.degrees, (u, v))
 
 
-def insertion(coarse: Floats, fine: Floats, degree: int) -> Floats:
+def knot_insertion(coarse: Floats, fine: Floats, degree: int) -> Floats:
     """Coefficients of coarse B-splines in finer ones.
 
     Parameters
@@ -83,12 +80,12 @@ def _ratio(part: Floats, whole: Floats) -> Floats:
 
 
 class Hierarchy:
-    """Nested levels, and how fine each place is.
+    """Nested levels, and the level of each place.
 
     Parameters
     ----------
     levels : coarse to fine
-    depth : (a, b) int, the level wanted in every cell of the finest level
+    depth : (a, b) int, the level of every cell of the finest level's knot lines
 
     Attributes
     ----------
@@ -98,33 +95,34 @@ class Hierarchy:
     def __init__(self, levels: list[Level], depth: Ints) -> None:
         self.levels, self.depth = levels, depth
         self._lines = [np.unique(t) for t in levels[-1].knots]
-        self._steps = [
-            [insertion(c, f, p) for c, f, p in zip(a.knots, b.knots, a.degrees, strict=True)]
+        self._insertions = [
+            [knot_insertion(c, f, p) for c, f, p in zip(a.knots, b.knots, a.degrees, strict=True)]
             for a, b in pairwise(levels)
         ]
-        self._known: dict[tuple[int, int, int], bool] = {}
-        found = [self._active(number) for number in range(len(levels))]
-        self.active = np.concatenate(found)
+        self._truncated: dict[tuple[int, int, int], bool] = {}
+        active = [
+            (number, i, j)
+            for number, level in enumerate(levels)
+            for j in range(level.shape[1])
+            for i in range(level.shape[0])
+            if self._coarsest(number, i, j) == number
+        ]
+        self.active = np.array(active, dtype=np.int64).reshape(-1, 3)
 
-    def _active(self, number: int) -> Ints:
-        nu, nv = self.levels[number].shape
-        rows = [(number, i, j) for j in range(nv) for i in range(nu) if self._least(number, i, j) == number]
-        return np.array(rows, dtype=np.int64).reshape(-1, 3)
-
-    def _cells(self, number: int, i: int, j: int) -> Ints:
-        """Levels wanted in the support of a function."""
+    def _support(self, number: int, i: int, j: int) -> Ints:
+        """Levels of the cells in the support of a function."""
         slices = []
         for axis, index in enumerate((i, j)):
-            window = self.levels[number].window(axis, index)
-            ends = np.searchsorted(self._lines[axis], [window[0], window[-1]])
-            slices.append(slice(int(ends[0]), int(ends[1])))
+            knots = self.levels[number].local_knots(axis, index)
+            slices.append(slice(*np.searchsorted(self._lines[axis], knots[[0, -1]])))
         return self.depth[slices[0], slices[1]]
 
-    def _least(self, number: int, i: int, j: int) -> int:
-        cells = self._cells(number, i, j)
+    def _coarsest(self, number: int, i: int, j: int) -> int:
+        """The least level in the support of a function; -1 for an empty support."""
+        cells = self._support(number, i, j)
         return int(cells.min()) if cells.size else -1
 
-    def plain(self, coefficients: Floats) -> Floats:
+    def to_truncated(self, coefficients: Floats) -> Floats:
         """Coefficients for the truncated basis that give what ``coefficients (n, 3)`` give for the plain one.
 
         They are those of the sum so far in each level's own basis (Giannelli, Jüttler and Speleers 2014,
@@ -134,7 +132,8 @@ class Hierarchy:
         total = np.zeros((*self.levels[0].shape, 3))
         for number in range(len(self.levels)):
             if number:
-                total = np.einsum("ia,ijk,jb->abk", self._steps[number - 1][0], total, self._steps[number - 1][1])
+                u, v = self._insertions[number - 1]
+                total = np.einsum("ia,ijk,jb->abk", u, total, v)
             mine = self.active[:, 0] == number
             i, j = self.active[mine, 1], self.active[mine, 2]
             total[i, j] += coefficients[mine]
@@ -153,46 +152,39 @@ class Hierarchy:
         knots: tuple[list[Floats], list[Floats]] = ([], [])
         for number, level in enumerate(self.levels):
             mine = self.active[:, 0] == number
-            for (i, j), c in zip(self.active[mine, 1:], coefficients[mine], strict=True):
-                _add(pieces, (int(i), int(j)), np.append(1.0, c))
+            for (i, j), c in zip(self.active[mine, 1:].tolist(), coefficients[mine], strict=True):
+                pieces[i, j] = pieces.get((i, j), 0.0) + np.append(1.0, c)
             finer: Pieces = {}
             for (i, j), value in pieces.items():
-                if self._cut(number, i, j, value, finer):
+                if self._is_truncated(number, i, j):
+                    self._split(number, i, j, value, finer)
                     continue
                 rows.append(value)
                 for axis, index in enumerate((i, j)):
-                    knots[axis].append(level.window(axis, index))
+                    knots[axis].append(level.local_knots(axis, index))
             pieces = finer
         table = np.array(rows)
         return table[:, 1:] / table[:, :1], table[:, 0], knots[0], knots[1]
 
-    def _cut(self, number: int, i: int, j: int, value: Floats, finer: Pieces) -> bool:
-        """Where finer functions replace part of a function, pass on what is left of it."""
-        if not self._loses(number, i, j):
-            return False
+    def _split(self, number: int, i: int, j: int, value: Floats, finer: Pieces) -> None:
+        """Add those of a function's finer B-splines that no active function of the next level replaces to ``finer``."""
+        u, v = self._insertions[number]
         for a, b in self._children(number, i, j):
-            if self._least(number + 1, a, b) <= number:
-                share = self._steps[number][0][i, a] * self._steps[number][1][j, b]
-                _add(finer, (a, b), share * value)
-        return True
+            if self._coarsest(number + 1, a, b) <= number:
+                finer[a, b] = finer.get((a, b), 0.0) + u[i, a] * v[j, b] * value
 
-    def _loses(self, number: int, i: int, j: int) -> bool:
-        """Does a finer region take something from a function, at the next level or at any after it?"""
+    def _is_truncated(self, number: int, i: int, j: int) -> bool:
+        """Whether a finer region takes something from a function, at the next level or at any after it."""
         key = number, i, j
-        if key not in self._known:
-            lost = False
-            if number + 1 < len(self.levels) and self._cells(number, i, j).max() > number:
-                children = self._children(number, i, j)
-                lost = any(self._least(number + 1, *child) > number for child in children)
-                lost = lost or any(self._loses(number + 1, *child) for child in children)
-            self._known[key] = lost
-        return self._known[key]
+        if key not in self._truncated:
+            inside = number + 1 < len(self.levels) and self._support(number, i, j).max() > number
+            children = self._children(number, i, j) if inside else []
+            self._truncated[key] = any(self._coarsest(number + 1, *child) > number for child in children) or any(
+                self._is_truncated(number + 1, *child) for child in children
+            )
+        return self._truncated[key]
 
     def _children(self, number: int, i: int, j: int) -> list[tuple[int, int]]:
         """The next level's functions that a function is a sum of."""
-        u, v = (step[index].nonzero()[0] for step, index in zip(self._steps[number], (i, j), strict=True))
-        return [(int(a), int(b)) for a in u for b in v]
-
-
-def _add(pieces: Pieces, key: tuple[int, int], value: Floats) -> None:
-    pieces[key] = pieces[key] + value if key in pieces else value
+        u, v = self._insertions[number]
+        return list(product(u[i].nonzero()[0].tolist(), v[j].nonzero()[0].tolist()))

@@ -1,15 +1,15 @@
-"""The lines of a ``.tsm`` file as records that only refer to what exists."""
+"""Parser of ``.tsm`` files (T-splines of Rhino and Fusion): lines of text as records with checked references."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from surface.base.errors import SurfaceFileError
 
-from .named import Place
+from .common import Location
 
 HEADER = "#TS0200"
 HINT = "convert it to NURBS in the program that made it, and export .3dm"
@@ -32,25 +32,24 @@ class Link:
 
 @dataclass
 class TsmFile:
-    """Records by kind; the n-th line of a kind is number n, deleted ones are left out.
+    """Records by kind; the n-th line of a kind is number n, deleted ones are not kept.
 
     Attributes
     ----------
-    lines : word of the header to its line and the rest of it
-    links, edges, vertices : by number: link, knot interval, (link, compass word)
-    vertex_lines : by number the line of a vertex
-    creases : edge numbers with their lines
-    grips : (line, [x, y, z, weight]) by number
-    owners : (line, is it the vertex' own?, vertex) of every grip in order, deleted ones too
-    extras : (line, vertex, four counts, grips)
+    header : by keyword: its line and the rest of that line
+    links, edges : by number: link, knot interval
+    vertices : by number: line, link, compass word
+    creases : line and edge number
+    grips : by number: line, [x, y, z, weight]
+    owners : line, whether it is the vertex' own grip, and vertex, of every grip in order, deleted ones too
+    extras : line, vertex, four counts, grips
     """
 
-    place: Place
-    lines: dict[str, tuple[int, str]] = field(default_factory=dict)
+    location: Location
+    header: dict[str, tuple[int, str]] = field(default_factory=dict)
     links: dict[int, Link] = field(default_factory=dict)
     edges: dict[int, float] = field(default_factory=dict)
-    vertices: dict[int, tuple[int, str]] = field(default_factory=dict)
-    vertex_lines: dict[int, int] = field(default_factory=dict)
+    vertices: dict[int, tuple[int, int, str]] = field(default_factory=dict)
     creases: list[tuple[int, int]] = field(default_factory=list)
     grips: dict[int, tuple[int, list[float]]] = field(default_factory=dict)
     owners: list[tuple[int, bool, int]] = field(default_factory=list)
@@ -58,103 +57,99 @@ class TsmFile:
 
     def error(self, line: int, why: str, hint: str = "") -> SurfaceFileError:
         """The error for a line."""
-        return self.place.at(f"line {line}").error(why, hint=hint)
+        return self.location.at(f"line {line}").error(why, hint=hint)
 
 
-def parse(place: Place, text: str) -> TsmFile:
+def parse(location: Location, text: str) -> TsmFile:
     """The records of a file; ``SurfaceFileError`` names the line."""
-    out = TsmFile(place)
+    out = TsmFile(location)
     lines = text.splitlines()
     if not lines or lines[0].split()[:1] != [HEADER]:
-        raise place.at("line 1").error(f"is no T-spline file: it must begin with {HEADER}")
+        raise out.error(1, f"is no T-spline file: it must begin with {HEADER}")
     count = dict.fromkeys(FIELDS, 0)
     for number, line in enumerate(lines[1:], 2):
-        words = line.split("#")[0].split()
-        if not words:
-            continue
-        kind, rest = words[0], words[1:]
+        kind, *words = line.split("#")[0].split() or [""]
         if kind in FIELDS:
-            _entity(out, number, kind, count[kind], rest)
+            if words:  # else it is deleted
+                _add_entity(out, number, kind, count[kind], words)
             count[kind] += 1
-        else:
-            _other(out, number, kind, rest)
-    _check(out, count["0g"])
+        elif kind:
+            _add_other(out, number, kind, words)
+    _check_links(out)
+    _check_owners(out)
+    if len(out.owners) != count["0g"]:
+        raise location.error(f'has {count["0g"]} grips ("0g") and {len(out.owners)} owners ("0m gv", "0m gvp")')
     return out
 
 
-def _entity(out: TsmFile, line: int, kind: str, number: int, rest: list[str]) -> None:
-    """One line of a numbered kind."""
-    if not rest:
-        return  # deleted
-    if len(rest) != FIELDS[kind]:
-        raise out.error(line, f'"{kind}" needs {FIELDS[kind]} values, has {len(rest)}')
+def _add_entity(out: TsmFile, line: int, kind: str, number: int, words: list[str]) -> None:
+    """One line of a numbered kind; faces are not needed."""
+    if len(words) != FIELDS[kind]:
+        raise out.error(line, f'"{kind}" needs {FIELDS[kind]} values, has {len(words)}')
     if kind == "l":
-        values = _integers(out, line, rest)
-        out.links[number] = Link(line, *values[1:])
+        out.links[number] = Link(line, *_integers(out, line, words)[1:])
     elif kind == "e":
-        out.edges[number] = _floats(out, line, rest)[1]
+        _, out.edges[number] = _floats(out, line, words)
         if out.edges[number] <= 0:
-            raise out.error(line, f"the knot interval must be positive, not {rest[1]}")
+            raise out.error(line, f"the knot interval must be positive, not {words[1]}")
     elif kind == "v":
-        if rest[1] not in COMPASS:
-            raise out.error(line, f"{rest[1]!r} is no compass point ({', '.join(COMPASS)})")
-        out.vertices[number] = _integers(out, line, rest[:1])[0], rest[1]
-        out.vertex_lines[number] = line
+        if words[1] not in COMPASS:
+            raise out.error(line, f"{words[1]!r} is no compass point ({', '.join(COMPASS)})")
+        out.vertices[number] = line, _integers(out, line, words[:1])[0], words[1]
     elif kind == "0g":
-        out.grips[number] = line, _floats(out, line, rest)
+        out.grips[number] = line, _floats(out, line, words)
         if out.grips[number][1][3] <= 0:
-            raise out.error(line, f"the weight must be positive, not {rest[3]}")
+            raise out.error(line, f"the weight must be positive, not {words[3]}")
 
 
-def _other(out: TsmFile, line: int, kind: str, rest: list[str]) -> None:
-    """Creases, grip maps and the header; what omote does not need goes by."""
+def _add_other(out: TsmFile, line: int, kind: str, words: list[str]) -> None:
+    """Creases, grip maps and header lines; other lines are not needed."""
     if kind == "ec":
-        out.creases.append((line, _integers(out, line, rest[:1] or ["nothing"])[0]))
-    elif kind == "0m" and rest[:1] in (["gv"], ["gvp"]):
-        out.owners.append((line, rest[0] == "gvp", _integers(out, line, rest[1:2] or ["nothing"])[0]))
-    elif kind == "0m" and rest[:1] == ["cg"]:
-        values = _integers(out, line, rest[1:])
-        if len(values) < 2 or values[1] != 4:
+        out.creases.append((line, _integers(out, line, words[:1] or ["nothing"])[0]))
+    elif kind == "0m" and words[:1] in (["gv"], ["gvp"]):
+        out.owners.append((line, words[0] == "gvp", _integers(out, line, words[1:2] or ["nothing"])[0]))
+    elif kind == "0m" and words[:1] == ["cg"]:
+        vertex, *values = _integers(out, line, words[1:]) or [0]
+        if values[:1] != [4]:
             raise out.error(line, "a vertex with extra grips must have 4 sides; star points are not read", HINT)
-        counts, grips = values[2:6], values[6:]
-        if (
-            len(counts) != 4
-            or min(counts) < 0
-            or len(grips) != sum(a + a * b for a, b in zip(counts, counts[1:] + counts[:1], strict=True))
-        ):
+        counts, grips = values[1:5], values[5:]
+        sizes = [a + a * b for a, b in zip(counts, counts[1:] + counts[:1], strict=True)]
+        if len(counts) != 4 or min(counts) < 0 or len(grips) != sum(sizes):
             raise out.error(line, f"lists {len(grips)} grips, which does not fit its counts {counts}")
-        out.extras.append((line, values[0], counts, grips))
+        out.extras.append((line, vertex, counts, grips))
     else:
-        out.lines.setdefault(kind, (line, " ".join(rest)))
+        out.header.setdefault(kind, (line, " ".join(words)))
 
 
-def _check(out: TsmFile, grips: int) -> None:
-    """Everything that is referred to must be there."""
-    there: dict[str, Collection[int]] = {"l": out.links, "v": out.vertices, "e": out.edges}
+def _check_links(out: TsmFile) -> None:
+    """Links and vertices must refer to entities that exist."""
     for link in out.links.values():
         if link.turn not in (0, 1, 2):
             raise out.error(link.line, f"turn must be 0, 1 or 2, not {link.turn}")
-        ends = (("l", link.next), ("l", link.opposite), ("v", link.vertex), ("e", link.edge))
-        for kind, number in ends:
-            if number not in there[kind]:
+        for kind, number, known in (
+            ("l", link.next, out.links),
+            ("l", link.opposite, out.links),
+            ("v", link.vertex, out.vertices),
+            ("e", link.edge, out.edges),
+        ):
+            if number not in known:
                 raise out.error(link.line, f'refers to "{kind}" {number}, which the file does not have')
-    for vertex, (leaving, _) in out.vertices.items():
+    for vertex, (line, leaving, _) in out.vertices.items():
         if leaving not in out.links or out.links[leaving].vertex != vertex:
-            raise out.error(out.vertex_lines[vertex], f'"v" {vertex} names link {leaving}, which does not leave it')
-    _check_owners(out)
-    if len(out.owners) != grips:
-        raise out.place.error(f'has {grips} grips ("0g") and {len(out.owners)} owners ("0m gv", "0m gvp")')
+            raise out.error(line, f'"v" {vertex} names link {leaving}, which does not leave it')
 
 
 def _check_owners(out: TsmFile) -> None:
-    none: list[int] = []
-    wanted = [(line, vertex, none) for line, own, vertex in out.owners if own or vertex >= 0]
-    wanted += [(line, vertex, grips) for line, vertex, _, grips in out.extras]
-    for line, vertex, grips in wanted:
+    """Grip maps must refer to vertices and grips that exist."""
+    references: list[tuple[int, int, list[int]]] = [
+        (line, vertex, []) for line, own, vertex in out.owners if own or vertex >= 0
+    ]
+    references += [(line, vertex, grips) for line, vertex, _, grips in out.extras]
+    for line, vertex, grips in references:
         if vertex not in out.vertices:
             raise out.error(line, f'refers to "v" {vertex}, which the file does not have')
         if -1 in grips:
-            raise out.error(line, "leaves grips out (-1), as at star points and holes; these are not read", HINT)
+            raise out.error(line, "has missing grips (-1), as at star points and holes; these are not read", HINT)
         if any(grip not in out.grips for grip in grips):
             raise out.error(line, f'refers to a "0g" that the file does not have: {grips}')
 

@@ -1,4 +1,4 @@
-"""The picture: a head drawn with OpenGL 3.1, off-screen or in a window.
+"""Pictures of a head, drawn with OpenGL 3.1, off-screen or in a window.
 
 In: a head, poses, a camera and a theme. Out: pixels, image files, a window. Imports base, mesh and head.
 

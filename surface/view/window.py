@@ -1,4 +1,4 @@
-"""The head in a window: imgui-bundle's runner owns window and panel, moderngl draws into its context."""
+"""Window that shows a head: imgui-bundle's runner owns window and panels, moderngl draws into its context."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from surface.base.errors import ViewError
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target
 from surface.view.scene.camera import Camera
-from surface.view.scene.pace import Pace, is_software
 from surface.view.scene.parts import ViewHead
+from surface.view.scene.sampling import AdaptiveSampling, is_software
 from surface.view.scene.theme import Theme
 from surface.view.scene.viewpoint import Viewpoint
 
@@ -29,7 +30,7 @@ HEADLESS_HINT = "add --headless, or start it under: xvfb-run -a"
 
 @dataclass(frozen=True)
 class WindowReport:
-    """What a window did: frames drawn, and the seconds from its first frame to its last."""
+    """Statistics of a window: frames drawn, and the seconds from its first frame to its last."""
 
     frames: int
     seconds: float
@@ -58,52 +59,42 @@ def run_window(
 ) -> WindowReport:
     """Show the head until the window is closed.
 
-    Drag turns the head, right drag moves it, the wheel zooms, 1 to 5 choose a preset view, 0 goes back.
+    Drag rotates the head, right drag moves it, the wheel zooms, 1 to 5 choose a preset view, 0 resets it.
 
     Parameters
     ----------
     source : called once per frame, gives values (P,) in `head.parameters` order.
     gui : draws ImGui panels, once per frame.
-    camera : where the picture is taken from at first; a viewpoint stays in the caller's hands.
-    seconds : close by itself after this long.
-    keep_going : asked once per frame, also while the window is minimised; it closes when told False.
+    camera : the camera at first; a viewpoint can be changed by the caller later.
+    seconds : close automatically after this long.
+    keep_going : called once per frame, also while the window is minimised; the window closes when it returns False.
     quality, theme, evaluator : see :class:`surface.view.draw.renderer.Renderer`.
-    kiosk : cover a whole monitor, hide the cursor, let mouse and keys alone but for Esc, which ends it.
+    kiosk : cover a whole monitor, hide the cursor, ignore mouse and keys but for Esc, which closes the window.
     monitor : which one, from 0.
 
     Raises
     ------
-    ViewError : no display, no OpenGL, or imgui-bundle is missing. What `source` or `gui` raise comes
-        through after the window is closed.
+    ViewError : no display, no OpenGL, or imgui-bundle is missing. Exceptions of `source` and `gui` are raised again
+        after the window is closed.
     """
-    _require_display()
-    runner = _imgui()
-    viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera)
-    window = _Window(head, source, viewpoint, quality, theme, evaluator)
-    window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk
-    params = _parameters(runner, window, size, title)
-    if kiosk:
-        _cover(runner, params, monitor)
-    return _show(runner, window, params)
-
-
-def has_display() -> bool:
-    """Whether this session has a display to open a window on."""
-    if sys.platform in ("win32", "darwin"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def _require_display() -> None:
-    """ViewError without a display: the window library would end the process instead."""
-    if not has_display():
+    if not has_display():  # the window library would end the process instead
         raise ViewError("there is no display to open a window on (DISPLAY is not set)", hint=HEADLESS_HINT)
-
-
-def _show(runner: Any, window: _Window, params: Any) -> WindowReport:
-    """Hand over to the runner until the window closes."""
     try:
-        runner.run(params)
+        from imgui_bundle import hello_imgui, imgui  # optional
+    except ImportError as error:
+        why = f"the window needs imgui-bundle ({error})"
+        raise ViewError(why, hint="pip install '.[view]' in the checkout") from error
+    viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera)
+    make = partial(Renderer, head=head, quality=quality, theme=theme, evaluator=evaluator)
+    window = _Window(imgui, source, viewpoint, make, quality)
+    window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk
+    params = window.params = _parameters(hello_imgui, window, size, title)
+    if kiosk:
+        geometry = params.app_window_params.window_geometry
+        geometry.full_screen_mode = hello_imgui.FullScreenMode.full_screen_desktop_resolution
+        geometry.monitor_idx = monitor
+    try:
+        hello_imgui.run(params)
     except Exception as error:
         raise window.failure or _no_window(error) from error
     if window.failure is not None:
@@ -113,51 +104,46 @@ def _show(runner: Any, window: _Window, params: Any) -> WindowReport:
     return WindowReport(window.frames, window.last - window.first)
 
 
+def has_display() -> bool:
+    """Whether this session has a display to open a window on."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
 def _no_window(error: Exception) -> ViewError:
-    """Why the runner gave up; its own words name only its source line."""
+    """The error for a runner that failed; its own message names only its source line."""
     display = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY", "")
     return ViewError(f"no window on display {display!r}: {str(error).splitlines()[0]}", hint=HEADLESS_HINT)
 
 
-def _imgui() -> Any:
-    """The runner module of imgui-bundle."""
-    try:
-        from imgui_bundle import hello_imgui  # optional
-    except ImportError as error:
-        raise ViewError(
-            f"the window needs imgui-bundle ({error})", hint="pip install '.[view]' in the checkout"
-        ) from error
-    return hello_imgui
-
-
 class _Window:
-    """What the runner's callbacks do; keeps the first failure, since none may leave a callback."""
+    """The runner's callbacks; keeps the first exception, since none may leave a callback."""
+
+    params: Any
 
     def __init__(
         self,
-        head: ViewHead,
+        imgui: Any,
         source: Callable[[], np.ndarray],
         viewpoint: Viewpoint,
+        make_renderer: Callable[[moderngl.Context], Renderer],
         quality: str,
-        theme: str | Theme,
-        evaluator: str,
     ) -> None:
-        self.head, self.source = head, source
-        self.viewpoint, self.quality, self.theme, self.evaluator = viewpoint, quality, theme, evaluator
+        self._imgui, self._source, self._viewpoint = imgui, source, viewpoint
+        self._make_renderer, self._quality = make_renderer, quality
         self.kiosk = False
         self.gui: Callable[[], None] | None = None
         self.seconds: float | None = None
         self.keep_going: Callable[[], bool] | None = None
         self.frames, self.first, self.last, self._began = 0, 0.0, 0.0, 0.0
         self.failure: BaseException | None = None
-        self._ctx: moderngl.Context | None = None
         self._renderer: Renderer | None = None
         self._target: Target | None = None
-        self._made_for: tuple[object, ...] = ()
-        self._pace = Pace(quality)
+        self._target_settings: tuple[object, ...] = ()
 
-    def guarded(self, action: Callable[[], None]) -> Callable[[], None]:
-        """`action` as a callback: what it raises is kept and closes the window."""
+    def as_callback(self, action: Callable[[], None]) -> Callable[[], None]:
+        """`action` as a callback: an exception is kept and closes the window."""
 
         def call() -> None:
             if self.failure is not None:
@@ -170,168 +156,130 @@ class _Window:
 
         return call
 
-    @staticmethod
-    def close() -> None:
-        """Ask the runner to stop after this frame."""
-        from imgui_bundle import hello_imgui
-
-        hello_imgui.get_runner_params().app_shall_exit = True
+    def close(self) -> None:
+        """Make the runner stop after this frame."""
+        self.params.app_shall_exit = True
 
     def start(self) -> None:
         """Attach moderngl to the window's context."""
         import moderngl  # optional
 
         try:
-            self._ctx = moderngl.create_context(require=310)
+            ctx = moderngl.create_context(require=310)
         except Exception as error:
-            raise ViewError(
-                f"the window has no OpenGL 3.1: {error}", hint="set LIBGL_ALWAYS_SOFTWARE=1 to draw in software"
-            ) from error
-        self._ctx.clear_errors()
-        self._pace = Pace(self.quality, software=is_software(self._ctx))
-        self._pace.begin_live()
-        self._renderer = Renderer(
-            self._ctx, self.head, quality=self.quality, theme=self.theme, evaluator=self.evaluator
-        )
-        if self._pace.hurried:
+            why = f"the window has no OpenGL 3.1: {error}"
+            raise ViewError(why, hint="set LIBGL_ALWAYS_SOFTWARE=1 to draw in software") from error
+        ctx.clear_errors()
+        self._sampling = AdaptiveSampling(self._quality, software=is_software(ctx))
+        self._sampling.start_live()
+        self._renderer = self._make_renderer(ctx)
+        if self._sampling.simplified:
             self._renderer.hurry()
 
     def background(self) -> None:
         """One frame of the head, under the panels."""
-        if self._ctx is None or self._renderer is None:
+        if self._renderer is None:
             return
-        # The runner's own drawing changes OpenGL's state behind moderngl's back: begin from what is there.
-        screen = self._ctx.detect_framebuffer()
-        size = _pixels()
-        if size[0] < 1 or size[1] < 1:
+        ctx, size = self._renderer.ctx, self._pixels()
+        # The runner's own drawing changes OpenGL's state without moderngl: begin from what is bound.
+        screen = ctx.detect_framebuffer()
+        if min(size) < 1:
             return
-        self._renderer.pose(self.source())
+        self._renderer.pose(self._source())
         started = time.perf_counter()
-        target = self._fitting(self._ctx, size)
+        settings = (*size, *self._sampling.settings)
+        target = self._target
+        if target is None or self._target_settings != settings:
+            self._target, self._target_settings = Target(ctx, size, *self._sampling.settings), settings
+            if target is not None:
+                target.release()
+            target = self._target
         self._renderer.update()
-        target.paint(self._renderer, self.viewpoint.camera)
+        target.paint(self._renderer, self._viewpoint.camera)
         target.complete()
         target.picture.scissor = (0, 0, *size)
         screen.viewport = screen.scissor = (0, 0, *size)
-        self._ctx.copy_framebuffer(screen, target.picture)
+        ctx.copy_framebuffer(screen, target.picture)
         screen.use()
-        self._ctx.enable_only(self._ctx.NOTHING)
-        self._pace.note(time.perf_counter() - started)
-        self._count()
+        ctx.enable_only(ctx.NOTHING)
+        self.last = time.perf_counter()
+        self._sampling.add_frame(self.last - started)
+        self.first = self.first if self.frames else self.last
+        self.frames += 1
 
     def panels(self) -> None:
         """Mouse, keys and the caller's panels."""
         if self.kiosk:
-            self._rest_hands()
+            self._imgui.set_mouse_cursor(self._imgui.MouseCursor_.none)
+            if self._imgui.is_key_pressed(self._imgui.Key.escape, repeat=False):
+                self.close()
         else:
-            _steer(self.viewpoint)
+            self._steer()
         if self.gui is not None:
             self.gui()
 
-    def ask(self) -> None:
-        """Before every frame, drawn or not: whether to go on."""
+    def _steer(self) -> None:
+        """Apply this frame's mouse and keys to the camera, unless a panel uses them."""
+        imgui, viewpoint = self._imgui, self._viewpoint
+        io = imgui.get_io()
+        if not io.want_capture_mouse:
+            moved = io.mouse_delta
+            if imgui.is_mouse_down(imgui.MouseButton_.left):
+                viewpoint.turn(moved.x, moved.y)
+            elif imgui.is_mouse_down(imgui.MouseButton_.right):
+                viewpoint.shift(moved.x, moved.y, int(io.display_size.y))
+            if io.mouse_wheel:
+                viewpoint.zoom(io.mouse_wheel)
+        if not io.want_text_input:
+            for digit in range(6):
+                if imgui.is_key_pressed(getattr(imgui.Key, f"_{digit}"), repeat=False):
+                    viewpoint.press(str(digit))
+
+    def check(self) -> None:
+        """Before every frame, drawn or not: close the window if its time is over."""
         now = time.perf_counter()
         self._began = self._began or now
         over = self.seconds is not None and now - (self.first if self.frames else self._began) >= self.seconds
         if over or (self.keep_going is not None and not self.keep_going()):
             self.close()
-        elif min(_pixels()) < 1:
-            time.sleep(_MINIMISED_S)  # nothing to draw, and nobody to wait for the screen
-
-    def _rest_hands(self) -> None:
-        """No cursor in a kiosk, and one key."""
-        from imgui_bundle import imgui
-
-        imgui.set_mouse_cursor(imgui.MouseCursor_.none)
-        if imgui.is_key_pressed(imgui.Key.escape, repeat=False):
-            self.close()
+        elif min(self._pixels()) < 1:
+            time.sleep(_MINIMISED_S)  # nothing is drawn, so nothing waits for the screen
 
     def stop(self) -> None:
-        """Give back what was drawn with, while the context still lives."""
-        if self._target is not None:
-            self._target.release()
-        if self._renderer is not None:
-            self._renderer.release()
+        """Release the graphics memory, while the context still exists."""
+        for thing in (self._target, self._renderer):
+            if thing is not None:
+                thing.release()
         self._target = self._renderer = None
 
-    def _fitting(self, ctx: moderngl.Context, size: tuple[int, int]) -> Target:
-        """The target, made anew when the window changed its size or the pace its samples."""
-        wanted = (*size, *self._pace.wanted)
-        if self._target is None or self._made_for != wanted:
-            old = self._target
-            self._target, self._made_for = Target(ctx, size, *self._pace.wanted), wanted
-            if old is not None:
-                old.release()
-        return self._target
-
-    def _count(self) -> None:
-        """Note the frame."""
-        self.last = time.perf_counter()
-        self.first = self.first if self.frames else self.last
-        self.frames += 1
-
-
-def _pixels() -> tuple[int, int]:
-    """Size of the window's framebuffer, pixels."""
-    from imgui_bundle import imgui
-
-    io = imgui.get_io()
-    scale = io.display_framebuffer_scale
-    return round(io.display_size.x * scale.x), round(io.display_size.y * scale.y)
-
-
-def _steer(viewpoint: Viewpoint) -> None:
-    """Apply this frame's mouse and keys to the camera, where no panel wants them."""
-    from imgui_bundle import imgui
-
-    io = imgui.get_io()
-    if not io.want_capture_mouse:
-        moved = io.mouse_delta
-        if imgui.is_mouse_down(imgui.MouseButton_.left):
-            viewpoint.turn(moved.x, moved.y)
-        elif imgui.is_mouse_down(imgui.MouseButton_.right):
-            viewpoint.shift(moved.x, moved.y, int(io.display_size.y))
-        if io.mouse_wheel:
-            viewpoint.zoom(io.mouse_wheel)
-    if not io.want_text_input:
-        for digit in range(6):
-            if imgui.is_key_pressed(getattr(imgui.Key, f"_{digit}"), repeat=False):
-                viewpoint.press(str(digit))
-
-
-def _cover(runner: Any, params: Any, monitor: int) -> None:
-    """Let the window cover a monitor."""
-    geometry = params.app_window_params.window_geometry
-    geometry.full_screen_mode = runner.FullScreenMode.full_screen_desktop_resolution
-    geometry.monitor_idx = monitor
+    def _pixels(self) -> tuple[int, int]:
+        """Size of the window's framebuffer, pixels."""
+        io = self._imgui.get_io()
+        scale = io.display_framebuffer_scale
+        return round(io.display_size.x * scale.x), round(io.display_size.y * scale.y)
 
 
 def _parameters(runner: Any, window: _Window, size: tuple[int, int], title: str) -> Any:
-    """The runner's settings: OpenGL, no files left behind, our callbacks."""
+    """The runner's settings: OpenGL 3.1, no files written, our callbacks."""
     params = runner.RunnerParams()
     params.app_window_params.window_title = title
     params.app_window_params.window_geometry.size = size
     params.ini_disable = True
     params.imgui_window_params.default_imgui_window_type = runner.DefaultImGuiWindowType.no_default_window
     params.fps_idling.enable_idling = False
-    _choose_opengl(runner, params)
-    callbacks = params.callbacks
-    callbacks.post_init = window.guarded(window.start)
-    callbacks.pre_new_frame = window.guarded(window.ask)
-    callbacks.custom_background = window.guarded(window.background)
-    callbacks.show_gui = window.guarded(window.panels)
-    callbacks.before_exit = window.stop
-    return params
-
-
-def _choose_opengl(runner: Any, params: Any) -> None:
-    """OpenGL 3.1 as the floor; macOS offers nothing below its own 3.3 core."""
     params.renderer_backend_type = runner.RendererBackendType.open_gl3
     options = runner.OpenGlOptions()
     options.anti_aliasing_samples = 0
-    if sys.platform != "darwin":
+    if sys.platform != "darwin":  # macOS offers nothing below its own 3.3 core
         options.major_version, options.minor_version = 3, 1
         options.glsl_version = "#version 140"
         options.use_core_profile = False
         options.use_forward_compat = False
     params.renderer_backend_options.open_gl_options = options
+    callbacks = params.callbacks
+    callbacks.post_init = window.as_callback(window.start)
+    callbacks.pre_new_frame = window.as_callback(window.check)
+    callbacks.custom_background = window.as_callback(window.background)
+    callbacks.show_gui = window.as_callback(window.panels)
+    callbacks.before_exit = window.stop
+    return params

@@ -1,4 +1,4 @@
-"""Materials: which program draws a part, and what it is told about the part."""
+"""Materials: which shader program draws a part, with which vertex data and uniforms."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.view.draw.programs import build
-from surface.view.scene.apertures import LID_POINTS
-from surface.view.scene.openings import Openings
+from surface.view.scene.openings import LID_POINTS, Openings
 from surface.view.scene.parts import ViewPart
 from surface.view.scene.theme import Theme
 
@@ -18,18 +17,18 @@ if TYPE_CHECKING:
     import moderngl
 
 Arrays = dict[str, np.ndarray]
-#: Tiles of the detail texture once round the head; whole, so that its seam at the back of the head does not show.
+#: Tiles of the detail texture around the head; a whole number, so that its seam at the back of the head is invisible.
 _DETAIL_TILES = 18
-#: Middle of the ball that the detail is wrapped on, mm.
+#: Centre of the sphere that the detail is wrapped on, mm.
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
 _DETAIL_SIZE = 128
-#: How bright skin is seen from its back, as the hollow bust is from below and behind.
+#: Brightness of the back of skin, as the hollow bust shows it from below and behind.
 _INSIDE = "0.25"
-#: A baked sky that hides nothing.
+#: A baked sky without occlusion.
 _OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
 _LOWER_LASHES = 0.42
-#: Materials of what the skin surrounds, in whatever pose.
+#: Materials of parts that the skin surrounds in every pose.
 INSIDE = ("eye", "teeth", "gums", "mouth")
 
 
@@ -40,10 +39,10 @@ class Material:
     Parameters
     ----------
     program : name in :func:`programs`.
-    static : part, theme, openings -> per-vertex data that never changes.
-    uniforms : part, theme, openings -> uniforms of this frame.
+    static : per-vertex data that never changes.
+    uniforms : uniforms of this frame.
     two_sided : whether back faces are drawn.
-    blended : whether the fragment's alpha mixes it with what is behind.
+    blended : whether the fragment's alpha blends it with the picture behind.
     order : lower is drawn earlier; what hides most comes first.
     """
 
@@ -58,24 +57,23 @@ class Material:
 def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, moderngl.Program]:
     """Every program of a quality and a theme, by name."""
     flat = ("flat.frag",)
-    made = {
+    return {
+        "skin": skin_program(ctx, quality, theme),
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
         "inner": build(ctx, ("light.glsl", "inner.vert"), flat),
         "hair": build(ctx, ("light.glsl", "hair.vert"), ("hair.frag",)),
         "background": build(ctx, ("background.vert",), ("background.frag",)),
     }
-    made["skin"] = skin_program(ctx, quality, theme)
-    return made
 
 
-def skin_program(ctx: moderngl.Context, quality: str, theme: Theme, *, hurried: bool = False) -> moderngl.Program:
-    """The program of skin; a `hurried` one takes its grain unfiltered, for moving pictures drawn in software."""
+def skin_program(ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False) -> moderngl.Program:
+    """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software."""
     defines: dict[str, int | str] = {"INSIDE": _INSIDE}
     if quality != "full":
         return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), ("flat.frag",), defines=defines)
     if theme.seams:
         defines |= {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
-    if hurried:
+    if simplified:
         defines["GRAIN_TEXELS"] = f"{_DETAIL_SIZE // 2}.0"
     shared = ("light.glsl", "skin.glsl")
     return build(ctx, (*shared, "skin.vert"), (*shared, "skin.frag"), defines=defines)
@@ -86,14 +84,9 @@ def of(name: str) -> Material:
     return MATERIALS.get(name, MATERIALS["skin"])
 
 
-def told(part: ViewPart) -> tuple[str, str]:
-    """Equal for parts that are told the same in every frame: those of a material, but each eye looks for itself."""
+def uniforms_key(part: ViewPart) -> tuple[str, str]:
+    """Equal for parts with the same uniforms in every frame: those of a material, but each eye has its own."""
     return part.material, part.name if part.material == "eye" else ""
-
-
-def order(name: str) -> int:
-    """Drawing order of a material."""
-    return of(name).order
 
 
 def attribute(part: ViewPart, name: str, default: tuple[float, ...]) -> np.ndarray:
@@ -122,7 +115,7 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
 
 
 def detail_uv(part: ViewPart) -> np.ndarray:
-    """Where the detail texture lies on a part at rest, (m, 2), in tiles.
+    """Texture coordinates of the detail texture on a part at rest, (m, 2), in tiles.
 
     Longitude and latitude on the skull, height and reach on neck and shoulders: a head's own (u, v) are
     stretched, and differ from part to part.
@@ -144,10 +137,6 @@ def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[
     }
 
 
-def _eye_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
-    return {"local": openings.local(part)}
-
-
 def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
     return {
         "iris_colour": theme.iris,
@@ -162,17 +151,17 @@ def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[s
 def _inner(albedo: tuple[float, float, float], wrap: float, wetness: float, **options: Any) -> Material:
     """A material inside the mouth."""
 
-    def static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
-        return {"occlusion": attribute(part, "occlusion", (1.0,))[:, :1]}
-
-    def uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
-        return {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness, **openings.mouth()}
-
-    return Material("inner", static, uniforms, **options)
+    fixed = {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness}
+    return Material(
+        "inner",
+        lambda part, theme, openings: {"occlusion": attribute(part, "occlusion", (1.0,))[:, :1]},
+        lambda part, theme, openings: fixed | openings.mouth(),
+        **options,
+    )
 
 
 def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0.0) -> Material:
-    """Lashes and brows; `colour` names the theme's, `fade` and `edges` as in hair.frag."""
+    """Lashes or brows; `colour` is a key of the theme, `fade` and `edges` are as in hair.frag."""
     return Material(
         "hair",
         lambda part, theme, openings: {"along": np.hstack([strip_uv(part), strip_strength(part, theme)])},
@@ -184,14 +173,14 @@ def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0
 
 
 def strip_uv(part: ViewPart) -> np.ndarray:
-    """Along and across a strip of hair, 0..1 (m, 2): several strips of one part lie two units of u apart."""
+    """Coordinates along and across a strip of hair, 0..1 (m, 2): strips of one part lie two units of u apart."""
     uv = np.array(part.uv, np.float32)
     uv[:, 0] -= 2.0 * np.floor(uv[:, 0] / 2.0)
     return np.clip(uv, 0.0, 1.0)
 
 
 def strip_strength(part: ViewPart, theme: Theme) -> np.ndarray:
-    """How strong each hair is, (m, 1): lashes of the lower lid are the fainter ones."""
+    """Opacity of each hair, (m, 1): lashes of the lower lid are fainter."""
     strength = np.full((len(part.vertices), 1), theme.hair, np.float32)
     if part.material == "lash":
         strip = np.floor(np.asarray(part.uv)[:, 0] / 2.0)
@@ -204,7 +193,7 @@ def strip_strength(part: ViewPart, theme: Theme) -> np.ndarray:
 
 MATERIALS: dict[str, Material] = {
     "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
-    "eye": Material("eye", _eye_static, _eye_uniforms, order=1),
+    "eye": Material("eye", lambda part, theme, openings: {"local": openings.local(part)}, _eye_uniforms, order=1),
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
     "brow": _hair("brow", (0.72, 0.50, 0.30, 2.4), 1.0),
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, order=3),
@@ -215,7 +204,7 @@ MATERIALS: dict[str, Material] = {
 
 
 def detail_texture(ctx: moderngl.Context) -> moderngl.Texture:
-    """Tiling noise (rgb: bumps, a: mottling), the same every time."""
+    """Tiling noise (rgb: bumps, a: mottling) from a fixed seed."""
     random = np.random.default_rng(7)
     layers = [_tiling_noise(random, falloff) for falloff in (0.5, 0.5, 0.5, 1.0)]
     data = np.clip(np.stack(layers, axis=-1) * 0.17 + 0.5, 0.0, 1.0)

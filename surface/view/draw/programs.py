@@ -1,4 +1,4 @@
-"""Shader programs: GLSL 140 text from the shaders folder, put together and compiled."""
+"""Shader programs: GLSL 140 text from the shaders folder, assembled and compiled, and their uniforms."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from surface.base.errors import ViewError
 if TYPE_CHECKING:
     import moderngl
 
-VERSION = "#version 140\n"
-
 
 @cache
 def source(name: str) -> str:
@@ -26,7 +24,7 @@ def source(name: str) -> str:
 def assemble(names: tuple[str, ...], defines: Mapping[str, int | str]) -> str:
     """One shader's text: version line, defines, then the named files in order."""
     lines = [f"#define {key} {value}\n" for key, value in defines.items()]
-    return VERSION + "".join(lines) + "\n".join(source(name) for name in names)
+    return "#version 140\n" + "".join(lines) + "\n".join(source(name) for name in names)
 
 
 def build(
@@ -47,13 +45,12 @@ def build(
 
     Raises
     ------
-    ViewError : when the driver refuses the shader; the message carries the driver's words.
+    ViewError : when the driver refuses the shader; the message contains the driver's.
     """
     import moderngl  # optional
 
-    texts: dict[str, Any] = {"vertex_shader": assemble(vertex, defines or {})}
-    if fragment:
-        texts["fragment_shader"] = assemble(fragment, defines or {})
+    shaders = {"vertex_shader": vertex, "fragment_shader": fragment}
+    texts: dict[str, Any] = {kind: assemble(names, defines or {}) for kind, names in shaders.items() if names}
     if outputs:
         texts["varyings"] = outputs
     try:
@@ -63,15 +60,14 @@ def build(
             f"the graphics driver refused the shader {'+'.join(vertex)} / {'+'.join(fragment)}: {error}",
             hint="update the graphics driver, or set LIBGL_ALWAYS_SOFTWARE=1 to draw in software",
         ) from error
-    # moderngl asks every program for things that OpenGL 3.1 does not have; the complaint is not ours.
-    ctx.clear_errors()
+    ctx.clear_errors()  # moderngl queries every program for features that OpenGL 3.1 does not have
     return program
 
 
-def put(program: moderngl.Program, values: Mapping[str, Any]) -> None:
-    """Set uniforms; names that the compiler removed are passed over.
+def set_uniforms(program: moderngl.Program, values: Mapping[str, Any]) -> None:
+    """Set uniforms; names that the compiler removed are ignored.
 
-    Numbers go in as they are; arrays as float32 in column-major order, so matrices are given as they are
+    Numbers are set as they are; arrays as float32 in column-major order, so matrices are given as they are
     written on paper (row, column).
     """
     for name, value in values.items():
@@ -83,16 +79,12 @@ def put(program: moderngl.Program, values: Mapping[str, Any]) -> None:
         elif isinstance(value, tuple):
             uniform.write(_packed(value))
         else:
-            uniform.write(_bytes(np.asarray(value, np.float32)))
+            array = np.asarray(value, np.float32)
+            square = array.ndim == 2 and array.shape[0] == array.shape[1]
+            uniform.write((array.T if square else array).tobytes())
 
 
 @lru_cache(maxsize=256)
 def _packed(numbers: tuple[float, ...]) -> bytes:
-    """Uniform bytes of a vector; the same few come in every frame."""
+    """Uniform bytes of a vector; the same few are set in every frame."""
     return np.array(numbers, np.float32).tobytes()
-
-
-def _bytes(array: np.ndarray) -> bytes:
-    """Uniform bytes: square matrices transposed to column-major, everything else as it lies."""
-    square = array.ndim == 2 and array.shape[0] == array.shape[1]
-    return (array.T if square else array).tobytes()

@@ -1,4 +1,4 @@
-"""Pictures without a window: frames, clips, sheets, and shade that is worked out beforehand.
+"""Pictures without a window: frames, clips, contact sheets, and baked ambient occlusion.
 
 In: a head and poses. Out: arrays of pixels and image files. Imports base, head, view.scene, view.draw.
 """

@@ -1,4 +1,4 @@
-"""Moving pictures: animated WebP and GIF by Pillow, MP4 by an ffmpeg on the PATH."""
+"""Video clips: animated WebP and GIF by Pillow, MP4 by an ffmpeg on the PATH."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from surface.view.pictures.imagefile import as_image, replacing
 
 SUFFIXES = (".webp", ".gif", ".mp4")
 _WEBP_QUALITY = 80
-_LAST_WORDS = 400
+_MESSAGE_BYTES = 400  # of ffmpeg's output, its end
 
 
 def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 25.0) -> int:
@@ -36,23 +37,21 @@ def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 2
     ViewError : unknown suffix, no frames, no ffmpeg for .mp4, or the file cannot be written.
     """
     path = Path(path)
-    if path.suffix.lower() not in SUFFIXES:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
         raise ViewError(
             f"cannot write {path.name}: {path.suffix or 'no suffix'} is no clip format",
             hint=f"end the name with one of {', '.join(SUFFIXES)}",
         )
     if not fps > 0:
         raise ViewError(f"a clip cannot run at {fps} frames per second", hint="give a rate above 0")
-    counted = _Counted(frames)
+    counted = _CheckedFrames(frames)
     with replacing(path) as temporary:
-        if path.suffix.lower() == ".mp4":
-            _write_mp4(temporary, counted, fps)
-        else:
-            _write_pillow(temporary, counted, fps)
+        (_write_mp4 if suffix == ".mp4" else _write_pillow)(temporary, counted, fps)
     return counted.count
 
 
-class _Counted:
+class _CheckedFrames:
     """Iterates over frames, counts them, and refuses an empty clip or a frame of another size."""
 
     def __init__(self, frames: Iterable[np.ndarray]) -> None:
@@ -64,53 +63,42 @@ class _Counted:
         self.first = np.asarray(first)
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        frame: np.ndarray | None = self.first
-        while frame is not None:
+        for frame in chain([self.first], self._frames):
             if frame.shape != self.first.shape:
                 raise ViewError(f"frame {self.count} is {frame.shape}, the first was {self.first.shape}")
             self.count += 1
             yield frame
-            frame = next(self._frames, None)
 
 
-def _write_pillow(path: Path, frames: _Counted, fps: float) -> None:
+def _write_pillow(path: Path, frames: _CheckedFrames, fps: float) -> None:
     """WebP or GIF, by the path's suffix."""
     images = (as_image(frame) for frame in frames)
-    first = next(images)
-    options: dict[str, Any] = {"save_all": True, "append_images": images, "loop": 0}
-    options["duration"] = max(1, round(1000.0 / fps))
+    options: dict[str, Any] = {"loop": 0, "duration": max(1, round(1000.0 / fps))}
     if path.suffix.lower() == ".webp":
         options |= {"quality": _WEBP_QUALITY, "method": 2, "minimize_size": False}
-    first.save(path, **options)
+    next(images).save(path, save_all=True, append_images=images, **options)
 
 
-def _write_mp4(path: Path, frames: _Counted, fps: float) -> None:
+def _write_mp4(path: Path, frames: _CheckedFrames, fps: float) -> None:
     """H.264 through a pipe to ffmpeg; odd sizes lose their last row or column."""
     program = shutil.which("ffmpeg")
     if program is None:
         raise ViewError(
             "writing .mp4 needs ffmpeg, which is not on the PATH", hint="apt-get install ffmpeg, or name a .webp"
         )
-    height, width = frames.first.shape[:2]
+    height, width = (length & ~1 for length in frames.first.shape[:2])
     command = [program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    command += ["-s", f"{width & ~1}x{height & ~1}", "-r", f"{fps:g}", "-i", "-", "-an"]
+    command += ["-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-", "-an"]
     command += ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart", str(path)]
     with tempfile.TemporaryFile() as log:
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log) as process:
-            _feed(process, frames, (height & ~1, width & ~1))
+            try:
+                for frame in frames:
+                    process.stdin.write(np.ascontiguousarray(frame[:height, :width]).tobytes())  # type: ignore[union-attr]
+                process.stdin.close()  # type: ignore[union-attr]
+            except BrokenPipeError:
+                pass  # ffmpeg has ended: its exit status is checked below
         if process.returncode != 0:
             log.seek(0)
-            words = log.read()[-_LAST_WORDS:].decode(errors="replace").strip()
-            raise ViewError(f"ffmpeg failed ({process.returncode}): {words}", hint="write a .webp instead")
-
-
-def _feed(process: subprocess.Popen[bytes], frames: _Counted, shape: tuple[int, int]) -> None:
-    """Send every frame; an ffmpeg that went away is told by its exit status, not here."""
-    if process.stdin is None:
-        return
-    try:
-        for frame in frames:
-            process.stdin.write(np.ascontiguousarray(frame[: shape[0], : shape[1]]).tobytes())
-        process.stdin.close()
-    except BrokenPipeError:
-        return
+            message = log.read()[-_MESSAGE_BYTES:].decode(errors="replace").strip()
+            raise ViewError(f"ffmpeg failed ({process.returncode}): {message}", hint="write a .webp instead")

@@ -1,4 +1,4 @@
-"""Writing image files whole: into a neighbour first, then moved into place."""
+"""Image files written whole or not at all: to a temporary file first, then moved to their name."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def as_image(pixels: np.ndarray) -> Image:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to; moved over `path` on success, removed on failure.
+    """A temporary path beside `path` to write to; moved to `path` on success, removed on failure.
 
     Raises
     ------

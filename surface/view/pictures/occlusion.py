@@ -1,6 +1,7 @@
-"""How much sky each vertex sees: depth pictures from many directions, for the shade in sockets, nostrils and folds.
+"""Baked ambient occlusion: how much sky each vertex sees, from depth pictures from many directions.
 
-Done once when a head is made and kept in its file; the picture then shades crevices at no cost per frame.
+Done once when a head is made and kept in its file; the picture then shades sockets, nostrils and folds at no cost per
+frame.
 """
 
 from __future__ import annotations
@@ -13,64 +14,40 @@ import numpy as np
 
 from surface.head import Head, load_data
 from surface.head.posing.baked import shade_path, write_shade
-from surface.view.draw.programs import build, put
+from surface.view.draw.programs import build, set_uniforms
 from surface.view.pictures.offscreen import open_context
 from surface.view.scene.parts import ViewHead, ViewPart
 
 if TYPE_CHECKING:
     import moderngl
 
-#: What hides the sky from what: skin and eyes are shaded by each other, the mouth's inside by itself alone,
-#: since the light that comes in between the lips is worked out each frame.
-_COMPANIES = (("skin", "eye"), ("teeth", "gums", "tongue"))
-
+#: Materials that occlude each other: the mouth's inside is occluded by itself alone, since the light that enters
+#: between the lips is computed each frame.
+_OCCLUDERS = (("skin", "eye"), ("teeth", "gums", "tongue"))
 #: Coefficients of the sky lie between minus and plus this.
 SKY_RANGE = 2.0
 #: Skin whose other side is further away lets no light through, mm.
 _THICK_MM = 11.0
 _NEIGHBOURS = 220
-
 #: Pose in which mouth and lids show what they hide at rest.
 _OPEN = {"jawOpen": 0.45, "eyeBlinkLeft": 0.8, "eyeBlinkRight": 0.8}
 
 
-def bake(
-    parts: Sequence[ViewPart], *, directions: int = 96, resolution: int = 512, bias_mm: float = 1.2
-) -> dict[str, np.ndarray]:
-    """Cosine-weighted share of the surroundings that each vertex sees, as the parts stand now.
-
-    Parameters
-    ----------
-    directions : how many views from all round.
-    resolution : pixels along the side of each depth picture.
-    bias_mm : how far behind the depth picture a vertex still counts as seen.
-
-    Returns
-    -------
-    Part name -> (m, 1) float32, 1 = open, 0 = buried; parts of other materials are 1 throughout.
-
-    Raises
-    ------
-    ViewError : no OpenGL on this machine.
-    """
-    return {name: seen[:, :1] for name, seen in _bake_all(parts, directions, resolution, bias_mm).items()}
-
-
 def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str, np.ndarray]:
-    """The greater of what vertices see at rest and in `open_pose` (P,), so that what opens does not stay black, calmed.
+    """Occlusion by part name, (m, 1): the greater of what vertices see at rest and in `open_pose` (P,), smoothed.
 
-    `open_pose` has the mouth open and the eyes shut; the head is left at rest. Options as for :func:`bake`.
-    Skin also gets which way the sky lies, by "NAME/visible" (see :func:`fit_sky`), and how thin it is, by
-    "NAME/thin".
+    `open_pose` has the mouth open and the eyes shut, so that parts that it uncovers do not stay black; the head is
+    left at rest. Options as for :func:`bake`. Skin also gets the direction of the sky, by "NAME/visible" (see
+    :func:`fit_sky`), and its thinness, by "NAME/thin".
     """
     head.pose(np.asarray(open_pose, np.float64))
-    opened = _bake_all(head.parts, **options)
+    opened = bake(head.parts, **options)
     head.pose(np.zeros(len(head.parameters)))
-    rest = _bake_all(head.parts, **options)
+    rest = bake(head.parts, **options)
     result: dict[str, np.ndarray] = {}
     for part in head.parts:
         shut, wide = rest[part.name], opened[part.name]
-        best = calm(np.where(wide[:, :1] > shut[:, :1], wide, shut), part.triangles)
+        best = smoothed(np.where(wide[:, :1] > shut[:, :1], wide, shut), part.triangles)
         result[part.name] = best[:, :1]
         if part.material == "skin":
             result[f"{part.name}/visible"] = best[:, 1:] / (2.0 * SKY_RANGE) + 0.5
@@ -78,21 +55,20 @@ def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str
     return result
 
 
-def calm(values: np.ndarray, triangles: np.ndarray, passes: int = 2) -> np.ndarray:
-    """Values (m, k) of vertices half way to the mean of their neighbours, `passes` times over.
+def smoothed(values: np.ndarray, triangles: np.ndarray, passes: int = 2) -> np.ndarray:
+    """Values (m, k) of vertices moved half way to the mean of their neighbours, `passes` times.
 
-    Views are few, and what neighbours differ by for that reason shows as streaks where skin stretches.
+    The directions are few, and the noise this causes between neighbours shows as streaks where skin stretches.
     """
     from scipy.sparse import coo_array  # takes a moment to import
 
     start, end = np.asarray(triangles).T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     ones = np.ones(2 * len(start), np.float32)
     joined = coo_array((ones, (np.append(start, end), np.append(end, start))), shape=(len(values),) * 2).tocsr()
-    count = np.maximum(joined.sum(axis=1), 1e-9)[:, None]
-    alone = (count < 1.0)[:, 0]
+    count = joined.sum(axis=1)[:, None]
     result = np.asarray(values, np.float32)
     for _ in range(passes):
-        result = np.where(alone[:, None], result, 0.5 * result + 0.5 * (joined @ result) / count)
+        result = np.where(count < 1.0, result, 0.5 * result + 0.5 * (joined @ result) / np.maximum(count, 1e-9))
     return result
 
 
@@ -101,27 +77,42 @@ def thinness(part: ViewPart) -> np.ndarray:
     from scipy.spatial import cKDTree
 
     vertices, normals = np.asarray(part.vertices, float), np.asarray(part.normals, float)
-    distance, near = cKDTree(vertices).query(
-        vertices, k=min(_NEIGHBOURS, len(vertices)), distance_upper_bound=_THICK_MM
-    )
-    there = np.append(vertices, [[0.0, 0.0, 0.0]], axis=0)[near] - vertices[:, None]
-    away = np.append(normals, [[0.0, 0.0, 0.0]], axis=0)[near]
-    facing = (away * normals[:, None]).sum(axis=2) < -0.4
-    inside = (there * normals[:, None]).sum(axis=2) < -0.5 * distance
-    depth = np.where(facing & inside, distance, _THICK_MM).min(axis=1)
+    count = min(_NEIGHBOURS, len(vertices))
+    distance, near = cKDTree(vertices).query(vertices, k=count, distance_upper_bound=_THICK_MM)
+    none = np.zeros((1, 3))  # the row of a neighbour that was not found
+    offset = np.append(vertices, none, axis=0)[near] - vertices[:, None]
+    opposite = (np.append(normals, none, axis=0)[near] * normals[:, None]).sum(axis=2) < -0.4
+    inside = (offset * normals[:, None]).sum(axis=2) < -0.5 * distance
+    depth = np.where(opposite & inside, distance, _THICK_MM).min(axis=1)
     thin: np.ndarray = (1.0 - depth[:, None] / _THICK_MM).astype(np.float32)
     return thin
 
 
-def _bake_all(
-    parts: Sequence[ViewPart], directions: int = 96, resolution: int = 512, bias_mm: float = 1.2
+def bake(
+    parts: Sequence[ViewPart], *, directions: int = 96, resolution: int = 512, bias_mm: float = 1.2
 ) -> dict[str, np.ndarray]:
-    """Part name -> (m, 5): the share of the surroundings seen, and the sky of :func:`fit_sky`."""
+    """Cosine-weighted share of the sky that each vertex sees, as the parts are posed now.
+
+    Parameters
+    ----------
+    directions : number of views from all around.
+    resolution : pixels along the side of each depth picture.
+    bias_mm : how far behind the depth picture a vertex still counts as seen.
+
+    Returns
+    -------
+    Part name -> (m, 5) float32: the share, 1 = open, 0 = buried, and the coefficients of :func:`fit_sky`; parts of
+    other materials have 1, 1, 0, 0, 0 throughout.
+
+    Raises
+    ------
+    ViewError : no OpenGL on this machine.
+    """
     result = {part.name: np.tile(np.array([1, 1, 0, 0, 0], np.float32), (len(part.vertices), 1)) for part in parts}
     ctx = open_context()
     try:
-        for company in _COMPANIES:
-            members = [part for part in parts if part.material in company]
+        for materials in _OCCLUDERS:
+            members = [part for part in parts if part.material in materials]
             if members:
                 result |= _bake(ctx, members, directions, resolution, bias_mm)
     finally:
@@ -130,36 +121,40 @@ def _bake_all(
 
 
 def fit_sky(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Coefficients (m, 4) so that a + (b, c, d) . direction is nearest to what a vertex sees there.
+    """Coefficients (m, 4) so that a + (b, c, d) . direction is nearest to what a vertex sees there (least squares).
 
     Parameters
     ----------
     normal : (m, 4, 4) sum over directions of weight times the products of (1, direction) with itself.
     right : (m, 4) sum of weight times seen times (1, direction).
     """
-    steady = normal + 0.02 * np.eye(4) * np.maximum(normal[:, :1, :1], 1e-6)
-    return np.clip(np.linalg.solve(steady, right[..., None])[..., 0], -SKY_RANGE, SKY_RANGE)
+    regular = normal + 0.02 * np.eye(4) * np.maximum(normal[:, :1, :1], 1e-6)
+    return np.clip(np.linalg.solve(regular, right[..., None])[..., 0], -SKY_RANGE, SKY_RANGE)
 
 
 def _bake(
     ctx: moderngl.Context, parts: Sequence[ViewPart], directions: int, resolution: int, bias_mm: float
 ) -> dict[str, np.ndarray]:
-    """As :func:`_bake_all` for parts that shade each other."""
+    """As :func:`bake`, for parts that occlude each other."""
     points = np.concatenate([np.asarray(part.vertices, np.float64) for part in parts])
     normals = np.concatenate([np.asarray(part.normals, np.float64) for part in parts])
     program = build(ctx, ("depth.vert",), ("depth.frag",))
-    arrays = _arrays(ctx, program, parts)
+    arrays = [_vertex_array(ctx, program, part) for part in parts]
     depth = ctx.depth_texture((resolution, resolution))
     target = ctx.framebuffer([], depth)
     seen, total = np.zeros(len(points)), np.zeros(len(points))
     normal, right = np.zeros((len(points), 4, 4)), np.zeros((len(points), 4))
-    for direction in spread(directions):
+    for direction in sphere_directions(directions):
         weight = np.clip(normals @ direction, 0.0, None)
         box, matrix, span = orthographic(points, direction)
-        put(program, {"view_projection": matrix})
-        _draw_depth(ctx, target, arrays)
+        set_uniforms(program, {"view_projection": matrix})
+        target.use()
+        ctx.enable_only(ctx.DEPTH_TEST)
+        target.clear(depth=1.0)
+        for array in arrays:
+            array.render()
         picture = np.frombuffer(depth.read(), np.float32).reshape(resolution, resolution)
-        visible = lit(box, picture, bias_mm / span)
+        visible = visibility(box, picture, bias_mm / span)
         seen += weight * visible
         total += weight
         one = np.append(1.0, direction)
@@ -170,8 +165,15 @@ def _bake(
     return dict(zip([part.name for part in parts], np.split(share, ends), strict=True))
 
 
-def spread(count: int) -> np.ndarray:
-    """`count` directions (count, 3) spread evenly over the sphere (golden spiral)."""
+def _vertex_array(ctx: moderngl.Context, program: moderngl.Program, part: ViewPart) -> moderngl.VertexArray:
+    """Positions and triangles of a part."""
+    positions = ctx.buffer(np.ascontiguousarray(part.vertices, np.float32).tobytes())
+    index = ctx.buffer(np.ascontiguousarray(part.triangles, np.int32).tobytes())
+    return ctx.vertex_array(program, [(positions, "3f", "position")], index, 4)
+
+
+def sphere_directions(count: int) -> np.ndarray:
+    """`count` unit vectors (count, 3) evenly over the sphere (golden spiral)."""
     index = np.arange(count) + 0.5
     height, angle = 1.0 - 2.0 * index / count, np.pi * (1.0 + 5.0**0.5) * index
     ring = np.sqrt(1.0 - height**2)
@@ -183,7 +185,7 @@ def orthographic(points: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray,
 
     Returns
     -------
-    Their place in the unit cube (m, 3), depth last and growing away from the viewer; the matrix (4, 4) to
+    Their coordinates in the unit cube (m, 3), depth last and growing away from the viewer; the matrix (4, 4) to
     clip space; and the depth of the cube in mm.
     """
     side = np.cross(direction, (0.0, 1.0, 0.0) if abs(direction[1]) < 0.9 else (1.0, 0.0, 0.0))
@@ -198,37 +200,18 @@ def orthographic(points: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray,
     return (own - low) / size, matrix, float(size[2])
 
 
-def lit(box: np.ndarray, picture: np.ndarray, bias: float) -> np.ndarray:
-    """Whether each place (m, 3) in the unit cube lies before the depth `picture` (r, r); 0..1 over 4 pixels."""
+def visibility(box: np.ndarray, picture: np.ndarray, bias: float) -> np.ndarray:
+    """Whether each of `box` (m, 3) in the unit cube lies before the depth `picture` (r, r); 0..1 over 4 pixels."""
     size = picture.shape[0]
     at = box[:, :2] * size - 0.5
     corner = np.clip(np.floor(at).astype(int), 0, size - 2)
     rest = np.clip(at - corner, 0.0, 1.0)
     result = np.zeros(len(box))
-    for dx in (0, 1):
-        for dy in (0, 1):
-            share = (rest[:, 0] if dx else 1.0 - rest[:, 0]) * (rest[:, 1] if dy else 1.0 - rest[:, 1])
-            result += share * (box[:, 2] <= picture[corner[:, 1] + dy, corner[:, 0] + dx] + bias)
+    for dx, x_share in enumerate((1.0 - rest[:, 0], rest[:, 0])):
+        for dy, y_share in enumerate((1.0 - rest[:, 1], rest[:, 1])):
+            before = box[:, 2] <= picture[corner[:, 1] + dy, corner[:, 0] + dx] + bias
+            result += x_share * y_share * before
     return result
-
-
-def _arrays(ctx: moderngl.Context, program: moderngl.Program, parts: Sequence[ViewPart]) -> list[moderngl.VertexArray]:
-    """Positions and triangles of the parts."""
-    made = []
-    for part in parts:
-        positions = ctx.buffer(np.ascontiguousarray(part.vertices, np.float32).tobytes())
-        index = ctx.buffer(np.ascontiguousarray(part.triangles, np.int32).tobytes())
-        made.append(ctx.vertex_array(program, [(positions, "3f", "position")], index, 4))
-    return made
-
-
-def _draw_depth(ctx: moderngl.Context, target: moderngl.Framebuffer, arrays: list[moderngl.VertexArray]) -> None:
-    """The parts' depth as seen by the program's matrix."""
-    target.use()
-    ctx.enable_only(ctx.DEPTH_TEST)
-    target.clear(depth=1.0)
-    for array in arrays:
-        array.render()
 
 
 def shade_head(folder: str | Path) -> Path:
@@ -240,6 +223,6 @@ def shade_head(folder: str | Path) -> Path:
     ViewError : no OpenGL on this machine.
     """
     shade_path(folder).unlink(missing_ok=True)
-    head = Head(load_data(folder), str(folder))  # without what stands beside it and is made for another, perhaps
+    head = Head(load_data(folder), str(folder))  # without the files beside it, which may belong to another head
     open_pose = np.array([_OPEN.get(name, 0.0) for name in head.parameters])
     return write_shade(folder, bake_head(head, open_pose), head.parts)

@@ -1,10 +1,9 @@
-"""Pictures without a window: an EGL context, a multisampled target, numpy arrays out."""
+"""Pictures without a window: an EGL context, a render target, numpy arrays out."""
 
 from __future__ import annotations
 
 import time
-from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,8 +11,8 @@ from surface.base.errors import ViewError
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target
 from surface.view.scene.camera import Camera
-from surface.view.scene.pace import Pace, is_software
 from surface.view.scene.parts import ViewHead
+from surface.view.scene.sampling import AdaptiveSampling, is_software
 from surface.view.scene.theme import Theme
 
 if TYPE_CHECKING:
@@ -23,11 +22,11 @@ NO_OPENGL_HINT = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 
 
 def open_context() -> moderngl.Context:
-    """A context of its own: EGL first (no display needed), then the platform's.
+    """A new context: EGL first (no display needed), then the platform's.
 
     Raises
     ------
-    ViewError : moderngl is missing, or no OpenGL 3.1 is to be had.
+    ViewError : moderngl is missing, or there is no OpenGL 3.1.
     """
     try:
         import moderngl  # optional
@@ -52,9 +51,9 @@ class Offscreen:
     ----------
     head : anything with the parts of `surface.view.scene.parts.ViewHead`.
     size : (width, height), pixels.
-    samples : per pixel; None = 4 for quality "full" and 1 with smoothed edges for "fast". Once :meth:`draw` is
-        used, the picture counts as live, and "full" too falls back to 1 where 4 cannot be kept up; "fast" on a
-        software renderer is then drawn at a share of its size (:data:`surface.view.scene.pace.SCALE`) and enlarged.
+    samples : per pixel; None = 4 for quality "full" and 1 with smoothed edges for "fast". After the first :meth:`draw`
+        the picture is live, and "full" too falls back to 1 where 4 take too long; "fast" on a software renderer is then
+        drawn at a share of its size (:data:`surface.view.scene.sampling.SCALE`) and enlarged.
     quality, theme, evaluator : see :class:`surface.view.draw.renderer.Renderer`.
 
     Raises
@@ -78,26 +77,23 @@ class Offscreen:
             self.ctx.release()
             raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
         self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme, evaluator=evaluator)
-        self._pace = Pace(quality, samples, software=is_software(self.ctx))
-        self._wanted = self._pace.wanted
-        self.target = Target(self.ctx, size, *self._wanted)
+        self._sampling = AdaptiveSampling(quality, samples, software=is_software(self.ctx))
+        self._settings = self._sampling.settings
+        self.target = Target(self.ctx, size, *self._settings)
 
     def go_live(self) -> None:
-        """Make ready what only moving pictures need, which the first :meth:`draw` would do otherwise."""
-        self._pace.begin_live()
-        self._enter()
-        if self._pace.hurried:
-            self.renderer.hurry()
-        self._fit_target()
+        """Prepare for moving pictures, which the first :meth:`draw` would do otherwise."""
+        self._sampling.start_live()
+        self._make_current()
+        self._apply_sampling()
 
     def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
         """Pose the head with `values` (P,) and draw it, without reading the picture back.
 
-        The frame before is waited for after the pose, so on a software renderer posing runs beside the
-        filling of the last frame and never more than one frame is under way. :meth:`read` and :meth:`finish`
-        wait for this one.
+        The frame before is waited for after the pose, so a software renderer fills the last frame while the head is
+        posed, and there is never more than one frame in flight. :meth:`read` and :meth:`finish` wait for this one.
         """
-        self._pace.begin_live()
+        self._sampling.start_live()
         self._frame(values, camera)
 
     def render(self, values: np.ndarray, camera: Camera | None = None) -> np.ndarray:
@@ -105,51 +101,52 @@ class Offscreen:
         self._frame(values, camera)
         return self.read()
 
-    def _enter(self) -> None:
+    def _make_current(self) -> None:
         """Make the context current; another may have been since."""
-        self.ctx.__enter__()  # type: ignore[no-untyped-call]  # moderngl says no types here
+        self.ctx.__enter__()  # type: ignore[no-untyped-call]  # moderngl has no types here
 
     def _frame(self, values: np.ndarray, camera: Camera | None) -> None:
         """Pose and draw."""
         self.renderer.pose(values)
         started = time.perf_counter()
-        self._enter()
+        self._make_current()
         self.target.complete()
-        if self._pace.hurried:  # smoothing has just waited for all that was painted: there is no more than one frame
-            self.renderer.hurry()
-        else:
+        if not self._sampling.simplified:  # there, smoothing has just waited for all that was painted
             self.ctx.finish()
-        self._fit_target()
+        self._apply_sampling()
         self.renderer.update()
         self.target.paint(self.renderer, camera or Camera.front())
-        if self._pace.live:
-            self._pace.note(time.perf_counter() - started)
+        if self._sampling.live:
+            self._sampling.add_frame(time.perf_counter() - started)
 
-    def _fit_target(self) -> None:
-        """Make the target anew when the pace asks for other samples."""
-        if self._wanted != self._pace.wanted:
-            self._wanted = self._pace.wanted
-            old = self.target
-            self.target = Target(self.ctx, old.size, *self._wanted)  # before its framebuffer, still bound, is released
+    def _apply_sampling(self) -> None:
+        """Simplify the drawing, and replace the target by one with other samples, where the sampling says so."""
+        if self._sampling.simplified:
+            self.renderer.hurry()
+        if self._settings != self._sampling.settings:
+            self._settings, old = self._sampling.settings, self.target
+            self.target = Target(
+                self.ctx, old.size, *self._settings
+            )  # before its framebuffer, still bound, is released
             old.release()
 
     def read(self) -> np.ndarray:
         """The picture last drawn, (height, width, 3) uint8, top row first."""
-        self._enter()
+        self._make_current()
         return self.target.read()
 
     def finish(self) -> None:
         """Wait until the last frame is drawn."""
-        self._enter()
+        self._make_current()
         self.target.complete()
         self.ctx.finish()
 
     def close(self) -> None:
-        """Give everything back; safe to call twice."""
+        """Release everything; safe to call twice."""
         if self._closed:
             return
         self._closed = True
-        self._enter()
+        self._make_current()
         self.renderer.release()
         self.target.release()
         self.ctx.release()
@@ -157,7 +154,5 @@ class Offscreen:
     def __enter__(self) -> Offscreen:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: Any) -> None:
         self.close()

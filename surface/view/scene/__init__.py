@@ -1,4 +1,4 @@
-"""What a picture is of: camera, light, what the renderer asks of a head's parts, which openings are seen.
+"""The scene of a picture: camera, lights, buffers of a head's parts, openings of lids and lips, adaptive sampling.
 
 In: settings and parts. Out: matrices, bounds and states, without OpenGL. Imports base and head.
 """

@@ -1,4 +1,4 @@
-"""Which pixels a head can touch: bands of the picture's rows, each from its leftmost to its rightmost pixel."""
+"""Screen-space bounds of a head: bands of the picture's rows, each from its leftmost to its rightmost pixel."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import numpy as np
 
 from surface.base.jit import kernel
 
-Box = tuple[int, int, int, int]
-"""A rectangle of pixels: x, y (from the lower left corner), width, height."""
 ROWS = 16
 _MARGIN = 3
 
@@ -37,8 +35,8 @@ def project(points: Any, matrix: Any, near: Any, pixels: Any) -> bool:
 
 @kernel
 def sweep(triangles: Any, pixels: Any, rows: int, margin: float, low: Any, high: Any) -> None:
-    """Widen the bands ``low``, ``high`` (k,) float64, ``rows`` pixels high each, by the boxes round ``triangles``
-    (t, 3) of ``pixels (m, 2)``, with a margin all round."""
+    """Widen the bands ``low``, ``high`` (k,) float64, ``rows`` pixels high each, by the boxes around ``triangles``
+    (t, 3) of ``pixels (m, 2)``, with a margin on every side."""
     last, share = low.shape[0] - 1.0, 1.0 / rows
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -62,9 +60,7 @@ def sweep(triangles: Any, pixels: Any, rows: int, margin: float, low: Any, high:
 class Bands:
     """Pixels of a picture of ``size``: of each :data:`ROWS` rows from below, those from ``low`` up to ``high``.
 
-    Attributes
-    ----------
-    low, high : (k,) int64, whole pixels within the picture; a band with no more ``high`` than ``low`` is empty.
+    ``low`` and ``high`` are (k,) int64, whole pixels within the picture; a band with ``high`` <= ``low`` is empty.
     """
 
     size: tuple[int, int]
@@ -90,8 +86,8 @@ class Bands:
         top = np.minimum((some + 1) * ROWS, self.size[1])
         return np.column_stack([self.low[some], some * ROWS, self.high[some], top])
 
-    def box(self) -> Box:
-        """The rectangle round all of them, without area where there are none."""
+    def box(self) -> tuple[int, int, int, int]:
+        """The rectangle around all of them: left, bottom, width and height; zeros if there are none."""
         boxes = self.boxes()
         if not len(boxes):
             return 0, 0, 0, 0
@@ -100,24 +96,21 @@ class Bands:
 
 
 class Silhouette:
-    """Finds the bands of a picture that parts can touch.
+    """Finds the bands of a picture that parts can cover.
 
-    Parameters
-    ----------
-    size : of the picture, pixels; matrix : (4, 4) to clip space; near : the nearest depth that is drawn, mm.
+    ``size`` is the picture's, pixels; ``matrix`` (4, 4) maps to clip space; ``near`` is the nearest depth drawn, mm.
     """
 
     def __init__(self, size: tuple[int, int], matrix: np.ndarray, near: float) -> None:
         self._size, self._near = size, np.float32(near)
-        self._matrix = np.array(matrix, np.float64)
-        for axis in (0, 1):
-            self._matrix[axis] = (0.5 * self._matrix[axis] + 0.5 * self._matrix[3]) * size[axis]
-        self._matrix = self._matrix.astype(np.float32)
+        to_pixels = np.array(matrix, np.float64)
+        to_pixels[:2] = (0.5 * to_pixels[:2] + 0.5 * to_pixels[3]) * np.array(size)[:, None]
+        self._matrix = to_pixels.astype(np.float32)
         count = -(-size[1] // ROWS)
         self._low, self._high = np.full(count, np.inf), np.full(count, -np.inf)
 
     def add(self, vertices: np.ndarray, triangles: np.ndarray) -> bool:
-        """Take in a part's ``vertices (m, 3)`` and ``triangles (t, 3)``; False where one is too near to tell."""
+        """Add a part's ``vertices (m, 3)`` and ``triangles (t, 3)``; False if one is nearer than the camera draws."""
         pixels = np.empty((len(vertices), 2), np.float32)
         if not project(np.asarray(vertices, np.float32), self._matrix, self._near, pixels):
             return False
@@ -125,7 +118,7 @@ class Silhouette:
         return True
 
     def bands(self) -> Bands:
-        """What was taken in, in whole pixels of the picture."""
+        """The bands of the parts added, in whole pixels of the picture."""
         width = self._size[0]
         low, high = np.clip(np.floor(self._low), 0, width), np.clip(np.ceil(self._high), 0, width)
         return Bands(self._size, low.astype(np.int64), high.astype(np.int64))
@@ -133,7 +126,5 @@ class Silhouette:
 
 def corners(boxes: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """(6 k, 2) float32: two triangles in clip space for each of ``boxes (k, 4)``, pixels of a picture."""
-    places = 2.0 * np.asarray(boxes, np.float64).reshape(-1, 2, 2) / size - 1.0
-    pick = np.array([[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]])
-    both = np.stack([places[:, pick[:, 0], 0], places[:, pick[:, 1], 1]], axis=2)
-    return both.reshape(-1, 2).astype(np.float32)
+    box = 2.0 * np.asarray(boxes, np.float64).reshape(-1, 4) / (*size, *size) - 1.0
+    return box[:, [0, 1, 2, 1, 2, 3, 0, 1, 2, 3, 0, 3]].reshape(-1, 2).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Where the picture is taken from: a pinhole camera in head space, with presets."""
+"""Pinhole camera in head space, with presets."""
 
 from __future__ import annotations
 
@@ -68,19 +68,24 @@ class Camera:
     @property
     def yaw_deg(self) -> float:
         """Angle about y from straight ahead, degrees; + = towards the subject's left."""
-        offset = np.subtract(self.eye, self.target)
-        return float(np.degrees(np.arctan2(offset[0], offset[2])))
+        x, _, z = self._offset
+        return float(np.degrees(np.arctan2(x, z)))
 
     @property
     def pitch_deg(self) -> float:
         """Angle above the horizon, degrees."""
-        offset = np.subtract(self.eye, self.target)
-        return float(np.degrees(np.arctan2(offset[1], np.hypot(offset[0], offset[2]))))
+        x, y, z = self._offset
+        return float(np.degrees(np.arctan2(y, np.hypot(x, z))))
 
     @property
     def distance(self) -> float:
         """Millimetres from eye to target."""
-        return float(np.linalg.norm(np.subtract(self.eye, self.target)))
+        return float(np.linalg.norm(self._offset))
+
+    @property
+    def _offset(self) -> np.ndarray:
+        """From target to eye, (3,)."""
+        return np.subtract(self.eye, self.target)
 
     def orbit(self, yaw_deg: float, pitch_deg: float) -> Camera:
         """The camera turned about its target by these angles; pitch stops short of the poles."""
@@ -91,14 +96,12 @@ class Camera:
 
     def zoom(self, factor: float) -> Camera:
         """The camera with its distance divided by `factor`, kept between 120 and 3000 mm."""
-        offset = np.subtract(self.eye, self.target)
         distance = float(np.clip(self.distance / factor, 120.0, 3000.0))
-        return replace(self, eye=_triple(np.asarray(self.target) + offset * (distance / self.distance)))
+        return replace(self, eye=_triple(np.asarray(self.target) + self._offset * (distance / self.distance)))
 
     def aimed(self, target: tuple[float, float, float]) -> Camera:
         """The same view direction and distance, moved to look at `target` (3,), millimetres."""
-        offset = np.subtract(self.eye, self.target)
-        return replace(self, eye=_triple(np.asarray(target) + offset), target=target)
+        return replace(self, eye=_triple(np.asarray(target) + self._offset), target=target)
 
     def view(self) -> np.ndarray:
         """World to camera, (4, 4) float32, for column vectors."""
@@ -122,8 +125,7 @@ class Camera:
         return matrix.astype(np.float32)
 
     def matrix(self, aspect: float) -> np.ndarray:
-        """World to clip space, (4, 4) float32, for column vectors; read-only, a camera that stands still is asked in
-        every frame."""
+        """World to clip space, (4, 4) float32, for column vectors; read-only, since it is cached."""
         return _matrix(self, aspect)
 
 

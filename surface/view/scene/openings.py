@@ -1,4 +1,8 @@
-"""Where lids, lips and eyeballs are now: the few numbers per frame that the shaders need to shade eyes and mouth."""
+"""Positions of lids, lips and eyeballs in the current pose, as uniforms for the shaders of eyes and mouth.
+
+The eye's shader darkens the eyeball under the upper lid and draws the wet line on the lower one; the mouth's shader
+lights teeth and tongue by the light that enters between the lips. So blinks and gaze are shaded without a shadow map.
+"""
 
 from __future__ import annotations
 
@@ -8,36 +12,53 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surface.view.scene.apertures import (
-    LID_POINTS,
-    Aperture,
-    aperture,
-    boundary_loops,
-    leading_edge,
-    nearest_loop,
-    vector_area,
-)
+from surface.mesh.mesh import border_edges
 from surface.view.scene.parts import ViewPart
 
+#: Points of one lid that the eye's shader gets.
+LID_POINTS = 10
+#: How far from the skin's edge a lid's margin may lie, and the width of the column that is searched for it, mm.
+_MARGIN_MM = 7.0
+_COLUMN_MM = 1.6
 _INNER = ("teeth", "tongue", "gums", "mouth")
-#: Vertices of an eyeball that its rotation is read from.
+#: Vertices of an eyeball that its rotation is computed from.
 _SAMPLES = 48
 #: How far, in eyeball radii, a lid loop's mean may lie from the eyeball's centre.
 _LID_REACH = 2.0
 #: How far, millimetres, the lips' mean may lie from the front of the teeth.
 _LIP_REACH = 45.0
-#: The skin ends inside the lips; the light comes in this far in front of its edge, mm.
+#: The skin ends inside the lips; the light enters this far in front of its edge, mm.
 _LIP_DEPTH = 14.0
 #: Share of the edge's area at rest that is still hidden behind closed lips.
 _SHUT = 0.75
 #: Half the mouth's width, a little less: how far the opening counts to either side.
 _SLIDE = 0.38
 _FALLBACK_AREA = (0.0, 0.0, 250.0)
+_FALLBACK_MOUTH = {
+    "opening_centre": (0.0, -35.0, 110.0), "opening_area": _FALLBACK_AREA, "opening_side": (18.0, 0.0, 0.0),
+}  # fmt: skip
+
+Read = Callable[[ViewPart, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Aperture:
+    """An opening in a part.
+
+    Parameters
+    ----------
+    loop : (k,) vertex ids around the opening, in order, first = corner with the least x.
+    upper, lower : (LID_POINTS,) vertex ids along either edge, from the corner with the least x to the other.
+    """
+
+    loop: np.ndarray
+    upper: np.ndarray
+    lower: np.ndarray
 
 
 @dataclass(frozen=True)
 class EyeFrame:
-    """How to read an eyeball's rotation from its vertices.
+    """Maps vertices of an eyeball to its rotation.
 
     Parameters
     ----------
@@ -53,17 +74,8 @@ class EyeFrame:
     lids: Aperture | None
 
 
-Read = Callable[[ViewPart, np.ndarray], np.ndarray]
-
-
-def from_vertices(part: ViewPart, ids: np.ndarray) -> np.ndarray:
-    """Positions (k, 3) of vertices `ids` (k,) as the part holds them."""
-    positions: np.ndarray = part.vertices[ids]
-    return positions
-
-
 class Openings:
-    """Lids, lips and eyeballs of a head at rest; reads them again each frame.
+    """Lids, lips and eyeballs of a head.
 
     Parameters
     ----------
@@ -71,55 +83,38 @@ class Openings:
     read : gives the positions (k, 3) of vertices (k,) of a part as posed now.
     """
 
-    def __init__(self, parts: Sequence[ViewPart], read: Read = from_vertices) -> None:
+    def __init__(self, parts: Sequence[ViewPart], read: Read = lambda part, ids: part.vertices[ids]) -> None:
         self._read = read
         self._skin = max((p for p in parts if p.material == "skin"), key=lambda p: len(p.vertices), default=None)
         loops = boundary_loops(self._skin.triangles) if self._skin is not None else []
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
-        area = np.array(_FALLBACK_AREA) if self._lips is None else self._edge_area()
+        area = np.array(_FALLBACK_AREA)
+        if self._lips is not None and self._skin is not None:
+            area = vector_area(self._read(self._skin, self._lips.loop))
         self._shut_area, self._outward = _SHUT * float(np.linalg.norm(area)), 1.0 if area[2] > 0 else -1.0
         self.refresh()
 
     def read_vertices(self) -> dict[str, np.ndarray]:
-        """Which vertices (k,) are read, by part."""
+        """Vertices (k,) whose positions are needed, by part."""
         found = {name: frame.ids for name, frame in self._eyes.items()}
-        edges = [frame.lids for frame in self._eyes.values() if frame.lids is not None]
-        edges += [self._lips] if self._lips is not None else []
+        edges = [edge for edge in (*(frame.lids for frame in self._eyes.values()), self._lips) if edge is not None]
         if self._skin is not None and edges:
             found[self._skin.name] = np.unique(np.concatenate([i for e in edges for i in (e.loop, e.upper, e.lower)]))
         return found
 
-    def read_by(self, read: Read) -> None:
-        """From now on somebody else knows where vertices are."""
-        self._read = read
-
-    def refresh(self) -> None:
-        """Read the mouth anew, once after each pose: five materials ask for it."""
-        self._mouth = self._read_mouth()
-
     def _eye(self, part: ViewPart, loops: list[np.ndarray]) -> EyeFrame:
         """Frame and lids of one eyeball."""
-        local = part.attributes.get("eye_local")
         vertices = np.asarray(part.vertices, float)
         centre, radius = fit_sphere(vertices)
-        if local is None:
-            local = (vertices - centre) / radius
-        local = np.asarray(local, np.float32)
+        local = np.asarray(part.attributes.get("eye_local", (vertices - centre) / radius), np.float32)
         ids = np.unique(np.linspace(0, len(vertices) - 1, min(_SAMPLES, len(vertices))).astype(int))
         solve = np.linalg.pinv(np.column_stack([local[ids], np.ones(len(ids))]))
         lids = None
         if self._skin is not None:
             loop = nearest_loop(loops, self._skin.vertices, centre, _LID_REACH * radius)
-            lids = None if loop is None else self._lids(loop, centre)
+            lids = None if loop is None else _lids(loop, np.asarray(self._skin.vertices, float), centre)
         return EyeFrame(local, ids, solve, lids)
-
-    def _lids(self, loop: np.ndarray, centre: np.ndarray) -> Aperture:
-        """The margins of both lids over an eyeball."""
-        vertices = np.asarray(self._skin.vertices if self._skin is not None else (), float)
-        edge = aperture(loop, vertices)
-        upper = leading_edge(edge.upper, edge.lower, vertices, centre, 1.0)
-        return replace(edge, upper=upper, lower=leading_edge(edge.lower, edge.upper, vertices, centre, -1.0))
 
     def _find_lips(self, parts: Sequence[ViewPart], loops: list[np.ndarray]) -> Aperture | None:
         """The skin's opening nearest to the front of the mouth's inner parts."""
@@ -148,32 +143,30 @@ class Openings:
         return {"eye_rotation": rotation, "lid_upper": upper, "lid_lower": lower, "lids": 1.0}
 
     def mouth(self) -> dict[str, object]:
-        """Uniforms of the opening between the lips now: centre and vector area, mm and mm^2."""
+        """Uniforms of the opening between the lips: centre and vector area, mm and mm^2."""
         return self._mouth
 
-    def _read_mouth(self) -> dict[str, object]:
+    def refresh(self) -> None:
+        """Compute the mouth's uniforms, once after each pose: five materials need them."""
+        self._mouth: dict[str, object] = dict(_FALLBACK_MOUTH)
         if self._lips is None or self._skin is None:
-            return {
-                "opening_centre": (0.0, -35.0, 110.0),
-                "opening_area": _FALLBACK_AREA,
-                "opening_side": (18.0, 0.0, 0.0),
-            }
+            return
         ring = self._read(self._skin, self._lips.loop)
         area = vector_area(ring) * self._outward
         size = max(math.hypot(*area), 1e-6)
-        centre = ring.mean(axis=0) + area * (_LIP_DEPTH / size)
-        corners = self._read(self._skin, self._lips.upper)[[0, -1]]
-        return {
-            "opening_centre": centre,
+        first, *_, last = self._read(self._skin, self._lips.upper)
+        self._mouth = {
+            "opening_centre": ring.mean(axis=0) + area * (_LIP_DEPTH / size),
             "opening_area": area * (max(size - self._shut_area, 20.0) / size),
-            "opening_side": (corners[1] - corners[0]) * _SLIDE,
+            "opening_side": (last - first) * _SLIDE,
         }
 
-    def _edge_area(self) -> np.ndarray:
-        """Vector area (3,) inside the edge of the lips now, mm^2."""
-        if self._skin is None or self._lips is None:
-            return np.zeros(3)
-        return vector_area(self._read(self._skin, self._lips.loop))
+
+def _lids(loop: np.ndarray, vertices: np.ndarray, centre: np.ndarray) -> Aperture:
+    """The margins of both lids over an eyeball."""
+    edge = aperture(loop, vertices)
+    upper = leading_edge(edge.upper, edge.lower, vertices, centre, 1.0)
+    return replace(edge, upper=upper, lower=leading_edge(edge.lower, edge.upper, vertices, centre, -1.0))
 
 
 def fit_sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
@@ -182,3 +175,90 @@ def fit_sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
     solution = np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)[0]
     centre = solution[:3]
     return centre, float(np.sqrt(max(solution[3] + centre @ centre, 1e-9)))
+
+
+def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
+    """Closed loops (k,) of vertex ids along the edges that only one of `triangles` (t, 3) has.
+
+    Loops that meet themselves are not found.
+    """
+    following = dict(border_edges(np.asarray(triangles)).tolist())
+    loops = []
+    while following:
+        start, current = following.popitem()
+        loop = [start]
+        while current != start and current in following:
+            loop.append(current)
+            current = following.pop(current)
+        if current == start and len(loop) >= 6:
+            loops.append(np.array(loop, np.int64))
+    return loops
+
+
+def aperture(loop: np.ndarray, vertices: np.ndarray) -> Aperture:
+    """Split a boundary loop (k,) at its corners (least and greatest x) into upper and lower edge.
+
+    `vertices` (m, 3) are positions at rest, head not turned.
+    """
+    loop = np.roll(loop, -int(np.argmin(vertices[loop, 0])))
+    corner = int(np.argmax(vertices[loop, 0]))
+    first, second = loop[: corner + 1], np.append(loop[corner:], loop[0])[::-1]
+    if vertices[first, 1].mean() < vertices[second, 1].mean():
+        first, second = second, first
+    return Aperture(loop, _evenly_spaced(first, vertices), _evenly_spaced(second, vertices))
+
+
+def _evenly_spaced(path: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """LID_POINTS ids of `path` (k,), evenly spaced by length."""
+    steps = np.linalg.norm(np.diff(vertices[path], axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    at = np.searchsorted(along, np.linspace(0.0, along[-1], LID_POINTS))
+    return path[np.clip(at, 0, len(path) - 1)]
+
+
+def leading_edge(
+    path: np.ndarray, other: np.ndarray, vertices: np.ndarray, centre: np.ndarray, side: float
+) -> np.ndarray:
+    """The vertices (k,) of a lid that reach furthest over the eyeball, next to the skin's own edge.
+
+    The skin ends behind the lid's margin, out of sight; the margin is lowest (upper lid) or highest (lower lid) seen
+    from the eyeball's centre.
+
+    Parameters
+    ----------
+    path, other : (k,) vertex ids along the skin's edge, on this lid and on the other one.
+    vertices : (m, 3) positions at rest.
+    centre : (3,) of the eyeball.
+    side : +1 for an upper, -1 for a lower lid.
+    """
+    offset = vertices - centre
+    slope = side * offset[:, 1] / np.maximum(offset[:, 2], 1e-6)
+    heights = [np.interp(vertices[:, 0], vertices[edge, 0], vertices[edge, 1]) for edge in (path, other)]
+    middle = 0.5 * (heights[0] + heights[1])
+    chosen = path.copy()
+    for index, vertex in enumerate(path):
+        near = np.linalg.norm(vertices - vertices[vertex], axis=1) < _MARGIN_MM
+        near &= np.abs(vertices[:, 0] - vertices[vertex, 0]) < _COLUMN_MM
+        near &= (offset[:, 2] > 0.0) & (side * (vertices[:, 1] - middle) > 0.0)
+        ids = np.flatnonzero(near)
+        if len(ids):
+            chosen[index] = ids[np.argmin(slope[ids])]
+    return chosen
+
+
+def nearest_loop(loops: list[np.ndarray], vertices: np.ndarray, point: np.ndarray, reach: float) -> np.ndarray | None:
+    """The loop whose mean is nearest to `point` (3,), or None if none is within `reach` mm."""
+    if not loops:
+        return None
+    means = np.array([vertices[loop].mean(axis=0) for loop in loops])
+    distance = np.linalg.norm(means - point, axis=1)
+    best = int(np.argmin(distance))
+    return loops[best] if distance[best] <= reach else None
+
+
+def vector_area(ring: np.ndarray) -> np.ndarray:
+    """Vector area (3,) of a closed polygon (k, 3): half the sum of p_i x p_{i+1}, in mm^2."""
+    points = np.asarray(ring - ring[0], np.float64)
+    # The sum of p x q is the antisymmetric part of the sum of p q^T.
+    both = points[:-1].T @ points[1:]
+    return 0.5 * np.array([both[1, 2] - both[2, 1], both[2, 0] - both[0, 2], both[0, 1] - both[1, 0]])

@@ -1,8 +1,10 @@
-"""Colours and lights of the picture: data, one :class:`Theme` per look."""
+"""Themes: colours and lights of the picture."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from surface.base.errors import ViewError
 
 Colour = tuple[float, float, float]
 
@@ -24,21 +26,21 @@ class Light:
 
 @dataclass(frozen=True)
 class Theme:
-    """One look. Colours are linear RGB unless said otherwise.
+    """Colours and lights of a picture; linear RGB unless stated otherwise.
 
     Parameters
     ----------
-    albedo : skin where the head paints none.
+    albedo : skin of heads without a painted albedo.
     use_painted : whether the head's own albedo is used.
-    wrap : how far light bends round the terminator per channel, 0..1; red far, blue little, for skin.
+    wrap : how far light bends around the terminator per channel, 0..1; red far, blue little, for skin.
     gloss : scale of the skin's highlights.
     iris, sclera, brow, lash : colours.
     key, fill, rim : the three lights.
     sky, ground : the ambient light's upper and lower colour.
     background_top, background_bottom : sRGB colours of the gradient behind the head.
     through : colour of light that comes through thin skin, times its strength.
-    glow : light of its own in the iris, times its colour.
-    hair : how strong lashes and brows are.
+    glow : emitted light of the iris, times its colour.
+    hair : opacity of lashes and brows, 0..1.
     lips : how much darker a mask's lips are, 0..1.
     seams : whether the shell shows the gaps between its plates.
     lights_follow : 0 keeps the lights with the world, 1 turns them with the camera.
@@ -94,3 +96,12 @@ THEMES: dict[str, Theme] = {
         background_bottom=(0.20, 0.23, 0.27),
     ),
 }
+
+
+def find_theme(theme: str | Theme) -> Theme:
+    """The theme of that name, or `theme` itself; ViewError for an unknown name."""
+    if isinstance(theme, Theme):
+        return theme
+    if theme not in THEMES:
+        raise ViewError(f"there is no theme {theme!r}", hint=f"themes: {', '.join(sorted(THEMES))}")
+    return THEMES[theme]

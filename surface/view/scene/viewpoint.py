@@ -1,4 +1,4 @@
-"""What mouse and keys do to the camera; knows nothing of the window library."""
+"""Control of the camera by mouse and keys, without a window library."""
 
 from __future__ import annotations
 
@@ -13,23 +13,14 @@ _ZOOM_PER_NOTCH = 1.12
 
 
 class Viewpoint:
-    """The camera of a window and how it is moved.
-
-    Parameters
-    ----------
-    camera : where to begin, and where :meth:`reset` goes back to.
-    """
+    """The camera of a window; key 0 resets it to the camera given (the front without one)."""
 
     def __init__(self, camera: Camera | None = None) -> None:
         self.home = camera or Camera.front()
         self.camera = self.home
 
-    def reset(self) -> None:
-        """Back to where it began."""
-        self.camera = self.home
-
     def turn(self, right: float, down: float) -> None:
-        """Orbit for a drag of so many pixels; the head follows the hand."""
+        """Orbit for a drag of so many pixels; the head follows the mouse."""
         self.camera = self.camera.orbit(-right * _DEGREES_PER_PIXEL, down * _DEGREES_PER_PIXEL)
 
     def shift(self, right: float, down: float, height: int) -> None:
@@ -45,9 +36,9 @@ class Viewpoint:
         self.camera = self.camera.zoom(_ZOOM_PER_NOTCH**notches)
 
     def press(self, key: str) -> bool:
-        """A key: 1 to 5 are the presets, 0 goes home. Returns whether the key meant anything."""
+        """Apply a key: 1 to 5 are the presets, 0 resets. Returns whether the key has a meaning."""
         if key == "0":
-            self.reset()
+            self.camera = self.home
         elif key in KEYS:
             self.camera = PRESETS[KEYS[key]]()
         else:

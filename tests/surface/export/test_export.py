@@ -10,13 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_head import all_points, part, small_head
+from small_head import part, small_head
 
 import surface
 from surface.base.errors import ExportError
 from surface.export import API, SUFFIXES, Exporter, export_head, exporters
-from surface.export.png import png_bytes
-from surface.export.shapes import pieces_of
 from surface.fit.source.load import load_mesh
 from surface.head import Head
 from surface.readers.gltfmesh import read_gltf
@@ -86,19 +84,6 @@ def test_what_is_read_back_is_what_the_head_shows(tmp_path, head):
         distance = np.linalg.norm(got[:, None] - moved[None], axis=2).min(axis=1)
         assert distance.max() < 0.005
     assert load_mesh(path).named.left_out == ()
-
-
-def test_normals_have_length_one(head):
-    for piece in pieces_of(head):
-        for turned in (piece.normals, *(piece.normals + t for t in piece.turns.values())):
-            np.testing.assert_allclose(np.linalg.norm(turned, axis=1), 1.0, atol=1e-3)
-
-
-def test_closing_lips_are_written_as_what_they_add_to_an_open_jaw():
-    groups = [all_points("mouthClose", (0, 5, 0)), all_points("jawOpen", (0, -7, 0))]
-    head = Head(small_head(parts=[part("a", -40, groups=groups)], seams=[]))
-    (piece,) = pieces_of(head)
-    np.testing.assert_allclose(piece.moves["mouthClose"], np.tile([0, 5, 0], (len(piece.vertices), 1)), atol=0.01)
 
 
 def test_eyeballs_turn_about_their_own_node(tmp_path):
@@ -215,23 +200,6 @@ def test_exporters_from_outside_are_used_and_refused_where_they_cannot_be(tmp_pa
     with pytest.raises(ExportError, match=f"made for exporters of version {API + 1}, this omote has {API}") as caught:
         exporters([Exporter(api=API + 1, kind="other", title="", suffixes=(".x",), write=write)])
     assert caught.value.hint == "update omote"
-
-
-def test_png_is_what_pillow_reads():
-    image = pytest.importorskip("PIL.Image", reason="needs Pillow (extra view)")
-    import io
-
-    picture = np.random.default_rng(0).integers(0, 256, (5, 7, 3), np.uint8)
-    np.testing.assert_array_equal(np.asarray(image.open(io.BytesIO(png_bytes(picture)))), picture)
-
-
-def test_trimesh_opens_it(tmp_path, head):
-    trimesh = pytest.importorskip("trimesh", reason="needs trimesh (development only)")
-    (path,) = export_head(head, tmp_path / "h.glb")
-    scene = trimesh.load(path)
-    assert set(scene.geometry) == {"a", "b", "tooth"}
-    rest = np.concatenate([p.vertices for p in head.parts])
-    np.testing.assert_allclose(1000 * scene.bounds, [rest.min(axis=0), rest.max(axis=0)], atol=1e-2)
 
 
 VALIDATE = """

@@ -140,11 +140,11 @@ def test_hierarchical_splines_are_taken_exactly(tmp_path: Path, kind: str, name:
 
 
 def test_the_manuals_example_has_the_manuals_numbers_and_few_points(tmp_path: Path) -> None:
-    from surface.readers.thb import Hierarchy, Level, halved
+    from surface.readers.thb import Hierarchy, Level, dyadic_refinement
 
     levels = [Level((2, 2), (np.array([float(x) for x in OPEN.split()]),) * 2)]
-    levels += [halved(levels[0])]
-    levels += [halved(levels[1])]
+    levels += [dyadic_refinement(levels[0])]
+    levels += [dyadic_refinement(levels[1])]
     depth = np.zeros((16, 16), dtype=np.int64)
     depth[4:12, 4:12] = 1
     depth[4:10, 4:10] = 2

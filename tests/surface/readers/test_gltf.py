@@ -1,245 +1,229 @@
-"""glTF meshes: what is read, and a clear refusal of everything that is wrong."""
+"""surface.readers.gltf: containers and accessors, every number checked against what was packed by hand."""
 
 import base64
 import json
-from dataclasses import replace
+import struct
 
 import numpy as np
 import pytest
-from meshfiles import FLOAT, UINT, GlbBuilder, glb, triangulated
-from slit_sheet import slit_sheet
+from meshfiles import FLOAT, GlbBuilder
 
 from surface.base.errors import FitError
-from surface.fit.source.load import LoadOptions, load_mesh
-from surface.readers.gltfmesh import read_gltf
+from surface.readers.gltf import MOST_ELEMENTS, Gltf
 
 
-def write(tmp_path, builder: GlbBuilder, name: str = "m.glb"):
-    path = tmp_path / name
+def opened(tmp_path, builder: GlbBuilder) -> Gltf:
+    path = tmp_path / "m.glb"
     path.write_bytes(builder.bytes())
-    return path
+    return Gltf(path)
 
 
-def refused(path) -> str:
-    with pytest.raises(FitError) as e:
-        load_mesh(path)
-    assert str(path) in str(e.value) and e.value.hint
-    return str(e.value)
-
-
-def nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    return np.argmin(np.linalg.norm(points[:, None] - wanted, axis=2), axis=0)
-
-
-@pytest.mark.parametrize("sparse", [False, True])
-def test_a_mesh_comes_back(tmp_path, sparse):
-    want = slit_sheet()
-    got = load_mesh(write(tmp_path, glb(want, sparse=sparse))).mesh
-    at = nearest(got.vertices, want.vertices)
-    assert got.names == want.names and len(got.vertices) == len(want.vertices)
-    assert len(got.faces) == 2 * len(want.faces)
-    np.testing.assert_allclose(got.vertices[at], want.vertices, atol=1e-4)
-    np.testing.assert_allclose(got.deltas[:, at], want.deltas, atol=1e-4)
-    np.testing.assert_allclose(np.sort(got.uv, axis=0), np.sort(want.uv, axis=0), atol=1e-6)
-
-
-def test_vertices_doubled_along_a_seam_are_one_again(tmp_path):
-    mesh = slit_sheet()
-    right = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0
-    uv = np.vstack([mesh.uv, mesh.uv + np.array([2.0, 0.0])])
-    cut = replace(mesh, uv=uv, face_uv=np.where(right[:, None], mesh.face_uv + len(mesh.uv), mesh.face_uv))
-    path = write(tmp_path, glb(cut))
-    assert len(read_gltf(path).vertices) == len(mesh.vertices)
-    assert len(np.unique(read_gltf(path).face_uv)) > len(mesh.vertices)  # -1 and both sides of the seam
-
-
-def test_lips_that_touch_but_move_apart_stay_two(tmp_path):
-    quad = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
-    vertices = np.column_stack([np.vstack([quad, quad + np.array([0, 1])]), np.zeros(8)]) * 100
-    faces = np.array([[0, 1, 2, 3], [4, 5, 6, 7]])
-    drop = np.zeros((1, 8, 3))
-    drop[0, :4, 1] = -5
-    mesh = slit_sheet().__class__(vertices, faces, vertices[:, :2] / 300, faces, ("jawOpen",), drop)
-    assert len(read_gltf(write(tmp_path, glb(mesh))).vertices) == 8
-    still = mesh.with_shapes(("jawOpen",), 0 * drop)
-    assert len(read_gltf(write(tmp_path, glb(still))).vertices) == 6
-
-
-def test_nodes_move_turn_and_mirror_what_hangs_on_them(tmp_path):
-    builder = glb(slit_sheet())
-    half = float(np.sqrt(0.5))
-    builder.document["nodes"] = [
-        {"children": [1], "translation": [1.0, 0.0, 0.0]},
-        {"mesh": 0, "rotation": [0.0, half, 0.0, half], "scale": [1.0, 1.0, -1.0]},
-    ]
-    got, plain = read_gltf(write(tmp_path, builder)), read_gltf(write(tmp_path, glb(slit_sheet()), "n.glb"))
-    turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]) @ np.diag([1.0, 1, -1])
-    np.testing.assert_allclose(got.vertices, plain.vertices @ turn.T + [1, 0, 0], atol=1e-6)
-    np.testing.assert_allclose(got.deltas, plain.deltas @ turn.T, atol=1e-6)
-    assert (got.faces[:, :3] == plain.faces[:, [0, 2, 1]]).all()
-
-
-def test_a_skinned_mesh_stands_where_its_joints_are(tmp_path):
-    builder = glb(slit_sheet())
-    primitive = builder.document["meshes"][0]["primitives"][0]
-    n = builder.document["accessors"][primitive["attributes"]["POSITION"]]["count"]
-    weights = np.tile(np.float32([1, 0, 0, 0]), (n, 1))
-    primitive["attributes"] |= {
-        "JOINTS_0": builder.accessor(np.zeros((n, 4), np.uint8), 5121, "VEC4"),
-        "WEIGHTS_0": builder.accessor(weights, FLOAT, "VEC4"),
-    }
-    bind = np.eye(4, dtype=np.float32)
-    bind[3, :3] = [0, -1.5, 0]  # column by column
-    builder.document["skins"] = [
-        {"joints": [1], "inverseBindMatrices": builder.accessor(bind.reshape(1, 16), FLOAT, "MAT4")}
-    ]
-    builder.document["nodes"] = [
-        {"mesh": 0, "skin": 0, "translation": [9.0, 9.0, 9.0]}, {"translation": [0.0, 1.75, 0.0]},
-    ]  # fmt: skip
-    builder.document["scenes"] = [{"nodes": [0, 1]}]
-    got, plain = read_gltf(write(tmp_path, builder)), read_gltf(write(tmp_path, glb(slit_sheet()), "n.glb"))
-    np.testing.assert_allclose(got.vertices, plain.vertices + np.array([0, 0.25, 0]), atol=1e-6)
-
-
-def test_several_primitives_and_unnamed_shapes(tmp_path):
-    builder = glb(slit_sheet(), names=False)
-    first = builder.document["meshes"][0]["primitives"][0]
-    builder.document["materials"] = [{"name": "skin"}, {"name": "lips"}]
-    builder.document["meshes"][0]["primitives"] = [{**first, "material": 0}, {**first, "material": 1, "mode": 1}]
-    builder.document["nodes"] = [{"mesh": 0, "name": "head"}]
-    got = read_gltf(write(tmp_path, builder))
-    assert got.names == ("target0", "target1") and got.pieces == ("head/skin",)
-
-
-def test_quantised_and_interleaved_numbers(tmp_path):
-    builder = GlbBuilder()
-    points = np.array([[0, 0, 0], [255, 0, 0], [0, 255, 0]], np.uint8)
-    row = np.zeros((3, 8), np.uint8)
-    row[:, :3], row[:, 4:6] = points, [[0, 255], [255, 255], [0, 0]]
-    view = builder.view(row)
-    builder.document["bufferViews"][view]["byteStride"] = 8
-    common = {"bufferView": view, "componentType": 5121, "count": 3, "normalized": True}
-    builder.document["accessors"] = [{**common, "type": "VEC3"}, {**common, "type": "VEC2", "byteOffset": 4}]
-    builder.document["meshes"] = [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}}]}]
-    builder.document["extensionsRequired"] = ["KHR_mesh_quantization"]
-    got = read_gltf(write(tmp_path, builder))
-    np.testing.assert_allclose(got.vertices, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    np.testing.assert_allclose(got.uv, [[0, 0], [1, 0], [0, 1]])
-
-
-@pytest.mark.parametrize(("mode", "wanted"), [(5, [[0, 1, 2], [1, 3, 2]]), (6, [[0, 1, 2], [0, 2, 3]])])
-def test_strips_and_fans(tmp_path, mode, wanted):
-    builder = GlbBuilder()
-    points = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])[[0, 1, 3, 2] if mode == 5 else [0, 1, 2, 3]]
-    attributes = {"POSITION": builder.accessor(points, FLOAT, "VEC3"),
-                  "TEXCOORD_0": builder.accessor(points[:, :2].copy(), FLOAT, "VEC2")}  # fmt: skip
-    builder.document["meshes"] = [{"primitives": [{"attributes": attributes, "mode": mode}]}]
-    assert read_gltf(write(tmp_path, builder)).faces[:, :3].tolist() == wanted
-
-
-def test_text_files_with_buffers_inside_and_beside(tmp_path):
-    builder = glb(slit_sheet())
-    builder.bytes()
-    inside = {**builder.document, "buffers": [{
-        "byteLength": len(builder.data),
-        "uri": "data:application/octet-stream;base64," + base64.b64encode(builder.data).decode(),
-    }]}  # fmt: skip
-    (tmp_path / "a.gltf").write_text(json.dumps(inside))
-    (tmp_path / "my data.bin").write_bytes(builder.data)
-    (tmp_path / "b.gltf").write_text(
-        json.dumps({**inside, "buffers": [{"byteLength": len(builder.data), "uri": "my%20data.bin"}]})
-    )
-    a, b = (read_gltf(tmp_path / name) for name in ("a.gltf", "b.gltf"))
-    np.testing.assert_array_equal(a.vertices, b.vertices)
-    assert len(a.vertices) == len(slit_sheet().vertices)
-
-
-@pytest.mark.parametrize("uri", ["../secret.bin", "/etc/hostname", "http://example.com/a.bin"])
-def test_nothing_but_a_file_beside_is_opened(tmp_path, uri):
-    builder = glb(slit_sheet())
-    builder.bytes()
+def text_file(tmp_path, **document) -> Gltf:
     path = tmp_path / "m.gltf"
-    path.write_text(json.dumps({**builder.document, "buffers": [{"byteLength": 9, "uri": uri}]}))
-    assert "is not beside the file" in refused(path)
+    path.write_text(json.dumps({"asset": {"version": "2.0"}, **document}))
+    return Gltf(path)
 
 
-def change(builder: GlbBuilder, key: str, index: int, **other) -> GlbBuilder:
-    builder.document[key][index] |= other
-    return builder
+def chunk(kind: int, data: bytes) -> bytes:
+    return struct.pack("<II", len(data), kind) + data
+
+
+def glb(*chunks: bytes, version: int = 2, length: int | None = None) -> bytes:
+    body = b"".join(chunks)
+    return struct.pack("<4sII", b"glTF", version, 12 + len(body) if length is None else length) + body
+
+
+JSON = chunk(0x4E4F534A, b'{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4}]}   ')
 
 
 @pytest.mark.parametrize(
-    ("damage", "message"),
+    ("raw", "why"),
     [
-        (lambda b: change(b, "accessors", 0, count=10**9), "says 1000000000 elements"),
-        (lambda b: change(b, "accessors", 0, count=626), "do not fit into"),
-        (lambda b: change(b, "accessors", 0, count=-1), "says -1 elements"),
-        (lambda b: change(b, "accessors", 0, componentType=1), "componentType"),
-        (lambda b: change(b, "accessors", 0, type="VEC2"), "which has not 3 numbers"),
-        (lambda b: change(b, "accessors", 0, bufferView=99), r"points at bufferViews\[99\]"),
-        (lambda b: change(b, "bufferViews", 0, byteLength=10**9), "it is cut short"),
-        (lambda b: change(b, "bufferViews", 0, byteOffset=-4), "byteOffset: is -4"),
-        (lambda b: change(b, "nodes", 0, mesh=5), r"points at meshes\[5\]"),
-        (lambda b: change(b, "nodes", 0, children=[0]), "its own ancestor"),
-        (lambda b: change(b, "nodes", 0, scale=[1, 1]), "needs 3 finite numbers"),
-        (lambda b: change(b, "scenes", 0, nodes=[]), "holds no triangles"),
-        (lambda b: b.document.update(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_draco"),
-        (lambda b: b.document.update(asset={"version": "1.0"}), "asset.version"),
-        (lambda b: b.document["meshes"][0].update(extras={"targetNames": ["a", "a"]}), "stands there twice"),
+        (b"", "is empty"),
+        (b"PK\x03\x04", "is no glTF file"),
+        (glb(JSON, version=1), "header: is glTF version 1"),
+        (glb(JSON, length=10**6), "header: the file is cut short: .* of 1000000 bytes"),
+        (glb(JSON)[:19], "header: the file is cut short$"),
+        (glb(chunk(0x004E4942, b"abcdefgh")), "there is no JSON chunk"),
+        (glb(JSON, struct.pack("<II", 9, 0x004E4942) + b"abcd"), r"chunk at byte 84: says 9 bytes, 4 are left"),
+        (glb(chunk(0x4E4F534A, b"[1]     ")), "JSON: is no object"),
+        (glb(chunk(0x4E4F534A, b'{"a": \xff}  ')), "JSON: cannot be read"),
+        (b'{"asset": {}}', "asset.version: is missing"),
+        (b'{"asset": []}', r"JSON.asset: '\[\]' is no object"),
+        (b'{"asset": {"version": "3.0"}}', "asset.version: is '3.0'"),
+        (b'{"asset": {"version": "2.1"}, "extensionsRequired": ["X_y"]}', "'X_y' is not read"),
     ],
 )
-def test_damage_names_its_place(tmp_path, damage, message):
-    builder = glb(slit_sheet())
-    damage(builder)
-    with pytest.raises(FitError, match=message):
-        load_mesh(write(tmp_path, builder))
-
-
-def test_nan_names_the_shape_and_the_vertex(tmp_path):
-    mesh = slit_sheet()
-    bad = mesh.deltas.copy()
-    bad[1, 3, 0] = np.nan
-    builder = glb(triangulated(mesh).with_shapes(mesh.names, bad))
-    assert "mouthSmile_L), element" in refused(write(tmp_path, builder))
-
-
-def test_a_primitive_without_uvs_can_be_left_out(tmp_path):
-    builder = glb(slit_sheet())
-    builder.document["nodes"] = [{"children": [1, 2]}, {"mesh": 0, "name": "face"}, {"mesh": 1, "name": "Hair"}]
-    points = builder.accessor(np.float32(np.eye(3)), FLOAT, "VEC3")
-    builder.document["meshes"].append({"primitives": [{"attributes": {"POSITION": points}}]})
-    path = write(tmp_path, builder)
-    assert "'Hair') has no texture coordinates" in refused(path)
-    assert len(load_mesh(path, LoadOptions(without=("hair",))).mesh.vertices) == len(slit_sheet().vertices)
-    with pytest.raises(FitError, match=r"--without beard: .* holds face, Hair"):
-        load_mesh(path, LoadOptions(without=("beard",)))
-
-
-def test_an_index_beyond_the_vertices_is_named(tmp_path):
-    builder = glb(slit_sheet())
-    primitive = builder.document["meshes"][0]["primitives"][0]
-    primitive["indices"] = builder.accessor(np.uint32([0, 1, 9999]), UINT, "SCALAR")
-    assert "element 2: points at vertex 9999" in refused(write(tmp_path, builder))
-
-
-def test_a_file_cut_short_anywhere_is_refused(tmp_path):
-    whole = glb(slit_sheet()).bytes()
+def test_damaged_containers_are_refused(tmp_path, raw, why):
     path = tmp_path / "m.glb"
-    for size in [0, 3, 11, 19, 50, 500, len(whole) // 2, len(whole) - 1]:
-        path.write_bytes(whole[:size])
-        refused(path)
+    path.write_bytes(raw)
+    with pytest.raises(FitError, match=why) as caught:
+        Gltf(path)
+    assert str(path) in str(caught.value) and caught.value.hint
 
 
-def test_flipped_bits_give_one_kind_of_error(tmp_path):
-    whole = bytearray(glb(slit_sheet(), sparse=True).bytes())
-    rng, path, errors = np.random.default_rng(3), tmp_path / "m.glb", 0
-    for _ in range(150):
-        bad = bytearray(whole)
-        for at in rng.integers(0, 3000 if rng.random() < 0.8 else len(bad), rng.integers(1, 4)):
-            bad[at] ^= 1 << int(rng.integers(8))
-        path.write_bytes(bad[: len(bad) if rng.random() < 0.8 else int(rng.integers(len(bad)))])
-        try:
-            load_mesh(path)
-        except FitError:
-            errors += 1
-    assert errors > 50
+def test_the_first_chunk_of_a_kind_counts_and_unknown_ones_are_skipped(tmp_path):
+    path = tmp_path / "m.glb"
+    path.write_bytes(glb(JSON, chunk(7, b"what"), chunk(0x004E4942, b"1234"), chunk(0x004E4942, b"5678")))
+    assert Gltf(path)._buffer(0, "x") == b"1234"
+    path.write_bytes(glb(JSON) + b"trailing bytes")
+    with pytest.raises(FitError, match=r"buffers\[0\]: has neither a uri nor a binary chunk"):
+        Gltf(path)._buffer(0, "x")
+
+
+@pytest.mark.parametrize(
+    ("code", "format_"), [(5120, "b"), (5121, "B"), (5122, "h"), (5123, "H"), (5125, "I"), (5126, "f")]
+)
+def test_every_component_type_is_little_endian(tmp_path, code, format_):
+    numbers = [1, 0, 100, 7]
+    builder = GlbBuilder()
+    packed = np.frombuffer(struct.pack(f"<4{format_}", *numbers), np.uint8)
+    at = builder.accessor(packed, code, "SCALAR")
+    builder.document["accessors"][at]["count"] = 4
+    assert opened(tmp_path, builder).floats(at, 1, "x").ravel().tolist() == numbers
+
+
+@pytest.mark.parametrize(
+    ("dtype", "code", "stored", "wanted"),
+    [
+        (np.int8, 5120, [-128, -127, 0, 127], [-1, -1, 0, 1]),
+        (np.uint8, 5121, [0, 51, 255], [0, 0.2, 1]),
+        (np.int16, 5122, [-32768, 32767], [-1, 1]),
+        (np.uint16, 5123, [0, 13107, 65535], [0, 0.2, 1]),
+    ],
+)
+def test_normalised_integers_follow_the_specification(tmp_path, dtype, code, stored, wanted):
+    builder = GlbBuilder()
+    plain = builder.accessor(np.array(stored, dtype), code, "SCALAR")
+    scaled = builder.accessor(np.array(stored, dtype), code, "SCALAR", normalized=True)
+    file = opened(tmp_path, builder)
+    assert file.floats(plain, 1, "x").ravel().tolist() == stored
+    np.testing.assert_allclose(file.floats(scaled, 1, "x").ravel(), wanted, atol=1e-12)
+
+
+def test_interleaved_elements_are_found_by_stride_and_offset(tmp_path):
+    builder = GlbBuilder()
+    rows = np.arange(40, dtype=np.float32).reshape(5, 8)
+    view = builder.view(rows)
+    builder.document["bufferViews"][view]["byteStride"] = 32
+    entry = {"bufferView": view, "componentType": FLOAT, "count": 5, "type": "VEC3"}
+    builder.document["accessors"] = [
+        {**entry, "byteOffset": 8},
+        {**entry, "byteOffset": 20},
+        {**entry, "byteOffset": 24},
+    ]
+    file = opened(tmp_path, builder)
+    assert (file.floats(0, 3, "x") == rows[:, 2:5]).all()
+    assert (file.floats(1, 3, "x") == rows[:, 5:8]).all(), "the last element ends with the view"
+    with pytest.raises(FitError, match="5 elements do not fit into the 160 bytes"):
+        file.floats(2, 3, "x")
+    file.document["bufferViews"][view]["byteStride"] = 8
+    with pytest.raises(FitError, match="do not fit"):
+        file.floats(0, 3, "x")
+
+
+def sparse(**change) -> GlbBuilder:
+    builder = GlbBuilder()
+    ids, values = builder.view(np.array([1, 3], np.uint16)), builder.view(np.float32([[1, 2, 3], [4, 5, 6]]))
+    table = {
+        "count": 2, "indices": {"bufferView": ids, "componentType": 5123}, "values": {"bufferView": values}, **change,
+    }  # fmt: skip
+    builder.document["accessors"] = [{"componentType": FLOAT, "count": 4, "type": "VEC3", "sparse": table}]
+    return builder
+
+
+def test_sparse_elements_replace_zeros_or_those_of_a_view(tmp_path):
+    wanted = [[0, 0, 0], [1, 2, 3], [0, 0, 0], [4, 5, 6]]
+    assert opened(tmp_path, sparse()).floats(0, 3, "x").tolist() == wanted
+    builder = sparse()
+    builder.document["accessors"][0]["bufferView"] = builder.view(np.full((4, 3), 9, np.float32))
+    assert opened(tmp_path, builder).floats(0, 3, "x").tolist() == [[9] * 3, [1, 2, 3], [9] * 3, [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"count": 5}, "replaces 5 of 4 elements"),
+        ({"count": -1}, "sparse.count: is -1"),
+        ({"values": {}}, "sparse.values.bufferView: is missing"),
+        ({"indices": {"componentType": 5123}}, "sparse.indices.bufferView: is missing"),
+        ({"indices": {"bufferView": 1, "componentType": 5123}}, "replaces element .*, but there are 4"),
+        ({"indices": 3}, "sparse.indices: '3' is no object"),
+    ],
+)
+def test_wrong_sparse_accessors_are_refused(tmp_path, change, why):
+    with pytest.raises(FitError, match=why):
+        opened(tmp_path, sparse(**change)).floats(0, 3, "x")
+
+
+@pytest.mark.parametrize("last", [3, 4])
+def test_a_sparse_index_must_be_one_of_the_elements(tmp_path, last):
+    builder = sparse()
+    builder.document["accessors"][0]["sparse"]["indices"]["bufferView"] = builder.view(np.array([0, last], np.uint16))
+    file = opened(tmp_path, builder)
+    if last < 4:
+        assert file.floats(0, 3, "x")[3].tolist() == [4, 5, 6]
+    else:
+        with pytest.raises(FitError, match="replaces element 4, but there are 4"):
+            file.floats(0, 3, "x")
+
+
+def test_integers_must_be_unsigned_and_floats_finite(tmp_path):
+    builder = GlbBuilder()
+    builder.accessor(np.array([[1, 2], [3, 4]], np.uint16), 5123, "VEC2")
+    builder.accessor(np.array([-1, 2], np.int16), 5122, "SCALAR")
+    builder.accessor(np.float32([1, np.inf]), FLOAT, "SCALAR")
+    file = opened(tmp_path, builder)
+    assert file.integers(0, "x", 2).tolist() == [[1, 2], [3, 4]]
+    with pytest.raises(FitError, match="x: holds int16, not unsigned numbers"):
+        file.integers(1, "x")
+    with pytest.raises(FitError, match="x, element 1: is not a finite number"):
+        file.floats(2, 1, "x")
+    with pytest.raises(FitError, match=r"accessors\[0\] \(x\): is of type 'VEC2', which has not 3 numbers"):
+        file.floats(0, 3, "x")
+
+
+@pytest.mark.parametrize("index", [-1, 1, True, "0", None])
+def test_only_an_index_into_the_list_finds_an_item(tmp_path, index):
+    file = text_file(tmp_path, nodes=[{"name": "a"}])
+    assert file.item("nodes", 0, "scene") == {"name": "a"}
+    with pytest.raises(FitError, match=r"scene: points at nodes\[.*\], but there are 1"):
+        file.item("nodes", index, "scene")
+
+
+def test_values_of_another_kind_and_missing_ones_are_named(tmp_path):
+    file = text_file(tmp_path, nodes=[1])
+    assert file.value({"n": 3}, "n", int, "here") == 3
+    assert file.value({}, "n", int, "here", 5) == 5
+    assert file.items("meshes") == []
+    for table, why in (({"n": True}, "here.n: 'True' is no number"), ({"n": "x"}, "'x' is no number"),
+                       ({}, "here.n: is missing")):  # fmt: skip
+        with pytest.raises(FitError, match=why):
+            file.value(table, "n", int, "here")
+    with pytest.raises(FitError, match=r"nodes\[0\]: is no object"):
+        file.item("nodes", 0, "scene")
+
+
+def test_buffers_inside_and_beside_the_text(tmp_path):
+    (tmp_path / "a b.bin").write_bytes(b"beside")
+    uris = [
+        "data:;base64," + base64.b64encode(b"inside").decode(),
+        "a%20b.bin",
+        "data:;base64,@@",
+        7,
+        "../x",
+        "none.bin",
+    ]
+    file = text_file(tmp_path, buffers=[{"uri": uri} for uri in uris])
+    assert [file._buffer(k, "x") for k in (0, 1, 0)] == [b"inside", b"beside", b"inside"]
+    for k, why in ((2, "uri: is damaged"), (3, "uri: is no text"), (4, "is not beside the file"), (5, "no such mesh")):
+        with pytest.raises(FitError, match=why):
+            file._buffer(k, "x")
+
+
+def test_the_number_of_elements_is_limited(tmp_path):
+    entry = {"componentType": FLOAT, "type": "SCALAR"}
+    file = text_file(tmp_path, accessors=[{**entry, "count": MOST_ELEMENTS + 1}, {**entry, "count": 0}])
+    with pytest.raises(FitError, match="20000001 elements; 20000000 are the most"):
+        file.floats(0, 1, "x")
+    assert file.floats(1, 1, "x").shape == (0, 1)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from ball_head import BallHead, values
 
 from surface.base.errors import ViewError
 from surface.view import run_window
+from surface.view.draw.renderer import Renderer
+from surface.view.scene.camera import Camera
 from surface.view.scene.viewpoint import Viewpoint
 from surface.view.window import WindowReport, _Window
 
@@ -137,22 +140,106 @@ def test_a_kiosk_covers_the_screen(root: Path, tmp_path: Path, display: str) -> 
     assert np.load(tmp_path / "shot.npy").shape[:2] == (480, 640)
 
 
+class Minimised:
+    """What imgui reports of a minimised window."""
+
+    def get_io(self) -> SimpleNamespace:
+        size = SimpleNamespace(x=0.0, y=0.0)
+        return SimpleNamespace(display_size=size, display_framebuffer_scale=size)
+
+
 def test_a_minimised_window_still_asks_and_rests(monkeypatch: pytest.MonkeyPatch) -> None:
-    window = _Window(BallHead(), lambda: values(), Viewpoint(), "fast", "skin", "auto")
-    closed: list[bool] = []
-    rested: list[float] = []
-    monkeypatch.setattr(window, "close", lambda: closed.append(True))
-    monkeypatch.setattr("surface.view.window._pixels", lambda: (0, 0))
-    monkeypatch.setattr("surface.view.window.time.sleep", rested.append)
+    window = _Window(Minimised(), lambda: values(), Viewpoint(), Renderer, "fast")
+    window.params = SimpleNamespace(app_shall_exit=False)
+    slept: list[float] = []
+    monkeypatch.setattr("surface.view.window.time.sleep", slept.append)
     answers = iter([True, True, False])
     window.keep_going = lambda: next(answers)
+    closed = []
     for _ in range(3):
-        window.ask()
-    assert len(rested) == 2
-    assert min(rested) >= 0.01
-    assert closed == [True]
+        window.check()
+        closed.append(window.params.app_shall_exit)
+    assert len(slept) == 2
+    assert min(slept) >= 0.01
+    assert closed == [False, False, True]
 
 
 def test_report_rate() -> None:
     assert WindowReport(61, 2.0).rate_hz == pytest.approx(30.0)
     assert WindowReport(1, 0.0).rate_hz == 0.0
+
+
+class Hands:
+    """What imgui reports of mouse and keys in one frame."""
+
+    MouseButton_ = SimpleNamespace(left=0, right=1)
+    MouseCursor_ = SimpleNamespace(none=-1)
+    Key = SimpleNamespace(escape="esc", **{f"_{digit}": str(digit) for digit in range(10)})
+
+    def __init__(self, *keys: str, button: int | None = None, wheel: float = 0.0, captured: bool = False) -> None:
+        self.keys, self.button, self.cursor = keys, button, 0
+        self.io = SimpleNamespace(
+            mouse_delta=SimpleNamespace(x=10.0, y=4.0), mouse_wheel=wheel, want_capture_mouse=captured,
+            want_text_input=captured, display_size=SimpleNamespace(x=320.0, y=240.0),
+        )  # fmt: skip
+
+    def get_io(self) -> SimpleNamespace:
+        return self.io
+
+    def is_mouse_down(self, button: int) -> bool:
+        return button == self.button
+
+    def is_key_pressed(self, key: str, *, repeat: bool) -> bool:
+        return key in self.keys and not repeat
+
+    def set_mouse_cursor(self, cursor: int) -> None:
+        self.cursor = cursor
+
+
+def steered(hands: Hands, *, kiosk: bool = False) -> tuple[Camera, bool]:
+    """The camera after a frame, and whether the window closes."""
+    viewpoint = Viewpoint()
+    window = _Window(hands, lambda: values(), viewpoint, Renderer, "fast")
+    window.params, window.kiosk = SimpleNamespace(app_shall_exit=False), kiosk
+    window.panels()
+    return viewpoint.camera, window.params.app_shall_exit
+
+
+def test_mouse_and_keys_move_the_camera_unless_a_panel_has_them() -> None:
+    wanted = {name: Viewpoint() for name in ("turn", "shift", "zoom", "press")}
+    wanted["turn"].turn(10.0, 4.0)
+    wanted["shift"].shift(10.0, 4.0, 240)
+    wanted["zoom"].zoom(2.0)
+    wanted["press"].press("5")
+    moved = {"turn": {"button": 0}, "shift": {"button": 1}, "zoom": {"wheel": 2.0}}
+    for name, options in moved.items():
+        assert steered(Hands(**options)) == (wanted[name].camera, False)
+        assert steered(Hands(**options, captured=True)) == (Viewpoint().camera, False)
+    assert steered(Hands("5")) == (wanted["press"].camera, False)
+    assert steered(Hands("5", captured=True)) == steered(Hands("6")) == steered(Hands("esc")) == (Camera.front(), False)
+
+
+def test_a_kiosk_hears_escape_alone() -> None:
+    hands = Hands("5", button=0, wheel=1.0)
+    assert steered(hands, kiosk=True) == (Camera.front(), False) and hands.cursor == -1
+    assert steered(Hands("esc"), kiosk=True) == (Camera.front(), True)
+
+
+def test_a_window_closes_after_its_seconds() -> None:
+    window = _Window(Hands(), lambda: values(), Viewpoint(), Renderer, "fast")
+    window._imgui.io.display_framebuffer_scale = SimpleNamespace(x=2.0, y=1.5)
+    assert window._pixels() == (640, 360)
+    for seconds, closed in ((None, False), (1000.0, False), (0.0, True)):
+        window.params, window.seconds = SimpleNamespace(app_shall_exit=False), seconds
+        window.check()
+        assert window.params.app_shall_exit == closed
+
+
+def test_the_first_exception_is_kept_and_nothing_is_called_after_it() -> None:
+    window = _Window(Hands(), lambda: values(), Viewpoint(), Renderer, "fast")
+    window.params = SimpleNamespace(app_shall_exit=False)
+    called: list[int] = []
+    window.as_callback(lambda: called.append(1))()
+    window.as_callback(lambda: called.append(1 // 0))()
+    window.as_callback(lambda: called.append(2))()
+    assert called == [1] and isinstance(window.failure, ZeroDivisionError) and window.params.app_shall_exit

@@ -11,7 +11,7 @@ from small_head import small_head
 from surface.head import Head
 from surface.head.posing.part import border_edges
 from surface.view import Camera, Offscreen
-from surface.view.draw.decimate import decimated_triangles, gathered
+from surface.view.draw.decimate import decimated_triangles, grouped_in_patches
 
 SHAPES: tuple[dict[str, float], ...] = (
     {"jawOpen": 1.0, "mouthUpperUpLeft": 1.0},
@@ -61,15 +61,67 @@ def test_where_parts_meet_all_vertices_stay_and_other_borders_thin_out() -> None
         assert len(kept) < len(rim)
 
 
-def test_gathered_triangles_are_the_same_and_share_more_vertices_with_those_drawn_with_them(head: Head) -> None:
+def test_triangles_in_patches_are_the_same_and_share_more_vertices_with_those_drawn_with_them(
+    head: Head,
+) -> None:
     triangles = head.part("face").decimated["fast"]
     shuffled = np.random.default_rng(2).permutation(triangles)
-    made = gathered(shuffled)
+    made = grouped_in_patches(shuffled)
     assert np.array_equal(np.unique(made, axis=0), np.unique(triangles, axis=0))
     assert worked_out(made) < 1.4 * len(np.unique(triangles)) < 0.5 * worked_out(shuffled)
-    assert worked_out(triangles) <= 1.02 * worked_out(made), "the shipped ones are gathered"
+    assert worked_out(triangles) <= 1.02 * worked_out(made), "the shipped ones are grouped_in_patches"
 
 
 def worked_out(triangles: np.ndarray, at_once: int = 341) -> int:
     """Vertices that patch after patch needs."""
     return sum(len(np.unique(triangles[k : k + at_once])) for k in range(0, len(triangles), at_once))
+
+
+def test_patches_hold_341_connected_triangles() -> None:
+    from ball_head import grid
+
+    _, triangles = grid(31, 31)
+    made = grouped_in_patches(np.random.default_rng(1).permutation(triangles))
+    for start in range(0, len(made), 341):
+        patch = made[start : start + 341]
+        found, todo = {0}, [0]
+        while todo:
+            corner = set(patch[todo.pop()].tolist())
+            new = [t for t in range(len(patch)) if t not in found and corner & set(patch[t].tolist())]
+            found.update(new)
+            todo += new
+        assert len(found) == len(patch) or start + 341 >= len(made), "the last one takes what is left over"
+    assert len(made) == 1800
+    first = made[:341]
+    middle = np.unravel_index(first[0, 0], (31, 31))
+    reach = np.abs(np.array(np.unravel_index(np.unique(first), (31, 31))).T - middle).max()
+    assert reach <= 341 / 2 / 4, "a round patch, no strip"
+
+
+def test_small_and_empty_meshes_are_one_patch() -> None:
+    triangles = np.array([[0, 1, 2], [7, 8, 9], [2, 1, 3]])
+    assert sorted(map(tuple, grouped_in_patches(triangles).tolist())) == sorted(map(tuple, triangles.tolist()))
+
+
+def test_the_head_rests_after_its_triangles_are_found() -> None:
+    head = Head(small_head())
+    rest = [part.vertices.copy() for part in head.parts]
+    decimated_triangles(head)
+    for part, before in zip(head.parts, rest, strict=True):
+        np.testing.assert_allclose(part.vertices, before, atol=1e-5)
+
+
+def test_errors_stay_below_those_of_the_material() -> None:
+    head = Head(small_head())
+    found = decimated_triangles(head)
+    for part in head.parts:
+        for level, most in (("full", 0.18), ("fast", 0.5)):
+            triangles = found[f"{part.name}/{level}"]
+            assert triangles.max() < len(part.vertices)
+            corners = part.vertices[triangles].astype(float)
+            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+            planes = np.abs(((part.vertices[:, None] - corners[None, :, 0]) * normal).sum(axis=2))
+            inside = np.linalg.norm(part.vertices[:, None] - corners.mean(axis=1), axis=2).argmin(axis=1)
+            near = planes[np.arange(len(inside)), inside]
+            assert np.sqrt((near**2).mean()) < 2 * most

@@ -12,7 +12,7 @@ from ball_head import BallHead
 from surface.base.errors import ViewError
 from surface.head import Head
 from surface.view import Camera, Offscreen
-from surface.view.draw.evaluator import EVALUATORS, turned, what_lacks
+from surface.view.draw.evaluator import EVALUATORS, rotate_by_share, why_not_gpu
 from surface.view.pictures.offscreen import open_context
 
 SIZE = (220, 200)
@@ -92,12 +92,12 @@ def test_what_cannot_be_had(gl: None, head: Head) -> None:
     ctx = open_context()
     info = dict(ctx.info)
     ctx.release()
-    assert what_lacks(info, head) is None
-    assert "no textures" in str(what_lacks(info | {"GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS": 0}, head))
-    assert "too small" in str(what_lacks(info | {"GL_MAX_TEXTURE_SIZE": 512}, head))
+    assert why_not_gpu(info, head) is None
+    assert "no textures" in str(why_not_gpu(info | {"GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS": 0}, head))
+    assert "too small" in str(why_not_gpu(info | {"GL_MAX_TEXTURE_SIZE": 512}, head))
 
 
 def test_turned_by_share() -> None:
     points, pivot = np.array([[1.0, 5.0, 0.0], [1.0, 5.0, 0.0]]), np.array([0.0, 5.0, 0.0])
-    at = turned(points, np.array([1.0, 0.5]), np.array([0.0, np.pi / 2, 0.0]), pivot)
+    at = rotate_by_share(points, np.array([1.0, 0.5]), np.array([0.0, np.pi / 2, 0.0]), pivot)
     assert at == pytest.approx(np.array([[0, 5, -1], [np.sqrt(0.5), 5, -np.sqrt(0.5)]]), abs=1e-12)

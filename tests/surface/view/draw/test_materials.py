@@ -4,15 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ball_head import skin
+from ball_head import BallHead, BallPart, skin
 
-from surface.view.draw.materials import MATERIALS, attribute, detail_uv, of, order, strip_uv
+from surface.view.draw.materials import (
+    MATERIALS,
+    attribute,
+    detail_texture,
+    detail_uv,
+    of,
+    programs,
+    strip_uv,
+    uniforms_key,
+)
+from surface.view.pictures.offscreen import open_context
 from surface.view.scene.openings import Openings
 from surface.view.scene.theme import THEMES
 
 
 def test_skin_is_drawn_before_what_it_hides() -> None:
-    assert order("skin") < order("eye") < order("teeth") < order("mouth")
+    assert of("skin").order < of("eye").order < of("teeth").order < of("mouth").order
 
 
 def test_an_unknown_material_draws_as_skin() -> None:
@@ -52,3 +62,129 @@ def test_strips_of_hair_are_told_apart_by_their_tiles() -> None:
     part = skin()
     part.uv[:4] = [(0.0, 0.2), (1.0, 0.5), (2.25, 1.0), (7.0, 0.0)]
     assert strip_uv(part)[:4] == pytest.approx(np.array([(0.0, 0.2), (1.0, 0.5), (0.25, 1.0), (1.0, 0.0)]))
+
+
+def openings() -> Openings:
+    return Openings(BallHead().parts)
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_skin_of_a_mask_is_plain_and_darker_on_wet_lips(theme: str) -> None:
+    part, own = skin(), THEMES[theme]
+    count = len(part.rest)
+    gloss = np.full((count, 1), 0.3, np.float32)
+    gloss[0], gloss[1] = 0.6, 0.45
+    part.attributes = {"albedo": np.full((count, 3), 0.25, np.float32), "gloss": gloss}
+    colour = (of("skin").static(part, own, Openings([part]))["albedo_occlusion"][:, :3] / 255.0) ** 2
+    if theme == "skin":
+        assert colour == pytest.approx(np.full((count, 3), 0.25), abs=0.006)
+    else:
+        for row, share in ((0, 1.0), (1, 0.5), (2, 0.0)):
+            assert colour[row] == pytest.approx(np.array(own.albedo) * (1 - own.lips * share), abs=0.006)
+
+
+def test_vertex_data_of_skin_comes_in_the_order_of_the_shader() -> None:
+    part = skin()
+    count = len(part.rest)
+    sky = np.tile([0.0, 0.2, 0.4, 1.0], (count, 1))
+    part.attributes = {"visible": sky, "thin": np.full((count, 1), 0.7), "gloss": np.full((count, 1), 0.4)}
+    made = of("skin").static(part, THEMES["skin"], Openings([part]))
+    assert made["around"].dtype == np.uint8 and made["around"][0].tolist() == [0, 51, 102, 255]
+    assert made["surface_uv_gloss"][:, 2:] == pytest.approx(np.tile([0.4, 0.7], (count, 1)))
+    assert made["surface_uv_gloss"][:, :2] == pytest.approx(detail_uv(part), abs=1e-5)
+    bare = of("skin").static(skin(), THEMES["skin"], Openings([part]))
+    assert np.unique(bare["around"], axis=0).tolist() == [[191, 128, 128, 128]]
+    assert bare["surface_uv_gloss"][:, 2:] == pytest.approx(np.tile([0.3, 0.0], (count, 1)))
+
+
+def test_detail_is_longitude_and_latitude_on_the_skull_and_height_below_it() -> None:
+    part = skin()
+    tiles = 18 / (2 * np.pi)
+    part.vertices[:4] = [(0, 10, 100), (95, 10, 5), (0, 105, 5.001), (0, -200, 105)]
+    uv = detail_uv(part)[:4]
+    assert uv[:2] == pytest.approx(np.array([[0, 0], [0.5 * np.pi, 0]]) * tiles, abs=1e-5)
+    assert uv[2, 1] == pytest.approx(0.5 * np.pi * tiles, abs=1e-3)
+    assert uv[3, 1] == pytest.approx((-210 - 0.7 * (100 - 95)) / 95 * tiles, abs=1e-4)
+
+
+def test_lashes_of_the_lower_lid_are_fainter() -> None:
+    at = np.array([[0, 5, 0], [1, 5, 0], [0, -5, 0]])
+    part = BallPart("lashes", "lash", np.array([[0, 1, 2]]), at, np.zeros((3, 3)))
+    part.uv[:] = [(0.5, 0.25), (0.75, 1.0), (2.5, 0.5)]
+    along = of("lash").static(part, THEMES["skin"], openings())["along"]
+    assert along == pytest.approx(np.array([[0.5, 0.25, 1], [0.75, 1, 1], [0.5, 0.5, 0.42]]))
+    part.material = "brow"
+    assert (of("brow").static(part, THEMES["skin"], openings())["along"][:, 2] == 1.0).all()
+    assert (of("brow").static(part, THEMES["mask"], openings())["along"][:, 2] == 0.0).all()
+
+
+def test_uniforms_name_what_the_shaders_read(gl: None) -> None:
+    head = BallHead()
+    seen = Openings(head.parts)
+    ctx = open_context()
+    try:
+        made = programs(ctx, "full", THEMES["skin"])
+        for part in head.parts:
+            material = of(part.material)
+            given = material.uniforms(part, THEMES["skin"], seen)
+            assert [name for name in given if name not in made[material.program]] == []
+            static = material.static(part, THEMES["skin"], seen)
+            assert [name for name in static if name not in made[material.program]] == []
+            assert all(len(rows) == len(part.vertices) for rows in static.values())
+    finally:
+        ctx.release()
+
+
+def test_uniforms_follow_the_theme_and_the_openings() -> None:
+    head, theme = BallHead(), THEMES["mask"]
+    seen = Openings(head.parts)
+    by_name = {part.name: part for part in head.parts}
+    eye = of("eye").uniforms(by_name["left_eye"], theme, seen)
+    assert (eye["iris_colour"], eye["sclera_colour"], eye["glow"]) == (theme.iris, theme.sclera, theme.glow)
+    assert 0.1 < eye["pupil_radius"] < eye["iris_radius"] < 0.6 and eye["lids"] == 1.0
+    face = of("skin").uniforms(by_name["face"], theme, seen)
+    assert face == {"wrap": theme.wrap, "through": theme.through, "gloss_scale": 1.5, "detail_strength": 0.0}
+    assert of("skin").uniforms(by_name["face"], THEMES["skin"], seen)["detail_strength"] == pytest.approx(0.16)
+    teeth, mouth = (of(name).uniforms(by_name[name], theme, seen) for name in ("teeth", "mouth"))
+    assert teeth["opening_area"] is seen.mouth()["opening_area"]
+    assert teeth["wrap"] == pytest.approx((0.3, 0.18, 0.18))
+    assert sum(teeth["albedo"]) > 3 * sum(mouth["albedo"]) and teeth["wetness"] > mouth["wetness"] > 0
+    assert of("lash").uniforms(by_name["face"], theme, seen)["albedo"] == theme.lash
+    assert of("brow").uniforms(by_name["face"], theme, seen)["albedo"] == theme.brow
+
+
+def test_flags_and_order_of_materials() -> None:
+    assert {name for name, one in MATERIALS.items() if one.two_sided} == {"lash", "brow", "mouth"}
+    assert {name for name, one in MATERIALS.items() if one.blended} == {"lash", "brow"}
+    ordered = ["skin", "eye", "lash", "teeth", "tongue", "gums", "mouth"]
+    assert [of(name).order for name in ordered] == sorted({of(name).order for name in ordered})
+    assert of("brow").order == of("lash").order
+
+
+def test_each_eye_has_uniforms_of_its_own_and_other_parts_share_them() -> None:
+    keys = {part.name: uniforms_key(part) for part in BallHead().parts}
+    assert keys["left_eye"] != keys["right_eye"]
+    one, two = skin(), skin()
+    two.name = "neck"
+    assert uniforms_key(one) == uniforms_key(two) != keys["teeth"]
+
+
+def test_the_detail_texture_tiles_and_is_even(gl: None) -> None:
+    ctx = open_context()
+    try:
+        data = np.frombuffer(detail_texture(ctx).read(), np.uint8).reshape(128, 128, 4).astype(float)
+        again = np.frombuffer(detail_texture(ctx).read(), np.uint8)
+    finally:
+        ctx.release()
+    assert (again == data.ravel()).all()
+    assert data.mean(axis=(0, 1)) == pytest.approx(np.full(4, 127.5), abs=1.5)
+    assert data.std(axis=(0, 1)) == pytest.approx(np.full(4, 0.17 * 255), rel=0.05)
+    for axis in (0, 1):
+        step = np.abs(np.diff(data, axis=axis)).mean()
+        seam = np.abs(data.take(0, axis) - data.take(-1, axis)).mean()
+        assert seam == pytest.approx(step, rel=0.3)
+    power = np.abs(np.fft.fft2(data - data.mean(axis=(0, 1)), axes=(0, 1))) ** 2
+    low = power[[0, 0, 1, 1, 2], [1, 2, 0, 1, 0]].sum(axis=0) / power.sum(axis=(0, 1))
+    assert low.max() < 1e-3, "nothing that shows as a pattern"
+    ratio = power[4:12, 4:12].mean(axis=(0, 1)) / power[40:60, 40:60].mean(axis=(0, 1))
+    assert ratio[3] > 3 * ratio[:3].max(), "mottling is coarser than bumps"

@@ -12,9 +12,9 @@ from ball_head import RADII, BallHead, BallPart, ball, values
 from surface.base.errors import ViewError
 from surface.head import Head
 from surface.view import Camera, Offscreen, Theme
-from surface.view.draw.renderer import light_direction, theme_named
+from surface.view.draw.renderer import light_direction
 from surface.view.scene.bounds import Bands
-from surface.view.scene.theme import THEMES, Light
+from surface.view.scene.theme import THEMES, Light, find_theme
 
 SIZE = (200, 160)
 
@@ -134,9 +134,9 @@ def test_themes_differ(gl: None) -> None:
 
 def test_names_that_do_not_exist(gl: None) -> None:
     with pytest.raises(ViewError, match="'clown'") as caught:
-        theme_named("clown")
+        find_theme("clown")
     assert "skin" in caught.value.hint
-    assert theme_named(Theme(gloss=2.0)).gloss == 2.0
+    assert find_theme(Theme(gloss=2.0)).gloss == 2.0
     with pytest.raises(ValueError, match="'best'"):
         Offscreen(BallHead(), SIZE, quality="best")
 
@@ -216,3 +216,75 @@ def test_a_hurried_picture_is_hardly_another(screen: Offscreen) -> None:
     hurried = screen.render(values(jawOpen=0.4)).astype(int)
     assert np.abs(calm - hurried).mean() < 0.5
     assert (calm != hurried).any() == (screen.renderer.quality == "full")
+
+
+@pytest.mark.parametrize(
+    ("yaw", "pitch", "turn", "wanted"),
+    [
+        (0, 0, 0, (0, 0, 1)),
+        (90, 0, 0, (1, 0, 0)),
+        (0, 90, 0, (0, 1, 0)),
+        (30, 0, 60, (1, 0, 0)),
+        (0, 30, 0, (0, 0.5, 0.75**0.5)),
+        (180, 30, 0, (0, 0.5, -(0.75**0.5))),
+        (90, 60, 0, (0.5, 0.75**0.5, 0)),
+    ],
+)
+def test_light_directions(yaw: float, pitch: float, turn: float, wanted: tuple[float, float, float]) -> None:
+    assert light_direction(Light(yaw, pitch, (1, 1, 1)), turn) == pytest.approx(wanted, abs=1e-6)
+
+
+def test_camera_lights_and_theme_reach_the_programs(screen: Offscreen) -> None:
+    renderer, camera = screen.renderer, Camera.around(40.0, 10.0)
+    screen.render(values(headYaw=0.5), camera)
+    program, theme = renderer._programs["skin"], renderer.theme
+
+    def held(name: str) -> np.ndarray | None:
+        uniform = program.get(name, None)
+        return None if uniform is None else np.array(uniform.value)
+
+    turn = theme.lights_follow * 40.0
+    wanted = {
+        "view_projection": camera.matrix(SIZE[0] / SIZE[1]).T.ravel(),
+        "camera": camera.eye,
+        "sky": theme.sky,
+        "ground": theme.ground,
+        **{f"{name}_colour": getattr(theme, name).colour for name in ("key", "fill", "rim")},
+        **{f"{name}_direction": light_direction(getattr(theme, name), turn) for name in ("key", "fill", "rim")},
+    }
+    found = {name: held(name) for name in wanted}
+    assert sum(value is not None for value in found.values()) >= 8
+    for name, value in found.items():
+        if value is not None:
+            assert value == pytest.approx(np.array(wanted[name]), rel=1e-6, abs=1e-5), name
+
+
+def test_pictures_are_drawn_again_when_only_the_aspect_changes(gl: None) -> None:
+    with Offscreen(BallHead(), (100, 60)) as wide, Offscreen(BallHead(), (60, 100)) as tall:
+        camera = Camera.front()
+        before = wide.render(values(), camera)
+        tall.render(values(), camera)
+        wide.renderer.draw(camera, tall.target._drawn)
+        assert wide.renderer._camera == (camera, 0.6)
+        assert (wide.render(values(jawOpen=0.1), camera) != before).any()
+        assert wide.renderer._camera == (camera, 100 / 60)
+
+
+def test_the_revision_grows_only_with_what_was_sent(gl: None) -> None:
+    with Offscreen(BallHead(), (40, 40)) as screen:
+        renderer = screen.renderer
+        renderer.pose(values(jawOpen=0.3))
+        assert renderer.update() == sum(len(part.vertices) for part in screen.head.parts)
+        assert renderer.revision == 1
+        for part in screen.head.parts:
+            part.changed = []
+        assert renderer.update() == 0 and renderer.revision == 1
+
+
+def test_many_rectangles_get_a_larger_buffer(gl: None) -> None:
+    with Offscreen(BallHead(), (64, 2000)) as screen:
+        background = screen.renderer._background
+        size = background._corners.size
+        screen.render(values())
+        assert background._corners.size > size
+        assert screen.read()[:, 0].max(axis=1).min() > 20, "background in every row"

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from ball_head import BallHead, BallPart, ball, grid, values
 
-from surface.view.pictures.occlusion import bake, bake_head, calm, fit_sky, lit, orthographic, spread, thinness
+from surface.view.pictures.occlusion import (
+    bake,
+    bake_head,
+    fit_sky,
+    orthographic,
+    smoothed,
+    sphere_directions,
+    thinness,
+    visibility,
+)
 
 
 def plate(name: str, y: float, half: float, material: str = "skin") -> BallPart:
@@ -17,16 +26,16 @@ def plate(name: str, y: float, half: float, material: str = "skin") -> BallPart:
 
 def test_a_ball_alone_sees_the_whole_sky(gl: None) -> None:
     points, normals, triangles = ball(50.0, 41, 61)
-    share = bake([BallPart("ball", "skin", triangles, points, normals)], directions=24, resolution=320)["ball"]
+    share = bake([BallPart("ball", "skin", triangles, points, normals)], directions=24, resolution=320)["ball"][:, :1]
     assert share.shape == (len(points), 1)
     assert share.min() > 0.97
 
 
 def test_under_a_lid_it_is_dark(gl: None) -> None:
     share = bake([plate("floor", 0.0, 100.0), plate("lid", 8.0, 100.0)], directions=60, resolution=320)
-    middle = share["floor"].reshape(15, 15)[5:10, 5:10]
+    middle = share["floor"][:, 0].reshape(15, 15)[5:10, 5:10]
     assert middle.max() < 0.05
-    assert share["lid"].min() > 0.95
+    assert share["lid"][:, 0].min() > 0.95
 
 
 def test_a_disc_above_hides_its_form_factor(gl: None) -> None:
@@ -35,7 +44,7 @@ def test_a_disc_above_hides_its_form_factor(gl: None) -> None:
     disc = BallPart(
         "disc", "skin", triangles, points + np.array([0.0, height, 0.0]), np.tile([0.0, 1.0, 0.0], (len(points), 1))
     )
-    share = bake([plate("floor", 0.0, 100.0), disc], directions=300, resolution=192)["floor"]
+    share = bake([plate("floor", 0.0, 100.0), disc], directions=300, resolution=192)["floor"][:, 0]
     wanted = 1.0 - radius**2 / (radius**2 + height**2)
     assert share.reshape(15, 15)[7, 7] == pytest.approx(wanted, abs=0.03)
 
@@ -46,8 +55,8 @@ def test_the_mouths_inside_is_shaded_by_itself_alone(gl: None) -> None:
         directions=24,
         resolution=96,
     )
-    assert share["teeth"].min() > 0.95
-    assert (share["mouth"] == 1.0).all()
+    assert share["teeth"][:, 0].min() > 0.95
+    assert (share["mouth"] == [1, 1, 0, 0, 0]).all()
 
 
 def test_neighbours_are_calmed_and_lone_vertices_left() -> None:
@@ -55,23 +64,23 @@ def test_neighbours_are_calmed_and_lone_vertices_left() -> None:
     slope = np.column_stack([uv[:, 0], np.ones(len(uv))])
     noisy = slope + np.random.default_rng(1).normal(0.0, 0.1, slope.shape)
     lone = np.vstack([noisy, [[7.0, 7.0]]]).astype(np.float32)
-    calmed = calm(lone, triangles)
+    result = smoothed(lone, triangles)
     inner = np.abs(uv - 0.5).max(axis=1) < 0.35
-    assert np.abs(calmed[:-1] - slope)[inner].std() < 0.5 * np.abs(noisy - slope)[inner].std()
-    np.testing.assert_allclose(calm(slope, triangles)[inner], slope[inner], atol=1e-6)
-    assert (calmed[-1] == 7.0).all()
+    assert np.abs(result[:-1] - slope)[inner].std() < 0.5 * np.abs(noisy - slope)[inner].std()
+    np.testing.assert_allclose(smoothed(slope, triangles)[inner], slope[inner], atol=1e-6)
+    assert (result[-1] == 7.0).all()
 
 
 def test_what_opens_does_not_stay_black(gl: None) -> None:
     head = BallHead()
     opened = bake_head(head, values(jawOpen=1.0), directions=12, resolution=96)
     rest = bake(head.parts, directions=12, resolution=96)
-    assert all((opened[p.name] >= calm(rest[p.name], p.triangles) - 1e-6).all() for p in head.parts)
+    assert all((opened[p.name] >= smoothed(rest[p.name][:, :1], p.triangles) - 1e-6).all() for p in head.parts)
     assert (head.parts[0].vertices == BallHead().parts[0].vertices).all()
 
 
 def test_directions_are_even() -> None:
-    directions = spread(200)
+    directions = sphere_directions(200)
     assert np.linalg.norm(directions, axis=1) == pytest.approx(np.ones(200))
     assert np.abs(directions.mean(axis=0)).max() < 0.01
     assert np.cov(directions.T) == pytest.approx(np.eye(3) / 3, abs=0.01)
@@ -93,11 +102,11 @@ def test_lit_blends_over_neighbours() -> None:
     picture = np.zeros((8, 8), np.float32)
     picture[:, 4:] = 1.0
     box = np.array([[0.5, 0.5, 0.5], [0.9, 0.5, 0.5], [0.1, 0.5, 0.5], [0.1, 0.5, 0.01]])
-    assert lit(box, picture, 0.02) == pytest.approx([0.5, 1.0, 0.0, 1.0])
+    assert visibility(box, picture, 0.02) == pytest.approx([0.5, 1.0, 0.0, 1.0])
 
 
 def test_a_sky_on_one_side_is_found() -> None:
-    directions = spread(400)
+    directions = sphere_directions(400)
     one = np.column_stack([np.ones(400), directions])
     seen = (directions[:, 0] > 0).astype(float)
     normal = (one[:, :, None] * one[:, None, :]).sum(axis=0)[None]
@@ -130,3 +139,53 @@ def test_skin_gets_its_sky_and_its_thinness(gl: None) -> None:
     assert (face.min() >= 0.0, face.max() <= 1.0) == (True, True)
     assert baked["face/thin"].shape == (len(face), 1)
     assert "teeth/visible" not in baked
+
+
+@pytest.mark.parametrize(("apart", "thin"), [(1.1, 0.9), (5.5, 0.5), (10.9, 0.1 / 11), (11.1, 0.0), (30.0, 0.0)])
+def test_thinness_falls_from_touching_to_eleven_millimetres(apart: float, thin: float) -> None:
+    front, back = plate("a", apart, 40.0), plate("b", 0.0, 40.0)
+    both = BallPart(
+        "both",
+        "skin",
+        np.concatenate([front.triangles, back.triangles + len(front.rest)]),
+        np.concatenate([front.rest, back.rest]),
+        np.concatenate([front.normals, -back.normals]),
+    )
+    assert thinness(both) == pytest.approx(np.full((len(both.rest), 1), thin), abs=1e-4)
+    both.normals[:] = -both.normals  # a gap, not a plate
+    assert (thinness(both) == 0.0).all()
+
+
+def test_neighbours_share_half_of_their_mean_in_each_pass() -> None:
+    triangles, values = np.array([[0, 1, 2]]), np.array([[0.0], [1.0], [5.0], [9.0]])
+    assert smoothed(values, triangles, 1)[:, 0] == pytest.approx([1.5, 1.75, 2.75, 9.0])
+    assert smoothed(values, triangles)[:, 0] == pytest.approx([1.875, 1.9375, 2.1875, 9.0])
+
+
+def test_a_sky_that_is_all_open_is_one_in_every_direction() -> None:
+    one = np.column_stack([np.ones(300), sphere_directions(300)])
+    normal = (one[:, :, None] * one[:, None, :]).sum(axis=0)[None]
+    sky = fit_sky(normal, one.sum(axis=0)[None])[0]
+    assert sky == pytest.approx([1 / 1.02, 0, 0, 0], abs=1e-3)
+    assert fit_sky(normal, 100 * one.sum(axis=0)[None])[0, 0] == 2.0
+    assert fit_sky(0 * normal, 0 * one.sum(axis=0)[None])[0].tolist() == [0, 0, 0, 0]
+
+
+def test_an_orthographic_view_fills_its_cube_with_a_margin() -> None:
+    points = np.random.default_rng(3).normal(size=(50, 3)) * [10, 30, 20]
+    for direction in np.vstack([sphere_directions(7), [[0, 1, 0], [1, 0, 0]]]):
+        box, matrix, span = orthographic(points, direction)
+        assert box.min(axis=0) == pytest.approx(0.02 / 1.04) and box.max(axis=0) == pytest.approx(1.02 / 1.04)
+        clip = np.column_stack([points, np.ones(50)]) @ matrix.T
+        assert clip[:, :3] == pytest.approx(2 * box - 1) and (clip[:, 3] == 1).all()
+        assert span == pytest.approx(1.04 * np.ptp(points @ direction))
+        assert np.argmax(box[:, 2]) == np.argmin(points @ direction)
+
+
+def test_parts_of_no_group_stay_open_and_skin_gets_three_arrays(gl: None) -> None:
+    share = bake([plate("brow", 0.0, 9.0, "brow"), plate("lid", 8.0, 90.0)], directions=8, resolution=32)
+    assert share["brow"].dtype == np.float32 and (share["brow"] == [1, 1, 0, 0, 0]).all()
+    made = bake_head(BallHead(), values(), directions=8, resolution=32)
+    assert set(made) == {"face", "face/visible", "face/thin", "left_eye", "right_eye", "teeth", "mouth"}
+    assert made["face/visible"].shape[1] == 4 and made["face/thin"].shape[1] == 1
+    assert made["face/visible"].min() >= 0.0 and made["face/visible"].max() <= 1.0

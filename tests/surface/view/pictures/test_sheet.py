@@ -11,7 +11,7 @@ from PIL import Image
 
 from surface.base.errors import ViewError
 from surface.view import Camera, contact_sheet, write_png
-from surface.view.pictures.sheet import closer, compose
+from surface.view.pictures.sheet import compose, zoom_to_head
 
 
 def plain(colour: tuple[int, int, int], size: tuple[int, int] = (60, 80)) -> np.ndarray:
@@ -73,6 +73,59 @@ def test_write_png_round_trips(tmp_path: Path) -> None:
 
 
 def test_a_profile_is_seen_from_further_than_a_front() -> None:
-    front, side = closer(Camera.front()), closer(Camera.profile())
+    front, side = zoom_to_head(Camera.front()), zoom_to_head(Camera.profile())
     assert front.distance < side.distance / 1.1
     assert side.distance < Camera.profile().distance
+
+
+@pytest.mark.parametrize(
+    ("count", "size", "columns", "across", "down"),
+    [
+        (1, (60, 80), None, 1, 1),
+        (4, (60, 80), None, 3, 2),
+        (9, (100, 82), None, 3, 3),
+        (5, (60, 80), 3, 3, 2),
+        (6, (60, 80), 3, 3, 2),
+        (2, (60, 80), 9, 2, 1),
+        (2, (60, 80), 0, 1, 2),
+        (3, (600, 20), None, 1, 3),
+    ],
+)
+def test_a_page_has_room_for_all_pictures(
+    count: int, size: tuple[int, int], columns: int | None, across: int, down: int
+) -> None:
+    page = np.asarray(compose([plain((1, 2, 3), size)] * count, [""] * count, columns=columns))
+    line = max(18, size[1] // 13)
+    assert page.shape == ((size[1] + line + 4) * down + 4, (size[0] + 4) * across + 4, 3)
+    assert (page == (1, 2, 3)).all(axis=2).sum() == count * size[0] * size[1]
+    assert page[0, 0].tolist() == page[-1, -1].tolist() == [24, 26, 29]
+    assert page[4, 4].tolist() == [1, 2, 3] and page[3, 4].tolist() == [24, 26, 29]
+
+
+def test_a_label_is_written_in_the_middle_of_its_line() -> None:
+    page = np.asarray(compose([plain((0, 0, 0), (200, 260))] * 2, ["", "\N{MINUS SIGN}M"], columns=2)).astype(int)
+    rows, columns = np.nonzero(page.min(axis=2) > 150)
+    assert rows.min() > 4 + 260 and rows.max() < 4 + 260 + 20
+    assert pytest.approx((rows.min() + rows.max()) / 2, abs=2) == 4 + 260 + 10
+    assert pytest.approx((columns.min() + columns.max()) / 2, abs=2) == 4 + 204 + 100
+    dash = np.asarray(compose([plain((0, 0, 0), (200, 260))] * 2, ["", "-M"], columns=2))
+    assert (page == dash).all()
+
+
+def test_long_labels_get_smaller_then_shorter() -> None:
+    def ink(label: str) -> np.ndarray:
+        page = np.asarray(compose([plain((0, 0, 0), (120, 330))], [label])).astype(int)
+        return np.argwhere(page.min(axis=2) > 100)
+
+    short, middle, long = (np.ptp(ink("E" * count), axis=0) for count in (3, 12, 60))
+    assert short[0] > middle[0] >= long[0] >= 5
+    assert short[1] < middle[1] <= 114 and 80 < long[1] <= 114
+
+
+def test_a_head_is_nearer_and_higher_on_a_sheet() -> None:
+    camera = Camera.front()
+    near = zoom_to_head(camera)
+    assert near.target == pytest.approx((camera.target[0], camera.target[1] + 30, camera.target[2]))
+    assert near.distance == pytest.approx(camera.distance / 1.36)
+    side = zoom_to_head(Camera.profile())
+    assert side.distance == pytest.approx(Camera.profile().distance / 1.16)

@@ -34,7 +34,7 @@ def test_wheel_and_reset() -> None:
     view.zoom(-3)
     assert view.camera.distance == pytest.approx(Camera.three_quarter().distance)
     view.turn(10, 10)
-    view.reset()
+    view.press("0")
     assert view.camera == Camera.three_quarter()
 
 

@@ -1,4 +1,4 @@
-"""What every reader gives back, and how readers say what is wrong."""
+"""Shared by the readers of surface files: named surfaces, errors that name the place in a file, reading of bytes."""
 
 from __future__ import annotations
 
@@ -29,48 +29,50 @@ class NamedSurface:
 
 
 def summary(item: NamedSurface) -> str:
-    """What a surface is, in a line."""
+    """One line that describes a surface: control points, degrees, domain, trim loops and slits."""
     surface, domain = item.surface, item.domain
     degrees = " x ".join("/".join(map(str, np.unique(p))) for p in surface.degrees)
     u0, u1, v0, v1 = surface.rect if domain is None else domain.rect
     parts = [f"{surface.n} control points", f"degree {degrees}", f"u {u0:g} to {u1:g}", f"v {v0:g} to {v1:g}"]
     parts += [f"closed in {axis}" for axis, ends in zip("uv", surface.closed, strict=True) if ends is not None]
     if domain is not None:
-        parts += [
-            f"{len(x)} {word}{'s' * (len(x) > 1)}"
-            for word, x in (("trim loop", domain.loops), ("slit", domain.slits))
-            if len(x)
-        ]
+        counts = (("trim loop", len(domain.loops)), ("slit", len(domain.slits)))
+        parts += [f"{count} {word}{'s' * (count > 1)}" for word, count in counts if count]
     return f"{item.name}: {', '.join(parts)}"
 
 
-class Place:
-    """A file and a place in it, for error messages."""
+@dataclass(frozen=True)
+class Location:
+    """A file and a place in it, such as a line or an element, for error messages."""
 
-    def __init__(self, path: Path, where: str = "") -> None:
-        self.path, self.where = path, where
+    path: Path
+    where: str = ""
 
-    def at(self, where: str) -> Place:
-        """The same file, another place."""
-        return Place(self.path, where)
+    def at(self, where: str) -> Location:
+        """Another place in the same file."""
+        return Location(self.path, where)
+
+    def child(self, where: str) -> Location:
+        """A place inside this one: ``where`` is appended."""
+        return Location(self.path, self.where + where)
 
     def error(self, why: str, *, hint: str = "") -> SurfaceFileError:
-        """The error to raise."""
+        """The error to raise for this place."""
         place = f"{self.path}, {self.where}" if self.where else str(self.path)
         return SurfaceFileError(f"{place}: {why}", hint=hint or "export the file again, or take it from a copy")
 
 
 def read_text(path: Path, errors: str = "strict") -> str:
-    """The file as UTF-8; ``SurfaceFileError`` where it cannot be read."""
+    """A file's content as UTF-8; ``SurfaceFileError`` where it cannot be read."""
     try:
         return read_bytes(path).decode("utf-8", errors)
     except UnicodeDecodeError as error:
-        raise Place(path).error(f"is not text (byte {error.start}: {error.reason})") from error
+        raise Location(path).error(f"is not text (byte {error.start}: {error.reason})") from error
 
 
 def read_bytes(path: Path) -> bytes:
-    """The file; ``SurfaceFileError`` where it cannot be read."""
+    """A file's content; ``SurfaceFileError`` where it cannot be read."""
     try:
         return path.read_bytes()
     except OSError as error:
-        raise Place(path).error(f"cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+        raise Location(path).error(f"cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error

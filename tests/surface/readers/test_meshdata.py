@@ -1,0 +1,48 @@
+"""surface.readers.meshdata"""
+
+import os
+
+import pytest
+
+from surface.base.errors import FitError
+from surface.readers import meshdata
+from surface.readers.meshdata import MOST_BYTES, MOST_MOVES, MOST_VERTICES, check_size, read_bytes
+
+
+def test_limits_themselves_are_allowed():
+    check_size("m", MOST_VERTICES, MOST_MOVES // MOST_VERTICES)
+    check_size("m", 0, 10**9)
+
+
+def test_one_more_is_refused():
+    with pytest.raises(FitError, match="m: 400001 vertices; 400000 are the most") as caught:
+        check_size("m", MOST_VERTICES + 1, 0)
+    assert "decimate" in caught.value.hint
+    with pytest.raises(FitError, match="m: 101 shapes of 400000 vertices are too many") as caught:
+        check_size("m", MOST_VERTICES, MOST_MOVES // MOST_VERTICES + 1)
+    assert "leave out shapes" in caught.value.hint
+
+
+def test_a_file_is_read_whole(tmp_path):
+    (tmp_path / "m.obj").write_bytes(b"\x00\xffabc")
+    assert read_bytes(tmp_path / "m.obj") == b"\x00\xffabc"
+
+
+def test_a_sparse_file_beyond_the_limit_is_not_read(tmp_path, monkeypatch):
+    path = tmp_path / "m.glb"
+    path.touch()
+    os.truncate(path, MOST_BYTES + 1)  # takes no space on disk
+    with pytest.raises(FitError, match=r"2\.1 GB is more than a head needs"):
+        read_bytes(path)
+    monkeypatch.setattr(meshdata, "MOST_BYTES", 3)
+    path.write_bytes(b"abc")
+    assert read_bytes(path) == b"abc"
+
+
+def test_missing_files_and_folders_say_what_to_do(tmp_path):
+    for path, why, hint in ((tmp_path / "no.glb", "no such mesh file", "give the path"),
+                            (tmp_path, "cannot be read", "permissions"),
+                            (tmp_path / "a\0b", "cannot be read", "permissions")):  # fmt: skip
+        with pytest.raises(FitError, match=why) as caught:
+            read_bytes(path)
+        assert hint in caught.value.hint

@@ -1,0 +1,59 @@
+"""surface.view.scene.theme"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import pytest
+
+from surface.base.errors import ViewError
+from surface.view.scene.theme import THEMES, Light, Theme, find_theme
+
+
+def test_themes_are_found_by_name_or_taken_as_they_are() -> None:
+    for name, theme in THEMES.items():
+        assert find_theme(name) is theme
+    own = Theme(gloss=2.0)
+    assert find_theme(own) is own
+
+
+def test_an_unknown_name_lists_the_themes() -> None:
+    with pytest.raises(ViewError, match="there is no theme 'clown'") as caught:
+        find_theme("clown")
+    assert caught.value.hint == "themes: mask, skin"
+
+
+@pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
+def test_values_are_within_their_ranges(theme: Theme) -> None:
+    for field in fields(theme):
+        value = getattr(theme, field.name)
+        if isinstance(value, tuple):
+            assert len(value) == 3 and all(0.0 <= x <= 1.0 for x in value), field.name
+        if isinstance(value, Light):
+            assert -180.0 <= value.yaw_deg <= 180.0 and -90.0 <= value.pitch_deg <= 90.0
+            assert min(value.colour) >= 0.0
+    assert 0.0 <= theme.lights_follow <= 1.0 and 0.0 <= theme.hair <= 1.0 and 0.0 <= theme.lips <= 1.0
+
+
+@pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
+def test_the_key_is_brightest_and_the_rim_comes_from_behind(theme: Theme) -> None:
+    assert sum(theme.key.colour) > 3 * sum(theme.fill.colour)
+    assert theme.key.yaw_deg < 0.0 < theme.fill.yaw_deg, "key from the subject's right, fill from the left"
+    assert abs(theme.rim.yaw_deg) > 90.0 > abs(theme.key.yaw_deg)
+    assert min(light.pitch_deg for light in (theme.key, theme.fill, theme.rim)) > 0.0
+    assert sum(theme.sky) > sum(theme.ground), "more light from above"
+    assert sum(theme.background_bottom) > sum(theme.background_top)
+
+
+def test_skin_is_warm_and_painted_and_a_mask_is_grey_and_bald() -> None:
+    skin, mask = THEMES["skin"], THEMES["mask"]
+    assert skin.use_painted and not mask.use_painted
+    red, green, blue = skin.albedo
+    assert red > green > blue and skin.wrap[0] > skin.wrap[1] > skin.wrap[2] and skin.through[0] > 0.3
+    assert max(mask.albedo) - min(mask.albedo) < 0.03 and set(mask.wrap) == {0.1} and mask.through == (0, 0, 0)
+    assert (skin.hair, mask.hair) == (1.0, 0.0)
+    assert (skin.glow, mask.glow > 1.0) == (0.0, True)
+    assert mask.seams and mask.lips > 0.0 and not skin.seams and skin.lips == 0.0
+    assert (skin.detail, mask.detail) == (1.0, 0.0)
+    assert mask.gloss > skin.gloss == 1.0
+    assert skin.lights_follow == 0.5
