@@ -18,8 +18,8 @@ from typing import Any
 from drivers.base.errors import DriverError
 from drivers.base.priority import take_priority
 from drivers.sim.serving.control import Commands
-from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import Control, PortServer
+from drivers.sim.wire.simulator import make_line
 
 
 def build(settings: dict[str, Any]) -> PortServer:

@@ -120,28 +120,28 @@ class ControlSocket:
         self.path, self._handle = Path(path), handle
         self._clients: dict[int, tuple[socket.socket, Lines]] = {}
         _remove_dead(self.path)
-        self._voice_listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            self._voice_listener.bind(str(self.path))
-            self._voice_listener.listen()
+            self._listener.bind(str(self.path))
+            self._listener.listen()
         except OSError as error:
-            self._voice_listener.close()
+            self._listener.close()
             raise PortError(
                 f"cannot make the control socket {self.path}: {error}", hint=f"mkdir -p {self.path.parent}"
             ) from error
-        self._voice_listener.setblocking(False)
+        self._listener.setblocking(False)
 
     @property
     def descriptors(self) -> list[int]:
         """What to wait on."""
-        return [self._voice_listener.fileno(), *self._clients]
+        return [self._listener.fileno(), *self._clients]
 
     def serve(self, ready: list[int]) -> None:
         """Take what has come at the descriptors that are ready."""
         for descriptor in ready:
-            if descriptor == self._voice_listener.fileno():
+            if descriptor == self._listener.fileno():
                 with contextlib.suppress(BlockingIOError):
-                    client, _ = self._voice_listener.accept()
+                    client, _ = self._listener.accept()
                     client.setblocking(False)
                     self._clients[client.fileno()] = (client, Lines())
             elif descriptor in self._clients:
@@ -152,8 +152,8 @@ class ControlSocket:
         for client, _ in self._clients.values():
             client.close()
         self._clients.clear()
-        if self._voice_listener.fileno() >= 0:
-            self._voice_listener.close()
+        if self._listener.fileno() >= 0:
+            self._listener.close()
             self.path.unlink(missing_ok=True)
 
     def _take(self, descriptor: int) -> None:

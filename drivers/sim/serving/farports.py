@@ -171,22 +171,22 @@ class TcpPort(_SocketPort):
     def _offer(self) -> None:
         try:
             host, port = address_of(self.path)
-            self._voice_listener = socket.create_server((host, port))
+            self._listener = socket.create_server((host, port))
         except (OSError, ValueError) as error:
             kind = PortBusy if isinstance(error, OSError) and "in use" in str(error) else PortError
             raise kind(f"cannot listen at {self.path}: {error}", hint="for example --tcp 127.0.0.1:4000") from error
-        self._voice_listener.setblocking(False)
-        self.path = f"socket://{host}:{self._voice_listener.getsockname()[1]}"
+        self._listener.setblocking(False)
+        self.path = f"socket://{host}:{self._listener.getsockname()[1]}"
 
     def _withdraw(self) -> None:
-        self._voice_listener.close()
+        self._listener.close()
 
     def _door(self) -> int:
-        return self._voice_listener.fileno()
+        return self._listener.fileno()
 
     def _admit(self) -> socket.socket | None:
         try:
-            caller, _ = self._voice_listener.accept()
+            caller, _ = self._listener.accept()
         except OSError:
             return None
         caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -37,7 +37,7 @@ class PortServer:
 
     Parameters
     ----------
-    chain : the servos.
+    line : what is at the far end.
     link : path that shall point at a pseudo-terminal, or None; ``socket://HOST:PORT`` or ``memory://NAME`` instead.
     baud : bit rate while no client has set one.
     wire : bytes take their time.
@@ -54,7 +54,7 @@ class PortServer:
 
     def __init__(
         self,
-        chain: Line,
+        line: Line,
         link: str | os.PathLike[str] | None = None,
         *,
         baud: int = 1_000_000,
@@ -63,9 +63,9 @@ class PortServer:
         commands: str | os.PathLike[str] | None = None,
         on_line: Callable[[str], object] | None = None,
     ) -> None:
-        self.chain, self.baud = chain, baud
+        self.line, self.baud = line, baud
         self.tap: Callable[[bool, bytes], None] | None = None
-        self._socket = ControlSocket(commands, Commands(chain).handle) if commands else None
+        self._socket = ControlSocket(commands, Commands(line).handle) if commands else None
         try:
             self.port = make_port(link)
         except BaseException:
@@ -77,7 +77,7 @@ class PortServer:
         self._queue: deque[Timed] = deque()
         self._read_s = self._said_s = 0.0
         self._prompt = False
-        chain.on_unplug = self._unplug
+        line.on_unplug = self._unplug
 
     def run(self, control: Control) -> None:
         """Serve until `control` reaches its end (or says anything, without `on_lines`)."""
@@ -115,10 +115,10 @@ class PortServer:
 
     def _timeout(self) -> float | None:
         """Seconds until something is due; None = nothing is."""
-        due = self.chain.faults.next_change_s
+        due = self.line.faults.next_change_s
         if self._queue:
             due = min(due, self._queue[0][0] - EARLY_S)
-        if self.chain.reader.pending:
+        if self.line.reader.pending:
             due = min(due, self._read_s + PAUSE_S)
         now_s = time.monotonic()
         if self._prompt and now_s - self._said_s < LINGER_S:
@@ -135,21 +135,21 @@ class PortServer:
         if self._said_s:  # the first since the last reply
             self._prompt = self._timing is not None and now_s - self._said_s < LINGER_S
             self._said_s = 0.0
-        chain = self.chain
-        chain.set_line_baud(self.port.baud())
-        if chain.echo:
+        line = self.line
+        line.set_line_baud(self.port.baud())
+        if line.echo:
             self._send([(now_s, data)])
-        for packet in chain.reader.feed(data):
+        for packet in line.reader.feed(data):
             if self._timing is None:
-                self._send(without_timing(chain.handle(packet, now_s), now_s))
+                self._send(without_timing(line.handle(packet, now_s), now_s))
                 continue
-            baud = chain.line_baud or self.baud
-            at_s = self._timing.arrival(now_s, chain.size(packet), baud)
-            self._send(self._timing.deliveries(chain.handle(packet, at_s), baud))
+            baud = line.line_baud or self.baud
+            at_s = self._timing.arrival(now_s, line.size(packet), baud)
+            self._send(self._timing.deliveries(line.handle(packet, at_s), baud))
 
     def _send(self, timed: list[Timed]) -> None:
         """Write what is due, keep the rest in order."""
-        for time_s, data in self.chain.heard(timed):
+        for time_s, data in self.line.heard(timed):
             if self._queue or time_s > time.monotonic():
                 self._queue.append((time_s, data))
             else:
@@ -169,19 +169,19 @@ class PortServer:
                 now_s = time.monotonic()
             self._write(self._queue.popleft()[1])
             self._said_s = now_s
-        if self.chain.reader.pending and now_s >= self._read_s + PAUSE_S:
-            for packet in self.chain.reader.flush():
-                self._send(without_timing(self.chain.handle(packet, now_s), now_s))
-        if now_s >= self.chain.faults.next_change_s:
-            with self.chain.lock:
-                self.chain.faults.advance(now_s)
+        if self.line.reader.pending and now_s >= self._read_s + PAUSE_S:
+            for packet in self.line.reader.flush():
+                self._send(without_timing(self.line.handle(packet, now_s), now_s))
+        if now_s >= self.line.faults.next_change_s:
+            with self.line.lock:
+                self.line.faults.advance(now_s)
 
     def _unplug(self, fault: Fault, begins: bool) -> None:
         """The port goes away with all that was under way, and comes back, perhaps under another name."""
         if begins:
             self.port.close()
             self._queue.clear()
-            self.chain.reader.take_pending()
+            self.line.reader.take_pending()
         elif not self.port.is_open:
             self.port.open(fault.alias or self._link)
 

@@ -16,11 +16,11 @@ from typing import Any, Self
 from drivers.base.children import command, environment
 from drivers.base.errors import PortError
 from drivers.sim.serving.control import Commands
-from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import PortServer
 from drivers.sim.servos.chain import Chain
 from drivers.sim.wire.faults import parse_fault
 from drivers.sim.wire.line import Line
+from drivers.sim.wire.simulator import make_line
 
 START_S = 20.0
 """A child process that is not ready after this time is given up."""
@@ -93,7 +93,7 @@ class SimulatedBus:
     wire, latency_s : bytes take their time.
     process : serve from a child process (which ends with this one, however this one ends) instead of a thread.
     seed : of random faults.
-    family, options : see :func:`drivers.sim.serving.farend.make_line`.
+    family, options : see :func:`drivers.sim.wire.simulator.make_line`.
 
     Attributes
     ----------

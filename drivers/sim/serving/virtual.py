@@ -15,12 +15,12 @@ from typing import Any
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import PortLost, PortMissing
 from drivers.core.registry import open_bus
-from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import PAUSE_S
 from drivers.sim.serving.simulated import ServoView
 from drivers.sim.servos.chain import Chain
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Line
+from drivers.sim.wire.simulator import make_line
 from drivers.sim.wire.timing import Timed, WireTiming
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from drivers.sim.servos.bus import SimulatedChain
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.legacy import LegacyChain
+from drivers.sim.servos.protocol1 import Protocol1Chain
+from drivers.sim.servos.protocol2 import Protocol2Chain
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Reader
 from drivers.sim.wire.replies import Reply
@@ -67,8 +67,8 @@ class MixedChain(Chain):
         everyone = list(servos)
         by_protocol = [[servo for servo in everyone if servo.table.protocol == number] for number in (1, 2)]
         self.parts: tuple[Chain, ...] = (
-            LegacyChain(by_protocol[0], now_s, seed=seed),
-            SimulatedChain(by_protocol[1], now_s, seed=seed),
+            Protocol1Chain(by_protocol[0], now_s, seed=seed),
+            Protocol2Chain(by_protocol[1], now_s, seed=seed),
         )
         super().__init__(everyone, now_s, (), seed)
         for part in self.parts:

@@ -8,11 +8,11 @@ from typing import Any
 
 from drivers.base.options import option, parse_ids
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
-from drivers.sim.servos.bus import SimulatedChain
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.legacy import LegacyChain
 from drivers.sim.servos.mixed import MixedChain
+from drivers.sim.servos.protocol1 import Protocol1Chain
+from drivers.sim.servos.protocol2 import Protocol2Chain
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.simulator import Servos, Setting, Simulator
 from drivers.tables.models import check_dynamixel, check_feetech
@@ -36,7 +36,7 @@ def make_chain(servos: list[SimulatedServo], now_s: float, seed: int = 0) -> Cha
     protocols = {servo.table.protocol for servo in servos}
     if len(protocols) > 1:
         return MixedChain(servos, now_s, seed=seed)
-    kind = LegacyChain if protocols == {1} else SimulatedChain
+    kind = Protocol1Chain if protocols == {1} else Protocol2Chain
     return kind(servos, now_s, seed=seed)
 
 

@@ -83,3 +83,22 @@ class Simulator:
     options: type
     help: str
     decoder: Callable[[Line], Decoder] = field(default=lambda line: TextDecoder())
+
+
+def make_line(
+    family: str, servos: Servos, now_s: float, *, baud: int = 1_000_000, seed: int = 0, options: Mapping[str, Any] = {}
+) -> Line:
+    """What a simulated bus of a family has at its far end.
+
+    Parameters
+    ----------
+    family : a kind of bus; the models of Dynamixel and Feetech servos decide their protocol.
+    servos : id and model of each. now_s : time.
+    baud : rate of the wire. seed : of random faults.
+    options : what the family's driver gives as ``far_end()``.
+
+    Raises
+    ------
+    DriverError : unknown family or model, or servos that cannot share a wire.
+    """
+    return simulator_of(family).far_end(servos, options, Setting(now_s=now_s, baud=baud, seed=seed))

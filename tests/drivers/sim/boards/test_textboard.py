@@ -8,7 +8,7 @@ from drivers.omote.protocol import checksum
 from drivers.sim.boards.linehead import MAX_LINE, LineHead
 from drivers.sim.boards.maestro import Maestro
 from drivers.sim.boards.textboard import TextBoard
-from drivers.sim.serving.farend import make_line
+from drivers.sim.wire.simulator import make_line
 
 TEXTS = {"template": "#{ch}P{us}", "end": "T{time_ms}\r", "off": "#{ch}P0\r"}
 ASKED = TEXTS | {"query": "?{ch}\r", "answer": "{ch}={us}\r"}

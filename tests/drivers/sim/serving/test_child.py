@@ -63,7 +63,7 @@ def test_a_parent_that_goes_at_once_is_no_error(standard_input, capsys, text: st
 def test_build_makes_the_servos_and_sets_the_faults():
     server = child.build(SETTINGS)
     try:
-        assert [servo.table.model for servo in server.chain.servos] == ["xl330-m288", "xl320"]
-        assert [fault.kind for fault in server.chain.faults.active] == ["mute"]
+        assert [servo.table.model for servo in server.line.servos] == ["xl330-m288", "xl320"]
+        assert [fault.kind for fault in server.line.faults.active] == ["mute"]
     finally:
         server.port.close()

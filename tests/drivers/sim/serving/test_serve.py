@@ -16,7 +16,7 @@ from drivers.base.errors import DriverError
 from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusReader, encode_instruction
 from drivers.sim.serving.serve import PAUSE_S, PortServer, make_servos, serve_dynamixel
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.protocol2 import Protocol2Chain
 
 
 def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
@@ -76,7 +76,7 @@ def test_bad_settings_are_refused_before_anybody_is_told(tmp_path: Path, options
 
 
 def test_the_loop_sleeps_until_something_is_due():
-    chain = SimulatedChain(make_servos([1], "xl330-m288", 1_000_000, 0.0))
+    chain = Protocol2Chain(make_servos([1], "xl330-m288", 1_000_000, 0.0))
     server = PortServer(chain)
     try:
         assert server._timeout() is None  # at rest nothing wakes it but its descriptors

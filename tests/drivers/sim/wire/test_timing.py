@@ -6,8 +6,8 @@ import pytest
 
 from drivers.packets.packet import BROADCAST_ID, InstructionPacket
 from drivers.packets.packet import Instruction as I
-from drivers.sim.servos.bus import SimulatedChain
 from drivers.sim.servos.device import SimulatedServo
+from drivers.sim.servos.protocol2 import Protocol2Chain
 from drivers.sim.wire.replies import Reply
 from drivers.sim.wire.timing import USB_FRAME_S, WireTiming, without_timing
 
@@ -22,7 +22,7 @@ def transaction(
     servos = [SimulatedServo(i) for i in IDS]
     for servo in servos:
         servo.registers.put("Return Delay Time", delay)
-    bus, timing = SimulatedChain(servos), WireTiming(latency_s)
+    bus, timing = Protocol2Chain(servos), WireTiming(latency_s)
     packet = InstructionPacket(BROADCAST_ID, instruction, params)
     at_s = timing.arrival(1.0, bus.size(packet), baud)
     return timing.deliveries(bus.handle(packet, at_s), baud)

@@ -1,4 +1,4 @@
-"""drivers.sim.servos.legacy: Protocol 1.0 servos, AX and MX, Feetech STS and SCS, on a wire without a port."""
+"""drivers.sim.servos.protocol1: Protocol 1.0 servos, AX and MX, Feetech STS and SCS, on a wire without a port."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from drivers.packets.packet1 import Instruction1 as I
 from drivers.sim import SimulatedBus
 from drivers.sim.serving.serve import make_chain, make_servos
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.legacy import LegacyChain
 from drivers.sim.servos.mixed import MixedChain
 from drivers.sim.servos.plant import Skin
+from drivers.sim.servos.protocol1 import Protocol1Chain
 
 NO_LOAD = Skin(spring=0.0, inertia=0.0, friction=0.0)
 
 
-def chain(model: str = "ax-12a", ids: tuple[int, ...] = (1, 2, 3), faults: tuple[str, ...] = ()) -> LegacyChain:
-    return LegacyChain([SimulatedServo(i, model, skin=NO_LOAD) for i in ids], faults=faults)
+def chain(model: str = "ax-12a", ids: tuple[int, ...] = (1, 2, 3), faults: tuple[str, ...] = ()) -> Protocol1Chain:
+    return Protocol1Chain([SimulatedServo(i, model, skin=NO_LOAD) for i in ids], faults=faults)
 
 
-def ask(bus: LegacyChain, device: int, code: int, params: bytes | str = b"", now_s: float = 0.0) -> list[Packet1]:
+def ask(bus: Protocol1Chain, device: int, code: int, params: bytes | str = b"", now_s: float = 0.0) -> list[Packet1]:
     body = bytes.fromhex(params) if isinstance(params, str) else params
     data = b"".join(reply.data for reply in bus.feed(encode(device, code, body), now_s))
     return Reader1().feed(data)
@@ -248,7 +248,7 @@ def test_reply_faults_speak_protocol_1():
 
 
 def test_clocks_may_differ_by_three_percent():
-    bus = LegacyChain([SimulatedServo(1, "ax-12a", baud=115_200)])
+    bus = Protocol1Chain([SimulatedServo(1, "ax-12a", baud=115_200)])
     assert bus.servo(1).baud == 117_647
     bus.set_line_baud(115_200)
     assert len(ask(bus, 1, I.PING)) == 1
@@ -266,7 +266,7 @@ def test_scs_knows_no_sync_read():
 
 
 def test_the_models_decide_the_protocol():
-    assert isinstance(make_chain(make_servos([1], "sts3215", 1_000_000, 0.0), 0.0), LegacyChain)
+    assert isinstance(make_chain(make_servos([1], "sts3215", 1_000_000, 0.0), 0.0), Protocol1Chain)
     mixed = make_servos([1], "sts3215", 1_000_000, 0.0) + make_servos([2], "xl320", 1_000_000, 0.0)
     assert isinstance(make_chain(mixed, 0.0), MixedChain)
 

@@ -1,4 +1,4 @@
-"""drivers.sim.servos.bus: packets in, replies out, without a port."""
+"""drivers.sim.servos.protocol2: packets in, replies out, without a port."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from drivers.packets.packet import (
 )
 from drivers.packets.packet import ErrorNumber as E
 from drivers.packets.packet import Instruction as I
-from drivers.sim.servos.bus import SimulatedChain
 from drivers.sim.servos.device import SimulatedServo
+from drivers.sim.servos.protocol2 import Protocol2Chain
 
 
-def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> SimulatedChain:
+def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> Protocol2Chain:
     servos = [SimulatedServo(i, model, position=2000.0 + i, **options) for i in ids or (1, 2, 3)]
-    return SimulatedChain(servos, faults=faults)
+    return Protocol2Chain(servos, faults=faults)
 
 
-def wire(bus: SimulatedChain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
+def wire(bus: Protocol2Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
     """What comes back, as one run of bytes."""
     frame = encode_instruction(device, instruction, params)
     return b"".join(reply.data for reply in bus.feed(frame, now_s))
 
 
 def ask(
-    bus: SimulatedChain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0
+    bus: Protocol2Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0
 ) -> list[StatusPacket]:
     """The status packets that come back."""
     return StatusReader().feed(wire(bus, device, instruction, params, now_s))
@@ -58,7 +58,7 @@ def test_broadcast_ping_is_answered_in_order_of_id():
 
 
 def test_vendor_example_of_a_ping_byte_by_byte():
-    bus = SimulatedChain([SimulatedServo(i, "xm430-w210", firmware=38) for i in (1, 2)])
+    bus = Protocol2Chain([SimulatedServo(i, "xm430-w210", firmware=38) for i in (1, 2)])
     sent = bytes.fromhex("FFFFFD00FE0300013142")
     assert b"".join(reply.data for reply in bus.feed(sent, 0.0)).hex().upper() == (
         "FFFFFD00010700550006042 6655D".replace(" ", "") + "FFFFFD0002070055000604266F6D"

@@ -27,7 +27,7 @@ _FLAGS = {
 """Error flag for each reason that a servo refuses an instruction."""
 
 
-class LegacyChain(Chain):
+class Protocol1Chain(Chain):
     """Servos that speak Protocol 1.0 framing on one wire. See :class:`~drivers.sim.servos.chain.Chain`."""
 
     def make_reader(self) -> Reader1:

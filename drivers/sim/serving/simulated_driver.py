@@ -17,7 +17,7 @@ from drivers.sim.serving.simulated import SimulatedBus
 TRANSPORTS = ("pty", "tcp", "memory")
 
 
-class SimulatedWire(WireBus):
+class SimulatedDriver(WireBus):
     """What a driver gets from :func:`simulated`: simulated servos of its own.
 
     They live in a child process from ``open`` to ``close`` and keep their state over ``reconnect``.
@@ -108,4 +108,4 @@ class SimulatedWire(WireBus):
 @cache
 def simulated(driver: type[WireBus], family: str) -> type[WireBus]:
     """The driver of a family, with simulated servos of its own."""
-    return type(f"Simulated{driver.__name__}", (SimulatedWire, driver), {"family": family})
+    return type(f"Simulated{driver.__name__}", (SimulatedDriver, driver), {"family": family})

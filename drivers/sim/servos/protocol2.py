@@ -37,7 +37,7 @@ FACTORY_BROADCAST_FIRMWARE = 42
 """From here on a broadcast factory reset of everything is ignored."""
 
 
-class SimulatedChain(Chain):
+class Protocol2Chain(Chain):
     """Servos that speak Protocol 2.0 on one wire. See :class:`~drivers.sim.servos.chain.Chain`."""
 
     def make_reader(self) -> InstructionReader:
