@@ -1,4 +1,4 @@
-"""What simulated servo boards share: one voice on the port, faults of its answers, and a supply that may break down."""
+"""Base class of simulated servo boards: answers on one port, their faults, and a supply that may drop."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Line
-from drivers.sim.wire.replies import Reply
+from drivers.sim.wire.timing import Reply
 
 FAULTS = ("echo", "slow-reader", "unplug", "mute", "silent", "late", "drop", "flip", "noise", "short", "volts")
 """Faults of a board. Ids are channels; ``mute`` and ``volts`` are the board's, so write ``*``."""
@@ -36,34 +36,22 @@ class Board(Line):
 
     @abstractmethod
     def reset(self, now_s: float) -> None:
-        """Begin as after power-on."""
+        """The state after power-on."""
 
     def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
-        """What a packet does, and what is heard of the answers; nothing while the board is deaf."""
+        """Do a packet, unless the board is deaf; returns the replies that arrive."""
         if self._deaf:
             return []
-        answers = [self._spoilt(channel, data) for channel, data in self.answer(packet, now_s)]
-        return [answer for answer in answers if answer is not None]
+        replies = []
+        for channel, data in self.answer(packet, now_s):
+            arrived, late_s = self.faults.corrupt(data, channel)
+            if arrived is not None:
+                replies.append(Reply(arrived, None, late_s))
+        return replies
 
     def fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:
-        """Cut the board off, or its supply."""
         super().fault_changed(fault, begins, now_s)
         if fault.kind == "mute" or (fault.kind == "volts" and fault.value < BROWN_OUT_V):
             (self._deaf.append if begins else self._deaf.remove)(fault)
             if fault.kind == "volts" and begins:
                 self.reset(now_s)
-
-    def _spoilt(self, channel: int, data: bytes) -> Reply | None:
-        late_s, spoilt = 0.0, data
-        for spoiler in self.faults.spoilers:
-            if not spoiler.strikes(channel):
-                continue
-            late_s += spoiler.late_s
-            if spoiler.fault.kind == "short":
-                spoilt = spoilt[: spoiler.fault.value]
-                continue
-            result = spoiler.part(spoilt)
-            if result is None:
-                return None
-            spoilt = result
-        return Reply(spoilt, None, late_s)

@@ -1,4 +1,4 @@
-"""Serve a simulated bus on a port: one loop that sleeps until there is something to do."""
+"""Serve a simulated bus on a port: an event loop that moves bytes, keeps wire time and takes commands."""
 
 from __future__ import annotations
 
@@ -7,26 +7,28 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 from drivers.sim.serving.control import Commands, ControlSocket, Lines
-from drivers.sim.serving.farports import make_port
+from drivers.sim.serving.ports import Link, make_port
 from drivers.sim.servos.simulators import make_chain, make_servos
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Line
+from drivers.sim.wire.simulator import make_line
 from drivers.sim.wire.timing import Timed, WireTiming, without_timing
 
 PAUSE_S = 0.1
 """A packet that is not complete after this pause is given up."""
 EARLY_S = 80e-6
-"""How long before bytes are due the server wakes: the system wakes it late by about that much."""
+"""How long before bytes are due the server wakes: the system wakes it about this much late."""
 
-LINGER_S = 800e-6
-"""How long the server of a wire that takes time sleeps lightly after a reply, for a client that writes again at once: a
-real wire is not slow to wake up. For one that paces itself it sleeps as long as it can."""
-DOZE_S = 100e-6
-"""A light sleep: too short for the processor to be switched off. Without any the server, where it has real-time
-priority, would keep the system itself from carrying the bytes of its pseudo-terminal."""
+POLL_S = 800e-6
+"""How long the server of a wire that takes time polls after a reply, for a client that writes again at once: the system
+would wake it late. Where the client wrote later than that last time, it waits without polling."""
+POLL_STEP_S = 100e-6
+"""Sleep between polls: too short for the processor's idle states. Without it the server, where it has real-time
+priority, would keep the system from carrying the bytes of its pseudo-terminal."""
 
 Control = int | socket.socket
 """Where commands to the server come from: a descriptor, or (the only thing that Windows can wait for) a socket."""
@@ -38,13 +40,13 @@ class PortServer:
     Parameters
     ----------
     line : what is at the far end.
-    link : path that shall point at a pseudo-terminal, or None; ``socket://HOST:PORT`` or ``memory://NAME`` instead.
+    link : where clients find it, see :data:`drivers.sim.serving.ports.Link`.
     baud : bit rate while no client has set one.
     wire : bytes take their time.
     latency_s : USB latency timer, with `wire`.
     commands : where other programs may send commands (``drivers.sim.serving.control``), or None.
-    on_line : called with each command line that arrives at the descriptor of `run`; None = anything there ends
-        the loop, as its end always does.
+    on_line : called with each command line that arrives at the `control` of `run`; None: any byte there ends the
+        loop, as its end always does.
 
     Attributes
     ----------
@@ -55,7 +57,7 @@ class PortServer:
     def __init__(
         self,
         line: Line,
-        link: str | os.PathLike[str] | None = None,
+        link: Link = None,
         *,
         baud: int = 1_000_000,
         wire: bool = False,
@@ -73,14 +75,14 @@ class PortServer:
             raise
         self._link = self.port.path if "://" in self.port.path else link
         self._timing = WireTiming(latency_s) if wire else None
-        self._on_line, self._lines = on_line, Lines()
+        self.on_line, self._lines = on_line, Lines()
         self._queue: deque[Timed] = deque()
-        self._read_s = self._said_s = 0.0
+        self._read_s = self._replied_s = 0.0
         self._prompt = False
         line.on_unplug = self._unplug
 
     def run(self, control: Control) -> None:
-        """Serve until `control` reaches its end (or says anything, without `on_lines`)."""
+        """Serve until `control` reaches its end (or gives any byte, without `on_line`)."""
         try:
             while True:
                 watched = [control, *(self._socket.descriptors if self._socket else ()), *self.port.descriptors]
@@ -91,12 +93,12 @@ class PortServer:
                     self._socket.serve(ready)
                 if any(descriptor in ready for descriptor in self.port.descriptors):
                     self._receive()
-                self._work_off()
+                self._do_due()
         finally:
             self.close()
 
     def close(self) -> None:
-        """Take port, link and socket away; harmless when done."""
+        """Remove port, link and socket; harmless when done."""
         self.port.close()
         self._close_socket()
 
@@ -105,12 +107,12 @@ class PortServer:
             self._socket.close()
 
     def _command(self, control: Control) -> bool:
-        """Take commands; False when it is time to go."""
+        """Carry out commands; False when the loop must end."""
         data = os.read(control, 65536) if isinstance(control, int) else control.recv(65536)
-        if not data or self._on_line is None:
+        if not data or self.on_line is None:
             return False
         for line in self._lines.feed(data):
-            self._on_line(line)
+            self.on_line(line)
         return True
 
     def _timeout(self) -> float | None:
@@ -121,8 +123,8 @@ class PortServer:
         if self.line.reader.pending:
             due = min(due, self._read_s + PAUSE_S)
         now_s = time.monotonic()
-        if self._prompt and now_s - self._said_s < LINGER_S:
-            return min(DOZE_S, max(due - now_s, 0.0))
+        if self._prompt and now_s - self._replied_s < POLL_S:
+            return min(POLL_STEP_S, max(due - now_s, 0.0))
         return None if due == float("inf") else max(due - now_s, 0.0)
 
     def _receive(self) -> None:
@@ -132,9 +134,9 @@ class PortServer:
         if self.tap is not None:
             self.tap(True, data)
         now_s = self._read_s = time.monotonic()
-        if self._said_s:  # the first since the last reply
-            self._prompt = self._timing is not None and now_s - self._said_s < LINGER_S
-            self._said_s = 0.0
+        if self._replied_s:  # the first since the last reply
+            self._prompt = self._timing is not None and now_s - self._replied_s < POLL_S
+            self._replied_s = 0.0
         line = self.line
         line.set_line_baud(self.port.baud())
         if line.echo:
@@ -161,14 +163,14 @@ class PortServer:
             if self.tap is not None:
                 self.tap(False, data)
 
-    def _work_off(self) -> None:
-        """Replies, faults and broken packets whose time has come."""
+    def _do_due(self) -> None:
+        """Send replies, change faults and give up packets whose time has come."""
         now_s = time.monotonic()
         while self._queue and self._queue[0][0] - EARLY_S <= now_s:
             while now_s < self._queue[0][0]:  # so little that the system would oversleep it
                 now_s = time.monotonic()
             self._write(self._queue.popleft()[1])
-            self._said_s = now_s
+            self._replied_s = now_s
         if self.line.reader.pending and now_s >= self._read_s + PAUSE_S:
             for packet in self.line.reader.flush():
                 self._send(without_timing(self.line.handle(packet, now_s), now_s))
@@ -177,7 +179,7 @@ class PortServer:
                 self.line.faults.advance(now_s)
 
     def _unplug(self, fault: Fault, begins: bool) -> None:
-        """The port goes away with all that was under way, and comes back, perhaps under another name."""
+        """Close the port and drop all pending bytes, or open it again, perhaps under another name."""
         if begins:
             self.port.close()
             self._queue.clear()
@@ -186,11 +188,32 @@ class PortServer:
             self.port.open(fault.alias or self._link)
 
 
+def make_server(settings: Mapping[str, Any]) -> PortServer:
+    """The server of a simulated far end, from the settings of a :class:`~drivers.sim.serving.simulated.SimulatedBus`.
+
+    Raises
+    ------
+    DriverError : unknown family or model, unreadable fault, or the port cannot be made.
+    """
+    now_s, baud = time.monotonic(), settings["baud"]
+    line = make_line(
+        settings["family"], settings["servos"], now_s, baud=baud, seed=settings["seed"], options=settings["options"]
+    )
+    wire, latency_s, handle = settings["wire"], settings["latency_s"], Commands(line).handle
+    server = PortServer(line, settings["link"], baud=baud, wire=wire, latency_s=latency_s, on_line=handle)
+    try:
+        line.faults.add(settings["faults"], now_s)
+    except BaseException:
+        server.close()
+        raise
+    return server
+
+
 def serve_dynamixel(
     ids: Iterable[object],
     model: str | int = "xl330-m288",
     baud: int = 1_000_000,
-    link: str | os.PathLike[str] | None = None,
+    link: Link = None,
     wire: bool = False,
     faults: Iterable[str | Fault] = (),
     on_ready: Callable[[str], None] = lambda path: None,
@@ -209,14 +232,14 @@ def serve_dynamixel(
     model : of the servos given as bare ids, for example ``"xm430-w350"``, ``"ax-12a"``, ``"sts3215"``; it decides
         the protocol.
     baud : bit rate of the servos.
-    link : path that shall point at the terminal, or ``socket://HOST:PORT`` or ``memory://NAME`` instead of one.
+    link : where clients find it, see :data:`drivers.sim.serving.ports.Link`.
     wire : bytes take their time at the bit rate, with return delay and `latency_s`.
     faults : specs, see ``drivers.sim.wire.faults``.
     on_ready : called with the path to open as soon as clients may come.
     commands : path of a socket that takes commands while it runs, see ``drivers.sim.serving.control``.
     stop : descriptor or socket; the end of it (or any byte) ends the service. None = until KeyboardInterrupt.
     seed : of random faults.
-    on_server : called with the server before it serves, for who wants to look inside.
+    on_server : called with the server before it serves, for access to servos and traffic.
 
     Raises
     ------
@@ -240,7 +263,7 @@ def serve_dynamixel(
 
 def serve(
     line: Line,
-    link: str | os.PathLike[str] | None = None,
+    link: Link = None,
     on_ready: Callable[[str], None] = lambda path: None,
     *,
     baud: int = 1_000_000,

@@ -1,4 +1,4 @@
-"""kind = "simulated": any family's own driver over a bus that is simulated beside it."""
+"""Bus kind "simulated": the driver of any family over a simulated bus that it starts and ends."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ TRANSPORTS = ("pty", "tcp", "memory")
 
 
 class SimulatedDriver(WireBus):
-    """What a driver gets from :func:`simulated`: simulated servos of its own.
+    """Mixin that :func:`simulated` adds to a driver: it starts the simulated bus that the driver opens.
 
-    They live in a child process from ``open`` to ``close`` and keep their state over ``reconnect``.
+    The bus runs in a child process from ``open`` to ``close`` and keeps its state over ``reconnect``.
 
     Parameters
     ----------
@@ -107,5 +107,5 @@ class SimulatedDriver(WireBus):
 
 @cache
 def simulated(driver: type[WireBus], family: str) -> type[WireBus]:
-    """The driver of a family, with simulated servos of its own."""
+    """The driver of a family over a simulated bus of its own."""
     return type(f"Simulated{driver.__name__}", (SimulatedDriver, driver), {"family": family})

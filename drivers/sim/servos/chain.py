@@ -1,20 +1,25 @@
-"""Servos on one wire, whatever protocol they speak: who hears a packet, who answers, what faults do to it."""
+"""Base classes of simulated servos on one wire: who receives a packet, who answers, and the faults of servos."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable
-from typing import Any
+from functools import cached_property
+from typing import Any, ClassVar
 
+from drivers.packets.packet import BROADCAST_ID, ErrorNumber, Instruction
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.state import WATCHDOG_STEP_S, Heard, same_rate
+from drivers.sim.servos.state import WATCHDOG_STEP_S, LastInstruction, same_rate
 from drivers.sim.wire.faults import KINDS, Fault
 from drivers.sim.wire.line import Line
-from drivers.sim.wire.replies import Reply, collide
+from drivers.sim.wire.timing import Reply, collide
+
+ReadRequest = tuple[int, int, int]
+"""(id, address, length)"""
 
 
 class Chain(Line):
-    """Servos on one wire; what the packets mean is the subclass's.
+    """Servos on one wire.
 
     Parameters
     ----------
@@ -26,7 +31,7 @@ class Chain(Line):
     Attributes
     ----------
     servos : the servos, in the order given.
-    by_id, twins : who hears the wire at its bit rate, by id; more servos of an id that is taken.
+    by_id, duplicates : the servos at the wire's bit rate by id; further servos with an id that is taken.
     chain_stop : in reads of several servos nobody answers behind a silent one; otherwise the next one does.
     """
 
@@ -39,12 +44,12 @@ class Chain(Line):
     ) -> None:
         self.servos = list(servos)
         self.chain_stop = False
-        self._heard = Heard(now_s)
+        self._last_instruction = LastInstruction(now_s)
         self._muted: frozenset[int] = frozenset()
         self.by_id: dict[int, SimulatedServo] = {}
-        self.twins: dict[int, list[SimulatedServo]] = {}
-        self._extra: dict[Fault, list[SimulatedServo]] = {}
-        self._stale = True
+        self.duplicates: dict[int, list[SimulatedServo]] = {}
+        self._added: dict[Fault, list[SimulatedServo]] = {}
+        self._outdated = True
         super().__init__(seed)
         for servo in self.servos:
             self._adopt(servo)
@@ -55,7 +60,7 @@ class Chain(Line):
 
         Raises
         ------
-        KeyError : nobody has it.
+        KeyError : none has it.
         """
         for servo in self.servos:
             if servo.id == device_id:
@@ -81,115 +86,54 @@ class Chain(Line):
 
         Raises
         ------
-        KeyError : nobody has the id. ValueError : the motor holds the shaft.
+        KeyError : no servo has the id. ValueError : the motor holds the shaft.
         """
         self.servo(device_id).place(position, now_s)
 
-    @abstractmethod
-    def encode_status(self, device_id: int, error: int, data: bytes) -> bytes:
-        """A status packet of the protocol."""
-
     def set_line_baud(self, baud: int | None) -> None:
-        """The port's bit rate was changed."""
         if baud != self.line_baud:
             super().set_line_baud(baud)
-            self._stale = True
+            self._outdated = True
 
     def _adopt(self, servo: SimulatedServo) -> None:
-        servo.heard = self._heard
-        servo.on_change = self._mark_stale
-        self._stale = True
+        servo.last_instruction = self._last_instruction
+        servo.on_change = self._mark_outdated
+        self._outdated = True
 
-    def _mark_stale(self) -> None:
-        self._stale = True
+    def _mark_outdated(self) -> None:
+        self._outdated = True
 
     def catch_up(self, now_s: float) -> None:
-        """What happened on the wire since the last packet: faults that are due, watchdogs that tripped."""
+        """Update what changed since the last packet: faults begin and end, watchdogs trip."""
         super().catch_up(now_s)
-        if now_s - self._heard.at_s > WATCHDOG_STEP_S:
+        if now_s - self._last_instruction.at_s > WATCHDOG_STEP_S:
             for servo in self.servos:
-                servo.watch(now_s)
-        self._heard.at_s = now_s
-        if self._stale:
+                servo.check_watchdog(now_s)
+        self._last_instruction.at_s = now_s
+        if self._outdated:
             self._index()
 
     def _index(self) -> None:
-        """Who hears the wire, by id. Servos at another bit rate do not."""
-        self._stale = False
-        self.by_id, self.twins = {}, {}
-        everyone = self.servos + [twin for twins in self._extra.values() for twin in twins]
-        for servo in everyone:
+        """Find the servos at the wire's bit rate, by id."""
+        self._outdated = False
+        self.by_id, self.duplicates = {}, {}
+        for servo in self.servos + [servo for added in self._added.values() for servo in added]:
             if self.line_baud is not None and not same_rate(servo.baud, self.line_baud):
                 continue
-            if servo.id in self.by_id:
-                self.twins.setdefault(servo.id, []).append(servo)
-            else:
-                self.by_id[servo.id] = servo
+            if self.by_id.setdefault(servo.id, servo) is not servo:
+                self.duplicates.setdefault(servo.id, []).append(servo)
         muted = [fault for fault in self.faults.active if fault.kind == "mute"]
         self._muted = frozenset(i for i in self.by_id if any(fault.concerns(i) for fault in muted))
 
-    # ------------------------------------------------------------ who is addressed
-    def find(self, device_id: int, now_s: float) -> SimulatedServo | None:
-        """The servo that hears this id now, caught up with the time."""
-        servo = self.by_id.get(device_id)
-        if servo is None or device_id in self._muted or now_s < servo.deaf_until:
-            return None
-        if now_s >= servo.next_health_s:
-            servo.look(now_s)
-        return servo
-
-    def everyone(self, now_s: float) -> list[SimulatedServo]:
-        """All servos that hear, in order of id, twins included."""
-        heard = []
-        for device_id in sorted(self.by_id):
-            if self.find(device_id, now_s):
-                heard += [self.by_id[device_id], *self.twins.get(device_id, ())]
-        return heard
-
-    def group(self, device_id: int, now_s: float) -> list[SimulatedServo]:
-        """Servos that carry out a write to an id: its owner and twins, else those with that secondary id."""
-        servo = self.find(device_id, now_s)
-        if servo is not None:
-            return [servo, *self.twins.get(device_id, ())]
-        if device_id in self.by_id:
-            return []
-        return [other for other in self.everyone(now_s) if other.secondary_id == device_id]
-
-    # ------------------------------------------------------------ answers
-    def status(self, servo: SimulatedServo, device_id: int, error: int, data: bytes) -> Reply | None:
-        """One status packet as it arrives at the host; None where nothing does."""
-        frame = self.encode_status(device_id, error, data)
-        if not self.faults.spoilers:
-            return Reply(frame, servo)
-        spoilt, late_s = self.faults.spoil_status(frame, device_id, error, data, self.encode_status)
-        return None if spoilt is None else Reply(spoilt, servo, late_s)
-
-    def answer(
-        self, device_id: int, level: int, now_s: float, act: Callable[[SimulatedServo], tuple[int, bytes]]
-    ) -> list[Reply]:
-        """Let the servo (and its twins) act; the replies of twins collide on the wire."""
-        group = self.group(device_id, now_s)
-        replies = []
-        for servo in group:
-            answers = servo.id == device_id and servo.status_level >= level
-            error, data = act(servo)
-            if answers:
-                replies.append(self.status(servo, device_id, error, data))
-        return collide([reply for reply in replies if reply])
-
-    # ------------------------------------------------------------ faults
     def fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:
-        """A fault that is not about replies begins or ends."""
         super().fault_changed(fault, begins, now_s)
         if fault.kind == "chain-stop":
             self.chain_stop = begins
-        elif fault.kind == "mute":
-            self._stale = True
         elif KINDS[fault.kind].scope == "servo":
             for servo in self.servos:
                 if fault.concerns(servo.id):
                     self._change_servo(servo, fault, begins, now_s)
-            self._stale = True
+            self._outdated = True
 
     def _change_servo(self, servo: SimulatedServo, fault: Fault, begins: bool, now_s: float) -> None:
         if fault.kind == "baud":
@@ -199,8 +143,196 @@ class Chain(Line):
                 servo.id, servo.table.number, now_s=now_s, baud=servo.baud, position=servo.table.center / 2
             )
             self._adopt(twin)
-            self._extra.setdefault(fault, []).append(twin)
+            self._added.setdefault(fault, []).append(twin)
         elif fault.kind == "dup":
-            self._extra.pop(fault, None)
+            self._added.pop(fault, None)
         else:
-            servo.suffer(fault.kind, fault.value, begins, now_s)
+            servo.change_fault(fault.kind, fault.value, begins, now_s)
+
+
+class ProtocolChain(Chain):
+    """Servos that speak the same protocol, with the instructions that Protocol 1.0 and 2.0 share.
+
+    A packet is (id, instruction number, parameters). One servo answers an instruction with a status packet; one to
+    the broadcast id is carried out by all and, except for a ping, answered by none.
+    """
+
+    WORD: ClassVar[int]
+    """Bytes of an address, and of a length, in the parameters."""
+    MALFORMED_READ_LEVEL: ClassVar[int]
+    """Lowest Status Return Level at which a read without address or length is answered with an error."""
+
+    @abstractmethod
+    def encode_status(self, device_id: int, error: int, data: bytes) -> bytes:
+        """A status packet of the protocol."""
+
+    @abstractmethod
+    def error_byte(self, servo: SimulatedServo, error: int) -> int:
+        """Error byte of a status packet from one of Protocol 2.0 (`ALERT` and an `ErrorNumber`)."""
+
+    @abstractmethod
+    def identity(self, servo: SimulatedServo) -> bytes:
+        """Parameters of the answer to a ping."""
+
+    @abstractmethod
+    def factory_reset(self, servo: SimulatedServo, packet: Any, now_s: float) -> int:
+        """Reset a servo as the packet says; returns the error byte."""
+
+    @abstractmethod
+    def reboot(self, servo: SimulatedServo, now_s: float) -> int:
+        """Reboot a servo; returns the error byte."""
+
+    @abstractmethod
+    def _sync_read(self, packet: Any, now_s: float) -> list[Reply]: ...
+
+    @abstractmethod
+    def _bulk_read(self, packet: Any, now_s: float) -> list[Reply]: ...
+
+    @cached_property
+    def handlers(self) -> dict[int, Callable[[Any, float], list[Reply]]]:
+        """What carries out an instruction, by its number; the numbers are the same in both protocols."""
+        return {
+            Instruction.PING: self._ping,
+            Instruction.READ: self._read,
+            Instruction.WRITE: self._write,
+            Instruction.REG_WRITE: self._reg_write,
+            Instruction.ACTION: lambda packet, now_s: self._act(packet, now_s, lambda servo: servo.action(now_s)),
+            Instruction.FACTORY_RESET: lambda packet, now_s: self._act(
+                packet, now_s, lambda servo: self.factory_reset(servo, packet, now_s)
+            ),
+            Instruction.REBOOT: lambda packet, now_s: self._act(packet, now_s, lambda servo: self.reboot(servo, now_s)),
+            Instruction.SYNC_READ: self._sync_read,
+            Instruction.SYNC_WRITE: self._sync_write,
+            Instruction.BULK_READ: self._bulk_read,
+        }
+
+    def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
+        handler = self.handlers.get(packet[1])
+        return handler(packet, now_s) if handler else self._refuse(packet, ErrorNumber.INSTRUCTION, now_s)
+
+    # ------------------------------------------------------------ who is addressed
+    def find(self, device_id: int, now_s: float) -> SimulatedServo | None:
+        """The servo that receives packets to this id now, its health up to date."""
+        servo = self.by_id.get(device_id)
+        if servo is None or device_id in self._muted or now_s < servo.deaf_until:
+            return None
+        if now_s >= servo.next_health_s:
+            servo.update(now_s)
+        return servo
+
+    def receivers(self, now_s: float) -> list[SimulatedServo]:
+        """All servos that receive packets now, in order of id, those with the same id included."""
+        receivers = []
+        for device_id in sorted(self.by_id):
+            if self.find(device_id, now_s):
+                receivers += [self.by_id[device_id], *self.duplicates.get(device_id, ())]
+        return receivers
+
+    def addressed(self, device_id: int, now_s: float) -> list[SimulatedServo]:
+        """Servos that carry out a write to an id: those that have it, else those with that secondary id."""
+        servo = self.find(device_id, now_s)
+        if servo is not None:
+            return [servo, *self.duplicates.get(device_id, ())]
+        if device_id in self.by_id:
+            return []
+        return [other for other in self.receivers(now_s) if other.secondary_id == device_id]
+
+    # ------------------------------------------------------------ answers
+    def status(self, servo: SimulatedServo, device_id: int, error: int, data: bytes) -> Reply | None:
+        """One status packet as it arrives at the host; None where nothing does."""
+        frame = self.encode_status(device_id, error, data)
+        if not self.faults.reply_faults:
+            return Reply(frame, servo)
+        arrived, late_s = self.faults.corrupt(
+            frame,
+            device_id,
+            first=4,
+            shorten=lambda frame, size: self.encode_status(device_id, error, data[:size]),
+            readdress=lambda frame, other: self.encode_status(other, error, data),
+        )
+        return None if arrived is None else Reply(arrived, servo, late_s)
+
+    def answer(
+        self, device_id: int, level: int, now_s: float, act: Callable[[SimulatedServo], tuple[int, bytes]]
+    ) -> list[Reply]:
+        """Let the servos with an id act; those with at least this Status Return Level answer, and replies collide."""
+        replies = []
+        for servo in self.addressed(device_id, now_s):
+            answers = servo.id == device_id and servo.status_level >= level
+            error, data = act(servo)
+            if answers:
+                replies.append(self.status(servo, device_id, self.error_byte(servo, error), data))
+        return collide([reply for reply in replies if reply])
+
+    def _act(self, packet: Any, now_s: float, act: Callable[[SimulatedServo], int], level: int = 2) -> list[Reply]:
+        """Something every addressed servo does; one servo answers with an empty status, all with none."""
+        if packet.id == BROADCAST_ID:
+            for servo in self.receivers(now_s):
+                act(servo)
+            return []
+        return self.answer(packet.id, level, now_s, lambda servo: (act(servo), b""))
+
+    def _refuse(self, packet: Any, error: ErrorNumber, now_s: float, level: int = 2) -> list[Reply]:
+        return self._act(packet, now_s, lambda servo: servo.alert | error, level)
+
+    # ------------------------------------------------------------ instructions
+    def _word(self, params: bytes, at: int = 0) -> int:
+        return int.from_bytes(params[at : at + self.WORD], "little")
+
+    def _ping(self, packet: Any, now_s: float) -> list[Reply]:
+        """Always answered, whatever the Status Return Level. Broadcast: by all servos, in order of id."""
+        ids = sorted(self.by_id) if packet.id == BROADCAST_ID else [packet.id]
+        replies = []
+        for device_id in ids:
+            replies += self.answer(device_id, 0, now_s, lambda servo: (servo.alert, self.identity(servo)))
+        return replies
+
+    def _read(self, packet: Any, now_s: float) -> list[Reply]:
+        """Not answered by a secondary id."""
+        params, word = packet.params, self.WORD
+        if len(params) != 2 * word:
+            return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s, self.MALFORMED_READ_LEVEL)
+        if packet.id == BROADCAST_ID:
+            return []
+        address, length = self._word(params), self._word(params, word)
+        return self.answer(packet.id, 1, now_s, lambda servo: servo.read(address, length, now_s))
+
+    def _write(self, packet: Any, now_s: float) -> list[Reply]:
+        address, data = self._word(packet.params), packet.params[self.WORD :]
+        if not data:
+            return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s)
+        return self._act(packet, now_s, lambda servo: _write(servo, packet.id, address, data, now_s))
+
+    def _reg_write(self, packet: Any, now_s: float) -> list[Reply]:
+        address, data = self._word(packet.params), packet.params[self.WORD :]
+        if not data:
+            return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s)
+        return self._act(packet, now_s, lambda servo: servo.reg_write(address, data))
+
+    def _sync_requests(self, packet: Any) -> list[ReadRequest]:
+        """Reads that a sync read asks for: address, length, ids. Empty where it is malformed or not broadcast."""
+        params, word = packet.params, self.WORD
+        if packet.id != BROADCAST_ID or len(params) < 2 * word:
+            return []
+        address, length = self._word(params), self._word(params, word)
+        return [(device_id, address, length) for device_id in params[2 * word :]]
+
+    def _sync_write(self, packet: Any, now_s: float) -> list[Reply]:
+        """Address, length, (id, data) repeated; an entry that is cut short is left out. Answered by none."""
+        params, word = packet.params, self.WORD
+        if packet.id == BROADCAST_ID and len(params) >= 2 * word:
+            address, length = self._word(params), self._word(params, word)
+            for at in range(2 * word, len(params) - length, length + 1):
+                self._write_to(params[at], address, params[at + 1 : at + 1 + length], now_s)
+        return []
+
+    def _write_to(self, device_id: int, address: int, data: bytes, now_s: float) -> None:
+        for servo in self.addressed(device_id, now_s):
+            _write(servo, device_id, address, data, now_s)
+
+
+def _write(servo: SimulatedServo, device_id: int, address: int, data: bytes, now_s: float) -> int:
+    """A write to an id; one to a secondary id reaches RAM only. Returns the error byte of Protocol 2.0."""
+    if address < servo.table.eeprom_end and servo.secondary_id == device_id != servo.id:
+        return ErrorNumber.ACCESS
+    return servo.write(address, data, now_s)

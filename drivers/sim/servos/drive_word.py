@@ -12,6 +12,10 @@ MULTI_TURN = 0x10
 DIRECTION_BIT = 10
 """AX, MX and XL-320: speeds and loads are magnitudes with the direction in this bit (set = clockwise)."""
 
+SENSED = frozenset(("Present Position", "Present Speed", "Present Velocity", "Present Load", "Present Current",
+    "Present Voltage", "Present Temperature", "Moving", "Realtime Tick", "Goal Position 2"))  # fmt: skip
+"""Registers that the sensors write."""
+
 
 class WordDrive(Drive):
     """Plans and senses for one AX, MX(1.0) or XL-320 servo. See :class:`~drivers.sim.servos.drive.Drive`."""
@@ -19,16 +23,15 @@ class WordDrive(Drive):
     def __init__(self, registers: Registers, plant: Plant, now_s: float, speed: str = "Present Speed") -> None:
         super().__init__(registers, plant, now_s, speed)
         self.goals = ("Goal Position", "Moving Speed")
-        names = [name for name in registers.table if name in SENSED]
-        items = [registers.table[name] for name in names]
-        self._names = names
+        self._names = [name for name in registers.table if name in SENSED]
+        items = [registers.table[name] for name in self._names]
         self.first_sensed = min(item.address for item in items)
         self.last_sensed = max(item.end for item in items)
         self.motion_at = self.motion_end = registers.table.size
         self.configure()
 
     def configure(self) -> None:
-        """Nothing is kept besides the registers."""
+        """Everything is read from the registers when it is used."""
 
     def plan(self, now_s: float) -> None:
         """To Goal Position at Moving Speed (0 = the motor's top speed); in wheel mode at that share of full power."""
@@ -37,15 +40,11 @@ class WordDrive(Drive):
         magnitude = moving & (1 << DIRECTION_BIT) - 1
         if self._wheel():
             share = magnitude / 1023 * (-1 if moving >> DIRECTION_BIT & 1 else 1)
-            plant.trajectory = plan_speed(
-                now_s, now.position, now.velocity, share * plant.top_speed, plant.top_acceleration
-            )
+            plant.trajectory = plan_speed(now_s, now, share * plant.top_speed, plant.top_acceleration)
             return
         top = min(magnitude * self.ticks_s, plant.top_speed) if magnitude else plant.top_speed
         goal = self.to_shaft(registers.get("Goal Position"))
-        plant.trajectory = plan_move(
-            now_s, now.position, now.velocity, goal, top, plant.top_acceleration, Profile.RECTANGULAR
-        )
+        plant.trajectory = plan_move(now_s, now, goal, top, plant.top_acceleration, Profile.RECTANGULAR)
 
     def _wheel(self) -> bool:
         """XL-320 has a mode register; AX and MX turn endlessly when both angle limits are 0."""
@@ -55,15 +54,13 @@ class WordDrive(Drive):
         return registers.get("CW Angle Limit") == registers.get("CCW Angle Limit") == 0
 
     def sense(self, now_s: float) -> float:
-        """Write what the sensors see at `now_s` into memory; returns the load (-1 to 1)."""
-        motion, _, load = self.look(now_s)
+        motion, _, load = self.observe(now_s)
         values = self._values(now_s, motion, load)
         for name in self._names:
             self.registers.put(name, values[name])
         return load
 
     def sense_motion(self, now_s: float) -> None:
-        """There is no separate block: everything is sensed."""
         self.sense(now_s)
 
     def _values(self, now_s: float, motion: Motion, load: float) -> dict[str, int]:
@@ -118,18 +115,18 @@ class FeetechDrive(WordDrive):
             if mode == 2:
                 speed = registers.get("Goal Time") / 1000 * plant.top_speed
             speed = min(max(speed, -plant.top_speed), plant.top_speed)
-            plant.trajectory = plan_speed(now_s, now.position, now.velocity, speed, self._acceleration())
+            plant.trajectory = plan_speed(now_s, now, speed, self._acceleration())
             return
         goal = self.to_shaft(registers.get("Goal Position"))
         if mode == 3:
             goal = plant.trajectory.end + registers.get("Goal Position")
         time_s = registers.get("Goal Time") * 1e-3
         if time_s > 0.0 and registers.table.ticks_per_turn == 1024:
-            plant.trajectory = plan_timed(now_s, now.position, now.velocity, goal, time_s, 0.0)
+            plant.trajectory = plan_timed(now_s, now, goal, time_s)
             return
         speed = abs(registers.get("Goal Velocity")) * self.ticks_s
         top = min(speed, plant.top_speed) if speed else plant.top_speed
-        plant.trajectory = plan_move(now_s, now.position, now.velocity, goal, top, self._acceleration())
+        plant.trajectory = plan_move(now_s, now, goal, top, self._acceleration())
 
     def _acceleration(self) -> float:
         item = self.registers.table.get("Acceleration")
@@ -149,22 +146,6 @@ class FeetechDrive(WordDrive):
         values = super()._values(now_s, motion, load)
         values["Goal Position 2"] = self.registers.get("Goal Position")
         return values
-
-
-SENSED = frozenset(
-    {
-        "Present Position",
-        "Present Speed",
-        "Present Velocity",
-        "Present Load",
-        "Present Current",
-        "Present Voltage",
-        "Present Temperature",
-        "Moving",
-        "Realtime Tick",
-        "Goal Position 2",
-    }
-)
 
 
 def _direction(value: int) -> int:

@@ -1,4 +1,4 @@
-"""Servos of Protocol 1.0 and 2.0 on one wire: each hears every byte and makes of it what its protocol says."""
+"""Servos of Protocol 1.0 and 2.0 on one wire: each receives every byte and parses it by its own protocol."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from drivers.sim.servos.protocol1 import Protocol1Chain
 from drivers.sim.servos.protocol2 import Protocol2Chain
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Reader
-from drivers.sim.wire.replies import Reply
+from drivers.sim.wire.timing import Reply
 
 
-class Heard(NamedTuple):
-    """A packet that one of the two protocols understood."""
+class PartPacket(NamedTuple):
+    """A packet of one of the two protocols, and the index of the chain that speaks it."""
 
     part: int
     packet: Any
@@ -34,23 +34,20 @@ class TwoReaders:
 
     @property
     def pending(self) -> int:
-        """Bytes that a reader holds back; where another has just understood them all, none."""
+        """Bytes that a reader holds back; 0 where another has just completed a packet with them."""
         return min(reader.pending for reader in self._readers)
 
-    def feed(self, data: bytes) -> list[Heard]:
-        """Packets completed by these bytes. What a reader kept of a whole packet of the other's it then forgets."""
-        heard = [Heard(k, packet) for k, reader in enumerate(self._readers) for packet in reader.feed(data)]
-        if heard and self.pending == 0:
-            for reader in self._readers:
-                reader.take_pending()
-        return heard
+    def feed(self, data: bytes) -> list[PartPacket]:
+        """Packets completed by these bytes. Bytes of a complete packet are removed from the other reader too."""
+        packets = [PartPacket(k, packet) for k, reader in enumerate(self._readers) for packet in reader.feed(data)]
+        if packets and self.pending == 0:
+            self.take_pending()
+        return packets
 
-    def flush(self) -> list[Heard]:
-        """Give up on the incomplete packets."""
-        return [Heard(k, packet) for k, reader in enumerate(self._readers) for packet in reader.flush()]
+    def flush(self) -> list[PartPacket]:
+        return [PartPacket(k, packet) for k, reader in enumerate(self._readers) for packet in reader.flush()]
 
     def take_pending(self) -> bytes:
-        """Forget the incomplete packets."""
         return max((reader.take_pending() for reader in self._readers), key=len)
 
 
@@ -65,56 +62,44 @@ class MixedChain(Chain):
         seed: int = 0,
     ) -> None:
         everyone = list(servos)
-        by_protocol = [[servo for servo in everyone if servo.table.protocol == number] for number in (1, 2)]
-        self.parts: tuple[Chain, ...] = (
-            Protocol1Chain(by_protocol[0], now_s, seed=seed),
-            Protocol2Chain(by_protocol[1], now_s, seed=seed),
-        )
+        first, second = ([servo for servo in everyone if servo.table.protocol == number] for number in (1, 2))
+        self.parts: tuple[Chain, ...] = Protocol1Chain(first, now_s), Protocol2Chain(second, now_s)
         super().__init__(everyone, now_s, (), seed)
         for part in self.parts:
-            part.faults, part._heard = self.faults, self._heard
+            part.faults, part._last_instruction = self.faults, self._last_instruction
             for servo in part.servos:
                 part._adopt(servo)
         self.faults.add(faults, now_s)
 
     def make_reader(self) -> TwoReaders:
-        """Both protocols' readers."""
         return TwoReaders(part.reader for part in self.parts)
 
-    def size(self, packet: Heard) -> int:
-        """Bytes of an instruction packet on the wire."""
+    def size(self, packet: PartPacket) -> int:
         return self.parts[packet.part].size(packet.packet)
 
-    def encode_status(self, device_id: int, error: int, data: bytes) -> bytes:
-        """A status packet of Protocol 2.0; servos of 1.0 make theirs in their own part."""
-        return self.parts[1].encode_status(device_id, error, data)
-
-    def carry_out(self, packet: Heard, now_s: float) -> list[Reply]:
-        """What the servos of the packet's protocol make of it."""
+    def carry_out(self, packet: PartPacket, now_s: float) -> list[Reply]:
         return self.parts[packet.part].carry_out(packet.packet, now_s)
 
     def set_line_baud(self, baud: int | None) -> None:
-        """The port's bit rate was changed."""
         super().set_line_baud(baud)
         for part in self.parts:
             part.set_line_baud(baud)
 
     def _index(self) -> None:
-        """Each part knows its own servos; an id may be there once in each protocol."""
-        self._stale = False
+        """Each part indexes its own servos; an id may be there once in each protocol."""
+        self._outdated = False
         for part in self.parts:
             part._index()
 
     def catch_up(self, now_s: float) -> None:
-        """What happened since the last packet, to all of them."""
-        self._stale |= any(part._stale for part in self.parts)
+        self._outdated |= any(part._outdated for part in self.parts)
         super().catch_up(now_s)
 
     def fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:
-        """A fault of the wire concerns all, one of a servo the part it is in."""
+        """A fault of the wire concerns all servos, one of a servo the part it is in."""
         if fault.kind in ("echo", "unplug"):
             super().fault_changed(fault, begins, now_s)
             return
         for part in self.parts:
             part.fault_changed(fault, begins, now_s)
-        self._stale = True
+        self._outdated = True

@@ -24,7 +24,7 @@ def test_a_text_board_reads_what_its_template_writes_in_any_pieces() -> None:
         board = TextBoard(TEXTS, [1, 2], ["jaw", "brow"])
         say(board, line[:cut])
         say(board, line[cut:])
-        assert (board.told, board.refused) == ({1: None, 2: 1600.0}, 0)
+        assert (board.values, board.refused) == ({1: None, 2: 1600.0}, 0)
 
 
 def test_a_text_board_answers_and_passes_over_what_it_does_not_know() -> None:
@@ -37,10 +37,10 @@ def test_a_text_board_answers_and_passes_over_what_it_does_not_know() -> None:
 def test_a_move_at_the_very_end_is_done_after_a_pause() -> None:
     board = TextBoard(TEXTS, [1], ["jaw"])
     say(board, b"#1P150")
-    assert board.told == {1: None}
+    assert board.values == {1: None}
     for packet in board.reader.flush():
         board.handle(packet, 1.0)
-    assert board.told == {1: 150.0}
+    assert board.values == {1: 150.0}
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivers.sim.serving import child
+from drivers.sim.serving.serve import make_server
 
 SETTINGS = {
     "servos": [[1, "xl330-m288"], [2, "xl320"]],
@@ -60,8 +61,8 @@ def test_a_parent_that_goes_at_once_is_no_error(standard_input, capsys, text: st
     assert capsys.readouterr().out == ""
 
 
-def test_build_makes_the_servos_and_sets_the_faults():
-    server = child.build(SETTINGS)
+def test_make_server_makes_the_servos_and_sets_the_faults():
+    server = make_server(SETTINGS)
     try:
         assert [servo.table.model for servo in server.line.servos] == ["xl330-m288", "xl320"]
         assert [fault.kind for fault in server.line.faults.active] == ["mute"]

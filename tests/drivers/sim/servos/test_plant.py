@@ -7,7 +7,7 @@ import math
 import pytest
 
 from drivers.sim.servos.motion import Motion, plan_speed
-from drivers.sim.servos.plant import Heat, Plant, Skin
+from drivers.sim.servos.plant import Plant, Skin
 
 AT_REST = Motion(2048.0, 0.0, 0.0)
 
@@ -46,30 +46,32 @@ def test_the_supply_sags_under_load():
 
 
 def test_heat_follows_the_square_of_the_load_with_a_lag():
-    heat = Heat(lag_s=100.0)
-    heat.advance(100.0, 0.5)
-    assert heat.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
-    heat.advance(50.0, 1.0)  # time does not run back
-    assert heat.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
-    heat.advance(1e6, 0.0)
-    assert heat.temperature_c == pytest.approx(30.0)
+    motor = plant()
+    motor.heat(200.0, 0.5)
+    assert motor.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
+    motor.heat(50.0, 1.0)  # time does not run back
+    assert motor.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
+    motor.heat(400.0, 0.5)
+    assert motor.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-2)))
+    motor.heat(1e6, 0.0)
+    assert motor.temperature_c == pytest.approx(30.0)
 
 
 def test_a_temperature_from_outside_wins():
     hot = plant()
     hot.forced_c = 80.0
-    hot.warm(10.0, 1.0)
+    hot.heat(10.0, 1.0)
     assert hot.temperature_c == 80.0
 
 
 def test_a_jammed_shaft_stays_pushes_and_goes_on_from_where_it_is():
     stuck = plant()
-    stuck.trajectory = plan_speed(0.0, 2048.0, 0.0, 100.0, 1e6)
+    stuck.trajectory = plan_speed(0.0, AT_REST, 100.0, 1e6)
     stuck.jam(1.0, True)
     held = stuck.motion(1.0)
     assert held.position == pytest.approx(2148.0, abs=0.1)
     assert stuck.motion(5.0) == held
-    assert stuck.load(stuck.motion(1.1), stuck.wanted(1.1)) == pytest.approx(0.2, abs=0.01)
+    assert stuck.load(stuck.motion(1.1), stuck.trajectory.at(1.1)) == pytest.approx(0.2, abs=0.01)
     stuck.jam(6.0, True)
     assert stuck.jammed_since == 1.0
     stuck.jam(7.0, False)

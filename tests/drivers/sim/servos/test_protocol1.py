@@ -43,7 +43,7 @@ def test_ping_of_the_vendor_byte_by_byte():
 def test_read_temperature_of_the_vendor():
     bus = chain(ids=(1,))
     bus.servo(1).plant.forced_c = 32.0
-    bus.servo(1).look(0.0)
+    bus.servo(1).update(0.0)
     (reply,) = bus.feed(bytes.fromhex("FF FF 01 04 02 2B 01 CC"), 1.0)
     assert reply.data == bytes.fromhex("FF FF 01 03 00 20 DB")
 

@@ -74,9 +74,9 @@ def test_voltage_dip_latches_after_the_voltage_came_back():
     device = servo()
     write(device, "Torque Enable", 1)
     device.plant.supply_v = 3.0
-    device.look(1.0)
+    device.update(1.0)
     device.plant.supply_v = 5.0
-    device.look(2.0)
+    device.update(2.0)
     assert (device.register("Hardware Error Status", 2.0), device.torque) == (0x01, False)
     assert device.register("Present Input Voltage", 2.0) == 50
 
@@ -84,10 +84,10 @@ def test_voltage_dip_latches_after_the_voltage_came_back():
 def test_heat_latches_overheating():
     device = servo()
     device.plant.forced_c = 70.0
-    device.look(1.0)
+    device.update(1.0)
     assert device.alert == 0
     device.plant.forced_c = 71.0
-    device.look(2.0)
+    device.update(2.0)
     assert device.register("Hardware Error Status", 2.0) == 0x04
 
 
@@ -99,9 +99,9 @@ def test_a_jammed_shaft_draws_full_current_and_overloads():
     assert read(device, "Present Position", 0.5) == 2048
     assert read(device, "Present Current", 0.5) == 1750
     assert read(device, "Moving Status", 0.5) & 8
-    device.look(0.9)
+    device.update(0.9)
     assert device.torque
-    device.look(1.2)
+    device.update(1.2)
     assert (device.register("Hardware Error Status", 1.2), device.torque) == (0x20, False)
 
 
@@ -109,7 +109,7 @@ def test_full_load_heats_the_motor():
     device = servo(skin=Skin(spring=1e-3, rest=1548.0, inertia=0.0, friction=0.0))
     write(device, "Torque Enable", 1)
     for k in range(100):
-        device.look(k * 10.0)
+        device.update(k * 10.0)
     assert device.register("Present Temperature", 1000.0) == pytest.approx(30 + 60 * 0.25, abs=1)
 
 
@@ -119,9 +119,9 @@ def test_watchdog_trips_stops_and_locks_the_goals():
     write(device, "Torque Enable", 1)
     write(device, "Profile Velocity", 50)
     write(device, "Goal Position", 4000)
-    device.watch(0.1)
+    device.check_watchdog(0.1)
     assert read(device, "Bus Watchdog", 0.1) == 5
-    device.watch(0.3)
+    device.check_watchdog(0.3)
     assert read(device, "Bus Watchdog", 0.3) == 0xFF
     stopped = device.position_ticks(0.3)
     assert stopped == pytest.approx(2048 + 0.1 * 50 * 15.63, abs=3)
@@ -129,7 +129,7 @@ def test_watchdog_trips_stops_and_locks_the_goals():
     assert write(device, "Goal Position", 3000, 9.0) == E.DATA_RANGE
     assert write(device, "Goal Velocity", 1, 9.0) == E.DATA_RANGE
     assert device.torque
-    device.heard.at_s = 9.0
+    device.last_instruction.at_s = 9.0
     assert write(device, "Bus Watchdog", 0, 9.0) == 0
     assert write(device, "Goal Position", 3000, 9.0) == 0
     assert device.position_ticks(20.0) == 3000
@@ -138,7 +138,7 @@ def test_watchdog_trips_stops_and_locks_the_goals():
 def test_watchdog_rests_without_torque():
     device = servo()
     write(device, "Bus Watchdog", 1)
-    device.watch(10.0)
+    device.check_watchdog(10.0)
     assert read(device, "Bus Watchdog", 10.0) == 1
 
 
@@ -151,7 +151,7 @@ def test_small_servos_keep_turning_in_current_mode(model: str, mode: int, stops:
     write(device, "Bus Watchdog", 5)
     write(device, "Torque Enable", 1)
     write(device, "Goal Current" if mode == 0 else "Goal Velocity", 40)
-    device.watch(1.0)
+    device.check_watchdog(1.0)
     assert read(device, "Bus Watchdog", 1.0) == 0xFF
     assert (device.position_ticks(1.0) == device.position_ticks(2.0)) is stops
 
@@ -162,7 +162,7 @@ def test_watchdog_may_be_ignored():
     write(device, "Bus Watchdog", 1)
     write(device, "Torque Enable", 1)
     write(device, "Goal Position", 3000)
-    device.watch(5.0)
+    device.check_watchdog(5.0)
     assert (read(device, "Bus Watchdog", 5.0), device.position_ticks(5.0)) == (0xFF, 3000)
 
 

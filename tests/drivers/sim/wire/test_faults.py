@@ -8,7 +8,7 @@ import pytest
 
 from drivers.base.errors import DriverError
 from drivers.packets.packet import StatusPacket, StatusReader, encode_status
-from drivers.sim.wire.faults import KINDS, Fault, FaultSet, Spoiler, parse_fault
+from drivers.sim.wire.faults import KINDS, Fault, FaultSet, ReplyFault, parse_fault
 
 
 @pytest.mark.parametrize(
@@ -66,14 +66,13 @@ def test_unreadable_specs_are_named_with_the_reason(spec: str, why: str):
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_has_a_help_line_and_can_be_written(kind: str):
     entry = KINDS[kind]
-    assert entry.help
     value = ":7" if entry.value and entry.default is None else ""
     assert parse_fault(f"{kind}{'' if entry.scope == 'bus' else ':1'}{value}").kind == kind
 
 
 def strikes(spec: str, ids: list[int]) -> list[bool]:
-    spoiler = Spoiler(parse_fault(spec), random.Random(1))
-    return [spoiler.strikes(device) for device in ids]
+    reply_fault = ReplyFault(parse_fault(spec), random.Random(1))
+    return [reply_fault.hits(device) for device in ids]
 
 
 def test_every_counts_each_servo_for_itself():
@@ -90,48 +89,52 @@ def test_chance_is_about_right_and_repeatable():
     assert hits == strikes("drop:*:p=0.1", [1] * 5000)
 
 
-def spoil(spec: str, data: bytes = b"\1\2\3\4") -> bytes | None:
-    frame = encode_status(5, 0x80, data)
-    return Spoiler(parse_fault(spec), random.Random(1)).status(frame, 5, 0x80, data)
+def corrupted(spec: str, data: bytes = b"\1\2\3\4") -> bytes | None:
+    """A status packet of servo 5 as a servo on a wire with this fault sends it."""
+    faults = FaultSet(lambda *change: None, seed=1)
+    faults.add([spec], 0.0)
+    return faults.corrupt(
+        encode_status(5, 0x80, data),
+        5,
+        first=4,
+        shorten=lambda frame, size: encode_status(5, 0x80, data[:size]),
+        readdress=lambda frame, other: encode_status(other, 0x80, data),
+    )[0]
 
 
 def test_what_happens_to_a_status_packet():
     frame = encode_status(5, 0x80, b"\1\2\3\4")
-    assert spoil("drop:*") is None
-    assert spoil("silent:*") is None
-    assert StatusReader().feed(spoil("short:*:2")) == [StatusPacket(5, 0x80, b"\1\2")]
-    assert StatusReader().feed(spoil("wrongid:*:9")) == [StatusPacket(9, 0x80, b"\1\2\3\4")]
-    assert spoil("crc:*")[:-1] == frame[:-1]
-    assert spoil("crc:*")[-1] != frame[-1]
-    assert spoil("noise:*:6")[6:] == frame
-    assert len(spoil("noise:*:6")) == len(frame) + 6
-    assert spoil("late:*") == frame
+    assert corrupted("drop:*") is None
+    assert corrupted("silent:*") is None
+    assert StatusReader().feed(corrupted("short:*:2")) == [StatusPacket(5, 0x80, b"\1\2")]
+    assert StatusReader().feed(corrupted("wrongid:*:9")) == [StatusPacket(9, 0x80, b"\1\2\3\4")]
+    assert corrupted("crc:*")[:-1] == frame[:-1]
+    assert corrupted("crc:*")[-1] != frame[-1]
+    assert corrupted("noise:*:6")[6:] == frame
+    assert len(corrupted("noise:*:6")) == len(frame) + 6
+    assert corrupted("late:*") == frame
 
 
 def test_flip_changes_exactly_one_bit_behind_the_header():
     frame = encode_status(5, 0x80, b"\1\2\3\4")
     places = set()
-    spoiler = Spoiler(parse_fault("flip:*"), random.Random(1))
+    faults = FaultSet(lambda *change: None)
+    faults.add(["flip:*"], 0.0)
     for _ in range(300):
-        spoilt = spoiler.status(frame, 5, 0x80, b"\1\2\3\4")
-        difference = int.from_bytes(spoilt, "big") ^ int.from_bytes(frame, "big")
+        changed = faults.corrupt(frame, 5, first=4)[0]
+        difference = int.from_bytes(changed, "big") ^ int.from_bytes(frame, "big")
         assert difference.bit_count() == 1
-        assert spoilt[:4] == frame[:4]
+        assert changed[:4] == frame[:4]
         places.add(difference)
     assert len(places) > 60
 
 
-def test_what_happens_to_a_part_of_a_joint_reply():
-    part = bytes((0, 5, 1, 2, 3, 4, 0xAA, 0xBB))
-
-    def spoilt(spec: str) -> bytes | None:
-        return Spoiler(parse_fault(spec), random.Random(1)).part(part)
-
-    assert spoilt("drop:*") is None
-    assert spoilt("short:*:1") == bytes((0, 5, 1, 0xAA, 0xBB))
-    assert spoilt("wrongid:*:9") == bytes((0, 9, 1, 2, 3, 4, 0xAA, 0xBB))
-    assert spoilt("crc:*")[:-1] == part[:-1]
-    assert spoilt("late:*") == part
+def test_without_a_frame_format_data_is_cut_and_late_replies_add_up():
+    faults = FaultSet(lambda *change: None)
+    faults.add(["short:1:2", "late:*:0.5", "late:1:0.25", "silent:2"], 0.0)
+    assert faults.corrupt(b"abcd", 1) == (b"ab", 0.75)
+    assert faults.corrupt(b"abcd", 2) == (None, 0.5)
+    assert faults.corrupt(b"abcd", 3) == (b"abcd", 0.5)
 
 
 def recorded(*specs: str | Fault, now_s: float = 0.0) -> tuple[FaultSet, list[tuple[str, bool, float]]]:
@@ -155,7 +158,7 @@ def test_clearing_ends_what_runs_and_forgets_what_was_to_come():
     faults, seen = recorded("crc:1", "crc:2:at=5s", "mute:2")
     faults.clear("crc", 1.0)
     assert seen[-1] == ("crc", False, 1.0)
-    assert faults.spoilers == []
+    assert faults.reply_faults == []
     assert faults.next_change_s == float("inf")
     faults.clear(None, 2.0)
     assert faults.active == []

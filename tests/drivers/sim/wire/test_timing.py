@@ -8,8 +8,7 @@ from drivers.packets.packet import BROADCAST_ID, InstructionPacket
 from drivers.packets.packet import Instruction as I
 from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.protocol2 import Protocol2Chain
-from drivers.sim.wire.replies import Reply
-from drivers.sim.wire.timing import USB_FRAME_S, WireTiming, without_timing
+from drivers.sim.wire.timing import USB_FRAME_S, Reply, WireTiming, collide, without_timing
 
 IDS = bytes(range(1, 25))
 POSITION = b"\x84\0\4\0"
@@ -86,3 +85,13 @@ def test_without_timing_only_lateness_counts():
     replies = [Reply(b"a", None), Reply(b"b", None), Reply(b"c", None, 0.5), Reply(b"d", None)]
     assert without_timing(replies, 1.0) == [(1.0, b"ab"), (1.5, b"cd")]
     assert without_timing([], 1.0) == []
+
+
+def test_one_reply_passes():
+    assert collide([]) == []
+    assert collide([Reply(b"ab", None, 0.1)]) == [Reply(b"ab", None, 0.1)]
+
+
+def test_a_wire_that_idles_high_carries_the_bitwise_and():
+    mixed = collide([Reply(b"\xff\xf0\x55", None, 0.1), Reply(b"\xff\x0f\x0f\x12", None)])
+    assert mixed == [Reply(b"\xff\x00\x05\x12", None, 0.1)]
