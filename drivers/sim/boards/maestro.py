@@ -13,25 +13,8 @@ from drivers.base.errors import DriverError
 from drivers.base.options import option
 from drivers.core.families import BOARD_BAUD
 from drivers.core.traffic import HexDecoder
-from drivers.maestro.protocol import (
-    GET_ERRORS,
-    GET_MOVING,
-    GET_POSITION,
-    GO_HOME,
-    MINI_SSC,
-    POLOLU,
-    RESTART_SCRIPT,
-    RESTART_WITH_PARAMETER,
-    SCRIPT_STATUS,
-    SET_ACCELERATION,
-    SET_MULTIPLE,
-    SET_PWM,
-    SET_SPEED,
-    SET_TARGET,
-    STOP_SCRIPT,
-    MaestroError,
-    crc7,
-)
+from drivers.maestro import protocol
+from drivers.maestro.protocol import MaestroError, crc7
 from drivers.sim.boards.board import Board
 from drivers.sim.boards.rc import RcChannel
 from drivers.sim.wire.faults import Fault
@@ -40,26 +23,26 @@ from drivers.sim.wire.simulator import Servos, Setting, Simulator
 
 LIMITS_US = (992.0, 2000.0)
 """Pulse limits of a new board."""
-_MINI_ONLY = (SET_MULTIPLE, GET_MOVING, SET_PWM)
+_MINI_ONLY = (protocol.SET_MULTIPLE, protocol.GET_MOVING, protocol.SET_PWM)
 SPEED_UNIT = 100.0
 """One step of speed, quarter microseconds per second (0.25 us per 10 ms)."""
 ACCELERATION_UNIT = 1250.0
 """One step of acceleration, quarter microseconds per second² (0.25 us per 10 ms per 80 ms)."""
 
 _LENGTHS = {
-    SET_TARGET: 3,
-    SET_SPEED: 3,
-    SET_ACCELERATION: 3,
-    SET_PWM: 4,
-    GET_POSITION: 1,
-    GET_MOVING: 0,
-    GET_ERRORS: 0,
-    GO_HOME: 0,
-    STOP_SCRIPT: 0,
-    RESTART_SCRIPT: 1,
-    RESTART_WITH_PARAMETER: 3,
-    SCRIPT_STATUS: 0,
-    MINI_SSC: 2,
+    protocol.SET_TARGET: 3,
+    protocol.SET_SPEED: 3,
+    protocol.SET_ACCELERATION: 3,
+    protocol.SET_PWM: 4,
+    protocol.GET_POSITION: 1,
+    protocol.GET_MOVING: 0,
+    protocol.GET_ERRORS: 0,
+    protocol.GO_HOME: 0,
+    protocol.STOP_SCRIPT: 0,
+    protocol.RESTART_SCRIPT: 1,
+    protocol.RESTART_WITH_PARAMETER: 3,
+    protocol.SCRIPT_STATUS: 0,
+    protocol.MINI_SSC: 2,
 }
 
 
@@ -91,8 +74,8 @@ class MaestroReader(BufferingReader):
     def _take(self, byte: int) -> list[Command]:
         """A byte of 0x80 and more begins a command, wherever it comes; only Mini SSC may carry it as data."""
         buffer, commands = self._buffer, []
-        if byte >= 0x80 and not (buffer and buffer[0] == MINI_SSC and byte != MINI_SSC):
-            if buffer and buffer != bytes((POLOLU,)):
+        if byte >= 0x80 and not (buffer and buffer[0] == protocol.MINI_SSC and byte != protocol.MINI_SSC):
+            if buffer and buffer != bytes((protocol.POLOLU,)):
                 commands.append(Command(0, b"", len(buffer), MaestroError.PROTOCOL))
             self._buffer = b""
         elif not buffer:
@@ -104,14 +87,14 @@ class MaestroReader(BufferingReader):
     def _complete(self) -> Command | None:
         """The command in the buffer, once all its bytes are there."""
         buffer = self._buffer
-        start = 3 if buffer[0] == POLOLU else 1
+        start = 3 if buffer[0] == protocol.POLOLU else 1
         if len(buffer) < start:
             return None
         code = buffer[2] | 0x80 if start == 3 else buffer[0]
         length = _LENGTHS.get(code, -1)
-        if code == SET_MULTIPLE:
+        if code == protocol.SET_MULTIPLE:
             length = 2 + 2 * buffer[start] if len(buffer) > start else 1
-        checked = self._crc and code != MINI_SSC
+        checked = self._crc and code != protocol.MINI_SSC
         size = start + length + checked
         if length >= 0 and len(buffer) < size:
             return None
@@ -157,16 +140,16 @@ class Maestro(Board):
         self._count, self._limits = channels, (4 * limits_us[0], 4 * limits_us[1])
         self.reset(now_s)
         self._handlers: dict[int, Callable[[bytes, float], bytes | None]] = {
-            SET_TARGET: lambda data, now_s: self._go(data[0], _word(data[1:]), now_s),
-            SET_MULTIPLE: self._set_multiple,
-            MINI_SSC: self._mini_ssc,
-            SET_SPEED: lambda data, now_s: self._limit(self.speeds, data, now_s),
-            SET_ACCELERATION: lambda data, now_s: self._limit(self.accelerations, data, now_s),
-            GET_POSITION: self._get_position,
-            GET_MOVING: lambda data, now_s: bytes((any(channel.moving(now_s) for channel in self.channels),)),
-            GET_ERRORS: self._get_errors,
-            GO_HOME: lambda data, now_s: self._go_home(now_s),
-            SCRIPT_STATUS: lambda data, now_s: b"\x01",
+            protocol.SET_TARGET: lambda data, now_s: self._go(data[0], _word(data[1:]), now_s),
+            protocol.SET_MULTIPLE: self._set_multiple,
+            protocol.MINI_SSC: self._mini_ssc,
+            protocol.SET_SPEED: lambda data, now_s: self._limit(self.speeds, data, now_s),
+            protocol.SET_ACCELERATION: lambda data, now_s: self._limit(self.accelerations, data, now_s),
+            protocol.GET_POSITION: self._get_position,
+            protocol.GET_MOVING: lambda data, now_s: bytes((any(channel.moving(now_s) for channel in self.channels),)),
+            protocol.GET_ERRORS: self._get_errors,
+            protocol.GO_HOME: lambda data, now_s: self._go_home(now_s),
+            protocol.SCRIPT_STATUS: lambda data, now_s: b"\x01",
         }
         super().__init__(now_s, faults, seed)
 
@@ -192,7 +175,7 @@ class Maestro(Board):
             return []
         handler = self._handlers.get(packet.code)
         data = handler(packet.data, now_s) if handler else None
-        return [(packet.data[0] if packet.code == GET_POSITION else 0, data)] if data else []
+        return [(packet.data[0] if packet.code == protocol.GET_POSITION else 0, data)] if data else []
 
     def describe(self, now_s: float) -> list[dict[str, Any]]:
         """Pulse width in microseconds and target of each channel."""

@@ -1,6 +1,6 @@
-"""Child process that serves a ``SimulatedBus(process=True)``: settings (a JSON line), then commands, on standard input.
+"""Child process that serves a ``SimulatedBus(process=True)``: settings as a JSON argument, commands on standard input.
 
-It answers ``ready PATH`` (or ``error WHY``) on standard output and ends when standard input does, so it cannot
+It writes ``ready PATH`` (or ``error WHY``) to standard output and ends when standard input does, so it cannot
 outlive its parent however that one ends.
 """
 
@@ -24,11 +24,8 @@ def main() -> int:
         if hasattr(signal, ending):
             signal.signal(getattr(signal, ending), signal.SIG_IGN)
     take_priority()  # servos answer in time while another program draws
-    first = _first_line(sys.stdin.fileno())
-    if not first:
-        return 0
     try:
-        server = make_server(json.loads(first))
+        server = make_server(json.loads(sys.argv[1]))
     except DriverError as error:
         _print(f"error {error}")
         return 1
@@ -50,17 +47,6 @@ def _standard_input() -> Control:
 
     threading.Thread(target=forward, daemon=True).start()
     return ours
-
-
-def _first_line(descriptor: int) -> bytes:
-    """One line, read byte by byte, so that the bytes behind it are left to the server's loop."""
-    line = b""
-    while not line.endswith(b"\n"):
-        byte = os.read(descriptor, 1)
-        if not byte:
-            return b""
-        line += byte
-    return line
 
 
 def _print(line: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivers.sim.serving.control import Commands, ControlSocket, Lines
 from drivers.sim.serving.ports import Link, make_port
-from drivers.sim.servos.simulators import make_chain, make_servos
+from drivers.sim.servos.simulators import ids_and_models
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.simulator import make_line
@@ -42,9 +42,8 @@ class PortServer:
     line : what is at the far end.
     link : where clients find it, see :data:`drivers.sim.serving.ports.Link`.
     baud : bit rate while no client has set one.
-    wire : bytes take their time.
-    latency_s : USB latency timer, with `wire`.
-    commands : where other programs may send commands (``drivers.sim.serving.control``), or None.
+    wire : bytes take their time at the bit rate, with return delay and the USB latency timer `latency_s`.
+    commands : path of a socket that takes commands (``drivers.sim.serving.control``), or None.
     on_line : called with each command line that arrives at the `control` of `run`; None: any byte there ends the
         loop, as its end always does.
 
@@ -232,12 +231,9 @@ def serve_dynamixel(
     model : of the servos given as bare ids, for example ``"xm430-w350"``, ``"ax-12a"``, ``"sts3215"``; it decides
         the protocol.
     baud : bit rate of the servos.
-    link : where clients find it, see :data:`drivers.sim.serving.ports.Link`.
-    wire : bytes take their time at the bit rate, with return delay and `latency_s`.
-    faults : specs, see ``drivers.sim.wire.faults``.
+    link, wire, latency_s, commands : see :class:`PortServer`. faults : specs, see ``drivers.sim.wire.faults``.
     on_ready : called with the path to open as soon as clients may come.
-    commands : path of a socket that takes commands while it runs, see ``drivers.sim.serving.control``.
-    stop : descriptor or socket; the end of it (or any byte) ends the service. None = until KeyboardInterrupt.
+    stop : descriptor or socket; the end of it (or any byte) ends the service. None: until KeyboardInterrupt.
     seed : of random faults.
     on_server : called with the server before it serves, for access to servos and traffic.
 
@@ -246,19 +242,10 @@ def serve_dynamixel(
     DriverError : unknown model, unreadable fault, or the terminal or link cannot be made.
     """
     now_s = time.monotonic()
-    chain = make_chain(make_servos(ids, model, baud, now_s), now_s, seed)
-    chain.faults.add(faults, now_s)
-    serve(
-        chain,
-        link,
-        on_ready,
-        baud=baud,
-        wire=wire,
-        latency_s=latency_s,
-        commands=commands,
-        stop=stop,
-        on_server=on_server,
-    )
+    line = make_line("dynamixel", ids_and_models(ids, model), now_s, baud=baud, seed=seed)
+    line.faults.add(faults, now_s)
+    port: dict[str, Any] = {"baud": baud, "wire": wire, "latency_s": latency_s}
+    serve(line, link, on_ready, commands=commands, stop=stop, on_server=on_server, **port)
 
 
 def serve(

@@ -18,6 +18,7 @@ from drivers.base.errors import PortError
 from drivers.sim.serving.ports import Link
 from drivers.sim.serving.serve import PortServer, make_server
 from drivers.sim.servos.chain import Chain
+from drivers.sim.servos.simulators import ids_and_models
 from drivers.sim.wire.faults import parse_fault
 from drivers.sim.wire.line import Line
 
@@ -121,7 +122,7 @@ class SimulatedBus:
     ) -> None:
         self.baud = baud
         self._settings = {
-            "servos": [(int(getattr(servo, "id", servo)), getattr(servo, "model", model)) for servo in servos],
+            "servos": ids_and_models(servos, model),
             "link": None if link is None else os.fspath(link),
             "baud": baud,
             "faults": list(faults),
@@ -215,25 +216,22 @@ class SimulatedBus:
         self._thread.start()
 
     def _start_child(self) -> None:
-        self._child = subprocess.Popen(
-            command(_CHILD), stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment(_CHILD)
+        child = self._child = subprocess.Popen(
+            command(_CHILD, json.dumps(self._settings)),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment(_CHILD),
         )
-        self._send(json.dumps(self._settings))
-        self._path = self._first_line(self._child)
-
-    def _first_line(self, child: subprocess.Popen[bytes]) -> str:
-        """The path the child serves."""
         timer = threading.Timer(START_S, child.kill)
         timer.start()
         try:
             words = (child.stdout.readline() if child.stdout else b"").decode().strip().partition(" ")
         finally:
             timer.cancel()
-        if words[0] == "ready":
-            return words[2]
-        _end_child(child)
-        self._child = None
-        raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
+        if words[0] != "ready":
+            self.close()
+            raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
+        self._path = words[2]
 
     def _send(self, command: str) -> None:
         """Send a command; a bus in a thread has carried it out when this returns."""

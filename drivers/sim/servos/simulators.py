@@ -19,24 +19,9 @@ from drivers.sim.wire.simulator import Servos, Setting, Simulator
 from drivers.tables.models import check_dynamixel, check_feetech
 
 
-def make_servos(servos: Iterable[object], model: str | int, baud: int, now_s: float) -> list[SimulatedServo]:
-    """Simulated servos for ids, or for anything that has an ``id`` and a ``model`` (a ``ServoSpec``)."""
-    return [
-        SimulatedServo(
-            int(getattr(servo, "id", servo)),  # type: ignore[call-overload]
-            getattr(servo, "model", model),
-            now_s=now_s,
-            baud=baud,
-        )
-        for servo in servos
-    ]
-
-
-def make_chain(servos: list[SimulatedServo], now_s: float, seed: int = 0) -> Chain:
-    """A wire with these servos, of the protocol they speak, or of both."""
-    protocols = {servo.table.protocol for servo in servos}
-    kind = MixedChain if len(protocols) > 1 else Protocol1Chain if protocols == {1} else Protocol2Chain
-    return kind(servos, now_s, seed=seed)
+def ids_and_models(servos: Iterable[Any], model: str | int) -> list[tuple[int, str | int]]:
+    """(id, model) of servos given as ids, which get `model`, or as specs with ``id`` and ``model``."""
+    return [(int(getattr(servo, "id", servo)), getattr(servo, "model", model)) for servo in servos]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +42,11 @@ class FeetechOptions(DynamixelOptions):
 
 
 def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Chain:
+    """A wire with these servos, of the protocol they speak, or of both."""
     made = [SimulatedServo(servo, model, now_s=setting.now_s, baud=setting.baud) for servo, model in servos]
-    return make_chain(made, setting.now_s, setting.seed)
+    protocols = {servo.table.protocol for servo in made}
+    kind = MixedChain if len(protocols) > 1 else Protocol1Chain if protocols == {1} else Protocol2Chain
+    return kind(made, setting.now_s, seed=setting.seed)
 
 
 def _alone(check_model: Callable[[str], object], options: DynamixelOptions, setting: Setting) -> Chain:

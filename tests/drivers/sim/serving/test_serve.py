@@ -15,8 +15,10 @@ import serial
 from drivers.base.errors import DriverError
 from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusReader, encode_instruction
-from drivers.sim.serving.serve import PAUSE_S, PortServer, make_servos, serve_dynamixel
+from drivers.sim.serving.serve import PAUSE_S, PortServer, serve_dynamixel
+from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.protocol2 import Protocol2Chain
+from drivers.sim.servos.simulators import ids_and_models
 
 
 def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
@@ -76,7 +78,7 @@ def test_bad_settings_are_refused_before_anybody_is_told(tmp_path: Path, options
 
 
 def test_the_loop_sleeps_until_something_is_due():
-    chain = Protocol2Chain(make_servos([1], "xl330-m288", 1_000_000, 0.0))
+    chain = Protocol2Chain([SimulatedServo(1)])
     server = PortServer(chain)
     try:
         assert server._timeout() is None  # at rest nothing wakes it but its descriptors
@@ -94,11 +96,7 @@ def test_servos_from_ids_and_from_specs():
     class Spec:
         id, model = 7, "xl320"
 
-    servos = make_servos([2, Spec()], "xm430-w210", 57_600, 0.0)
-    assert [(s.id, s.table.model, s.baud) for s in servos] == [
-        (2, "xm430-w210", 57_600),
-        (7, "xl320", 57_600),
-    ]
+    assert ids_and_models([2, Spec()], "xm430-w210") == [(2, "xm430-w210"), (7, "xl320")]
 
 
 def test_another_program_sets_faults_through_the_socket(tmp_path: Path):

@@ -9,11 +9,12 @@ from dynamixel_sdk import GroupSyncWrite, PacketHandler, PortHandler
 from drivers.packets.packet1 import BROADCAST_ID, Error1, Packet1, Reader1, encode
 from drivers.packets.packet1 import Instruction1 as I
 from drivers.sim import SimulatedBus
-from drivers.sim.serving.serve import make_chain, make_servos
 from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.mixed import MixedChain
 from drivers.sim.servos.plant import Skin
 from drivers.sim.servos.protocol1 import Protocol1Chain
+from drivers.sim.servos.protocol2 import Protocol2Chain
+from drivers.sim.wire.simulator import make_line
 
 NO_LOAD = Skin(spring=0.0, inertia=0.0, friction=0.0)
 
@@ -266,9 +267,9 @@ def test_scs_knows_no_sync_read():
 
 
 def test_the_models_decide_the_protocol():
-    assert isinstance(make_chain(make_servos([1], "sts3215", 1_000_000, 0.0), 0.0), Protocol1Chain)
-    mixed = make_servos([1], "sts3215", 1_000_000, 0.0) + make_servos([2], "xl320", 1_000_000, 0.0)
-    assert isinstance(make_chain(mixed, 0.0), MixedChain)
+    assert isinstance(make_line("feetech", [(1, "sts3215")], 0.0), Protocol1Chain)
+    assert isinstance(make_line("dynamixel", [(1, "xl320")], 0.0), Protocol2Chain)
+    assert isinstance(make_line("feetech", [(1, "sts3215"), (2, "xl320")], 0.0), MixedChain)
 
 
 # ---------------------------------------------------------------- served
