@@ -1,25 +1,52 @@
-"""Base classes of simulated servos on one wire: who receives a packet, who answers, and the faults of servos."""
+"""Simulated servos on one wire: the protocols they speak, bit rates, bus watchdogs, and the faults of servos."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Callable, Iterable
-from functools import cached_property
-from typing import Any, ClassVar
+from collections.abc import Iterable
+from typing import Any
 
-from drivers.packets.packet import BROADCAST_ID, ErrorNumber, Instruction
 from drivers.sim.servos.device import SimulatedServo
+from drivers.sim.servos.protocol import Protocol
+from drivers.sim.servos.protocol1 import Protocol1
+from drivers.sim.servos.protocol2 import Protocol2
 from drivers.sim.servos.state import WATCHDOG_STEP_S, LastInstruction, same_rate
 from drivers.sim.wire.faults import KINDS, Fault
-from drivers.sim.wire.line import Line
-from drivers.sim.wire.timing import Reply, collide
+from drivers.sim.wire.line import Line, Reader
+from drivers.sim.wire.timing import Reply
 
-ReadRequest = tuple[int, int, int]
-"""(id, address, length)"""
+
+class ProtocolReaders:
+    """The readers of all protocols on the same bytes. Packets of one are noise to the other.
+
+    A packet comes with the index of its protocol: (index, packet).
+    """
+
+    def __init__(self, readers: Iterable[Reader]) -> None:
+        self._readers = tuple(readers)
+
+    @property
+    def pending(self) -> int:
+        """Bytes that every reader holds back; 0 where one has just completed a packet with them."""
+        return min(reader.pending for reader in self._readers)
+
+    def feed(self, data: bytes) -> list[tuple[int, Any]]:
+        """Packets completed by these bytes. Bytes of a complete packet are removed from the other readers too."""
+        packets = [(k, packet) for k, reader in enumerate(self._readers) for packet in reader.feed(data)]
+        if packets and self.pending == 0:
+            self.take_pending()
+        return packets
+
+    def flush(self) -> list[tuple[int, Any]]:
+        return [(k, packet) for k, reader in enumerate(self._readers) for packet in reader.flush()]
+
+    def take_pending(self) -> bytes:
+        return max((reader.take_pending() for reader in self._readers), key=len)
 
 
 class Chain(Line):
-    """Servos on one wire.
+    """Servos on one wire, of Protocol 1.0, 2.0 or both: each receives every byte and parses it by its own protocol.
+
+    An id may be there once in each protocol.
 
     Parameters
     ----------
@@ -31,8 +58,7 @@ class Chain(Line):
     Attributes
     ----------
     servos : the servos, in the order given.
-    by_id, duplicates : the servos at the wire's bit rate by id; further servos with an id that is taken.
-    chain_stop : in reads of several servos nobody answers behind a silent one; otherwise the next one does.
+    protocols : the protocols that the servos speak; Protocol 2.0 where there are none.
     """
 
     def __init__(
@@ -43,14 +69,13 @@ class Chain(Line):
         seed: int = 0,
     ) -> None:
         self.servos = list(servos)
-        self.chain_stop = False
+        numbers = {servo.table.protocol for servo in self.servos} or {2}
+        self._kinds = [kind for kind in (Protocol1, Protocol2) if kind.NUMBER in numbers]
         self._last_instruction = LastInstruction(now_s)
-        self._muted: frozenset[int] = frozenset()
-        self.by_id: dict[int, SimulatedServo] = {}
-        self.duplicates: dict[int, list[SimulatedServo]] = {}
         self._added: dict[Fault, list[SimulatedServo]] = {}
         self._outdated = True
         super().__init__(seed)
+        self.protocols: list[Protocol] = [kind(self.faults) for kind in self._kinds]
         for servo in self.servos:
             self._adopt(servo)
         self.faults.add(faults, now_s)
@@ -90,6 +115,15 @@ class Chain(Line):
         """
         self.servo(device_id).place(position, now_s)
 
+    def make_reader(self) -> ProtocolReaders:
+        return ProtocolReaders(kind.make_reader() for kind in self._kinds)
+
+    def size(self, packet: tuple[int, Any]) -> int:
+        return self.protocols[packet[0]].size(packet[1])
+
+    def carry_out(self, packet: tuple[int, Any], now_s: float) -> list[Reply]:
+        return self.protocols[packet[0]].carry_out(packet[1], now_s)
+
     def set_line_baud(self, baud: int | None) -> None:
         if baud != self.line_baud:
             super().set_line_baud(baud)
@@ -114,21 +148,19 @@ class Chain(Line):
             self._index()
 
     def _index(self) -> None:
-        """Find the servos at the wire's bit rate, by id."""
+        """Find the servos at the wire's bit rate."""
         self._outdated = False
-        self.by_id, self.duplicates = {}, {}
-        for servo in self.servos + [servo for added in self._added.values() for servo in added]:
-            if self.line_baud is not None and not same_rate(servo.baud, self.line_baud):
-                continue
-            if self.by_id.setdefault(servo.id, servo) is not servo:
-                self.duplicates.setdefault(servo.id, []).append(servo)
-        muted = [fault for fault in self.faults.active if fault.kind == "mute"]
-        self._muted = frozenset(i for i in self.by_id if any(fault.concerns(i) for fault in muted))
+        servos = self.servos + [servo for added in self._added.values() for servo in added]
+        if self.line_baud is not None:
+            servos = [servo for servo in servos if same_rate(servo.baud, self.line_baud)]
+        for protocol in self.protocols:
+            protocol.index(servo for servo in servos if servo.table.protocol == protocol.NUMBER)
 
     def fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:
         super().fault_changed(fault, begins, now_s)
         if fault.kind == "chain-stop":
-            self.chain_stop = begins
+            for protocol in self.protocols:
+                protocol.chain_stop = begins
         elif KINDS[fault.kind].scope == "servo":
             for servo in self.servos:
                 if fault.concerns(servo.id):
@@ -148,191 +180,3 @@ class Chain(Line):
             self._added.pop(fault, None)
         else:
             servo.change_fault(fault.kind, fault.value, begins, now_s)
-
-
-class ProtocolChain(Chain):
-    """Servos that speak the same protocol, with the instructions that Protocol 1.0 and 2.0 share.
-
-    A packet is (id, instruction number, parameters). One servo answers an instruction with a status packet; one to
-    the broadcast id is carried out by all and, except for a ping, answered by none.
-    """
-
-    WORD: ClassVar[int]
-    """Bytes of an address, and of a length, in the parameters."""
-    MALFORMED_READ_LEVEL: ClassVar[int]
-    """Lowest Status Return Level at which a read without address or length is answered with an error."""
-
-    @abstractmethod
-    def encode_status(self, device_id: int, error: int, data: bytes) -> bytes:
-        """A status packet of the protocol."""
-
-    @abstractmethod
-    def error_byte(self, servo: SimulatedServo, error: int) -> int:
-        """Error byte of a status packet from one of Protocol 2.0 (`ALERT` and an `ErrorNumber`)."""
-
-    @abstractmethod
-    def identity(self, servo: SimulatedServo) -> bytes:
-        """Parameters of the answer to a ping."""
-
-    @abstractmethod
-    def factory_reset(self, servo: SimulatedServo, packet: Any, now_s: float) -> int:
-        """Reset a servo as the packet says; returns the error byte."""
-
-    @abstractmethod
-    def reboot(self, servo: SimulatedServo, now_s: float) -> int:
-        """Reboot a servo; returns the error byte."""
-
-    @abstractmethod
-    def _sync_read(self, packet: Any, now_s: float) -> list[Reply]: ...
-
-    @abstractmethod
-    def _bulk_read(self, packet: Any, now_s: float) -> list[Reply]: ...
-
-    @cached_property
-    def handlers(self) -> dict[int, Callable[[Any, float], list[Reply]]]:
-        """What carries out an instruction, by its number; the numbers are the same in both protocols."""
-        return {
-            Instruction.PING: self._ping,
-            Instruction.READ: self._read,
-            Instruction.WRITE: self._write,
-            Instruction.REG_WRITE: self._reg_write,
-            Instruction.ACTION: lambda packet, now_s: self._act(packet, now_s, lambda servo: servo.action(now_s)),
-            Instruction.FACTORY_RESET: lambda packet, now_s: self._act(
-                packet, now_s, lambda servo: self.factory_reset(servo, packet, now_s)
-            ),
-            Instruction.REBOOT: lambda packet, now_s: self._act(packet, now_s, lambda servo: self.reboot(servo, now_s)),
-            Instruction.SYNC_READ: self._sync_read,
-            Instruction.SYNC_WRITE: self._sync_write,
-            Instruction.BULK_READ: self._bulk_read,
-        }
-
-    def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
-        handler = self.handlers.get(packet[1])
-        return handler(packet, now_s) if handler else self._refuse(packet, ErrorNumber.INSTRUCTION, now_s)
-
-    # ------------------------------------------------------------ who is addressed
-    def find(self, device_id: int, now_s: float) -> SimulatedServo | None:
-        """The servo that receives packets to this id now, its health up to date."""
-        servo = self.by_id.get(device_id)
-        if servo is None or device_id in self._muted or now_s < servo.deaf_until:
-            return None
-        if now_s >= servo.next_health_s:
-            servo.update(now_s)
-        return servo
-
-    def receivers(self, now_s: float) -> list[SimulatedServo]:
-        """All servos that receive packets now, in order of id, those with the same id included."""
-        receivers = []
-        for device_id in sorted(self.by_id):
-            if self.find(device_id, now_s):
-                receivers += [self.by_id[device_id], *self.duplicates.get(device_id, ())]
-        return receivers
-
-    def addressed(self, device_id: int, now_s: float) -> list[SimulatedServo]:
-        """Servos that carry out a write to an id: those that have it, else those with that secondary id."""
-        servo = self.find(device_id, now_s)
-        if servo is not None:
-            return [servo, *self.duplicates.get(device_id, ())]
-        if device_id in self.by_id:
-            return []
-        return [other for other in self.receivers(now_s) if other.secondary_id == device_id]
-
-    # ------------------------------------------------------------ answers
-    def status(self, servo: SimulatedServo, device_id: int, error: int, data: bytes) -> Reply | None:
-        """One status packet as it arrives at the host; None where nothing does."""
-        frame = self.encode_status(device_id, error, data)
-        if not self.faults.reply_faults:
-            return Reply(frame, servo)
-        arrived, late_s = self.faults.corrupt(
-            frame,
-            device_id,
-            first=4,
-            shorten=lambda frame, size: self.encode_status(device_id, error, data[:size]),
-            readdress=lambda frame, other: self.encode_status(other, error, data),
-        )
-        return None if arrived is None else Reply(arrived, servo, late_s)
-
-    def answer(
-        self, device_id: int, level: int, now_s: float, act: Callable[[SimulatedServo], tuple[int, bytes]]
-    ) -> list[Reply]:
-        """Let the servos with an id act; those with at least this Status Return Level answer, and replies collide."""
-        replies = []
-        for servo in self.addressed(device_id, now_s):
-            answers = servo.id == device_id and servo.status_level >= level
-            error, data = act(servo)
-            if answers:
-                replies.append(self.status(servo, device_id, self.error_byte(servo, error), data))
-        return collide([reply for reply in replies if reply])
-
-    def _act(self, packet: Any, now_s: float, act: Callable[[SimulatedServo], int], level: int = 2) -> list[Reply]:
-        """Something every addressed servo does; one servo answers with an empty status, all with none."""
-        if packet.id == BROADCAST_ID:
-            for servo in self.receivers(now_s):
-                act(servo)
-            return []
-        return self.answer(packet.id, level, now_s, lambda servo: (act(servo), b""))
-
-    def _refuse(self, packet: Any, error: ErrorNumber, now_s: float, level: int = 2) -> list[Reply]:
-        return self._act(packet, now_s, lambda servo: servo.alert | error, level)
-
-    # ------------------------------------------------------------ instructions
-    def _word(self, params: bytes, at: int = 0) -> int:
-        return int.from_bytes(params[at : at + self.WORD], "little")
-
-    def _ping(self, packet: Any, now_s: float) -> list[Reply]:
-        """Always answered, whatever the Status Return Level. Broadcast: by all servos, in order of id."""
-        ids = sorted(self.by_id) if packet.id == BROADCAST_ID else [packet.id]
-        replies = []
-        for device_id in ids:
-            replies += self.answer(device_id, 0, now_s, lambda servo: (servo.alert, self.identity(servo)))
-        return replies
-
-    def _read(self, packet: Any, now_s: float) -> list[Reply]:
-        """Not answered by a secondary id."""
-        params, word = packet.params, self.WORD
-        if len(params) != 2 * word:
-            return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s, self.MALFORMED_READ_LEVEL)
-        if packet.id == BROADCAST_ID:
-            return []
-        address, length = self._word(params), self._word(params, word)
-        return self.answer(packet.id, 1, now_s, lambda servo: servo.read(address, length, now_s))
-
-    def _write(self, packet: Any, now_s: float) -> list[Reply]:
-        address, data = self._word(packet.params), packet.params[self.WORD :]
-        if not data:
-            return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s)
-        return self._act(packet, now_s, lambda servo: _write(servo, packet.id, address, data, now_s))
-
-    def _reg_write(self, packet: Any, now_s: float) -> list[Reply]:
-        address, data = self._word(packet.params), packet.params[self.WORD :]
-        if not data:
-            return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s)
-        return self._act(packet, now_s, lambda servo: servo.reg_write(address, data))
-
-    def _sync_requests(self, packet: Any) -> list[ReadRequest]:
-        """Reads that a sync read asks for: address, length, ids. Empty where it is malformed or not broadcast."""
-        params, word = packet.params, self.WORD
-        if packet.id != BROADCAST_ID or len(params) < 2 * word:
-            return []
-        address, length = self._word(params), self._word(params, word)
-        return [(device_id, address, length) for device_id in params[2 * word :]]
-
-    def _sync_write(self, packet: Any, now_s: float) -> list[Reply]:
-        """Address, length, (id, data) repeated; an entry that is cut short is left out. Answered by none."""
-        params, word = packet.params, self.WORD
-        if packet.id == BROADCAST_ID and len(params) >= 2 * word:
-            address, length = self._word(params), self._word(params, word)
-            for at in range(2 * word, len(params) - length, length + 1):
-                self._write_to(params[at], address, params[at + 1 : at + 1 + length], now_s)
-        return []
-
-    def _write_to(self, device_id: int, address: int, data: bytes, now_s: float) -> None:
-        for servo in self.addressed(device_id, now_s):
-            _write(servo, device_id, address, data, now_s)
-
-
-def _write(servo: SimulatedServo, device_id: int, address: int, data: bytes, now_s: float) -> int:
-    """A write to an id; one to a secondary id reaches RAM only. Returns the error byte of Protocol 2.0."""
-    if address < servo.table.eeprom_end and servo.secondary_id == device_id != servo.id:
-        return ErrorNumber.ACCESS
-    return servo.write(address, data, now_s)

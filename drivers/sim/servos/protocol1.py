@@ -11,8 +11,8 @@ from functools import partial
 
 from drivers.packets.packet import ALERT, ErrorNumber
 from drivers.packets.packet1 import BROADCAST_ID, Error1, Packet1, Reader1, encode
-from drivers.sim.servos.chain import ProtocolChain, ReadRequest
 from drivers.sim.servos.device import SimulatedServo
+from drivers.sim.servos.protocol import Protocol, ReadRequest
 from drivers.sim.wire.timing import Reply
 
 _FLAGS = {
@@ -27,13 +27,15 @@ _FLAGS = {
 """Error flag for each reason that a servo refuses an instruction."""
 
 
-class Protocol1Chain(ProtocolChain):
-    """Servos that speak Protocol 1.0 framing on one wire. See :class:`~drivers.sim.servos.chain.Chain`."""
+class Protocol1(Protocol):
+    """Servos that speak Protocol 1.0 framing on one wire."""
 
+    NUMBER = 1
     WORD = 1
     MALFORMED_READ_LEVEL = 2
 
-    def make_reader(self) -> Reader1:
+    @staticmethod
+    def make_reader() -> Reader1:
         """A reader of packets. (Nothing tells a status packet from an instruction; servos hear only the host.)"""
         return Reader1()
 

@@ -21,21 +21,23 @@ from drivers.packets.packet import (
     encode_status,
     stuff,
 )
-from drivers.sim.servos.chain import ProtocolChain, ReadRequest
 from drivers.sim.servos.device import SimulatedServo
+from drivers.sim.servos.protocol import Protocol, ReadRequest
 from drivers.sim.wire.timing import Reply, collide
 
 FACTORY_BROADCAST_FIRMWARE = 42
 """From here on a broadcast factory reset of everything is ignored."""
 
 
-class Protocol2Chain(ProtocolChain):
-    """Servos that speak Protocol 2.0 on one wire. See :class:`~drivers.sim.servos.chain.Chain`."""
+class Protocol2(Protocol):
+    """Servos that speak Protocol 2.0 on one wire."""
 
+    NUMBER = 2
     WORD = 2
     MALFORMED_READ_LEVEL = 1
 
-    def make_reader(self) -> InstructionReader:
+    @staticmethod
+    def make_reader() -> InstructionReader:
         """A reader of instruction packets; status packets are passed over."""
         return InstructionReader()
 

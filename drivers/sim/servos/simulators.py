@@ -11,9 +11,6 @@ from drivers.base.options import option, parse_ids
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.mixed import MixedChain
-from drivers.sim.servos.protocol1 import Protocol1Chain
-from drivers.sim.servos.protocol2 import Protocol2Chain
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.simulator import Servos, Setting, Simulator
 from drivers.tables.models import check_dynamixel, check_feetech
@@ -42,11 +39,8 @@ class FeetechOptions(DynamixelOptions):
 
 
 def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Chain:
-    """A wire with these servos, of the protocol they speak, or of both."""
     made = [SimulatedServo(servo, model, now_s=setting.now_s, baud=setting.baud) for servo, model in servos]
-    protocols = {servo.table.protocol for servo in made}
-    kind = MixedChain if len(protocols) > 1 else Protocol1Chain if protocols == {1} else Protocol2Chain
-    return kind(made, setting.now_s, seed=setting.seed)
+    return Chain(made, setting.now_s, seed=setting.seed)
 
 
 def _alone(check_model: Callable[[str], object], options: DynamixelOptions, setting: Setting) -> Chain:

@@ -12,16 +12,16 @@ import pytest
 
 from drivers.base.errors import PortBusy, PortError
 from drivers.sim.serving.control import MAX_LINE, Commands, ControlSocket, Lines
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.protocol2 import Protocol2Chain
 
 
 @pytest.fixture
-def chain() -> Protocol2Chain:
-    return Protocol2Chain([SimulatedServo(1), SimulatedServo(2, "xl320")])
+def chain() -> Chain:
+    return Chain([SimulatedServo(1), SimulatedServo(2, "xl320")])
 
 
-def test_faults_are_set_listed_and_cleared(chain: Protocol2Chain):
+def test_faults_are_set_listed_and_cleared(chain: Chain):
     commands = Commands(chain)
     assert commands.handle("fault mute:1 crc:2:every=3") == "ok"
     assert commands.handle("faults") == "ok mute:1 crc:2:every=3"
@@ -31,7 +31,7 @@ def test_faults_are_set_listed_and_cleared(chain: Protocol2Chain):
     assert commands.handle("faults") == "ok"
 
 
-def test_servos_and_a_hand(chain: Protocol2Chain):
+def test_servos_and_a_hand(chain: Chain):
     commands = Commands(chain)
     assert commands.handle("place 1 1500") == "ok"
     answer = commands.handle("servos")
@@ -52,7 +52,7 @@ def test_servos_and_a_hand(chain: Protocol2Chain):
         ("place 1", "not enough values"),
     ],
 )
-def test_bad_lines_are_answered_with_the_reason(chain: Protocol2Chain, line: str, why: str):
+def test_bad_lines_are_answered_with_the_reason(chain: Chain, line: str, why: str):
     answer = Commands(chain).handle(line)
     assert answer.startswith("error ")
     assert why in answer

@@ -16,8 +16,8 @@ from drivers.base.errors import DriverError
 from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusReader, encode_instruction
 from drivers.sim.serving.serve import PAUSE_S, PortServer, serve_dynamixel
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.protocol2 import Protocol2Chain
 from drivers.sim.servos.simulators import ids_and_models
 
 
@@ -78,14 +78,14 @@ def test_bad_settings_are_refused_before_anybody_is_told(tmp_path: Path, options
 
 
 def test_the_loop_sleeps_until_something_is_due():
-    chain = Protocol2Chain([SimulatedServo(1)])
+    chain = Chain([SimulatedServo(1)])
     server = PortServer(chain)
     try:
         assert server._timeout() is None  # at rest nothing wakes it but its descriptors
         chain.faults.add(["mute:1:at=60s"], time.monotonic())
         assert 59 < server._timeout() <= 60
         chain.faults.clear(None, 0.0)
-        chain.reader.feed_frames(b"\xff\xff\xfd\x00")
+        chain.reader.feed(b"\xff\xff\xfd\x00")
         server._read_s = time.monotonic()
         assert 0 < server._timeout() <= PAUSE_S
     finally:

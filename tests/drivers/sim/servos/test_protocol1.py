@@ -9,21 +9,19 @@ from dynamixel_sdk import GroupSyncWrite, PacketHandler, PortHandler
 from drivers.packets.packet1 import BROADCAST_ID, Error1, Packet1, Reader1, encode
 from drivers.packets.packet1 import Instruction1 as I
 from drivers.sim import SimulatedBus
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.mixed import MixedChain
 from drivers.sim.servos.plant import Skin
-from drivers.sim.servos.protocol1 import Protocol1Chain
-from drivers.sim.servos.protocol2 import Protocol2Chain
 from drivers.sim.wire.simulator import make_line
 
 NO_LOAD = Skin(spring=0.0, inertia=0.0, friction=0.0)
 
 
-def chain(model: str = "ax-12a", ids: tuple[int, ...] = (1, 2, 3), faults: tuple[str, ...] = ()) -> Protocol1Chain:
-    return Protocol1Chain([SimulatedServo(i, model, skin=NO_LOAD) for i in ids], faults=faults)
+def chain(model: str = "ax-12a", ids: tuple[int, ...] = (1, 2, 3), faults: tuple[str, ...] = ()) -> Chain:
+    return Chain([SimulatedServo(i, model, skin=NO_LOAD) for i in ids], faults=faults)
 
 
-def ask(bus: Protocol1Chain, device: int, code: int, params: bytes | str = b"", now_s: float = 0.0) -> list[Packet1]:
+def ask(bus: Chain, device: int, code: int, params: bytes | str = b"", now_s: float = 0.0) -> list[Packet1]:
     body = bytes.fromhex(params) if isinstance(params, str) else params
     data = b"".join(reply.data for reply in bus.feed(encode(device, code, body), now_s))
     return Reader1().feed(data)
@@ -249,7 +247,7 @@ def test_reply_faults_speak_protocol_1():
 
 
 def test_clocks_may_differ_by_three_percent():
-    bus = Protocol1Chain([SimulatedServo(1, "ax-12a", baud=115_200)])
+    bus = Chain([SimulatedServo(1, "ax-12a", baud=115_200)])
     assert bus.servo(1).baud == 117_647
     bus.set_line_baud(115_200)
     assert len(ask(bus, 1, I.PING)) == 1
@@ -259,7 +257,9 @@ def test_clocks_may_differ_by_three_percent():
 
 @pytest.mark.parametrize("params", [b"", b"\x1e\xff\xff"])
 def test_size_on_the_wire(params: bytes):
-    assert chain().size(Packet1(1, I.WRITE, params)) == len(encode(1, I.WRITE, params))
+    bus, frame = chain(), encode(1, I.WRITE, params)
+    (packet,) = bus.reader.feed(frame)
+    assert bus.size(packet) == len(frame)
 
 
 def test_scs_knows_no_sync_read():
@@ -267,9 +267,12 @@ def test_scs_knows_no_sync_read():
 
 
 def test_the_models_decide_the_protocol():
-    assert isinstance(make_line("feetech", [(1, "sts3215")], 0.0), Protocol1Chain)
-    assert isinstance(make_line("dynamixel", [(1, "xl320")], 0.0), Protocol2Chain)
-    assert isinstance(make_line("feetech", [(1, "sts3215"), (2, "xl320")], 0.0), MixedChain)
+    def protocols(*servos: tuple[int, str]) -> list[int]:
+        return [protocol.NUMBER for protocol in make_line("feetech", servos, 0.0).protocols]
+
+    assert protocols((1, "sts3215")) == [1]
+    assert protocols((1, "xl320")) == [2]
+    assert protocols((1, "xl320"), (2, "sts3215")) == [1, 2]
 
 
 # ---------------------------------------------------------------- served

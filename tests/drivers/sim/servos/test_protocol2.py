@@ -6,7 +6,6 @@ import pytest
 
 from drivers.packets.packet import (
     BROADCAST_ID,
-    InstructionPacket,
     StatusPacket,
     StatusReader,
     decode_fast,
@@ -14,24 +13,22 @@ from drivers.packets.packet import (
 )
 from drivers.packets.packet import ErrorNumber as E
 from drivers.packets.packet import Instruction as I
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.protocol2 import Protocol2Chain
 
 
-def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> Protocol2Chain:
+def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> Chain:
     servos = [SimulatedServo(i, model, position=2000.0 + i, **options) for i in ids or (1, 2, 3)]
-    return Protocol2Chain(servos, faults=faults)
+    return Chain(servos, faults=faults)
 
 
-def wire(bus: Protocol2Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
+def wire(bus: Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
     """What comes back, as one run of bytes."""
     frame = encode_instruction(device, instruction, params)
     return b"".join(reply.data for reply in bus.feed(frame, now_s))
 
 
-def ask(
-    bus: Protocol2Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0
-) -> list[StatusPacket]:
+def ask(bus: Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> list[StatusPacket]:
     """The status packets that come back."""
     return StatusReader().feed(wire(bus, device, instruction, params, now_s))
 
@@ -58,7 +55,7 @@ def test_broadcast_ping_is_answered_in_order_of_id():
 
 
 def test_vendor_example_of_a_ping_byte_by_byte():
-    bus = Protocol2Chain([SimulatedServo(i, "xm430-w210", firmware=38) for i in (1, 2)])
+    bus = Chain([SimulatedServo(i, "xm430-w210", firmware=38) for i in (1, 2)])
     sent = bytes.fromhex("FFFFFD00FE0300013142")
     assert b"".join(reply.data for reply in bus.feed(sent, 0.0)).hex().upper() == (
         "FFFFFD00010700550006042 6655D".replace(" ", "") + "FFFFFD0002070055000604266F6D"
@@ -267,5 +264,6 @@ def test_status_packets_on_the_wire_are_not_instructions():
 
 @pytest.mark.parametrize("params", [b"", POSITION, b"\x74\0\xff\xff\xfd\0"])
 def test_size_on_the_wire_counts_the_stuffing(params: bytes):
-    packet = InstructionPacket(1, I.WRITE, params)
-    assert chain().size(packet) == len(encode_instruction(*packet))
+    bus, frame = chain(), encode_instruction(1, I.WRITE, params)
+    (packet,) = bus.reader.feed(frame)
+    assert bus.size(packet) == len(frame)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.packets.packet import BROADCAST_ID, InstructionPacket
+from drivers.packets.packet import BROADCAST_ID, encode_instruction
 from drivers.packets.packet import Instruction as I
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.protocol2 import Protocol2Chain
 from drivers.sim.wire.timing import USB_FRAME_S, Reply, WireTiming, collide, without_timing
 
 IDS = bytes(range(1, 25))
@@ -21,8 +21,8 @@ def transaction(
     servos = [SimulatedServo(i) for i in IDS]
     for servo in servos:
         servo.registers.put("Return Delay Time", delay)
-    bus, timing = Protocol2Chain(servos), WireTiming(latency_s)
-    packet = InstructionPacket(BROADCAST_ID, instruction, params)
+    bus, timing = Chain(servos), WireTiming(latency_s)
+    (packet,) = bus.reader.feed(encode_instruction(BROADCAST_ID, instruction, params))
     at_s = timing.arrival(1.0, bus.size(packet), baud)
     return timing.deliveries(bus.handle(packet, at_s), baud)
 
