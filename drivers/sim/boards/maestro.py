@@ -15,8 +15,7 @@ from drivers.core.families import BOARD_BAUD
 from drivers.core.traffic import HexDecoder
 from drivers.maestro import protocol
 from drivers.maestro.protocol import MaestroError, crc7
-from drivers.sim.boards.board import Board
-from drivers.sim.boards.rc import RcChannel
+from drivers.sim.boards.board import Board, RcChannel
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import BufferingReader
 from drivers.sim.wire.simulator import Servos, Setting, Simulator

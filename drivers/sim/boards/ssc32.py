@@ -10,8 +10,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from drivers.sim.boards.board import Board
-from drivers.sim.boards.rc import RcChannel
+from drivers.sim.boards.board import Board, RcChannel
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import BufferingReader
 from drivers.sim.wire.simulator import BoardOptions, Simulator

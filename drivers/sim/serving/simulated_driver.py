@@ -25,9 +25,9 @@ class SimulatedDriver(WireBus):
     Parameters
     ----------
     servos : the servos in the order of all arrays; the simulated ones have the same ids and models.
-    port : path that shall point at the simulated port, so that other programs can find it; empty for a private one.
+    port : path that shall point at the simulated port, so that other programs can find it; empty: a private one.
     transport : ``"pty"`` (a pseudo-terminal), ``"tcp"`` (this machine's loopback) or ``"memory"`` (a thread of this
-        process serves); empty takes a pseudo-terminal where the system has them, else TCP.
+        process serves); empty: a pseudo-terminal where the system has them, else TCP.
     faults, wire, latency_s, seed, process : see :class:`drivers.sim.serving.simulated.SimulatedBus`.
     options : see the driver.
 
@@ -71,21 +71,17 @@ class SimulatedDriver(WireBus):
         }
 
     def open(self) -> None:
-        """Start the simulated servos if they do not run yet, and take their port."""
+        """Start the simulated bus if it does not run yet, and open its port."""
         if self.simulation is None:
-            self._simulate()
+            simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
+            self.simulation = simulation.__enter__()
+            self._use_path(simulation.path)
         try:
             super().open()
         except BaseException:
             if not self.running:
                 self._release()
             raise
-
-    def _simulate(self) -> None:
-        simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
-        simulation.__enter__()
-        self.simulation = simulation
-        self._use_path(simulation.path)
 
     def _private_link(self) -> str:
         if self._transport == "tcp":
@@ -97,12 +93,11 @@ class SimulatedDriver(WireBus):
 
     def _release(self) -> None:
         super()._release()
-        simulation, self.simulation = self.simulation, None
-        if simulation is not None:
-            simulation.close()
-        folder, self._folder = self._folder, None
-        if folder is not None:
-            folder.cleanup()
+        if self.simulation is not None:
+            self.simulation.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+        self.simulation = self._folder = None
 
 
 @cache

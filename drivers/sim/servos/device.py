@@ -1,7 +1,7 @@
 """Instructions of one simulated servo: read, write, registered write, reboot, factory reset, clear.
 
-Behaviour follows the ROBOTIS e-Manual (Protocol 2.0 and control tables); where firmware differs or nobody has
-verified it, the method's docstring names the choice.
+Behaviour follows the ROBOTIS e-Manual (Protocol 2.0 and control tables); where firmware differs or was not
+verified, the method's docstring names the choice.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 from drivers.packets.packet import ErrorNumber
 from drivers.sim.servos.drive_x import CURRENT_POSITION, EXTENDED, GOAL_TORQUE
 from drivers.sim.servos.registers import GOALS, Change
-from drivers.sim.servos.state import ServoState
+from drivers.sim.servos.state import BOOT_S, ServoState
 from drivers.tables.tables import Item
 
 CLEAR_MULTI_TURN = b"\x01\x44\x58\x4c\x22"
@@ -80,9 +80,9 @@ class SimulatedServo(ServoState):
         return self.alert
 
     def reboot(self, now_s: float) -> None:
-        """RAM to its initial values, errors cleared, deaf for `boot_s`."""
+        """RAM to its initial values, errors cleared, deaf for `BOOT_S`."""
         self._boot(now_s)
-        self.deaf_until = now_s + self.boot_s
+        self.deaf_until = now_s + BOOT_S
 
     def factory_reset(self, option: int, now_s: float) -> int:
         """Error byte. 0xFF resets all, 1 keeps the id, 2 keeps id and baud rate."""

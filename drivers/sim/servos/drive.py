@@ -7,9 +7,15 @@ from abc import ABC, abstractmethod
 from drivers.sim.servos.motion import Motion, hold, plan_stop
 from drivers.sim.servos.plant import Plant
 from drivers.sim.servos.registers import Registers
+from drivers.tables.tables import ControlTable
 
 OVERLOAD_AFTER_S = 1.0
 """How long a jammed motor gives its full torque before it counts as overloaded."""
+
+
+def speed_unit(table: ControlTable) -> float:
+    """One step of a model's speed register, ticks/s."""
+    return (table.get("Present Speed") or table["Present Velocity"]).scale / table.rad_per_tick
 
 
 class Drive(ABC):
@@ -33,13 +39,11 @@ class Drive(ABC):
     goals: tuple[str, ...]
     first_sensed: int
     last_sensed: int
-    motion_at: int
-    motion_end: int
+    motion_at = motion_end = 0
 
-    def __init__(self, registers: Registers, plant: Plant, now_s: float, speed: str) -> None:
-        table = registers.table
+    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
         self.registers, self.plant, self.born_s = registers, plant, now_s
-        self.ticks_s = table[speed].scale / table.rad_per_tick
+        self.ticks_s = speed_unit(registers.table)
         self.side, self.mirror, self.offset = 1, 0.0, 0
 
     @abstractmethod
@@ -48,15 +52,15 @@ class Drive(ABC):
 
     @abstractmethod
     def plan(self, now_s: float) -> None:
-        """Move as the goal registers and the operating mode say, from the present motion on."""
+        """Plan the motion to the goal registers in the operating mode, from the present motion on."""
 
     @abstractmethod
     def sense(self, now_s: float) -> float:
         """Write the sensors' values at `now_s` into memory; returns the load (-1 to 1)."""
 
-    @abstractmethod
     def sense_motion(self, now_s: float) -> None:
         """Write at least current, velocity and position, the registers that control loops read."""
+        self.sense(now_s)
 
     def to_register(self, shaft: float) -> int:
         """Present Position for a shaft position: reversed about the middle of the turn, then offset."""

@@ -6,6 +6,7 @@ from drivers.sim.servos.drive import Drive
 from drivers.sim.servos.motion import Motion, Profile, plan_move, plan_speed, plan_timed
 from drivers.sim.servos.plant import Plant
 from drivers.sim.servos.registers import Registers
+from drivers.tables.tables import to_magnitude
 
 MULTI_TURN = 0x10
 """Feetech's Phase (18): present positions leave the turn."""
@@ -20,18 +21,18 @@ SENSED = frozenset(("Present Position", "Present Speed", "Present Velocity", "Pr
 class WordDrive(Drive):
     """Plans and senses for one AX, MX(1.0) or XL-320 servo. See :class:`~drivers.sim.servos.drive.Drive`."""
 
-    def __init__(self, registers: Registers, plant: Plant, now_s: float, speed: str = "Present Speed") -> None:
-        super().__init__(registers, plant, now_s, speed)
-        self.goals = ("Goal Position", "Moving Speed")
+    goals: tuple[str, ...] = ("Goal Position", "Moving Speed")
+
+    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
+        super().__init__(registers, plant, now_s)
         self._names = [name for name in registers.table if name in SENSED]
         items = [registers.table[name] for name in self._names]
         self.first_sensed = min(item.address for item in items)
         self.last_sensed = max(item.end for item in items)
-        self.motion_at = self.motion_end = registers.table.size
         self.configure()
 
     def configure(self) -> None:
-        """Everything is read from the registers when it is used."""
+        """Every setting is read when it is used."""
 
     def plan(self, now_s: float) -> None:
         """To Goal Position at Moving Speed (0 = the motor's top speed); in wheel mode at that share of full power."""
@@ -60,19 +61,16 @@ class WordDrive(Drive):
             self.registers.put(name, values[name])
         return load
 
-    def sense_motion(self, now_s: float) -> None:
-        self.sense(now_s)
-
     def _values(self, now_s: float, motion: Motion, load: float) -> dict[str, int]:
         plant = self.plant
-        speed = round(motion.velocity / self.ticks_s)
-        if self._unsigned_speed():
-            speed = _direction(speed)
+        speed, load_register = round(motion.velocity / self.ticks_s), round(1000 * load)
+        if "Control Mode" in self.registers.table:  # the XL-320's table leaves the direction bit to the host
+            speed, load_register = (to_magnitude(each, DIRECTION_BIT) for each in (speed, round(1023 * load)))
         return {
             "Present Position": self._position(motion),
             "Present Speed": speed,
             "Present Velocity": speed,
-            "Present Load": _direction(round(1023 * load)) if self._unsigned_speed() else round(1000 * load),
+            "Present Load": load_register,
             "Present Current": round(1000 * load),
             "Present Voltage": min(max(round(10.0 * plant.voltage(load)), 0), 255),
             "Present Temperature": min(max(round(plant.temperature_c), 0), 255),
@@ -84,10 +82,6 @@ class WordDrive(Drive):
         """Present Position, which ends at the ends of the turn."""
         return min(max(self.to_register(motion.position), 0), self.registers.table.ticks_per_turn - 1)
 
-    def _unsigned_speed(self) -> bool:
-        """Whether the table leaves the direction bit to the host (XL-320, as its vendor writes it)."""
-        return "Control Mode" in self.registers.table
-
 
 class FeetechDrive(WordDrive):
     """Plans and senses for one Feetech STS or SCS servo. See :class:`~drivers.sim.servos.drive.Drive`.
@@ -96,9 +90,7 @@ class FeetechDrive(WordDrive):
     2 PWM (in Goal Time), 3 step by step. SCS: Goal Time, when it is not 0, is the duration of the move.
     """
 
-    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
-        super().__init__(registers, plant, now_s, "Present Velocity")
-        self.goals = ("Goal Position", "Goal Velocity", "Goal Time")
+    goals = ("Goal Position", "Goal Velocity", "Goal Time")
 
     def configure(self) -> None:
         """Present Position is the shaft's less Homing Offset."""
@@ -106,7 +98,7 @@ class FeetechDrive(WordDrive):
             self.offset = -self.registers.get("Homing Offset")
 
     def plan(self, now_s: float) -> None:
-        """Move as Operating Mode says."""
+        """Plan the motion of the Operating Mode."""
         registers, plant = self.registers, self.plant
         now = plant.motion(now_s)
         mode = registers.get("Operating Mode") if "Operating Mode" in registers.table else 0
@@ -146,9 +138,3 @@ class FeetechDrive(WordDrive):
         values = super()._values(now_s, motion, load)
         values["Goal Position 2"] = self.registers.get("Goal Position")
         return values
-
-
-def _direction(value: int) -> int:
-    """Magnitude in bits 0-9, direction in bit 10 (clear = counter-clockwise)."""
-    magnitude = min(abs(value), (1 << DIRECTION_BIT) - 1)
-    return magnitude | 1 << DIRECTION_BIT if value < 0 else magnitude

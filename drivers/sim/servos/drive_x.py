@@ -58,7 +58,7 @@ class XDrive(Drive):
     """Plans and senses for one X-series servo. See :class:`~drivers.sim.servos.drive.Drive`."""
 
     def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
-        super().__init__(registers, plant, now_s, "Present Velocity")
+        super().__init__(registers, plant, now_s)
         table = registers.table
         acceleration = table["Profile Acceleration"]
         self.ticks_s2 = acceleration.scale / table.rad_per_tick

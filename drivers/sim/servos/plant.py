@@ -46,7 +46,7 @@ class Plant:
     """
 
     RAMP_S = 0.03
-    """Time from rest to the no-load speed: the quickest a motor can be, whatever its profile says."""
+    """Time from rest to the no-load speed: the shortest possible, whatever the profile."""
     STIFFNESS = 0.02
     """Share of stall torque per tick of following error of a jammed shaft."""
     RESISTANCE_V = 0.4

@@ -70,7 +70,7 @@ class Protocol(ABC):
 
     @abstractmethod
     def factory_reset(self, servo: SimulatedServo, packet: Any, now_s: float) -> int:
-        """Reset a servo as the packet says; returns the error byte."""
+        """Reset a servo to the factory settings that a packet names; returns the error byte."""
 
     @abstractmethod
     def reboot(self, servo: SimulatedServo, now_s: float) -> int:
@@ -110,7 +110,7 @@ class Protocol(ABC):
         self._muted = frozenset(i for i in self.by_id if any(fault.concerns(i) for fault in muted))
 
     def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
-        """Do what a packet says; returns the replies."""
+        """Carry out a packet; returns the replies."""
         handler = self.handlers.get(packet[1])
         return handler(packet, now_s) if handler else self._refuse(packet, ErrorNumber.INSTRUCTION, now_s)
 

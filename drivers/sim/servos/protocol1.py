@@ -36,7 +36,7 @@ class Protocol1(Protocol):
 
     @staticmethod
     def make_reader() -> Reader1:
-        """A reader of packets. (Nothing tells a status packet from an instruction; servos hear only the host.)"""
+        """A reader of packets. (A status packet looks like an instruction; servos receive only the host's bytes.)"""
         return Reader1()
 
     def size(self, packet: Packet1) -> int:
@@ -57,7 +57,7 @@ class Protocol1(Protocol):
         return int(flags)
 
     def identity(self, servo: SimulatedServo) -> bytes:
-        """Nothing: a ping does not say the model."""
+        """None: a ping does not report the model."""
         return b""
 
     def factory_reset(self, servo: SimulatedServo, packet: Packet1, now_s: float) -> int:

@@ -77,7 +77,7 @@ class Registers:
         return bytes(memory[pointers.get(at, at)] for at in range(address, address + length))
 
     def span(self, address: int, length: int) -> tuple[int, int]:
-        """First and last-plus-one address that a read looks at, through the pointers."""
+        """First and last-plus-one address that a read reaches through the pointers."""
         if not self._pointers or address + length <= self._first_slot:
             return address, address + length
         seen = [self._pointers.get(at, at) for at in range(address, address + length)]

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.packets.packet import ALERT
-from drivers.sim.servos.drive import Drive
+from drivers.sim.servos.drive import Drive, speed_unit
 from drivers.sim.servos.drive_word import FeetechDrive, WordDrive
 from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM, XDrive
 from drivers.sim.servos.plant import Plant, Skin
@@ -21,6 +21,8 @@ TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""
 WATCHDOG_STEP_S = 0.02
 HEALTH_PERIOD_S = 0.1
+BOOT_S = 0.25
+"""How long a servo is deaf after a reboot."""
 
 
 def same_rate(first: int, second: int) -> bool:
@@ -47,7 +49,6 @@ class ServoState:
     baud : bit rate in its Baud Rate register; for a rate the model lacks the register keeps its initial value.
     position : Present Position at power-up, ticks; None = the middle of the range.
     skin : load on the shaft.
-    boot_s : how long it is deaf after a reboot.
 
     Attributes
     ----------
@@ -70,14 +71,13 @@ class ServoState:
         baud: int = 1_000_000,
         position: float | None = None,
         skin: Skin | None = None,
-        boot_s: float = 0.25,
     ) -> None:
         self.table = table = load_table(model, firmware)
         self.registers = Registers(table)
         self.registers.reset(0, table.size)
         self.eeprom_writes: Counter[str] = Counter()
         self.on_change: Callable[[], None] = lambda: None
-        self.boot_s, self.deaf_until = boot_s, now_s
+        self.deaf_until = now_s
         self.watchdog_ignored = self.forced_alert = self.shut_down = False
         self.eeprom_busy_s = 0.0
         self.last_instruction = LastInstruction(now_s)
@@ -90,25 +90,13 @@ class ServoState:
         self.registers.put("ID", device_id)
         self.force_baud(baud, self.baud)
         start = float(table.center if position is None else position)
-        self.plant = Plant(now_s, start, self._no_load_speed(), table.voltage / 10, skin or Skin())
-        self.drive = self._make_drive(now_s)
+        top_speed = (table.top_speed or table["Velocity Limit"].initial) * speed_unit(table)
+        self.plant = Plant(now_s, start, top_speed, table.voltage / 10, skin or Skin())
+        kind: type[Drive] = WordDrive
+        if "Goal Velocity" in table:
+            kind = XDrive if "Profile Velocity" in table else FeetechDrive
+        self.drive = kind(self.registers, self.plant, now_s)
         self._boot(now_s)
-
-    def _no_load_speed(self) -> float:
-        """Ticks/s."""
-        table = self.table
-        if table.top_speed:
-            speed = table["Present Speed"] if "Present Speed" in table else table["Present Velocity"]
-            return table.top_speed * speed.scale / table.rad_per_tick
-        limit = table["Velocity Limit"]
-        return limit.initial * limit.scale / table.rad_per_tick
-
-    def _make_drive(self, now_s: float) -> Drive:
-        """The motor control that fits the control table."""
-        if "Profile Velocity" in self.table:
-            return XDrive(self.registers, self.plant, now_s)
-        kind = FeetechDrive if "Goal Velocity" in self.table else WordDrive
-        return kind(self.registers, self.plant, now_s)
 
     # ------------------------------------------------------------ settings that the bus reads
     @property

@@ -115,7 +115,7 @@ class Line(ABC):
 
     @abstractmethod
     def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
-        """Do what a packet says; returns the replies."""
+        """Carry out a packet; returns the replies."""
 
     @abstractmethod
     def describe(self, now_s: float) -> list[dict[str, Any]]:

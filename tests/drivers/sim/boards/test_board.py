@@ -1,10 +1,10 @@
-"""drivers.sim.boards.rc: pulses that move to their targets."""
+"""drivers.sim.boards.board: brown-out, faults of answers, and pulses that move to their targets."""
 
 from __future__ import annotations
 
 import pytest
 
-from drivers.sim.boards.rc import RcChannel
+from drivers.sim.boards.board import RcChannel
 
 
 def at(position: float) -> RcChannel:
