@@ -6,7 +6,6 @@ import os
 import select
 import socket
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -14,12 +13,10 @@ from drivers.sim.serving.control import Commands, ControlSocket, Lines
 from drivers.sim.serving.ports import Link, make_port
 from drivers.sim.servos.simulators import ids_and_models
 from drivers.sim.wire.faults import Fault
-from drivers.sim.wire.line import Line
+from drivers.sim.wire.line import Line, ReplyQueue
 from drivers.sim.wire.simulator import make_line
-from drivers.sim.wire.timing import Timed, WireTiming, without_timing
+from drivers.sim.wire.timing import WireTiming
 
-PAUSE_S = 0.1
-"""A packet that is not complete after this pause is given up."""
 EARLY_S = 80e-6
 """How long before bytes are due the server wakes: the system wakes it about this much late."""
 
@@ -64,7 +61,7 @@ class PortServer:
         commands: str | os.PathLike[str] | None = None,
         on_line: Callable[[str], object] | None = None,
     ) -> None:
-        self.line, self.baud = line, baud
+        self.line = line
         self.tap: Callable[[bool, bytes], None] | None = None
         self._socket = ControlSocket(commands, Commands(line).handle) if commands else None
         try:
@@ -73,10 +70,10 @@ class PortServer:
             self._close_socket()
             raise
         self._link = self.port.path if "://" in self.port.path else link
-        self._timing = WireTiming(latency_s) if wire else None
+        self._wire = wire
+        self._queue = ReplyQueue(line, baud, WireTiming(latency_s) if wire else None)
         self.on_line, self._lines = on_line, Lines()
-        self._queue: deque[Timed] = deque()
-        self._read_s = self._replied_s = 0.0
+        self._replied_s = 0.0
         self._prompt = False
         line.on_unplug = self._unplug
 
@@ -116,15 +113,12 @@ class PortServer:
 
     def _timeout(self) -> float | None:
         """Seconds until something is due; None = nothing is."""
-        due = self.line.faults.next_change_s
-        if self._queue:
-            due = min(due, self._queue[0][0] - EARLY_S)
-        if self.line.reader.pending:
-            due = min(due, self._read_s + PAUSE_S)
-        now_s = time.monotonic()
+        now_s, due_s = time.monotonic(), self._queue.due_s
+        if self._queue.replies:
+            due_s = min(due_s, self._queue.replies[0][0] - EARLY_S)
         if self._prompt and now_s - self._replied_s < POLL_S:
-            return min(POLL_STEP_S, max(due - now_s, 0.0))
-        return None if due == float("inf") else max(due - now_s, 0.0)
+            return min(POLL_STEP_S, max(due_s - now_s, 0.0))
+        return None if due_s == float("inf") else max(due_s - now_s, 0.0)
 
     def _receive(self) -> None:
         data = self.port.read()
@@ -132,57 +126,32 @@ class PortServer:
             return
         if self.tap is not None:
             self.tap(True, data)
-        now_s = self._read_s = time.monotonic()
+        now_s = time.monotonic()
         if self._replied_s:  # the first since the last reply
-            self._prompt = self._timing is not None and now_s - self._replied_s < POLL_S
+            self._prompt = self._wire and now_s - self._replied_s < POLL_S
             self._replied_s = 0.0
-        line = self.line
-        line.set_line_baud(self.port.baud())
-        if line.echo:
-            self._send([(now_s, data)])
-        for packet in line.reader.feed(data):
-            if self._timing is None:
-                self._send(without_timing(line.handle(packet, now_s), now_s))
-                continue
-            baud = line.line_baud or self.baud
-            at_s = self._timing.arrival(now_s, line.size(packet), baud)
-            self._send(self._timing.deliveries(line.handle(packet, at_s), baud))
-
-    def _send(self, timed: list[Timed]) -> None:
-        """Write what is due, keep the rest in order."""
-        for time_s, data in self.line.heard(timed):
-            if self._queue or time_s > time.monotonic():
-                self._queue.append((time_s, data))
-            else:
-                self._write(data)
-
-    def _write(self, data: bytes) -> None:
-        if self.port.is_open:
-            self.port.write(data)
-            if self.tap is not None:
-                self.tap(False, data)
+        self.line.set_line_baud(self.port.baud())
+        self._queue.receive(data, now_s)
 
     def _do_due(self) -> None:
         """Send replies, change faults and give up packets whose time has come."""
-        now_s = time.monotonic()
-        while self._queue and self._queue[0][0] - EARLY_S <= now_s:
-            while now_s < self._queue[0][0]:  # so little that the system would oversleep it
+        now_s, replies = time.monotonic(), self._queue.replies
+        while replies and replies[0][0] - EARLY_S <= now_s:
+            while now_s < replies[0][0]:  # so little that the system would oversleep it
                 now_s = time.monotonic()
-            self._write(self._queue.popleft()[1])
+            data = replies.popleft()[1]
+            if self.port.is_open:
+                self.port.write(data)
+                if self.tap is not None:
+                    self.tap(False, data)
             self._replied_s = now_s
-        if self.line.reader.pending and now_s >= self._read_s + PAUSE_S:
-            for packet in self.line.reader.flush():
-                self._send(without_timing(self.line.handle(packet, now_s), now_s))
-        if now_s >= self.line.faults.next_change_s:
-            with self.line.lock:
-                self.line.faults.advance(now_s)
+        self._queue.advance(now_s)
 
     def _unplug(self, fault: Fault, begins: bool) -> None:
         """Close the port and drop all pending bytes, or open it again, perhaps under another name."""
         if begins:
             self.port.close()
             self._queue.clear()
-            self.line.reader.take_pending()
         elif not self.port.is_open:
             self.port.open(fault.alias or self._link)
 

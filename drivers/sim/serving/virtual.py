@@ -7,21 +7,18 @@ deadline, so nothing ever sleeps, and the same run gives the same figures on eve
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import PortLost, PortMissing
 from drivers.core.registry import open_bus
-from drivers.sim.serving.serve import PAUSE_S
 from drivers.sim.serving.simulated import ServoView
 from drivers.sim.servos.chain import Chain
 from drivers.sim.wire.faults import Fault
-from drivers.sim.wire.line import Line
+from drivers.sim.wire.line import Line, ReplyQueue
 from drivers.sim.wire.simulator import make_line
-from drivers.sim.wire.timing import Timed, WireTiming
+from drivers.sim.wire.timing import WireTiming
 
 
 class VirtualClock:
@@ -66,9 +63,7 @@ class VirtualLink:
         self.clock, self.sleep = clock, clock.sleep
         self.tap: Callable[[bool, bytes], None] | None = None
         self._line = line
-        self._timing = WireTiming(latency_s)
-        self._queue: deque[Timed] = deque()
-        self._gives_up_s = math.inf
+        self._queue = ReplyQueue(line, baud, WireTiming(latency_s))
         self._open = self._gone = False
         line.on_unplug = self._unplug
 
@@ -79,12 +74,12 @@ class VirtualLink:
 
     def open(self) -> None:
         """Take it; raises PortMissing while it is unplugged."""
-        self._advance()
+        self._queue.advance(self.clock())
         if self._gone:
             raise PortMissing("no port virtual: it is unplugged", port=self.path)
         self._open = True
         self._line.set_line_baud(self.baud)
-        self._queue.clear()
+        self._queue.replies.clear()
 
     def close(self) -> None:
         """Give it back."""
@@ -92,16 +87,11 @@ class VirtualLink:
 
     def write(self, data: bytes) -> None:
         """Send; the far end acts when the last byte of a packet has arrived."""
-        self._advance()
+        self._queue.advance(self.clock())
         self._check()
-        now_s = self.clock()
         if self.tap is not None:
             self.tap(True, data)
-        if self._line.echo:
-            self._queue.append((now_s, data))
-        for packet in self._line.reader.feed(data):
-            self._handle(packet, now_s)
-        self._gives_up_s = now_s + PAUSE_S if self._line.reader.pending else math.inf
+        self._queue.receive(data, self.clock())
 
     def put(self, data: bytes) -> int:
         """Send; there is always room."""
@@ -113,9 +103,9 @@ class VirtualLink:
         self._check()
         end_s = max(deadline_s, self.clock())
         while True:
-            due_s = min(self._due(), end_s)
+            due_s = min(self._queue.due_s, end_s)
             self.clock.wait_until(due_s)
-            self._advance()
+            self._queue.advance(self.clock())
             self._check()
             data = self._arrived()
             if data or due_s >= end_s:
@@ -127,32 +117,13 @@ class VirtualLink:
         self._check()
         return len(self._arrived())
 
-    def _handle(self, packet: Any, now_s: float) -> None:
-        at_s = self._timing.arrival(now_s, self._line.size(packet), self.baud)
-        self._queue += self._line.heard(self._timing.deliveries(self._line.handle(packet, at_s), self.baud))
-
-    def _due(self) -> float:
-        """When the next thing happens."""
-        arrival_s = self._queue[0][0] if self._queue else math.inf
-        return min(arrival_s, self._line.faults.next_change_s, self._gives_up_s)
-
     def _arrived(self) -> bytes:
-        data = b""
-        while self._queue and self._queue[0][0] <= self.clock():
-            data += self._queue.popleft()[1]
+        data, replies = b"", self._queue.replies
+        while replies and replies[0][0] <= self.clock():
+            data += replies.popleft()[1]
         if data and self.tap is not None:
             self.tap(False, data)
         return data
-
-    def _advance(self) -> None:
-        """Begin and end faults that are due, and give up packets whose end does not come."""
-        if self.clock() >= self._line.faults.next_change_s:
-            with self._line.lock:
-                self._line.faults.advance(self.clock())
-        if self.clock() >= self._gives_up_s:
-            self._gives_up_s = math.inf
-            for packet in self._line.reader.flush():
-                self._handle(packet, self.clock())
 
     def _check(self) -> None:
         if self._gone or not self._open:
@@ -161,7 +132,6 @@ class VirtualLink:
     def _unplug(self, fault: Fault, begins: bool) -> None:
         self._gone = begins
         self._queue.clear()
-        self._line.reader.take_pending()
 
 
 class VirtualBus:

@@ -133,7 +133,7 @@ class SimulatedServo(ServoState):
     def _store(self, item: Item, value: int, now_s: float) -> None:
         if item.name == "Torque Enable" and value and self.shut_down and not self._recover():
             return
-        self.registers.put(item.name, value)
+        self.registers.store(item, value)
         if item.address < self.table.eeprom_end:
             self.eeprom_writes[item.name] += 1
             self.deaf_until = max(self.deaf_until, now_s + self.eeprom_busy_s)

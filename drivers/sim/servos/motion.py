@@ -74,7 +74,8 @@ class Trajectory:
         """Motion at a time; before the start it is the start's."""
         t = max(now_s - self.start_s, 0.0)
         if t >= self.duration:
-            return Motion(self.end + self._end_velocity * (t - self.duration), self._end_velocity)
+            velocity = self._end_velocity
+            return Motion(self.end + velocity * (t - self.duration), velocity, 0.0)
         begin, position, velocity, acceleration = next(piece for piece in reversed(self._pieces) if t >= piece[0])
         t -= begin
         return Motion(position + (velocity + 0.5 * acceleration * t) * t, velocity + acceleration * t, acceleration)

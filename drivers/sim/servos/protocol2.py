@@ -100,16 +100,16 @@ class Protocol2(Protocol):
             servo = self.find(device_id, now_s)
             reply = None
             if servo is not None and servo.status_level:
-                reply = self.status(servo, device_id, *servo.read(address, length, now_s))
-            if reply is None:
-                if self.chain_stop:
-                    break
-                continue
-            others = [
-                self.status(other, device_id, *other.read(address, length, now_s))
-                for other in self.duplicates.get(device_id, ())
-            ]
-            replies += collide([reply, *(other for other in others if other)])
+                error, data = servo.read(address, length, now_s)
+                reply = self.status(servo, device_id, error, data)
+                if reply and device_id in self.duplicates:
+                    twins = self.duplicates[device_id]
+                    others = [self.status(twin, device_id, *twin.read(address, length, now_s)) for twin in twins]
+                    (reply,) = collide([reply, *(other for other in others if other)])
+            if reply:
+                replies.append(reply)
+            elif self.chain_stop:
+                break
         return replies
 
     def _read_fast(self, requests: list[ReadRequest], now_s: float) -> list[Reply]:

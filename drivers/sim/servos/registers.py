@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 
 from drivers.packets.packet import ErrorNumber
-from drivers.tables.tables import ControlTable, Item, from_magnitude
+from drivers.tables.tables import ControlTable, Item, from_magnitude, to_magnitude
 
 EXTENDED_RANGE = 1_048_575
 """Goal Position in modes 4 and 5: 256 turns either way (e-Manual, Goal Position)."""
@@ -99,12 +99,20 @@ class Registers:
             return layout
         changes = []
         for item in layout:
-            value = item.decode(data[item.address - address :])
+            cell, _, sign_bit = self._cells[item.name]
+            value = cell.unpack_from(data, item.address - address)[0]
+            if sign_bit is not None:
+                value = from_magnitude(value, sign_bit)
             error = self._refusal(item, value)
             if error:
                 return error
             changes.append((item, value))
         return changes
+
+    def store(self, item: Item, value: int) -> None:
+        """Put a value that `parse` allowed."""
+        cell, address, sign_bit = self._cells[item.name]
+        cell.pack_into(self.memory, address, value if sign_bit is None else to_magnitude(value, sign_bit))
 
     def _layout(self, address: int, length: int) -> tuple[Item, ...] | ErrorNumber:
         """The items that a write of this size at this address covers; cached, as hosts repeat themselves."""

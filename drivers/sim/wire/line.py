@@ -1,15 +1,19 @@
-"""Base class of everything at the far end of a simulated wire: bytes in, replies out, the time given by the caller."""
+"""Base class of devices at the far end of a simulated wire, and the queue of their replies to the host."""
 
 from __future__ import annotations
 
 import math
 import threading
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from drivers.sim.wire.faults import KINDS, Fault, FaultSet
-from drivers.sim.wire.timing import Reply, Timed
+from drivers.sim.wire.timing import Reply, Timed, WireTiming, without_timing
+
+PAUSE_S = 0.1
+"""A packet that is not complete after this pause is given up."""
 
 
 class Reader(Protocol):
@@ -159,3 +163,60 @@ class Line(ABC):
             self.burst_s = fault.value if begins else 0.0
         elif fault.kind == "unplug":
             self.on_unplug(fault, begins)
+
+
+class ReplyQueue:
+    """Passes bytes from the host to a line at its bit rate, and keeps the replies until the host can read them.
+
+    Parameters
+    ----------
+    line : the line.
+    baud : bit rate while the line knows none.
+    timing : time on the wire; None: bytes take no time.
+
+    Attributes
+    ----------
+    replies : (time, bytes) at which the host can read them, in order.
+    """
+
+    def __init__(self, line: Line, baud: int, timing: WireTiming | None) -> None:
+        self.replies: deque[Timed] = deque()
+        self._line, self._baud, self._timing = line, baud, timing
+        self._gives_up_s = math.inf
+
+    @property
+    def due_s(self) -> float:
+        """When the next reply is due, a fault begins or ends, or a packet is given up; infinity: nothing is due."""
+        reply_s = self.replies[0][0] if self.replies else math.inf
+        return min(reply_s, self._line.faults.next_change_s, self._gives_up_s)
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Bytes from the host."""
+        if self._line.echo:
+            self.replies += self._line.heard([(now_s, data)])
+        self._handle(self._line.reader.feed(data), now_s)
+        self._gives_up_s = now_s + PAUSE_S if self._line.reader.pending else math.inf
+
+    def advance(self, now_s: float) -> None:
+        """Begin and end faults that are due, and give up a packet whose end does not come."""
+        if now_s >= self._line.faults.next_change_s:
+            with self._line.lock:
+                self._line.faults.advance(now_s)
+        if now_s >= self._gives_up_s:
+            self._gives_up_s = math.inf
+            self._handle(self._line.reader.flush(), now_s)
+
+    def clear(self) -> None:
+        """Drop all replies, and the bytes of an incomplete packet."""
+        self.replies.clear()
+        self._line.reader.take_pending()
+
+    def _handle(self, packets: list[Any], now_s: float) -> None:
+        line, timing = self._line, self._timing
+        for packet in packets:
+            if timing is None:
+                self.replies += line.heard(without_timing(line.handle(packet, now_s), now_s))
+                continue
+            baud = line.line_baud or self._baud
+            at_s = timing.arrival(now_s, line.size(packet), baud)
+            self.replies += line.heard(timing.deliveries(line.handle(packet, at_s), baud))

@@ -15,10 +15,11 @@ import serial
 from drivers.base.errors import DriverError
 from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusReader, encode_instruction
-from drivers.sim.serving.serve import PAUSE_S, PortServer, serve_dynamixel
+from drivers.sim.serving.serve import PortServer, serve_dynamixel
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.simulators import ids_and_models
+from drivers.sim.wire.line import PAUSE_S
 
 
 def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
@@ -85,8 +86,7 @@ def test_the_loop_sleeps_until_something_is_due():
         chain.faults.add(["mute:1:at=60s"], time.monotonic())
         assert 59 < server._timeout() <= 60
         chain.faults.clear(None, 0.0)
-        chain.reader.feed(b"\xff\xff\xfd\x00")
-        server._read_s = time.monotonic()
+        server._queue.receive(b"\xff\xff\xfd\x00", time.monotonic())
         assert 0 < server._timeout() <= PAUSE_S
     finally:
         server.port.close()

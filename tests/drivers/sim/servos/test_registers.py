@@ -81,7 +81,7 @@ def test_allowed_writes(registers: Registers, address: int, data: bytes, changes
     parsed = registers.parse(address, data)
     assert {item.name: value for item, value in parsed} == changes
     for item, value in parsed:
-        registers.put(item.name, value)
+        registers.store(item, value)
     assert registers.read(address, len(data)) == data
 
 
@@ -143,7 +143,7 @@ def test_indirect_data_shows_and_writes_what_its_pointers_spell(registers: Regis
 
 def test_unmapped_indirect_data_is_plain_memory(registers: Registers):
     for item, value in registers.parse(210, b"\x11\x22"):
-        registers.put(item.name, value)
+        registers.store(item, value)
     assert registers.read(210, 2) == b"\x11\x22"
     assert registers.span(210, 2) == (210, 212)
 
@@ -176,6 +176,6 @@ def test_magnitudes_and_high_bytes_first(model: str, name: str, data: str, value
     item = made.table[name]
     ((parsed, number),) = made.parse(item.address, bytes.fromhex(data))
     assert (parsed.name, number) == (name, value)
-    made.put(parsed.name, number)
+    made.store(parsed, number)
     assert made.get(name) == value
     assert made.read(item.address, 2) == bytes.fromhex(data)
