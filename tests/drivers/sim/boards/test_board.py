@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.sim.boards.board import RcChannel
+from drivers.base.errors import DriverError
+from drivers.sim.boards.board import BROWN_OUT_V, RcChannel
+from drivers.sim.boards.ssc32 import Ssc32
 
 
 def at(position: float) -> RcChannel:
@@ -62,3 +64,45 @@ def test_a_move_in_a_given_time():
     assert other.position(0.0) == 1500.0
     other.go_in(0.0, 1.0, 9.0)
     assert other.position(1.0) == 0.0
+
+
+def test_what_is_described_is_in_microseconds():
+    channel = at(6000.0)
+    channel.go(8000.0, 0.0, speed=1000.0)
+    assert channel.describe(3, 1.0, 0.25) == {"id": 3, "pulse_us": 1750.0, "target_us": 2000.0}
+
+
+def ask(board: Ssc32, line: bytes, now_s: float) -> bytes:
+    return b"".join(reply.data for reply in board.feed(line, now_s))
+
+
+def test_a_board_without_supply_is_deaf_and_starts_without_pulses():
+    board = Ssc32()
+    board.feed(b"#1P1500\r", 0.0)
+    board.faults.add([f"volts:*:{BROWN_OUT_V}"], 1.0)
+    assert ask(board, b"QP1\r", 1.0) == bytes((150,)), "just enough"
+    board.faults.add(["volts:*:3.9:for=1s"], 2.0)
+    assert ask(board, b"QP1\r#2P1000\r", 2.5) == b""
+    assert ask(board, b"QP1\rQP2\r", 3.5) == b"\0\0"
+
+
+def test_a_mute_board_keeps_its_pulses_until_both_faults_have_ended():
+    board = Ssc32(faults=("mute:*", "mute:1"))
+    board.feed(b"#1P1500\r", 0.0)
+    assert board.channels[1].target == 0
+    board.faults.clear("mute", 1.0)
+    board.feed(b"#1P1500\r", 1.0)
+    board.faults.add(["mute:*:for=1s"], 2.0)
+    assert ask(board, b"QP1\r", 2.5) == b""
+    assert ask(board, b"QP1\r", 3.5) == bytes((150,))
+
+
+def test_answers_are_lost_late_or_cut():
+    board = Ssc32(faults=("late:*:20ms", "short:2:0", "silent:3"))
+    replies = board.feed(b"#1P1500\rQP1\rQP2\rQP3\r", 0.0)
+    assert [(reply.data, reply.servo, reply.late_s) for reply in replies] == [
+        (bytes((150,)), None, 0.02),
+        (b"", None, 0.02),
+    ]
+    with pytest.raises(DriverError, match="only drop, echo"):
+        board.faults.add(["crc:1"], 0.0)
