@@ -92,3 +92,51 @@ def test_stop_and_hold():
     assert tuple(plan.at(9.0)) == (plan.end, 0.0, 0.0)
     assert tuple(hold(5.0, 7.0).at(0.0)) == (7.0, 0.0, 0.0)
     assert tuple(plan_stop(0.0, Motion(3.0), 200.0).at(1.0)) == (3.0, 0.0, 0.0)
+
+
+def test_profiles_have_the_numbers_of_moving_status():
+    assert (Profile.STEP, Profile.RECTANGULAR, Profile.TRIANGULAR, Profile.TRAPEZOIDAL) == (0, 1, 2, 3)
+
+
+@pytest.mark.parametrize(
+    ("goal", "profile", "shown"), [(90.0, 1, 1), (90.0, 0, 0), (90.0, 3, 2), (1000.0, 3, 3), (1000.0, 1, 1)]
+)
+def test_only_a_trapezoid_without_a_level_is_reported_as_a_triangle(goal: float, profile: int, shown: int):
+    assert plan_move(0.0, Motion(0.0), goal, 500.0, 1000.0, profile).profile == shown
+
+
+def test_a_move_ends_at_its_duration_exactly():
+    plan = plan_move(2.0, Motion(0.0), 1000.0, 500.0, 1000.0)
+    assert (plan.moving(2.0), plan.moving(4.49), plan.moving(4.5)) == (True, True, False)
+    assert plan.at(1.0) == Motion(0.0, 0.0, 1000.0), "before the start it is the start's"
+    assert plan.end == 1000.0
+
+
+def test_a_move_that_ends_where_the_shaft_would_stop_only_brakes():
+    plan = plan_move(0.0, Motion(0.0, 400.0), 80.0, 500.0, 1000.0)
+    assert plan.duration == pytest.approx(0.4)
+    assert plan.at(0.2) == pytest.approx((60.0, 200.0, -1000.0))
+    back = plan_move(0.0, Motion(0.0, -400.0), -80.0, 500.0, 1000.0)
+    assert back.at(0.2) == pytest.approx((-60.0, -200.0, 1000.0))
+
+
+def test_no_move_takes_no_time():
+    plan = plan_move(0.0, Motion(5.0), 5.0, 500.0, 1000.0)
+    assert (plan.duration, plan.at(0.0)) == (0.0, Motion(5.0))
+
+
+def test_a_move_from_above_the_top_speed_slows_down_to_it():
+    plan = plan_move(0.0, Motion(0.0, 1000.0), 5000.0, 500.0, 1000.0)
+    assert plan.at(0.25).acceleration == -1000.0
+    assert plan.at(1.0).velocity == 500.0
+    assert plan.at(0.5).position == pytest.approx(375.0)
+
+
+def test_the_ramps_of_a_timed_move_start_at_the_present_velocity():
+    plan = plan_timed(1.0, Motion(100.0, 50.0), 600.0, 2.0, 0.5)
+    speed = (500.0 - 0.5 * 50.0 * 0.5) / 1.5
+    assert plan.at(1.0).acceleration == pytest.approx((speed - 50.0) / 0.5)
+    assert plan.at(2.0) == pytest.approx((100.0 + (50.0 + speed) / 4 + speed * 0.5, speed, 0.0))
+    assert plan.at(2.75).acceleration == pytest.approx(-speed / 0.5)
+    jump = plan_timed(1.0, Motion(100.0, 50.0), 600.0, 2.0)
+    assert jump.at(1.0) == Motion(100.0, 250.0)

@@ -85,3 +85,31 @@ def test_placing_moves_even_a_jammed_shaft():
     limp.jam(0.0, True)
     limp.place(1.0, 100.0)
     assert limp.motion(2.0).position == 100.0
+
+
+def test_the_skin_by_default_pulls_back_and_rubs():
+    motor = Plant(0.0, 2048.0, 1000.0, 5.0, Skin())
+    motor.powered = True
+    still = Motion(3048.0)
+    assert motor.load(still, still) == pytest.approx(0.04)
+    moving = Motion(2048.0, 5.0, 1e4)
+    assert motor.load(moving, moving) == pytest.approx(0.012 + 0.02)
+    assert motor.load(Motion(-1e6), AT_REST) == -1.0
+
+
+def test_the_motor_takes_thirty_milliseconds_to_its_top_speed():
+    assert plant().top_acceleration == pytest.approx(1000.0 / 0.03)
+
+
+def test_a_shaft_that_is_placed_stays_there_and_starts_cold():
+    motor = plant()
+    motor.place(1.0, 100.0)
+    assert (motor.motion(5.0), motor.jammed_at, motor.temperature_c) == (Motion(100.0), None, 30.0)
+
+
+def test_heat_is_counted_from_power_up():
+    motor = Plant(1000.0, 0.0, 1000.0, 5.0, Skin())
+    motor.heat(1000.0, 1.0)
+    assert motor.temperature_c == 30.0
+    motor.heat(1200.0, 1.0)
+    assert motor.temperature_c == pytest.approx(30 + 60 * (1 - math.exp(-1)))

@@ -305,3 +305,31 @@ def test_a_feetech_child_process_answers_bare_bytes():
     ):
         port.write(bytes.fromhex("FF FF FE 06 82 38 02 01 02 3C"))
         assert Reader1().feed(port.read(16)) == [Packet1(1, 0, word(2048)), Packet1(2, 0, word(2048))]
+
+
+@pytest.mark.parametrize(("level", "answered"), [(0, False), (1, True)])
+def test_group_reads_are_answered_from_level_1_on(level: int, answered: bool):
+    bus = chain("mx1-28")
+    bus.servo(1).registers.put("Status Return Level", level)
+    assert bool(ask(bus, BROADCAST_ID, I.BULK_READ, "00 02 01 24")) is answered
+
+
+def test_broken_or_addressed_group_reads_are_not_answered():
+    bus = chain("mx1-28")
+    assert ask(bus, BROADCAST_ID, I.BULK_READ, "00 02 01 24 02") == []
+    assert ask(bus, 1, I.BULK_READ, "00 02 01 24") == []
+    sts = chain("sts3215")
+    assert len(ask(sts, BROADCAST_ID, I.SYNC_READ, "38 02 01 02")) == 2
+    assert ask(sts, 1, I.SYNC_READ, "38 02 01") == []
+    assert ask(sts, BROADCAST_ID, I.SYNC_READ, "38") == []
+
+
+def test_chain_stop_ends_a_group_read_of_either_maker():
+    for model, code, params in (("mx1-28", I.BULK_READ, "00 02 01 24 02 09 24 02 03 24"),
+                                ("sts3215", I.SYNC_READ, "38 02 01 09 03")):  # fmt: skip
+        assert [packet.id for packet in ask(chain(model), BROADCAST_ID, code, params)] == [1, 3]
+        assert [packet.id for packet in ask(chain(model, faults=("chain-stop",)), BROADCAST_ID, code, params)] == [1]
+
+
+def test_an_alert_is_reported_as_input_voltage():
+    assert ask(chain(faults=("alert:1",)), 1, I.PING) == [Packet1(1, Error1.INPUT_VOLTAGE, b"")]

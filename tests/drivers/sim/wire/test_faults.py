@@ -187,3 +187,65 @@ def test_a_bus_may_have_few_kinds_of_fault():
     with pytest.raises(DriverError, match=r"'mute:1': a bus of this kind has only echo, unplug"):
         faults.add(["unplug", "mute:1"], 0.0)
     assert [fault.kind for fault in faults.active] == ["echo"]
+
+
+def test_ids_are_inclusive_and_end_at_252():
+    assert parse_fault("mute:0,3-5,252").ids == {0, 3, 4, 5, 252}
+    for spec in ("mute:253", "mute:250-253", "mute:"):
+        with pytest.raises(DriverError):
+            parse_fault(spec)
+
+
+@pytest.mark.parametrize("spec", ["crc:7:p=0", "crc:7:p=1", "crc:7:every=1", "crc:7:at=0", "noise:1:0"])
+def test_values_at_their_ends_are_allowed(spec: str):
+    assert parse_fault(spec).spec == spec
+
+
+def test_a_wrong_option_among_good_ones_is_named():
+    with pytest.raises(DriverError, match=r"'p=2' is out of range"):
+        parse_fault("crc:7:every=2:p=2:count=1")
+
+
+@pytest.mark.parametrize(
+    ("kind", "scope", "default"),
+    [("late", "reply", 0.045), ("short", "reply", 1), ("noise", "reply", 5), ("hw", "servo", 0x20),
+     ("eeprom-busy", "servo", 0.02), ("slow-reader", "bus", 0.2)],
+)  # fmt: skip
+def test_defaults_of_the_documentation(kind: str, scope: str, default: float):
+    assert (KINDS[kind].scope, parse_fault(kind if scope == "bus" else f"{kind}:1").value) == (scope, default)
+
+
+def test_a_chance_is_taken_only_where_it_is_below_one():
+    rng = random.Random(1)
+    before = rng.getstate()
+    assert all(ReplyFault(parse_fault("drop:*"), rng).hits(1) for _ in range(9))
+    assert rng.getstate() == before
+    assert not any(ReplyFault(parse_fault("drop:*:p=0"), rng).hits(1) for _ in range(99))
+
+
+def test_a_hit_that_chance_spares_is_not_counted():
+    fault = ReplyFault(parse_fault("drop:*:p=0.5:count=3"), random.Random(3))
+    assert sum(fault.hits(1) for _ in range(99)) == 3
+
+
+def test_faults_due_at_one_moment_change_in_the_order_they_were_set():
+    faults, seen = recorded("mute:1:at=1s", "echo:at=1s", "stall:1:at=0.5s")
+    faults.advance(1.0)
+    assert [kind for kind, _, _ in seen] == ["stall", "mute", "echo"]
+
+
+def test_equal_faults_end_one_by_one():
+    faults, seen = recorded("crc:1:for=1s", "crc:1")
+    assert len(faults.reply_faults) == 2
+    faults.advance(1.0)
+    assert (len(faults.reply_faults), len(faults.active)) == (1, 1)
+    assert seen[-1] == ("crc", False, 1.0)
+
+
+def test_the_same_seed_gives_the_same_noise():
+    def noise(seed: int) -> bytes | None:
+        faults = FaultSet(lambda *change: None, seed)
+        faults.add(["noise:*:8"], 0.0)
+        return faults.corrupt(b"", 1)[0]
+
+    assert noise(4) == noise(4) != noise(5)

@@ -95,3 +95,31 @@ def test_one_reply_passes():
 def test_a_wire_that_idles_high_carries_the_bitwise_and():
     mixed = collide([Reply(b"\xff\xf0\x55", None, 0.1), Reply(b"\xff\x0f\x0f\x12", None)])
     assert mixed == [Reply(b"\xff\x00\x05\x12", None, 0.1)]
+
+
+def test_bytes_reach_the_host_together_within_half_a_millisecond_of_the_first():
+    timing = WireTiming()
+    timing.arrival(0.0, 0, 1_000_000)
+    out = timing.deliveries([Reply(b"a", None), Reply(b"b", None, 0.0004), Reply(b"c", None, 0.0002)], 1_000_000)
+    assert [data for _, data in out] == [b"ab", b"c"]
+    assert [time for time, _ in out] == pytest.approx([0.00042, 0.00063])
+
+
+def test_the_return_delay_comes_before_the_bytes():
+    timing = WireTiming()
+    timing.arrival(2.0, 10, 100_000)
+    out = timing.deliveries([Reply(b"abc", SimulatedServo(1))], 100_000)
+    assert out == [(pytest.approx(2.001 + 500e-6 + 3 * 10 / 100_000), b"abc")]
+
+
+def test_full_usb_packets_go_at_once():
+    timing = WireTiming(0.016)
+    timing.arrival(0.0, 0, 1_000_000)
+    out = timing.deliveries([Reply(b"x" * 62, None), Reply(b"y" * 125, None)], 1_000_000)
+    assert [(len(data), time) for time, data in out] == [
+        (62, pytest.approx(62e-5)),
+        (62, pytest.approx(187e-5)),
+        (62, pytest.approx(187e-5)),
+        (1, pytest.approx(187e-5 + 0.016)),
+    ]
+    assert WireTiming(0.016).deliveries([], 1_000_000) == []
