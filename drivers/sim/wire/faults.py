@@ -285,7 +285,7 @@ class FaultSet:
 
     def advance(self, now_s: float) -> None:
         """Begin and end what is due, each at its own time."""
-        while self.next_change_s <= now_s:
+        while self._due and self._due[0][0] <= now_s:
             time_s, _, begins, fault = self._due.pop(0)
             (self._begin if begins else self._end)(fault, time_s)
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from drivers.base.errors import DriverError
+from drivers.base.options import entries
 from drivers.sim.boards.board import BROWN_OUT_V, RcChannel
 from drivers.sim.boards.ssc32 import Ssc32
+from drivers.sim.wire.simulator import simulator_of
 
 
 def at(position: float) -> RcChannel:
@@ -106,3 +108,19 @@ def test_answers_are_lost_late_or_cut():
     ]
     with pytest.raises(DriverError, match="only drop, echo"):
         board.faults.add(["crc:1"], 0.0)
+
+
+def test_a_board_knows_the_faults_of_its_wire():
+    board, seen = Ssc32(), []
+    board.on_unplug = lambda fault, begins: seen.append(begins)
+    board.faults.add(["echo", "slow-reader:1s", "unplug:for=1s"], 0.0)
+    assert (board.echo, board.burst_s) == (True, 1.0)
+    board.faults.advance(2.0)
+    assert seen == [True, False]
+
+
+@pytest.mark.parametrize("kind", ["dynamixel", "feetech", "maestro", "omote", "ssc32", "text"])
+def test_no_bit_rate_is_below_300(kind: str):
+    (baud,) = (entry for entry in entries(simulator_of(kind).options) if entry.name == "baud")
+    assert baud.option.at_least == 300
+    assert baud.default == (1_000_000 if kind in ("dynamixel", "feetech") else 115_200)

@@ -5,8 +5,11 @@ from __future__ import annotations
 import pytest
 
 from drivers.omote.protocol import checksum
-from drivers.sim.boards.linehead import MAX_LINE, SILENCE_S, SIMULATOR, HeadOptions, LineHead
+from drivers.sim.boards.linehead import SILENCE_S, SIMULATOR, HeadOptions, LineHead
 from drivers.sim.wire.simulator import Setting
+
+MAX_LINE = 200
+"""What a head reports in its answer to HELLO."""
 
 
 def say(head: LineHead, data: bytes, now_s: float = 0.0) -> bytes:

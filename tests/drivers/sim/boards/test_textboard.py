@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from drivers.sim.boards.textboard import MAX_LINE, SIMULATOR, Message, TextBoard, TextOptions
+from drivers.sim.boards.textboard import SIMULATOR, Message, TextBoard, TextOptions
 from drivers.sim.wire.simulator import Setting
 
+MAX_LINE = 4096
 TEXTS = {"template": "#{ch}P{us}", "end": "T{time_ms}\r", "off": "#{ch}P0\r"}
 ASKED = TEXTS | {"query": "?{ch}\r", "answer": "{ch}={us}\r"}
 

@@ -108,3 +108,29 @@ def test_a_dead_socket_is_replaced_a_living_one_and_a_file_are_not(tmp_path: Pat
     assert path.read_text() == "data"
     with pytest.raises(PortError, match="cannot make the control socket"):
         ControlSocket(tmp_path / "none" / "s", str)
+
+
+def test_specs_with_spaces_are_quoted_and_words_may_be(chain: Chain):
+    commands = Commands(chain)
+    assert commands.handle("fault 'unplug:at=9s:as=/tmp/a b' mute:1") == "ok"
+    assert commands.handle("faults") == "ok mute:1"
+    chain.faults.advance(float("inf"))
+    assert commands.handle("faults") == "ok mute:1 'unplug:at=9s:as=/tmp/a b'"
+
+
+def test_all_faults_are_cleared_where_no_kind_is_named(chain: Chain):
+    commands = Commands(chain)
+    commands.handle("fault mute:1 echo crc:1:at=9s")
+    assert commands.handle("clear") == "ok"
+    assert (chain.faults.active, chain.faults.next_change_s) == ([], float("inf"))
+
+
+def test_the_hint_of_a_refused_fault_is_given(chain: Chain):
+    assert "kinds: alert, baud" in Commands(chain).handle("fault nonsense")
+
+
+def test_the_longest_line_is_kept():
+    lines = Lines()
+    assert lines.feed(b"x" * 4096) == []
+    assert lines.feed(b"\n") == ["x" * 4096]
+    assert lines.feed(b"\xff\n") == ["\ufffd"]

@@ -280,3 +280,76 @@ def test_what_nobody_reads_is_dropped_and_never_blocks():
     finally:
         os.close(client)
         port.close()
+
+
+# ---------------------------------------------------------------- the server's end
+@pytest.mark.parametrize("link", [*LINKS, ""])
+def test_a_port_as_its_server_sees_it(link: str) -> None:
+    port = make_port(link or None)
+    try:
+        assert port.is_open and len(port.descriptors) == 1
+        assert (port.read(), port.baud(), port.dropped) == (b"", None, 0)
+        client = SerialPort(port.path)
+        client.open()
+        try:
+            client.write(b"to")
+            received, end = b"", time.monotonic() + 20
+            while received != b"to":
+                assert time.monotonic() < end
+                received += port.read()
+            assert len(port.descriptors) == (2 if link else 1)
+            port.write(b"fro")
+            answer = b""
+            while answer != b"fro":
+                answer += client.read(end)
+            assert port.dropped == 0
+        finally:
+            client.close()
+    finally:
+        port.close()
+    assert (port.is_open, port.descriptors) == (False, [])
+    port.close()
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_bytes_without_a_client_are_lost_and_counted(link: str) -> None:
+    port = make_port(link)
+    port.write(b"abc")
+    port.write(b"d")
+    assert port.dropped == 4
+    port.close()
+
+
+def test_a_port_comes_back_under_another_name() -> None:
+    port = make_port("memory://one")
+    port.close()
+    port.open("memory://two")
+    assert port.path == "memory://two"
+    assert port.is_open
+    port.close()
+    port.open()
+    assert port.path == "memory://two"
+    port.close()
+
+
+def test_a_tcp_port_keeps_its_number_and_a_taken_one_is_said_to_be_busy() -> None:
+    port = make_port("socket://127.0.0.1:0")
+    path = port.path
+    assert path.startswith("socket://127.0.0.1:") and not path.endswith(":0")
+    port.close()
+    port.open()
+    assert port.path == path
+    port.close()
+    with pytest.raises(PortError, match="cannot listen") as error:
+        TcpPort("socket://192.0.2.1:1")
+    assert not isinstance(error.value, PortBusy)
+    assert error.value.hint == "for example --tcp 127.0.0.1:4000"
+
+
+def test_a_terminal_without_a_link_has_its_own_name(tmp_path: Path) -> None:
+    port = PtyPort()
+    assert port.path == port.device != ""
+    port.close()
+    port.open(tmp_path / "link")
+    assert port.path == str(tmp_path / "link")
+    port.close()

@@ -15,7 +15,8 @@ import serial
 from drivers.base.errors import DriverError
 from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusReader, encode_instruction
-from drivers.sim.serving.serve import PortServer, serve_dynamixel
+from drivers.port.serialport import SerialPort
+from drivers.sim.serving.serve import EARLY_S, POLL_STEP_S, PortServer, make_server, serve_dynamixel
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.simulators import ids_and_models
@@ -129,3 +130,80 @@ def test_a_port_that_cannot_be_made_leaves_no_socket(tmp_path: Path):
     with pytest.raises(DriverError, match="cannot make the link"):
         serve_dynamixel([1], link=tmp_path / "none" / "port", commands=tmp_path / "control")
     assert os.listdir(tmp_path) == []
+
+
+def test_what_passes_is_shown_and_any_byte_ends_a_server_without_commands():
+    server, seen = PortServer(Chain([SimulatedServo(1)]), "memory://shown"), []
+    server.tap = lambda sent, data: seen.append((sent, len(data)))
+    ours, theirs = socket.socketpair()
+    thread = threading.Thread(target=server.run, args=(ours,))
+    thread.start()
+    port = SerialPort("memory://shown")
+    port.open()
+    port.write(encode_instruction(1, I.PING))
+    data = b""
+    while len(data) < 14:
+        data += port.read(time.monotonic() + 20)
+    port.close()
+    theirs.sendall(b"x")
+    thread.join(30)
+    assert not thread.is_alive()
+    assert (seen[0], sum(size for sent, size in seen if not sent)) == ((True, 10), 14)
+    assert not server.port.is_open
+    server.close()
+    ours.close()
+    theirs.close()
+
+
+def test_commands_come_by_lines_until_their_end():
+    lines: list[str] = []
+    server = PortServer(Chain([SimulatedServo(1)]), "memory://lines", on_line=lines.append)
+    ours, theirs = socket.socketpair()
+    theirs.sendall(b"one\ntw")
+    theirs.sendall(b"o\nrest")
+    theirs.close()
+    server.run(ours)
+    assert lines == ["one", "two"]
+    ours.close()
+
+
+def test_an_unplug_drops_what_is_under_way_and_comes_back_where_it_was():
+    chain = Chain([SimulatedServo(1)])
+    server = PortServer(chain, "memory://plug")
+    server._queue.receive(encode_instruction(1, I.PING) + b"\xff\xff", 1.0)
+    assert server._queue.replies and chain.reader.pending
+    chain.faults.add(["unplug"], 1.0)
+    assert (server.port.is_open, list(server._queue.replies), chain.reader.pending) == (False, [], 0)
+    chain.faults.clear("unplug", 2.0)
+    assert (server.port.is_open, server.port.path) == (True, "memory://plug")
+    server.close()
+
+
+def test_a_server_wakes_early_for_a_reply_and_polls_after_it():
+    server = PortServer(Chain([SimulatedServo(1)]), "memory://early", wire=True)
+    now_s = time.monotonic()
+    server._queue.replies.append((now_s + 60.0, b"x"))
+    assert 59.0 < server._timeout() <= 60.0 - EARLY_S
+    server._queue.replies.clear()
+    server._prompt, server._replied_s = True, time.monotonic() + 60.0
+    assert server._timeout() == POLL_STEP_S
+    server._prompt = False
+    assert server._timeout() is None
+    server.close()
+
+
+def test_settings_of_a_server_reach_its_line_and_its_wire():
+    settings = {"servos": [(1, "xl320")], "link": "memory://made", "baud": 57_600, "faults": ["mute:1"], "seed": 5,
+                "wire": True, "latency_s": 0.016, "family": "dynamixel", "options": {}}  # fmt: skip
+    server = make_server(settings)
+    assert [servo.baud for servo in server.line.servos] == [57_600]
+    assert server._queue._timing.latency_s == 0.016
+    assert server._queue._baud == 57_600
+    assert server.on_line("faults") == "ok mute:1"
+    server.close()
+    server = make_server(settings | {"wire": False})
+    assert server._queue._timing is None
+    server.close()
+    with pytest.raises(DriverError, match="nonsense"):
+        make_server(settings | {"faults": ["nonsense"]})
+    make_server(settings).close()  # the name is free again
