@@ -16,7 +16,7 @@ from drivers.base.errors import DriverError
 from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusReader, encode_instruction
 from drivers.port.serialport import SerialPort
-from drivers.sim.serving.serve import EARLY_S, POLL_STEP_S, PortServer, make_server, serve_dynamixel
+from drivers.sim.serving.serve import EARLY_S, POLL_STEP_S, PortServer, make_server, serve, serve_dynamixel
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.simulators import ids_and_models
@@ -207,3 +207,38 @@ def test_settings_of_a_server_reach_its_line_and_its_wire():
     with pytest.raises(DriverError, match="nonsense"):
         make_server(settings | {"faults": ["nonsense"]})
     make_server(settings).close()  # the name is free again
+
+
+@pytest.mark.parametrize(("wire", "age_s", "polls"), [(True, 0.0, True), (False, 0.0, False), (True, 60.0, False)])
+def test_a_server_polls_for_a_client_that_writes_at_once_on_a_wire_that_takes_time(wire, age_s, polls):
+    server = PortServer(Chain([SimulatedServo(1)]), "memory://polls", wire=wire)
+    port = SerialPort("memory://polls")
+    port.open()
+    try:
+        port.write(b"\xff")
+        server._receive()  # accepts the client
+        end = time.monotonic() + 20
+        while not server.line.reader.pending and time.monotonic() < end:
+            # a reply in the future has just been sent, however slow this machine is
+            server._replied_s = time.monotonic() + 30.0 - age_s
+            server._receive()
+        assert server.line.reader.pending == 1
+        assert (server._prompt, server._replied_s) == (polls, 0.0)
+    finally:
+        port.close()
+        server.close()
+
+
+def test_the_server_is_shown_before_clients_may_come():
+    reading, writing = os.pipe()
+    os.close(writing)
+    calls: list[str] = []
+    serve(
+        Chain([SimulatedServo(1)]),
+        "memory://order",
+        lambda path: calls.append(path),
+        stop=reading,
+        on_server=lambda server: calls.append(type(server).__name__),
+    )
+    os.close(reading)
+    assert calls == ["PortServer", "memory://order"]

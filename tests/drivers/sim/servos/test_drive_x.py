@@ -161,3 +161,20 @@ def test_temperatures_beyond_the_register_are_cut():
         one.plant.forced_c = celsius
         one.sense(1.0)
         assert one.registers.get("Present Temperature") == shown & 0xFF
+
+
+def test_a_timed_move_with_ramps_is_judged_by_its_fastest_part():
+    one = drive(Drive_Mode=4, Profile_Velocity=100, Profile_Acceleration=50)
+    one.registers.put("Goal Position", 4000)
+    one.plan(0.0)
+    assert one.plant.trajectory.duration > 0.1
+    assert max(one.plant.motion(0.01 * k).velocity for k in range(60)) == pytest.approx(one.top_speed)
+    one.registers.put("Goal Position", 4050)
+    one.plan(9.0)
+    assert one.plant.trajectory.duration == pytest.approx(0.1)
+
+
+def test_the_homing_offset_is_in_both_positions():
+    one = drive(Homing_Offset=100)
+    one.sense(0.0)
+    assert one.registers.get("Present Position") == one.registers.get("Position Trajectory") == 2100
