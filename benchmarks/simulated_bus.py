@@ -17,7 +17,7 @@ from rich.table import Table
 
 from drivers.packets.packet import Instruction, encode_instruction
 from drivers.sim import SimulatedBus
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 
 console = Console()
@@ -61,7 +61,7 @@ def exchange_s(port: serial.Serial, ids: bytes) -> float:
 def answer_times(rounds: int = 400) -> Table:
     """What 24 servos cost without a port: the shortest of many rounds."""
     ids = bytes(range(1, 25))
-    chain = SimulatedChain([SimulatedServo(i) for i in ids])
+    chain = Chain([SimulatedServo(i) for i in ids])
     goals = b"".join(bytes((i, 0, 9, 0, 0)) for i in ids)
     cases = {
         "sync write": encode_instruction(0xFE, Instruction.SYNC_WRITE, b"\x74\0\4\0" + goals),

@@ -23,7 +23,7 @@ from drivers.base.bus import BusState, ServoSpec
 from drivers.base.errors import DriverError, PortLost
 from drivers.core.speed_limit import BURST_S
 from drivers.sim.serving.virtual import VirtualClock, VirtualLink
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 
 IDS = tuple(range(1, 9))
@@ -111,7 +111,7 @@ class Head:
 
     def __init__(self, seed: int) -> None:
         self.clock, self.random, self.result = VirtualClock(), random.Random(seed), Soak()
-        self.chain = SimulatedChain([SimulatedServo(i) for i in IDS], seed=seed)
+        self.chain = Chain([SimulatedServo(i) for i in IDS], seed=seed)
         specs = [ServoSpec(i, f"servo{i}", "xl330-m288", -1.2, 1.2, SPEED_RAD_S, 60.0) for i in IDS]
         link = VirtualLink(self.chain, self.clock)
         self.bus = open_bus("dynamixel", specs, port=link, clock=self.clock, reboot_faulted=True, margin_s=0.01)

@@ -27,10 +27,9 @@ from controller.robot.settings import ChannelSettings
 from controller.tools.monitor_view import Watch
 from drivers import open_bus
 from drivers.core.traffic import Decoder
-from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import PortServer, serve
 from drivers.sim.wire.line import Line
-from drivers.sim.wire.simulator import Setting, Simulator, simulator_of
+from drivers.sim.wire.simulator import Setting, Simulator, make_line, simulator_of
 
 Where = Path | str | None
 """A path that becomes a link to a pseudo-terminal, or a URL to listen at instead."""
@@ -102,8 +101,8 @@ def _watching(decoder: Decoder | None, console: Console) -> Iterator[Callable[[P
             return
 
         def rows() -> list[dict[str, Any]]:
-            with server.chain.lock:
-                return server.chain.describe(time.monotonic())
+            with server.line.lock:
+                return server.line.describe(time.monotonic())
 
         watch = Watch(f"simulated bus on {server.port.path}", rows, decoder, console)
         server.tap = watch.tap

@@ -107,7 +107,7 @@ def _simulated(kind: str, servos: Sequence[ServoSpec]) -> Any:
     family = FAMILIES.get(kind)
     if not family.simulator:
         raise no_simulator(kind)
-    return FAMILIES.load(family, "drivers.sim.serving.simulated_wire:simulated")(driver_of(kind, servos), kind)
+    return FAMILIES.load(family, "drivers.sim.serving.simulated_driver:simulated")(driver_of(kind, servos), kind)
 
 
 def no_simulator(kind: str) -> PluginError:

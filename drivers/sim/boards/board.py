@@ -1,4 +1,4 @@
-"""What simulated servo boards share: one voice on the port, faults of its answers, and a supply that may break down."""
+"""Base of simulated boards for hobby servos: answers and their faults, brown-out, and outputs with a pulse width."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from abc import abstractmethod
 from collections.abc import Iterable
 from typing import Any
 
+from drivers.sim.servos.motion import hold, plan_move, plan_timed
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Line
-from drivers.sim.wire.replies import Reply
+from drivers.sim.wire.timing import Reply
 
 FAULTS = ("echo", "slow-reader", "unplug", "mute", "silent", "late", "drop", "flip", "noise", "short", "volts")
 """Faults of a board. Ids are channels; ``mute`` and ``volts`` are the board's, so write ``*``."""
+NO_LIMIT = 1e9
 BROWN_OUT_V = 4.0
+"""Supply below which a board is deaf; it starts again when the supply comes back."""
 
 
 class Board(Line):
@@ -36,34 +39,72 @@ class Board(Line):
 
     @abstractmethod
     def reset(self, now_s: float) -> None:
-        """Begin as after power-on."""
+        """The state after power-on."""
 
     def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
-        """What a packet does, and what is heard of the answers; nothing while the board is deaf."""
+        """Do a packet, unless the board is deaf; returns the replies that arrive."""
         if self._deaf:
             return []
-        answers = [self._spoilt(channel, data) for channel, data in self.answer(packet, now_s)]
-        return [answer for answer in answers if answer is not None]
+        replies = []
+        for channel, data in self.answer(packet, now_s):
+            arrived, late_s = self.faults.corrupt(data, channel)
+            if arrived is not None:
+                replies.append(Reply(arrived, None, late_s))
+        return replies
 
     def fault_changed(self, fault: Fault, begins: bool, now_s: float) -> None:
-        """Cut the board off, or its supply."""
         super().fault_changed(fault, begins, now_s)
         if fault.kind == "mute" or (fault.kind == "volts" and fault.value < BROWN_OUT_V):
             (self._deaf.append if begins else self._deaf.remove)(fault)
             if fault.kind == "volts" and begins:
                 self.reset(now_s)
 
-    def _spoilt(self, channel: int, data: bytes) -> Reply | None:
-        late_s, spoilt = 0.0, data
-        for spoiler in self.faults.spoilers:
-            if not spoiler.strikes(channel):
-                continue
-            late_s += spoiler.late_s
-            if spoiler.fault.kind == "short":
-                spoilt = spoilt[: spoiler.fault.value]
-                continue
-            result = spoiler.part(spoilt)
-            if result is None:
-                return None
-            spoilt = result
-        return Reply(spoilt, None, late_s)
+
+class RcChannel:
+    """Pulse width of one output, in any unit; the shaft behind it is not known.
+
+    Attributes
+    ----------
+    target : last target; 0 = no pulses.
+    """
+
+    def __init__(self) -> None:
+        self.target = 0.0
+        self._trajectory = hold(0.0, 0.0)
+
+    def position(self, now_s: float) -> float:
+        """Pulse width at `now_s`; 0 = no pulses."""
+        return self._trajectory.at(now_s).position if self.target else 0.0
+
+    def moving(self, now_s: float) -> bool:
+        """Whether the pulse has not reached its target."""
+        return bool(self.target) and self._trajectory.moving(now_s)
+
+    def describe(self, number: int, now_s: float, unit_us: float = 1.0) -> dict[str, Any]:
+        """Channel number, pulse width and target in microseconds, for people and tools."""
+        return {"id": number, "pulse_us": self.position(now_s) * unit_us, "target_us": self.target * unit_us}
+
+    def go(self, target: float, now_s: float, speed: float = 0.0, acceleration: float = 0.0) -> None:
+        """Move to a target (0 = stop the pulses).
+
+        Parameters
+        ----------
+        speed, acceleration : units/s and units/s²; 0 = no limit. A channel without pulses does not know where
+            its servo is, so its first target is reached at once.
+        """
+        was_off, now = not self.target, self._trajectory.at(now_s)
+        self.target = target
+        distance = abs(target - now.position)
+        if was_off or not target or not distance or not (speed or acceleration):
+            self._trajectory = hold(now_s, target)
+        elif acceleration:
+            self._trajectory = plan_move(now_s, now, target, speed or NO_LIMIT, acceleration)
+        else:
+            self._trajectory = plan_timed(now_s, now, target, distance / speed)
+
+    def go_in(self, target: float, now_s: float, seconds: float) -> None:
+        """Move to a target so that it is there after `seconds` (0 = at once)."""
+        now = self._trajectory.at(now_s)
+        jump = not self.target or not target or seconds <= 0.0
+        self.target = target
+        self._trajectory = hold(now_s, target) if jump else plan_timed(now_s, now, target, seconds)

@@ -1,9 +1,9 @@
-"""A simulated head that takes the omote line protocol, as a small board with a short sketch would."""
+"""A simulated head that takes the omote line protocol, as a small board with a short sketch does."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,39 +11,22 @@ from drivers.base.options import option
 from drivers.core.families import BOARD_BAUD
 from drivers.omote.protocol import checksum
 from drivers.sim.boards.board import Board
-from drivers.sim.wire.faults import Fault
-from drivers.sim.wire.simulator import Servos, Setting, Simulator
+from drivers.sim.wire.line import BufferingReader
+from drivers.sim.wire.simulator import Setting, Simulator
 
 MAX_LINE = 200
 SILENCE_S = 1.0
-"""A head that hears nothing for so long lets go."""
+"""A head that receives nothing for so long releases all its outputs."""
 
 
-class HeadReader:
+class HeadReader(BufferingReader):
     """Cuts a byte stream into lines; CR and LF end one."""
-
-    def __init__(self) -> None:
-        self._buffer = b""
-
-    @property
-    def pending(self) -> int:
-        """A line waits for its end as long as it takes."""
-        return len(self._buffer)
 
     def feed(self, data: bytes) -> list[bytes]:
         """Lines completed by these bytes; empty ones are left out."""
-        *lines, self._buffer = (self._buffer + data).replace(b"\r", b"\n").split(b"\n")
-        self._buffer = self._buffer[: MAX_LINE + 1]
+        *lines, rest = (self._buffer + data).replace(b"\r", b"\n").split(b"\n")
+        self._buffer = rest[: MAX_LINE + 1]
         return [line for line in lines if line.strip()]
-
-    def flush(self) -> list[bytes]:
-        """Nothing is given up."""
-        return []
-
-    def take_pending(self) -> bytes:
-        """Forget the incomplete line."""
-        data, self._buffer = self._buffer, b""
-        return data
 
 
 class _Refusal(Exception):
@@ -56,7 +39,7 @@ class LineHead(Board):
     Parameters
     ----------
     names : its outputs.
-    now_s : time. faults : see :data:`drivers.sim.boards.board.FAULTS`. seed : of random faults.
+    now_s : time. seed : of random faults.
     simple : it does not know GET.
 
     Attributes
@@ -65,36 +48,26 @@ class LineHead(Board):
     refused : lines answered with ERR.
     """
 
-    def __init__(
-        self,
-        names: Sequence[str],
-        now_s: float = 0.0,
-        faults: Iterable[str | Fault] = (),
-        seed: int = 0,
-        simple: bool = False,
-    ) -> None:
+    def __init__(self, names: Sequence[str], now_s: float = 0.0, seed: int = 0, simple: bool = False) -> None:
         self._names, self.simple = list(names), simple
         self.refused = 0
         self.reset(now_s)
-        super().__init__(now_s, faults, seed)
+        super().__init__(now_s, seed=seed)
 
     def reset(self, now_s: float) -> None:
-        """Begin as after power-on: everything released."""
+        """The state after power-on: everything released."""
         self.values: dict[str, float | None] = dict.fromkeys(self._names)
-        self._heard_s = now_s
+        self._received_s = now_s
 
     def make_reader(self) -> HeadReader:
-        """A reader of lines."""
         return HeadReader()
 
     def size(self, packet: bytes) -> int:
-        """Bytes of a line on the wire."""
         return len(packet) + 1
 
     def answer(self, packet: bytes, now_s: float) -> list[tuple[int, bytes]]:
-        """Answer a line."""
-        self._let_go_after_silence(now_s)
-        self._heard_s = now_s
+        self._release_after_silence(now_s)
+        self._received_s = now_s
         tag, checked = "", False
         try:
             words, checked = _words(packet)
@@ -109,11 +82,11 @@ class LineHead(Board):
 
     def describe(self, now_s: float) -> list[dict[str, Any]]:
         """The value of each output."""
-        self._let_go_after_silence(now_s)
+        self._release_after_silence(now_s)
         return [{"id": k, "name": name, "value": value} for k, (name, value) in enumerate(self.values.items())]
 
-    def _let_go_after_silence(self, now_s: float) -> None:
-        if now_s - self._heard_s > SILENCE_S:
+    def _release_after_silence(self, now_s: float) -> None:
+        if now_s - self._received_s > SILENCE_S:
             self.values = dict.fromkeys(self._names)
 
     def _do(self, words: Sequence[str]) -> str:
@@ -121,7 +94,7 @@ class LineHead(Board):
             "HELLO": lambda rest: f"HELLO head protocol=1 parameters={len(self.values)} max_line={MAX_LINE}",
             "PING": lambda rest: " ".join(("PONG", *rest)),
             "SET": self._set,
-            "RELEASE": self._let_go,
+            "RELEASE": self._release,
         }
         if not self.simple:
             commands["GET"] = self._get
@@ -137,7 +110,7 @@ class LineHead(Board):
         self.values.update(new)
         return f"SET {len(new)}"
 
-    def _let_go(self, words: Sequence[str]) -> str:
+    def _release(self, words: Sequence[str]) -> str:
         names = self._names if [word.upper() for word in words] == ["ALL"] else [self._known(word) for word in words]
         self.values.update(dict.fromkeys(names))
         return f"RELEASE {len(names)}"
@@ -152,7 +125,7 @@ class LineHead(Board):
 
 
 def _words(line: bytes) -> tuple[list[str], bool]:
-    """The words of a line, and whether it came with a checksum, which is right."""
+    """The words of a line, and whether it has a checksum; raises _Refusal where that is wrong."""
     if len(line) > MAX_LINE:
         raise _Refusal(f"10 a line has at most {MAX_LINE} bytes")
     body, star, sum_ = line.rpartition(b"*")
@@ -175,7 +148,7 @@ def _number(text: str) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class HeadOptions:
-    """What ``omote simulate omote`` can be told."""
+    """Options of ``omote simulate omote``."""
 
     names: str = option("What the head takes, with commas; all parameters without it.", "")
     baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
@@ -186,12 +159,8 @@ def _alone(options: HeadOptions, setting: Setting) -> LineHead:
     return LineHead(names, setting.now_s, seed=setting.seed)
 
 
-def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> LineHead:
-    return LineHead(now_s=setting.now_s, seed=setting.seed, **options)
-
-
 SIMULATOR = Simulator(
-    far_end=_far_end,
+    far_end=lambda servos, options, setting: LineHead(now_s=setting.now_s, seed=setting.seed, **options),
     alone=_alone,
     options=HeadOptions,
     help="""Serve a simulated head that takes the omote line protocol, until interrupted; prints `ready PATH`.

@@ -13,57 +13,40 @@ from drivers.base.errors import DriverError
 from drivers.base.options import option
 from drivers.core.families import BOARD_BAUD
 from drivers.core.traffic import HexDecoder
-from drivers.maestro.protocol import (
-    GET_ERRORS,
-    GET_MOVING,
-    GET_POSITION,
-    GO_HOME,
-    MINI_SSC,
-    POLOLU,
-    RESTART_SCRIPT,
-    RESTART_WITH_PARAMETER,
-    SCRIPT_STATUS,
-    SET_ACCELERATION,
-    SET_MULTIPLE,
-    SET_PWM,
-    SET_SPEED,
-    SET_TARGET,
-    STOP_SCRIPT,
-    MaestroError,
-    crc7,
-)
-from drivers.sim.boards.board import Board
-from drivers.sim.boards.rc import RcChannel
+from drivers.maestro import protocol
+from drivers.maestro.protocol import MaestroError, crc7
+from drivers.sim.boards.board import Board, RcChannel
 from drivers.sim.wire.faults import Fault
+from drivers.sim.wire.line import BufferingReader
 from drivers.sim.wire.simulator import Servos, Setting, Simulator
 
 LIMITS_US = (992.0, 2000.0)
 """Pulse limits of a new board."""
-_MINI_ONLY = (SET_MULTIPLE, GET_MOVING, SET_PWM)
+_MINI_ONLY = (protocol.SET_MULTIPLE, protocol.GET_MOVING, protocol.SET_PWM)
 SPEED_UNIT = 100.0
 """One step of speed, quarter microseconds per second (0.25 us per 10 ms)."""
 ACCELERATION_UNIT = 1250.0
 """One step of acceleration, quarter microseconds per second² (0.25 us per 10 ms per 80 ms)."""
 
 _LENGTHS = {
-    SET_TARGET: 3,
-    SET_SPEED: 3,
-    SET_ACCELERATION: 3,
-    SET_PWM: 4,
-    GET_POSITION: 1,
-    GET_MOVING: 0,
-    GET_ERRORS: 0,
-    GO_HOME: 0,
-    STOP_SCRIPT: 0,
-    RESTART_SCRIPT: 1,
-    RESTART_WITH_PARAMETER: 3,
-    SCRIPT_STATUS: 0,
-    MINI_SSC: 2,
+    protocol.SET_TARGET: 3,
+    protocol.SET_SPEED: 3,
+    protocol.SET_ACCELERATION: 3,
+    protocol.SET_PWM: 4,
+    protocol.GET_POSITION: 1,
+    protocol.GET_MOVING: 0,
+    protocol.GET_ERRORS: 0,
+    protocol.GO_HOME: 0,
+    protocol.STOP_SCRIPT: 0,
+    protocol.RESTART_SCRIPT: 1,
+    protocol.RESTART_WITH_PARAMETER: 3,
+    protocol.SCRIPT_STATUS: 0,
+    protocol.MINI_SSC: 2,
 }
 
 
 class Command(NamedTuple):
-    """One command; `error` is set instead of `code` where the bytes make no sense."""
+    """One command of `size` bytes; `error` is set instead of `code` where the bytes make no sense."""
 
     code: int
     data: bytes
@@ -71,8 +54,8 @@ class Command(NamedTuple):
     error: MaestroError | None = None
 
 
-class MaestroReader:
-    """Cuts a byte stream into commands.
+class MaestroReader(BufferingReader):
+    """Cuts a byte stream into commands. An incomplete one is never given up (the time-out is off by default).
 
     Parameters
     ----------
@@ -81,52 +64,36 @@ class MaestroReader:
     """
 
     def __init__(self, device: int = 12, crc: bool = False) -> None:
+        super().__init__()
         self._device, self._crc = device, crc
-        self._buffer = bytearray()
-
-    @property
-    def pending(self) -> int:
-        """Bytes of a command that is not complete."""
-        return len(self._buffer)
 
     def feed(self, data: bytes) -> list[Command]:
-        """Commands completed by these bytes."""
         return [command for byte in data for command in self._take(byte)]
-
-    def flush(self) -> list[Command]:
-        """A command waits for its last byte as long as it takes (the time-out is off by default)."""
-        return []
-
-    def take_pending(self) -> bytes:
-        """Forget the incomplete command."""
-        data = bytes(self._buffer)
-        self._buffer.clear()
-        return data
 
     def _take(self, byte: int) -> list[Command]:
         """A byte of 0x80 and more begins a command, wherever it comes; only Mini SSC may carry it as data."""
         buffer, commands = self._buffer, []
-        if byte >= 0x80 and not (buffer and buffer[0] == MINI_SSC and byte != MINI_SSC):
-            if buffer and buffer != bytes((POLOLU,)):
+        if byte >= 0x80 and not (buffer and buffer[0] == protocol.MINI_SSC and byte != protocol.MINI_SSC):
+            if buffer and buffer != bytes((protocol.POLOLU,)):
                 commands.append(Command(0, b"", len(buffer), MaestroError.PROTOCOL))
-            buffer.clear()
+            self._buffer = b""
         elif not buffer:
             return [Command(0, b"", 1, MaestroError.PROTOCOL)]
-        buffer.append(byte)
+        self._buffer += bytes((byte,))
         command = self._complete()
         return [*commands, command] if command else commands
 
     def _complete(self) -> Command | None:
         """The command in the buffer, once all its bytes are there."""
         buffer = self._buffer
-        start = 3 if buffer[0] == POLOLU else 1
+        start = 3 if buffer[0] == protocol.POLOLU else 1
         if len(buffer) < start:
             return None
         code = buffer[2] | 0x80 if start == 3 else buffer[0]
         length = _LENGTHS.get(code, -1)
-        if code == SET_MULTIPLE:
+        if code == protocol.SET_MULTIPLE:
             length = 2 + 2 * buffer[start] if len(buffer) > start else 1
-        checked = self._crc and code != MINI_SSC
+        checked = self._crc and code != protocol.MINI_SSC
         size = start + length + checked
         if length >= 0 and len(buffer) < size:
             return None
@@ -171,32 +138,30 @@ class Maestro(Board):
         self._settings = device, crc
         self._count, self._limits = channels, (4 * limits_us[0], 4 * limits_us[1])
         self.reset(now_s)
-        self._handlers: dict[int, Callable[[bytes, float], bytes]] = {
-            SET_TARGET: self._set_target,
-            SET_MULTIPLE: self._set_multiple,
-            MINI_SSC: self._mini_ssc,
-            SET_SPEED: self._set_speed,
-            SET_ACCELERATION: self._set_acceleration,
-            GET_POSITION: self._get_position,
-            GET_MOVING: self._get_moving,
-            GET_ERRORS: self._get_errors,
-            GO_HOME: self._go_home,
-            SCRIPT_STATUS: lambda data, now_s: b"\x01",
+        self._handlers: dict[int, Callable[[bytes, float], bytes | None]] = {
+            protocol.SET_TARGET: lambda data, now_s: self._go(data[0], _word(data[1:]), now_s),
+            protocol.SET_MULTIPLE: self._set_multiple,
+            protocol.MINI_SSC: self._mini_ssc,
+            protocol.SET_SPEED: lambda data, now_s: self._limit(self.speeds, data, now_s),
+            protocol.SET_ACCELERATION: lambda data, now_s: self._limit(self.accelerations, data, now_s),
+            protocol.GET_POSITION: self._get_position,
+            protocol.GET_MOVING: lambda data, now_s: bytes((any(channel.moving(now_s) for channel in self.channels),)),
+            protocol.GET_ERRORS: self._get_errors,
+            protocol.GO_HOME: lambda data, now_s: self._go_home(now_s),
+            protocol.SCRIPT_STATUS: lambda data, now_s: b"\x01",
         }
         super().__init__(now_s, faults, seed)
 
     def reset(self, now_s: float) -> None:
-        """Begin as after power-on: no pulses, no limits of speed and acceleration."""
+        """The state after power-on: no pulses, no limits of speed and acceleration."""
         self.channels = [RcChannel() for _ in range(self._count)]
         self.speeds, self.accelerations = [0] * self._count, [0] * self._count
         self.errors = MaestroError(0)
 
     def make_reader(self) -> MaestroReader:
-        """A reader of commands."""
         return MaestroReader(*self._settings)
 
     def size(self, packet: Command) -> int:
-        """Bytes of a command on the wire."""
         return packet.size
 
     def answer(self, packet: Command, now_s: float) -> list[tuple[int, bytes]]:
@@ -205,83 +170,60 @@ class Maestro(Board):
         if self._count == 6 and packet.code in _MINI_ONLY:
             error = MaestroError.PROTOCOL
         if error:
-            self.errors |= error
-            self._go_home(b"", now_s)
+            self._refuse(error, now_s)
             return []
         handler = self._handlers.get(packet.code)
-        data = handler(packet.data, now_s) if handler else b""
-        return [(packet.data[0] if packet.code == GET_POSITION else 0, data)] if data else []
+        data = handler(packet.data, now_s) if handler else None
+        return [(packet.data[0] if packet.code == protocol.GET_POSITION else 0, data)] if data else []
 
     def describe(self, now_s: float) -> list[dict[str, Any]]:
         """Pulse width in microseconds and target of each channel."""
-        return [
-            {"id": k, "pulse_us": channel.position(now_s) / 4, "target_us": channel.target / 4}
-            for k, channel in enumerate(self.channels)
-        ]
+        return [channel.describe(k, now_s, 0.25) for k, channel in enumerate(self.channels)]
+
+    def _refuse(self, error: MaestroError, now_s: float) -> None:
+        self.errors |= error
+        self._go_home(now_s)
 
     def _go(self, number: int, target: float, now_s: float) -> None:
         """A target is cut to the channel's limits; one for a channel that is not there is a protocol error."""
-        if number >= len(self.channels):
-            self._refuse(now_s)
+        if number >= self._count:
+            self._refuse(MaestroError.PROTOCOL, now_s)
             return
         if target:
             target = min(max(target, self._limits[0]), self._limits[1])
         speed, acceleration = self.speeds[number] * SPEED_UNIT, self.accelerations[number] * ACCELERATION_UNIT
         self.channels[number].go(target, now_s, speed, acceleration)
 
-    def _set_target(self, data: bytes, now_s: float) -> bytes:
-        self._go(data[0], _word(data[1:]), now_s)
-        return b""
-
-    def _set_multiple(self, data: bytes, now_s: float) -> bytes:
+    def _set_multiple(self, data: bytes, now_s: float) -> None:
         for k in range(data[0]):
             self._go(data[1] + k, _word(data[2 + 2 * k :]), now_s)
-        return b""
 
-    def _mini_ssc(self, data: bytes, now_s: float) -> bytes:
+    def _mini_ssc(self, data: bytes, now_s: float) -> None:
         """8-bit target: 1500 us +- 476.25 us over 0 to 254."""
         self._go(data[0], 4 * (1500 + (data[1] - 127) / 127 * 476.25), now_s)
-        return b""
-
-    def _set_speed(self, data: bytes, now_s: float) -> bytes:
-        self._limit(self.speeds, data, now_s)
-        return b""
-
-    def _set_acceleration(self, data: bytes, now_s: float) -> bytes:
-        self._limit(self.accelerations, data, now_s)
-        return b""
 
     def _limit(self, limits: list[int], data: bytes, now_s: float) -> None:
-        if data[0] < len(limits):
+        if data[0] < self._count:
             limits[data[0]] = _word(data[1:])
         else:
-            self._refuse(now_s)
+            self._refuse(MaestroError.PROTOCOL, now_s)
 
-    def _refuse(self, now_s: float) -> None:
-        """A channel that is not there is an error as any other."""
-        self.errors |= MaestroError.PROTOCOL
-        self._go_home(b"", now_s)
-
-    def _get_position(self, data: bytes, now_s: float) -> bytes:
+    def _get_position(self, data: bytes, now_s: float) -> bytes | None:
         """The pulse that is put out, not the shaft: two full bytes, low first."""
-        if data[0] >= len(self.channels):
-            self._refuse(now_s)
-            return b""
-        return round(self.channels[data[0]].position(now_s)).to_bytes(2, "little")
-
-    def _get_moving(self, data: bytes, now_s: float) -> bytes:
-        return bytes((any(channel.moving(now_s) for channel in self.channels),))
+        if data[0] < self._count:
+            return round(self.channels[data[0]].position(now_s)).to_bytes(2, "little")
+        self._refuse(MaestroError.PROTOCOL, now_s)
+        return None
 
     def _get_errors(self, data: bytes, now_s: float) -> bytes:
         """Reading clears them."""
         errors, self.errors = int(self.errors), MaestroError(0)
         return errors.to_bytes(2, "little")
 
-    def _go_home(self, data: bytes, now_s: float) -> bytes:
+    def _go_home(self, now_s: float) -> None:
         """Home is "off" by default: pulses stop."""
         for channel in self.channels:
             channel.go(0.0, now_s)
-        return b""
 
 
 def _word(data: bytes) -> int:
@@ -294,7 +236,7 @@ SIZES = (6, 12, 18, 24)
 
 @dataclass(frozen=True, kw_only=True)
 class MaestroOptions:
-    """What ``omote simulate maestro`` can be told."""
+    """Options of ``omote simulate maestro``."""
 
     channels: int = option("6 (Micro Maestro), 12, 18 or 24.", 24)
     device: int = option("Device number, for the Pololu protocol.", 12, at_least=0, at_most=127)
@@ -309,6 +251,7 @@ def _alone(options: MaestroOptions, setting: Setting) -> Maestro:
 
 
 def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Maestro:
+    """The smallest board that has the highest channel."""
     others = dict(options)
     sizes = SIZES if others.pop("board", "mini") == "micro" else SIZES[1:]
     highest = max(channel for channel, _ in servos)

@@ -7,13 +7,13 @@ line that has begun. `PO` is not modelled.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
-from drivers.sim.boards.board import Board
-from drivers.sim.boards.rc import RcChannel
+from drivers.sim.boards.board import Board, RcChannel
 from drivers.sim.wire.faults import Fault
-from drivers.sim.wire.simulator import BoardOptions, Servos, Setting, Simulator
+from drivers.sim.wire.line import BufferingReader
+from drivers.sim.wire.simulator import BoardOptions, Simulator
 
 CHANNELS = 32
 MIN_US, MAX_US = 500, 2500
@@ -25,34 +25,15 @@ _ONE = re.compile(r"(QP|STOP)(\d+)")
 _GROUP = re.compile(r"(?:#\d+P\d+(?:S\d+)?)+(?:T(\d+))?")
 
 
-class LineReader:
+class LineReader(BufferingReader):
     """Cuts a byte stream into lines: CR ends one, spaces, tabs and LF are passed over, case does not count."""
-
-    def __init__(self) -> None:
-        self._buffer = bytearray()
-
-    @property
-    def pending(self) -> int:
-        """A line waits for its end as long as it takes."""
-        return len(self._buffer)
 
     def feed(self, data: bytes) -> list[str]:
         """Lines completed by these bytes, without blanks and in capitals; empty ones are left out."""
-        data = (bytes(self._buffer) + data).rpartition(b"\x1b")[2] if b"\x1b" in data else bytes(self._buffer) + data
-        self._buffer = bytearray(byte for byte in data if byte not in b" \t\n")
-        *lines, rest = bytes(self._buffer).split(b"\r")
-        self._buffer = bytearray(rest if len(rest) <= MAX_LINE else b"")
+        data = (self._buffer + data).rpartition(b"\x1b")[2]
+        *lines, rest = data.translate(None, b" \t\n").split(b"\r")
+        self._buffer = rest if len(rest) <= MAX_LINE else b""
         return [line.decode("latin-1").upper() for line in lines if line]
-
-    def flush(self) -> list[str]:
-        """Nothing is given up."""
-        return []
-
-    def take_pending(self) -> bytes:
-        """Forget the incomplete line."""
-        data = bytes(self._buffer)
-        self._buffer.clear()
-        return data
 
 
 class Ssc32(Board):
@@ -66,7 +47,7 @@ class Ssc32(Board):
     Attributes
     ----------
     channels : the outputs, microseconds.
-    refused : lines that were not understood; the board passes over them without a word.
+    refused : lines that were not understood; the board ignores them.
     """
 
     def __init__(self, now_s: float = 0.0, faults: Iterable[str | Fault] = (), seed: int = 0) -> None:
@@ -75,19 +56,16 @@ class Ssc32(Board):
         super().__init__(now_s, faults, seed)
 
     def reset(self, now_s: float) -> None:
-        """Begin as after power-on: no pulses."""
+        """The state after power-on: no pulses."""
         self.channels = [RcChannel() for _ in range(CHANNELS)]
 
     def make_reader(self) -> LineReader:
-        """A reader of lines."""
         return LineReader()
 
     def size(self, packet: str) -> int:
-        """Bytes of a line on the wire."""
         return len(packet) + 1
 
     def answer(self, packet: str, now_s: float) -> list[tuple[int, bytes]]:
-        """Do what a line says."""
         if packet == "Q":
             return [(0, b"+" if any(channel.moving(now_s) for channel in self.channels) else b".")]
         if packet == "VER":
@@ -100,7 +78,7 @@ class Ssc32(Board):
         return []
 
     def _one(self, word: str, number: int, now_s: float) -> list[tuple[int, bytes]]:
-        """What is said of one channel."""
+        """A query or a stop of one channel."""
         pulse = self.channels[number].position(now_s)
         if word == "QP":
             return [(number, bytes((round(pulse / 10),)))]
@@ -109,10 +87,7 @@ class Ssc32(Board):
 
     def describe(self, now_s: float) -> list[dict[str, Any]]:
         """Pulse width in microseconds and target of each channel."""
-        return [
-            {"id": k, "pulse_us": channel.position(now_s), "target_us": channel.target}
-            for k, channel in enumerate(self.channels)
-        ]
+        return [channel.describe(k, now_s) for k, channel in enumerate(self.channels)]
 
     def _move(self, line: str, now_s: float) -> bool:
         """A group move: with T all channels arrive together, with S none is faster; False = not understood.
@@ -134,17 +109,9 @@ class Ssc32(Board):
         return True
 
 
-def _alone(options: BoardOptions, setting: Setting) -> Ssc32:
-    return Ssc32(setting.now_s, seed=setting.seed)
-
-
-def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Ssc32:
-    return Ssc32(setting.now_s, seed=setting.seed)
-
-
 SIMULATOR = Simulator(
-    far_end=_far_end,
-    alone=_alone,
+    far_end=lambda servos, options, setting: Ssc32(setting.now_s, seed=setting.seed),
+    alone=lambda options, setting: Ssc32(setting.now_s, seed=setting.seed),
     options=BoardOptions,
     help="""Serve a simulated Lynxmotion SSC-32 until interrupted; prints `ready PATH`.
 

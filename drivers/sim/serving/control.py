@@ -1,14 +1,14 @@
-"""Commands to a running simulated bus: one line each, over a socket or a pipe.
+"""Control a running simulated bus by command lines over a Unix socket or a pipe: faults, state, positions.
 
 ================================  =====================================================================
 ``fault SPEC [SPEC ...]``         sets faults (``drivers.sim.wire.faults``)
 ``clear [KIND]``                  ends the faults of a kind, or all
 ``faults``                        answers with the faults that are set
-``servos``                        answers with a JSON list of the servos' (or channels') state
+``servos``                        answers with a JSON list of the states of servos (or channels)
 ``place ID TICKS``                moves a limp shaft by hand
 ================================  =====================================================================
 
-A word with spaces stands in quotes, as in a shell. Every line is answered by one line: ``ok``, ``ok VALUE`` or
+A word with spaces is put in quotes, as in a shell. Every line is answered by one line: ``ok``, ``ok VALUE`` or
 ``error WHY``.
 """
 
@@ -33,7 +33,7 @@ MAX_LINE = 4096
 class Commands:
     """Carries out command lines.
 
-    They run in the server's own loop, so a port is never pulled away while somebody waits on it.
+    They run in the server's own loop, so a port is never pulled away while it is waited for.
 
     Parameters
     ----------
@@ -42,54 +42,42 @@ class Commands:
 
     def __init__(self, line: Line) -> None:
         self._line = line
-        self._words: dict[str, Callable[[list[str], float], str]] = {
-            "fault": self._fault,
-            "clear": self._clear,
-            "faults": self._faults,
-            "servos": self._servos,
+        self._commands: dict[str, Callable[[list[str], float], str | None]] = {
+            "fault": lambda specs, now_s: line.faults.add(specs, now_s),
+            "clear": lambda kinds, now_s: line.faults.clear(kinds[0] if kinds else None, now_s),
+            "faults": lambda words, now_s: " ".join(_quoted(fault.spec) for fault in line.faults.active),
+            "servos": lambda words, now_s: json.dumps(line.describe(now_s)),
             "place": self._place,
         }
 
     def handle(self, line: str) -> str:
-        """Carry out one line; returns its answer and never raises on what the line says."""
+        """Carry out one line; returns its answer, also where the line is wrong."""
         try:
             word, *rest = shlex.split(line) or [""]
         except ValueError as error:
             return f"error {line!r}: {error}"
-        command = self._words.get(word)
+        command = self._commands.get(word)
         if command is None:
-            return f"error there is no command {word!r} (there are {', '.join(self._words)})"
+            return f"error there is no command {word!r} (there are {', '.join(self._commands)})"
         try:
             with self._line.lock:
-                return f"ok {command(rest, time.monotonic())}".rstrip()
+                return f"ok {command(rest, time.monotonic()) or ''}".rstrip()
         except DriverError as error:
             return f"error {error}; {error.hint}"
         except (KeyError, ValueError, IndexError) as error:
             return f"error {line!r}: {error.args[0] if error.args else error}"
 
-    def _fault(self, specs: list[str], now_s: float) -> str:
-        self._line.faults.add(specs, now_s)
-        return ""
-
-    def _clear(self, kinds: list[str], now_s: float) -> str:
-        self._line.faults.clear(kinds[0] if kinds else None, now_s)
-        return ""
-
-    def _faults(self, words: list[str], now_s: float) -> str:
-        specs = (fault.spec for fault in self._line.faults.active)
-        return " ".join(shlex.quote(spec) if " " in spec else spec for spec in specs)
-
-    def _servos(self, words: list[str], now_s: float) -> str:
-        return json.dumps(self._line.describe(now_s))
-
-    def _place(self, words: list[str], now_s: float) -> str:
+    def _place(self, words: list[str], now_s: float) -> None:
         device_id, ticks = (int(word) for word in words)
         self._line.place(device_id, ticks, now_s)
-        return ""
+
+
+def _quoted(spec: str) -> str:
+    return shlex.quote(spec) if " " in spec else spec
 
 
 class Lines:
-    """Cuts a byte stream into lines; one that is far too long is thrown away."""
+    """Cuts a byte stream into lines; one longer than `MAX_LINE` is thrown away."""
 
     def __init__(self) -> None:
         self._rest = b""
@@ -103,16 +91,16 @@ class Lines:
 
 
 class ControlSocket:
-    """A Unix socket that takes commands from any number of clients, without ever waiting for one.
+    """A Unix socket that takes commands from any number of clients and never blocks.
 
     Parameters
     ----------
-    path : where it listens; a socket that nobody serves any more is replaced.
+    path : where it listens; a socket without a server is replaced.
     handle : answers one line.
 
     Raises
     ------
-    PortBusy : somebody else listens there, or it is a file.
+    PortBusy : another program listens there, or it is a file.
     PortError : it cannot be made.
     """
 
@@ -120,28 +108,28 @@ class ControlSocket:
         self.path, self._handle = Path(path), handle
         self._clients: dict[int, tuple[socket.socket, Lines]] = {}
         _remove_dead(self.path)
-        self._voice_listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            self._voice_listener.bind(str(self.path))
-            self._voice_listener.listen()
+            self._listener.bind(str(self.path))
+            self._listener.listen()
         except OSError as error:
-            self._voice_listener.close()
+            self._listener.close()
             raise PortError(
                 f"cannot make the control socket {self.path}: {error}", hint=f"mkdir -p {self.path.parent}"
             ) from error
-        self._voice_listener.setblocking(False)
+        self._listener.setblocking(False)
 
     @property
     def descriptors(self) -> list[int]:
         """What to wait on."""
-        return [self._voice_listener.fileno(), *self._clients]
+        return [self._listener.fileno(), *self._clients]
 
     def serve(self, ready: list[int]) -> None:
-        """Take what has come at the descriptors that are ready."""
+        """Accept clients and carry out lines at the descriptors that are ready."""
         for descriptor in ready:
-            if descriptor == self._voice_listener.fileno():
+            if descriptor == self._listener.fileno():
                 with contextlib.suppress(BlockingIOError):
-                    client, _ = self._voice_listener.accept()
+                    client, _ = self._listener.accept()
                     client.setblocking(False)
                     self._clients[client.fileno()] = (client, Lines())
             elif descriptor in self._clients:
@@ -152,8 +140,8 @@ class ControlSocket:
         for client, _ in self._clients.values():
             client.close()
         self._clients.clear()
-        if self._voice_listener.fileno() >= 0:
-            self._voice_listener.close()
+        if self._listener.fileno() >= 0:
+            self._listener.close()
             self.path.unlink(missing_ok=True)
 
     def _take(self, descriptor: int) -> None:
@@ -170,7 +158,7 @@ class ControlSocket:
 
 
 def _remove_dead(path: Path) -> None:
-    """Take away a socket whose server is gone."""
+    """Remove a socket whose server is gone; raises PortBusy for any other file."""
     if not path.exists():
         return
     if not stat.S_ISSOCK(path.stat().st_mode):

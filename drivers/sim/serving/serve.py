@@ -1,4 +1,4 @@
-"""Serve a simulated bus on a port: one loop that sleeps until there is something to do."""
+"""Serve a simulated bus on a port: an event loop that moves bytes, keeps wire time and takes commands."""
 
 from __future__ import annotations
 
@@ -6,27 +6,26 @@ import os
 import select
 import socket
 import time
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 from drivers.sim.serving.control import Commands, ControlSocket, Lines
-from drivers.sim.serving.farports import make_port
-from drivers.sim.servos.simulators import make_chain, make_servos
+from drivers.sim.serving.ports import Link, make_port
+from drivers.sim.servos.simulators import ids_and_models
 from drivers.sim.wire.faults import Fault
-from drivers.sim.wire.line import Line
-from drivers.sim.wire.timing import Timed, WireTiming, without_timing
+from drivers.sim.wire.line import Line, ReplyQueue
+from drivers.sim.wire.simulator import make_line
+from drivers.sim.wire.timing import WireTiming
 
-PAUSE_S = 0.1
-"""A packet that is not complete after this pause is given up."""
 EARLY_S = 80e-6
-"""How long before bytes are due the server wakes: the system wakes it late by about that much."""
+"""How long before bytes are due the server wakes: the system wakes it about this much late."""
 
-LINGER_S = 800e-6
-"""How long the server of a wire that takes time sleeps lightly after a reply, for a client that writes again at once: a
-real wire is not slow to wake up. For one that paces itself it sleeps as long as it can."""
-DOZE_S = 100e-6
-"""A light sleep: too short for the processor to be switched off. Without any the server, where it has real-time
-priority, would keep the system itself from carrying the bytes of its pseudo-terminal."""
+POLL_S = 800e-6
+"""How long the server of a wire that takes time polls after a reply, for a client that writes again at once: the system
+would wake it late. Where the client wrote later than that last time, it waits without polling."""
+POLL_STEP_S = 100e-6
+"""Sleep between polls: too short for the processor's idle states. Without it the server, where it has real-time
+priority, would keep the system from carrying the bytes of its pseudo-terminal."""
 
 Control = int | socket.socket
 """Where commands to the server come from: a descriptor, or (the only thing that Windows can wait for) a socket."""
@@ -37,14 +36,13 @@ class PortServer:
 
     Parameters
     ----------
-    chain : the servos.
-    link : path that shall point at a pseudo-terminal, or None; ``socket://HOST:PORT`` or ``memory://NAME`` instead.
+    line : what is at the far end.
+    link : where clients find it, see :data:`drivers.sim.serving.ports.Link`.
     baud : bit rate while no client has set one.
-    wire : bytes take their time.
-    latency_s : USB latency timer, with `wire`.
-    commands : where other programs may send commands (``drivers.sim.serving.control``), or None.
-    on_line : called with each command line that arrives at the descriptor of `run`; None = anything there ends
-        the loop, as its end always does.
+    wire : bytes take their time at the bit rate, with return delay and the USB latency timer `latency_s`.
+    commands : path of a socket that takes commands (``drivers.sim.serving.control``), or None.
+    on_line : called with each command line that arrives at the `control` of `run`; None: any byte there ends the
+        loop, as its end always does.
 
     Attributes
     ----------
@@ -54,8 +52,8 @@ class PortServer:
 
     def __init__(
         self,
-        chain: Line,
-        link: str | os.PathLike[str] | None = None,
+        line: Line,
+        link: Link = None,
         *,
         baud: int = 1_000_000,
         wire: bool = False,
@@ -63,24 +61,24 @@ class PortServer:
         commands: str | os.PathLike[str] | None = None,
         on_line: Callable[[str], object] | None = None,
     ) -> None:
-        self.chain, self.baud = chain, baud
+        self.line = line
         self.tap: Callable[[bool, bytes], None] | None = None
-        self._socket = ControlSocket(commands, Commands(chain).handle) if commands else None
+        self._socket = ControlSocket(commands, Commands(line).handle) if commands else None
         try:
             self.port = make_port(link)
         except BaseException:
             self._close_socket()
             raise
         self._link = self.port.path if "://" in self.port.path else link
-        self._timing = WireTiming(latency_s) if wire else None
-        self._on_line, self._lines = on_line, Lines()
-        self._queue: deque[Timed] = deque()
-        self._read_s = self._said_s = 0.0
+        self._wire = wire
+        self._queue = ReplyQueue(line, baud, WireTiming(latency_s) if wire else None)
+        self.on_line, self._lines = on_line, Lines()
+        self._replied_s = 0.0
         self._prompt = False
-        chain.on_unplug = self._unplug
+        line.on_unplug = self._unplug
 
     def run(self, control: Control) -> None:
-        """Serve until `control` reaches its end (or says anything, without `on_lines`)."""
+        """Serve until `control` reaches its end (or gives any byte, without `on_line`)."""
         try:
             while True:
                 watched = [control, *(self._socket.descriptors if self._socket else ()), *self.port.descriptors]
@@ -91,12 +89,12 @@ class PortServer:
                     self._socket.serve(ready)
                 if any(descriptor in ready for descriptor in self.port.descriptors):
                     self._receive()
-                self._work_off()
+                self._do_due()
         finally:
             self.close()
 
     def close(self) -> None:
-        """Take port, link and socket away; harmless when done."""
+        """Remove port, link and socket; harmless when done."""
         self.port.close()
         self._close_socket()
 
@@ -105,25 +103,22 @@ class PortServer:
             self._socket.close()
 
     def _command(self, control: Control) -> bool:
-        """Take commands; False when it is time to go."""
+        """Carry out commands; False when the loop must end."""
         data = os.read(control, 65536) if isinstance(control, int) else control.recv(65536)
-        if not data or self._on_line is None:
+        if not data or self.on_line is None:
             return False
         for line in self._lines.feed(data):
-            self._on_line(line)
+            self.on_line(line)
         return True
 
     def _timeout(self) -> float | None:
         """Seconds until something is due; None = nothing is."""
-        due = self.chain.faults.next_change_s
-        if self._queue:
-            due = min(due, self._queue[0][0] - EARLY_S)
-        if self.chain.reader.pending:
-            due = min(due, self._read_s + PAUSE_S)
-        now_s = time.monotonic()
-        if self._prompt and now_s - self._said_s < LINGER_S:
-            return min(DOZE_S, max(due - now_s, 0.0))
-        return None if due == float("inf") else max(due - now_s, 0.0)
+        now_s, due_s = time.monotonic(), self._queue.due_s
+        if self._queue.replies:
+            due_s = min(due_s, self._queue.replies[0][0] - EARLY_S)
+        if self._prompt and now_s - self._replied_s < POLL_S:
+            return min(POLL_STEP_S, max(due_s - now_s, 0.0))
+        return None if due_s == float("inf") else max(due_s - now_s, 0.0)
 
     def _receive(self) -> None:
         data = self.port.read()
@@ -131,66 +126,62 @@ class PortServer:
             return
         if self.tap is not None:
             self.tap(True, data)
-        now_s = self._read_s = time.monotonic()
-        if self._said_s:  # the first since the last reply
-            self._prompt = self._timing is not None and now_s - self._said_s < LINGER_S
-            self._said_s = 0.0
-        chain = self.chain
-        chain.set_line_baud(self.port.baud())
-        if chain.echo:
-            self._send([(now_s, data)])
-        for packet in chain.reader.feed(data):
-            if self._timing is None:
-                self._send(without_timing(chain.handle(packet, now_s), now_s))
-                continue
-            baud = chain.line_baud or self.baud
-            at_s = self._timing.arrival(now_s, chain.size(packet), baud)
-            self._send(self._timing.deliveries(chain.handle(packet, at_s), baud))
-
-    def _send(self, timed: list[Timed]) -> None:
-        """Write what is due, keep the rest in order."""
-        for time_s, data in self.chain.heard(timed):
-            if self._queue or time_s > time.monotonic():
-                self._queue.append((time_s, data))
-            else:
-                self._write(data)
-
-    def _write(self, data: bytes) -> None:
-        if self.port.is_open:
-            self.port.write(data)
-            if self.tap is not None:
-                self.tap(False, data)
-
-    def _work_off(self) -> None:
-        """Replies, faults and broken packets whose time has come."""
         now_s = time.monotonic()
-        while self._queue and self._queue[0][0] - EARLY_S <= now_s:
-            while now_s < self._queue[0][0]:  # so little that the system would oversleep it
+        if self._replied_s:  # the first since the last reply
+            self._prompt = self._wire and now_s - self._replied_s < POLL_S
+            self._replied_s = 0.0
+        self.line.set_line_baud(self.port.baud())
+        self._queue.receive(data, now_s)
+
+    def _do_due(self) -> None:
+        """Send replies, change faults and give up packets whose time has come."""
+        now_s, replies = time.monotonic(), self._queue.replies
+        while replies and replies[0][0] - EARLY_S <= now_s:
+            while now_s < replies[0][0]:  # so little that the system would oversleep it
                 now_s = time.monotonic()
-            self._write(self._queue.popleft()[1])
-            self._said_s = now_s
-        if self.chain.reader.pending and now_s >= self._read_s + PAUSE_S:
-            for packet in self.chain.reader.flush():
-                self._send(without_timing(self.chain.handle(packet, now_s), now_s))
-        if now_s >= self.chain.faults.next_change_s:
-            with self.chain.lock:
-                self.chain.faults.advance(now_s)
+            data = replies.popleft()[1]
+            if self.port.is_open:
+                self.port.write(data)
+                if self.tap is not None:
+                    self.tap(False, data)
+            self._replied_s = now_s
+        self._queue.advance(now_s)
 
     def _unplug(self, fault: Fault, begins: bool) -> None:
-        """The port goes away with all that was under way, and comes back, perhaps under another name."""
+        """Close the port and drop all pending bytes, or open it again, perhaps under another name."""
         if begins:
             self.port.close()
             self._queue.clear()
-            self.chain.reader.take_pending()
         elif not self.port.is_open:
             self.port.open(fault.alias or self._link)
+
+
+def make_server(settings: Mapping[str, Any]) -> PortServer:
+    """The server of a simulated far end, from the settings of a :class:`~drivers.sim.serving.simulated.SimulatedBus`.
+
+    Raises
+    ------
+    DriverError : unknown family or model, unreadable fault, or the port cannot be made.
+    """
+    now_s, baud = time.monotonic(), settings["baud"]
+    line = make_line(
+        settings["family"], settings["servos"], now_s, baud=baud, seed=settings["seed"], options=settings["options"]
+    )
+    wire, latency_s, handle = settings["wire"], settings["latency_s"], Commands(line).handle
+    server = PortServer(line, settings["link"], baud=baud, wire=wire, latency_s=latency_s, on_line=handle)
+    try:
+        line.faults.add(settings["faults"], now_s)
+    except BaseException:
+        server.close()
+        raise
+    return server
 
 
 def serve_dynamixel(
     ids: Iterable[object],
     model: str | int = "xl330-m288",
     baud: int = 1_000_000,
-    link: str | os.PathLike[str] | None = None,
+    link: Link = None,
     wire: bool = False,
     faults: Iterable[str | Fault] = (),
     on_ready: Callable[[str], None] = lambda path: None,
@@ -209,38 +200,26 @@ def serve_dynamixel(
     model : of the servos given as bare ids, for example ``"xm430-w350"``, ``"ax-12a"``, ``"sts3215"``; it decides
         the protocol.
     baud : bit rate of the servos.
-    link : path that shall point at the terminal, or ``socket://HOST:PORT`` or ``memory://NAME`` instead of one.
-    wire : bytes take their time at the bit rate, with return delay and `latency_s`.
-    faults : specs, see ``drivers.sim.wire.faults``.
+    link, wire, latency_s, commands : see :class:`PortServer`. faults : specs, see ``drivers.sim.wire.faults``.
     on_ready : called with the path to open as soon as clients may come.
-    commands : path of a socket that takes commands while it runs, see ``drivers.sim.serving.control``.
-    stop : descriptor or socket; the end of it (or any byte) ends the service. None = until KeyboardInterrupt.
+    stop : descriptor or socket; the end of it (or any byte) ends the service. None: until KeyboardInterrupt.
     seed : of random faults.
-    on_server : called with the server before it serves, for who wants to look inside.
+    on_server : called with the server before it serves, for access to servos and traffic.
 
     Raises
     ------
     DriverError : unknown model, unreadable fault, or the terminal or link cannot be made.
     """
     now_s = time.monotonic()
-    chain = make_chain(make_servos(ids, model, baud, now_s), now_s, seed)
-    chain.faults.add(faults, now_s)
-    serve(
-        chain,
-        link,
-        on_ready,
-        baud=baud,
-        wire=wire,
-        latency_s=latency_s,
-        commands=commands,
-        stop=stop,
-        on_server=on_server,
-    )
+    line = make_line("dynamixel", ids_and_models(ids, model), now_s, baud=baud, seed=seed)
+    line.faults.add(faults, now_s)
+    port: dict[str, Any] = {"baud": baud, "wire": wire, "latency_s": latency_s}
+    serve(line, link, on_ready, commands=commands, stop=stop, on_server=on_server, **port)
 
 
 def serve(
     line: Line,
-    link: str | os.PathLike[str] | None = None,
+    link: Link = None,
     on_ready: Callable[[str], None] = lambda path: None,
     *,
     baud: int = 1_000_000,

@@ -1,4 +1,4 @@
-"""A simulated bus as one object: in a thread for tests, in a child process beside a program that is busy."""
+"""A simulated bus behind a port as one object, served from a thread or from a child process."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from typing import Any, Self
 
 from drivers.base.children import command, environment
 from drivers.base.errors import PortError
-from drivers.sim.serving.control import Commands
-from drivers.sim.serving.farend import make_line
-from drivers.sim.serving.serve import PortServer
+from drivers.sim.serving.ports import Link
+from drivers.sim.serving.serve import PortServer, make_server
 from drivers.sim.servos.chain import Chain
+from drivers.sim.servos.simulators import ids_and_models
 from drivers.sim.wire.faults import parse_fault
 from drivers.sim.wire.line import Line
 
@@ -28,7 +28,7 @@ _CHILD = "drivers.sim.serving.child"
 
 
 class ServoView:
-    """One servo of a running bus, seen from another thread: always up to date, never in the middle of a packet."""
+    """One servo of a running bus for use from another thread: always up to date, never in the middle of a packet."""
 
     def __init__(self, chain: Chain, device_id: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._chain, self._servo, self._clock = chain, chain.servo(device_id), clock
@@ -49,7 +49,7 @@ class ServoView:
     def torque(self) -> bool:
         """Whether the motor is on."""
         with self._chain.lock:
-            self._servo.look(self._clock())
+            self._servo.update(self._clock())
             return self._servo.torque
 
     @property
@@ -64,7 +64,7 @@ class ServoView:
             return self._servo.register(name, self._clock())
 
     def put(self, name: str, value: int) -> None:
-        """Set a register whatever its access, as it could have been left by somebody else."""
+        """Set a register whatever its access, as another program could have left it."""
         with self._chain.lock:
             self._servo.force(name, value, self._clock())
 
@@ -85,15 +85,15 @@ class SimulatedBus:
     Parameters
     ----------
     servos : ids, or specs with ``id`` and ``model``.
-    link : path that shall point at the pseudo-terminal, ``socket://HOST:PORT`` to listen there instead (port 0 takes
-        a free one), or ``memory://NAME`` for programs in this process.
+    link : where clients find it: a path that shall point at a pseudo-terminal, ``socket://HOST:PORT`` (port 0 takes a
+        free one), or ``memory://NAME`` for programs in this process.
     faults : specs, see ``drivers.sim.wire.faults``.
     model : of the servos given as bare ids.
     baud : bit rate of the servos.
     wire, latency_s : bytes take their time.
     process : serve from a child process (which ends with this one, however this one ends) instead of a thread.
     seed : of random faults.
-    family, options : see :func:`drivers.sim.serving.farend.make_line`.
+    family, options : see :func:`drivers.sim.wire.simulator.make_line`.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class SimulatedBus:
     def __init__(
         self,
         servos: Iterable[Any],
-        link: str | os.PathLike[str] | None = None,
+        link: Link = None,
         faults: Iterable[str] = (),
         *,
         model: str | int = "xl330-m288",
@@ -121,18 +121,24 @@ class SimulatedBus:
         options: Mapping[str, Any] = {},
     ) -> None:
         self.baud = baud
-        self._family, self._options = family, dict(options)
-        self._wire, self._latency_s = wire, latency_s
-        self._servos = [(int(getattr(s, "id", s)), getattr(s, "model", model)) for s in servos]
-        self._link, self._faults, self._seed = link, list(faults), seed
+        self._settings = {
+            "servos": ids_and_models(servos, model),
+            "link": None if link is None else os.fspath(link),
+            "baud": baud,
+            "faults": list(faults),
+            "seed": seed,
+            "wire": wire,
+            "latency_s": latency_s,
+            "family": family,
+            "options": dict(options),
+        }
         self._process = process
         self._path = ""
         self._child: subprocess.Popen[bytes] | None = None
         self._server: PortServer | None = None
-        self._line: Line | None = None
         self._thread: threading.Thread | None = None
         self._stop: socket.socket | None = None
-        self._obeyed = threading.Event()
+        self._done = threading.Event()
 
     @property
     def path(self) -> str:
@@ -142,9 +148,9 @@ class SimulatedBus:
     @property
     def line(self) -> Line:
         """What is at the far end (thread mode only)."""
-        if self._line is None:
+        if self._server is None:
             raise RuntimeError("the servos can be looked at only while the bus runs in a thread of this process")
-        return self._line
+        return self._server.line
 
     @property
     def chain(self) -> Chain:
@@ -154,7 +160,7 @@ class SimulatedBus:
         return self.line
 
     def servo(self, device_id: int) -> ServoView:
-        """One servo (thread mode only); KeyError where nobody has the id."""
+        """One servo (thread mode only); KeyError where none has the id."""
         return ServoView(self.chain, device_id)
 
     def fault(self, *specs: str) -> None:
@@ -166,11 +172,11 @@ class SimulatedBus:
         """
         for spec in specs:
             parse_fault(spec)
-        self._tell(shlex.join(("fault", *specs)))
+        self._send(shlex.join(("fault", *specs)))
 
     def clear(self, kind: str | None = None) -> None:
         """End the faults of a kind; None: all."""
-        self._tell(f"clear {kind or ''}")
+        self._send(f"clear {kind or ''}")
 
     def __enter__(self) -> Self:
         if self._process:
@@ -185,85 +191,58 @@ class SimulatedBus:
         self.close()
 
     def close(self) -> None:
-        """Pull the plug and end the service; harmless when it has ended."""
+        """Close the port and end the service; harmless when it has ended."""
         if self._child:
             _end_child(self._child)
             self._child = None
         if self._thread and self._stop:
             self._stop.close()
             self._thread.join()
-            self._thread = self._server = self._line = self._stop = None
+            self._thread = self._server = self._stop = None
 
-    # ------------------------------------------------------------ in a thread
     def _start_thread(self) -> None:
-        now_s = time.monotonic()
-        line = make_line(self._family, self._servos, now_s, baud=self.baud, seed=self._seed, options=self._options)
-        server = PortServer(
-            line,
-            self._link,
-            baud=self.baud,
-            wire=self._wire,
-            latency_s=self._latency_s,
-            on_line=self._handle,
-        )
-        try:
-            line.faults.add(self._faults, now_s)
-        except BaseException:
-            server.close()
-            raise
-        self._commands = Commands(line)
-        self._server, self._line, self._path = server, line, server.port.path
+        server = make_server(self._settings)
+        handle = server.on_line
+
+        def carry_out(line: str) -> None:
+            if handle is not None:
+                handle(line)
+            self._done.set()
+
+        server.on_line = carry_out
+        self._server, self._path = server, server.port.path
         reading, self._stop = socket.socketpair()
         self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
         self._thread.start()
 
-    def _handle(self, line: str) -> None:
-        self._commands.handle(line)
-        self._obeyed.set()
-
-    # ------------------------------------------------------------ in a child process
     def _start_child(self) -> None:
-        self._child = subprocess.Popen(
-            command(_CHILD), stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment(_CHILD)
+        child = self._child = subprocess.Popen(
+            command(_CHILD, json.dumps(self._settings)),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment(_CHILD),
         )
-        settings = {
-            "servos": self._servos,
-            "link": None if self._link is None else os.fspath(self._link),
-            "baud": self.baud,
-            "faults": self._faults,
-            "seed": self._seed,
-            "wire": self._wire,
-            "latency_s": self._latency_s,
-            "family": self._family,
-            "options": self._options,
-        }
-        self._tell(json.dumps(settings))
-        self._path = self._first_line(self._child)
-
-    def _first_line(self, child: subprocess.Popen[bytes]) -> str:
-        """The path the child serves."""
         timer = threading.Timer(START_S, child.kill)
         timer.start()
         try:
             words = (child.stdout.readline() if child.stdout else b"").decode().strip().partition(" ")
         finally:
             timer.cancel()
-        if words[0] == "ready":
-            return words[2]
-        _end_child(child)
-        self._child = None
-        raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
+        if words[0] != "ready":
+            self.close()
+            raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
+        self._path = words[2]
 
-    def _tell(self, command: str) -> None:
+    def _send(self, command: str) -> None:
         """Send a command; a bus in a thread has carried it out when this returns."""
         line = command.encode() + b"\n"
         if self._child and self._child.stdin:
             self._child.stdin.write(line)
             self._child.stdin.flush()
         elif self._thread and self._stop:
-            self._obeyed.clear()
+            self._done.clear()
             self._stop.sendall(line)
-            self._obeyed.wait(START_S)
+            self._done.wait(START_S)
 
 
 def _serve(server: PortServer, reading: socket.socket) -> None:
@@ -272,7 +251,7 @@ def _serve(server: PortServer, reading: socket.socket) -> None:
 
 
 def _end_child(child: subprocess.Popen[bytes]) -> None:
-    """The child goes when its standard input ends; one that does not is killed."""
+    """End the child by the end of its standard input, or kill it."""
     if child.stdin:
         child.stdin.close()
     try:

@@ -1,31 +1,28 @@
-"""A simulated bus in time that does not pass by itself: hours of running in the time the processor needs.
+"""Run drivers over a simulated bus in virtual time: hours of running in the time the processor needs.
 
 :class:`VirtualBus` is a far end of any family with drivers over it. Its :class:`VirtualLink` takes the place of a
-driver's port and hands the bytes to the far end directly. Whoever waits for bytes moves the clock on to when they
-arrive, or to the deadline, so nothing ever sleeps, and the same run gives the same figures on every machine.
+driver's port and passes the bytes to the far end directly. A read moves the clock on to when bytes arrive, or to its
+deadline, so nothing ever sleeps, and the same run gives the same figures on every machine.
 """
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import PortLost, PortMissing
 from drivers.core.registry import open_bus
-from drivers.sim.serving.farend import make_line
-from drivers.sim.serving.serve import PAUSE_S
 from drivers.sim.serving.simulated import ServoView
 from drivers.sim.servos.chain import Chain
 from drivers.sim.wire.faults import Fault
-from drivers.sim.wire.line import Line
-from drivers.sim.wire.timing import Timed, WireTiming
+from drivers.sim.wire.line import Line, ReplyQueue
+from drivers.sim.wire.simulator import make_line
+from drivers.sim.wire.timing import WireTiming
 
 
 class VirtualClock:
-    """Seconds that pass when somebody says so.
+    """A clock that only its methods move.
 
     Parameters
     ----------
@@ -44,7 +41,7 @@ class VirtualClock:
         self.now_s += max(span_s, 0.0)
 
     def wait_until(self, time_s: float) -> None:
-        """Let time pass up to a moment; one that has passed changes nothing."""
+        """Let time pass up to a moment; one in the past changes nothing."""
         self.now_s = max(self.now_s, time_s)
 
 
@@ -66,9 +63,7 @@ class VirtualLink:
         self.clock, self.sleep = clock, clock.sleep
         self.tap: Callable[[bool, bytes], None] | None = None
         self._line = line
-        self._timing = WireTiming(latency_s)
-        self._coming: deque[Timed] = deque()
-        self._given_up_s = math.inf
+        self._queue = ReplyQueue(line, baud, WireTiming(latency_s))
         self._open = self._gone = False
         line.on_unplug = self._unplug
 
@@ -79,12 +74,12 @@ class VirtualLink:
 
     def open(self) -> None:
         """Take it; raises PortMissing while it is unplugged."""
-        self._advance()
+        self._queue.advance(self.clock())
         if self._gone:
             raise PortMissing("no port virtual: it is unplugged", port=self.path)
         self._open = True
         self._line.set_line_baud(self.baud)
-        self._coming.clear()
+        self._queue.replies.clear()
 
     def close(self) -> None:
         """Give it back."""
@@ -92,16 +87,11 @@ class VirtualLink:
 
     def write(self, data: bytes) -> None:
         """Send; the far end acts when the last byte of a packet has arrived."""
-        self._advance()
+        self._queue.advance(self.clock())
         self._check()
-        now_s = self.clock()
         if self.tap is not None:
             self.tap(True, data)
-        if self._line.echo:
-            self._coming.append((now_s, data))
-        for packet in self._line.reader.feed(data):
-            self._hand_over(packet, now_s)
-        self._given_up_s = now_s + PAUSE_S if self._line.reader.pending else math.inf
+        self._queue.receive(data, self.clock())
 
     def put(self, data: bytes) -> int:
         """Send; there is always room."""
@@ -109,13 +99,13 @@ class VirtualLink:
         return len(data)
 
     def read(self, deadline_s: float) -> bytes:
-        """What has arrived, waiting for the first byte until a deadline; see ``SerialPort.read``."""
+        """What has arrived, waiting for the first byte until a deadline."""
         self._check()
         end_s = max(deadline_s, self.clock())
         while True:
-            due_s = min(self._due(), end_s)
+            due_s = min(self._queue.due_s, end_s)
             self.clock.wait_until(due_s)
-            self._advance()
+            self._queue.advance(self.clock())
             self._check()
             data = self._arrived()
             if data or due_s >= end_s:
@@ -127,32 +117,13 @@ class VirtualLink:
         self._check()
         return len(self._arrived())
 
-    def _hand_over(self, packet: Any, now_s: float) -> None:
-        at_s = self._timing.arrival(now_s, self._line.size(packet), self.baud)
-        self._coming += self._line.heard(self._timing.deliveries(self._line.handle(packet, at_s), self.baud))
-
-    def _due(self) -> float:
-        """When the next thing happens."""
-        coming_s = self._coming[0][0] if self._coming else math.inf
-        return min(coming_s, self._line.faults.next_change_s, self._given_up_s)
-
     def _arrived(self) -> bytes:
-        data = b""
-        while self._coming and self._coming[0][0] <= self.clock():
-            data += self._coming.popleft()[1]
+        data, replies = b"", self._queue.replies
+        while replies and replies[0][0] <= self.clock():
+            data += replies.popleft()[1]
         if data and self.tap is not None:
             self.tap(False, data)
         return data
-
-    def _advance(self) -> None:
-        """Faults that are due now, and packets whose end does not come."""
-        if self.clock() >= self._line.faults.next_change_s:
-            with self._line.lock:
-                self._line.faults.advance(self.clock())
-        if self.clock() >= self._given_up_s:
-            self._given_up_s = math.inf
-            for packet in self._line.reader.flush():
-                self._hand_over(packet, self.clock())
 
     def _check(self) -> None:
         if self._gone or not self._open:
@@ -160,12 +131,11 @@ class VirtualLink:
 
     def _unplug(self, fault: Fault, begins: bool) -> None:
         self._gone = begins
-        self._coming.clear()
-        self._line.reader.take_pending()
+        self._queue.clear()
 
 
 class VirtualBus:
-    """A simulated bus of any family and the time it lives in. Everything runs in the caller's thread.
+    """A simulated bus of any family and its clock. Everything runs in the caller's thread.
 
     Parameters
     ----------
@@ -173,12 +143,12 @@ class VirtualBus:
     family : a kind of bus, as ``drivers.kinds()`` lists them.
     driver : options of the drivers over it, such as ``{"margin_s": 0.05}``.
     faults, baud, latency_s, seed : see :class:`drivers.sim.SimulatedBus`.
-    options : what the far end is set to; None: as the driver wants it.
+    options : settings of the far end; None: those that the driver needs.
 
     Attributes
     ----------
     clock : the time; ``clock.sleep(1.0)`` lets a second pass.
-    line, link : the far end, and the port that leads to it.
+    line, link : the far end, and the port to it.
     """
 
     def __init__(
@@ -214,7 +184,7 @@ class VirtualBus:
         return self.line
 
     def servo(self, device_id: int) -> ServoView:
-        """One servo; KeyError where nobody has the id."""
+        """One servo; KeyError where none has the id."""
         return ServoView(self.chain, device_id, self.clock)
 
     def fault(self, *specs: str) -> None:

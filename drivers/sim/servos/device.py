@@ -1,7 +1,7 @@
-"""One simulated servo: what each instruction does to it.
+"""Instructions of one simulated servo: read, write, registered write, reboot, factory reset, clear.
 
-Behaviour follows the ROBOTIS e-Manual (Protocol 2.0 and control tables); where firmware differs or nobody has
-verified it, the choice is said at the method.
+Behaviour follows the ROBOTIS e-Manual (Protocol 2.0 and control tables); where firmware differs or was not
+verified, the method's docstring names the choice.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 from drivers.packets.packet import ErrorNumber
 from drivers.sim.servos.drive_x import CURRENT_POSITION, EXTENDED, GOAL_TORQUE
 from drivers.sim.servos.registers import GOALS, Change
-from drivers.sim.servos.state import ServoState
+from drivers.sim.servos.state import BOOT_S, ServoState
 from drivers.tables.tables import Item
 
 CLEAR_MULTI_TURN = b"\x01\x44\x58\x4c\x22"
@@ -22,7 +22,7 @@ CALIBRATE = 128
 
 
 class SimulatedServo(ServoState):
-    """A servo that obeys instructions.
+    """A servo that carries out instructions.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class SimulatedServo(ServoState):
         self._effects = self._effects_by_name()
 
     def force(self, name: str, value: int, now_s: float) -> None:
-        """Set a register whatever its access and range, with all that follows from it."""
+        """Set a register whatever its access and range, with all effects of a write."""
         self._store(self.table[name], value, now_s)
         self._sensed_at = -1.0
 
@@ -80,9 +80,9 @@ class SimulatedServo(ServoState):
         return self.alert
 
     def reboot(self, now_s: float) -> None:
-        """RAM to its initial values, errors cleared, deaf for `boot_s`."""
+        """RAM to its initial values, errors cleared, deaf for `BOOT_S`."""
         self._boot(now_s)
-        self.deaf_until = now_s + self.boot_s
+        self.deaf_until = now_s + BOOT_S
 
     def factory_reset(self, option: int, now_s: float) -> int:
         """Error byte. 0xFF resets all, 1 keeps the id, 2 keeps id and baud rate."""
@@ -104,7 +104,7 @@ class SimulatedServo(ServoState):
             return self.alert | ErrorNumber.DATA_RANGE
         if self.plant.motion(now_s).velocity:
             return self.alert | ErrorNumber.RESULT_FAIL
-        self._one_turn(now_s)
+        self._wrap_turns(now_s)
         return self.alert
 
     # ------------------------------------------------------------ effects of writes
@@ -114,13 +114,12 @@ class SimulatedServo(ServoState):
             "Torque Enable": self._write_torque,
             "Bus Watchdog": self._write_watchdog,
             "Operating Mode": self._write_mode,
-            "Hardware Error Status": lambda value, now_s: None,
         }
         for name in GOALS | {"Moving Speed", "Goal Time"}:
             effects[name] = partial(self._write_goal, name)
         if self.table.lock == "Lock":
             effects["Lock"] = self._write_lock
-        effects.update(dict.fromkeys(("ID", "Secondary(Shadow) ID", "Baud Rate"), self._write_address))
+        effects |= dict.fromkeys(("ID", "Secondary(Shadow) ID", "Baud Rate"), lambda value, now_s: self.on_change())
         for name in self.table:
             if name.startswith("Indirect Address"):
                 effects[name] = lambda value, now_s: self.registers.remap()
@@ -144,7 +143,7 @@ class SimulatedServo(ServoState):
             effect(value, now_s)
 
     def _recover(self) -> bool:
-        """Torque again after a shutdown: with Protocol 2.0 only a reboot gives it, older servos are just told to."""
+        """Whether torque comes back after a shutdown: with Protocol 2.0 only a reboot gives it, older servos obey."""
         if self.table.protocol == 2:
             return False
         self.shut_down, self.hardware_error = False, 0
@@ -173,7 +172,7 @@ class SimulatedServo(ServoState):
         self.drive.configure()
 
     def _write_goal(self, name: str, value: int, now_s: float) -> None:
-        """The goal of the present mode moves a powered motor; with Drive Mode bit 3 any goal powers it."""
+        """A goal of the present mode moves a powered motor; with Drive Mode bit 3 any goal switches it on."""
         if self.plant.powered:
             if name in self.drive.goals:
                 self.drive.plan(now_s)
@@ -186,10 +185,7 @@ class SimulatedServo(ServoState):
         self.registers.goals_locked = False
 
     def _write_mode(self, value: int, now_s: float) -> None:
-        """Goals go back to those of a servo that stands still; Present Position back into one turn."""
+        """Goals are reset to those of a servo at rest; Present Position back into one turn."""
         self.registers.extended = self.table.protocol == 2 and value in (EXTENDED, CURRENT_POSITION)
-        self._one_turn(now_s)
+        self._wrap_turns(now_s)
         self._reset_goals(now_s)
-
-    def _write_address(self, value: int, now_s: float) -> None:
-        self.on_change()

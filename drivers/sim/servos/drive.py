@@ -1,5 +1,4 @@
-"""What the motor control of every simulated servo has in common; the kinds of servo are in ``drive_x`` and
-``drive_word``."""
+"""Base class of the motor control of simulated servos: registers to trajectories, and sensors to registers."""
 
 from __future__ import annotations
 
@@ -8,9 +7,15 @@ from abc import ABC, abstractmethod
 from drivers.sim.servos.motion import Motion, hold, plan_stop
 from drivers.sim.servos.plant import Plant
 from drivers.sim.servos.registers import Registers
+from drivers.tables.tables import ControlTable
 
 OVERLOAD_AFTER_S = 1.0
 """How long a jammed motor gives its full torque before it counts as overloaded."""
+
+
+def speed_unit(table: ControlTable) -> float:
+    """One step of a model's speed register, ticks/s."""
+    return (table.get("Present Speed") or table["Present Velocity"]).scale / table.rad_per_tick
 
 
 class Drive(ABC):
@@ -27,37 +32,35 @@ class Drive(ABC):
     goals : names of the registers that move the motor in the present mode.
     offset : Present Position less the shaft's, ticks; `side` and `mirror` reverse the direction.
     ticks_s : one step of the speed register, ticks/s.
-    first_sensed, last_sensed : addresses from and to which `sense` writes.
-    motion_at, motion_end : the part of them that `sense_motion` writes; empty where there is no such part.
+    first_sensed, last_sensed : first and last-plus-one address that `sense` writes.
+    motion_at, motion_end : the same for `sense_motion`; empty where it has no part of its own.
     """
 
     goals: tuple[str, ...]
     first_sensed: int
     last_sensed: int
-    motion_at: int
-    motion_end: int
+    motion_at = motion_end = 0
 
-    def __init__(self, registers: Registers, plant: Plant, now_s: float, speed: str) -> None:
-        table = registers.table
+    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
         self.registers, self.plant, self.born_s = registers, plant, now_s
-        self.ticks_s = table[speed].scale / table.rad_per_tick
+        self.ticks_s = speed_unit(registers.table)
         self.side, self.mirror, self.offset = 1, 0.0, 0
 
     @abstractmethod
     def configure(self) -> None:
-        """Take over the permanent settings; to be called when one of them changed."""
+        """Read the permanent settings; to be called when one of them changed."""
 
     @abstractmethod
     def plan(self, now_s: float) -> None:
-        """Move as the goal registers and the operating mode say, from the present motion on."""
+        """Plan the motion to the goal registers in the operating mode, from the present motion on."""
 
     @abstractmethod
     def sense(self, now_s: float) -> float:
-        """Write what the sensors see at `now_s` into memory; returns the load (-1 to 1)."""
+        """Write the sensors' values at `now_s` into memory; returns the load (-1 to 1)."""
 
-    @abstractmethod
     def sense_motion(self, now_s: float) -> None:
-        """Only current, velocity and position, which is what control loops read."""
+        """Write at least current, velocity and position, the registers that control loops read."""
+        self.sense(now_s)
 
     def to_register(self, shaft: float) -> int:
         """Present Position for a shaft position: reversed about the middle of the turn, then offset."""
@@ -68,23 +71,22 @@ class Drive(ABC):
         return self.mirror + self.side * float(register - self.offset)
 
     def stop(self, now_s: float) -> None:
-        """Stand still at once (bus watchdog: profile acceleration and velocity count as 0)."""
+        """Stop at once (bus watchdog: profile acceleration and velocity count as 0)."""
         self.plant.trajectory = hold(now_s, self.plant.motion(now_s).position)
 
     def coast(self, now_s: float) -> None:
-        """Without power the shaft runs out."""
-        motion = self.plant.motion(now_s)
-        self.plant.trajectory = plan_stop(now_s, motion.position, motion.velocity, 0.5 * self.plant.top_acceleration)
+        """Slow down as without power, at half the motor's acceleration."""
+        self.plant.trajectory = plan_stop(now_s, self.plant.motion(now_s), 0.5 * self.plant.top_acceleration)
 
-    def look(self, now_s: float) -> tuple[Motion, Motion, float]:
-        """(motion of the shaft, motion the motor was told, load)."""
+    def observe(self, now_s: float) -> tuple[Motion, Motion, float]:
+        """(motion of the shaft, motion commanded to the motor, load)."""
         plant = self.plant
-        wanted = plant.wanted(now_s)
-        motion = wanted if plant.jammed_at is None else plant.motion(now_s)
-        return motion, wanted, plant.load(motion, wanted)
+        commanded = plant.trajectory.at(now_s)
+        motion = commanded if plant.jammed_at is None else plant.motion(now_s)
+        return motion, commanded, plant.load(motion, commanded)
 
     def hardware_errors(self, now_s: float, load: float) -> int:
-        """Bits of Hardware Error Status whose causes are there now."""
+        """Bits of Hardware Error Status whose causes are present."""
         registers, plant = self.registers, self.plant
         cause, bits = registers.table.hardware_error, 0
         voltage = round(10.0 * plant.voltage(load))

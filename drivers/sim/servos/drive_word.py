@@ -6,29 +6,33 @@ from drivers.sim.servos.drive import Drive
 from drivers.sim.servos.motion import Motion, Profile, plan_move, plan_speed, plan_timed
 from drivers.sim.servos.plant import Plant
 from drivers.sim.servos.registers import Registers
+from drivers.tables.tables import to_magnitude
 
 MULTI_TURN = 0x10
 """Feetech's Phase (18): present positions leave the turn."""
 DIRECTION_BIT = 10
 """AX, MX and XL-320: speeds and loads are magnitudes with the direction in this bit (set = clockwise)."""
 
+SENSED = frozenset(("Present Position", "Present Speed", "Present Velocity", "Present Load", "Present Current",
+    "Present Voltage", "Present Temperature", "Moving", "Realtime Tick", "Goal Position 2"))  # fmt: skip
+"""Registers that the sensors write."""
+
 
 class WordDrive(Drive):
     """Plans and senses for one AX, MX(1.0) or XL-320 servo. See :class:`~drivers.sim.servos.drive.Drive`."""
 
-    def __init__(self, registers: Registers, plant: Plant, now_s: float, speed: str = "Present Speed") -> None:
-        super().__init__(registers, plant, now_s, speed)
-        self.goals = ("Goal Position", "Moving Speed")
-        names = [name for name in registers.table if name in SENSED]
-        items = [registers.table[name] for name in names]
-        self._names = names
+    goals: tuple[str, ...] = ("Goal Position", "Moving Speed")
+
+    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
+        super().__init__(registers, plant, now_s)
+        self._names = [name for name in registers.table if name in SENSED]
+        items = [registers.table[name] for name in self._names]
         self.first_sensed = min(item.address for item in items)
         self.last_sensed = max(item.end for item in items)
-        self.motion_at = self.motion_end = registers.table.size
         self.configure()
 
     def configure(self) -> None:
-        """Nothing is kept besides the registers."""
+        """Every setting is read when it is used."""
 
     def plan(self, now_s: float) -> None:
         """To Goal Position at Moving Speed (0 = the motor's top speed); in wheel mode at that share of full power."""
@@ -37,15 +41,11 @@ class WordDrive(Drive):
         magnitude = moving & (1 << DIRECTION_BIT) - 1
         if self._wheel():
             share = magnitude / 1023 * (-1 if moving >> DIRECTION_BIT & 1 else 1)
-            plant.trajectory = plan_speed(
-                now_s, now.position, now.velocity, share * plant.top_speed, plant.top_acceleration
-            )
+            plant.trajectory = plan_speed(now_s, now, share * plant.top_speed, plant.top_acceleration)
             return
         top = min(magnitude * self.ticks_s, plant.top_speed) if magnitude else plant.top_speed
         goal = self.to_shaft(registers.get("Goal Position"))
-        plant.trajectory = plan_move(
-            now_s, now.position, now.velocity, goal, top, plant.top_acceleration, Profile.RECTANGULAR
-        )
+        plant.trajectory = plan_move(now_s, now, goal, top, plant.top_acceleration, Profile.RECTANGULAR)
 
     def _wheel(self) -> bool:
         """XL-320 has a mode register; AX and MX turn endlessly when both angle limits are 0."""
@@ -55,27 +55,22 @@ class WordDrive(Drive):
         return registers.get("CW Angle Limit") == registers.get("CCW Angle Limit") == 0
 
     def sense(self, now_s: float) -> float:
-        """Write what the sensors see at `now_s` into memory; returns the load (-1 to 1)."""
-        motion, _, load = self.look(now_s)
+        motion, _, load = self.observe(now_s)
         values = self._values(now_s, motion, load)
         for name in self._names:
             self.registers.put(name, values[name])
         return load
 
-    def sense_motion(self, now_s: float) -> None:
-        """There is no separate block: everything is sensed."""
-        self.sense(now_s)
-
     def _values(self, now_s: float, motion: Motion, load: float) -> dict[str, int]:
         plant = self.plant
-        speed = round(motion.velocity / self.ticks_s)
-        if self._unsigned_speed():
-            speed = _direction(speed)
+        speed, load_register = round(motion.velocity / self.ticks_s), round(1000 * load)
+        if "Control Mode" in self.registers.table:  # the XL-320's table leaves the direction bit to the host
+            speed, load_register = (to_magnitude(each, DIRECTION_BIT) for each in (speed, round(1023 * load)))
         return {
             "Present Position": self._position(motion),
             "Present Speed": speed,
             "Present Velocity": speed,
-            "Present Load": _direction(round(1023 * load)) if self._unsigned_speed() else round(1000 * load),
+            "Present Load": load_register,
             "Present Current": round(1000 * load),
             "Present Voltage": min(max(round(10.0 * plant.voltage(load)), 0), 255),
             "Present Temperature": min(max(round(plant.temperature_c), 0), 255),
@@ -87,10 +82,6 @@ class WordDrive(Drive):
         """Present Position, which ends at the ends of the turn."""
         return min(max(self.to_register(motion.position), 0), self.registers.table.ticks_per_turn - 1)
 
-    def _unsigned_speed(self) -> bool:
-        """Whether the table leaves the direction bit to the host (XL-320, as its vendor writes it)."""
-        return "Control Mode" in self.registers.table
-
 
 class FeetechDrive(WordDrive):
     """Plans and senses for one Feetech STS or SCS servo. See :class:`~drivers.sim.servos.drive.Drive`.
@@ -99,9 +90,7 @@ class FeetechDrive(WordDrive):
     2 PWM (in Goal Time), 3 step by step. SCS: Goal Time, when it is not 0, is the duration of the move.
     """
 
-    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
-        super().__init__(registers, plant, now_s, "Present Velocity")
-        self.goals = ("Goal Position", "Goal Velocity", "Goal Time")
+    goals = ("Goal Position", "Goal Velocity", "Goal Time")
 
     def configure(self) -> None:
         """Present Position is the shaft's less Homing Offset."""
@@ -109,7 +98,7 @@ class FeetechDrive(WordDrive):
             self.offset = -self.registers.get("Homing Offset")
 
     def plan(self, now_s: float) -> None:
-        """Move as Operating Mode says."""
+        """Plan the motion of the Operating Mode."""
         registers, plant = self.registers, self.plant
         now = plant.motion(now_s)
         mode = registers.get("Operating Mode") if "Operating Mode" in registers.table else 0
@@ -118,18 +107,18 @@ class FeetechDrive(WordDrive):
             if mode == 2:
                 speed = registers.get("Goal Time") / 1000 * plant.top_speed
             speed = min(max(speed, -plant.top_speed), plant.top_speed)
-            plant.trajectory = plan_speed(now_s, now.position, now.velocity, speed, self._acceleration())
+            plant.trajectory = plan_speed(now_s, now, speed, self._acceleration())
             return
         goal = self.to_shaft(registers.get("Goal Position"))
         if mode == 3:
             goal = plant.trajectory.end + registers.get("Goal Position")
         time_s = registers.get("Goal Time") * 1e-3
         if time_s > 0.0 and registers.table.ticks_per_turn == 1024:
-            plant.trajectory = plan_timed(now_s, now.position, now.velocity, goal, time_s, 0.0)
+            plant.trajectory = plan_timed(now_s, now, goal, time_s)
             return
         speed = abs(registers.get("Goal Velocity")) * self.ticks_s
         top = min(speed, plant.top_speed) if speed else plant.top_speed
-        plant.trajectory = plan_move(now_s, now.position, now.velocity, goal, top, self._acceleration())
+        plant.trajectory = plan_move(now_s, now, goal, top, self._acceleration())
 
     def _acceleration(self) -> float:
         item = self.registers.table.get("Acceleration")
@@ -149,25 +138,3 @@ class FeetechDrive(WordDrive):
         values = super()._values(now_s, motion, load)
         values["Goal Position 2"] = self.registers.get("Goal Position")
         return values
-
-
-SENSED = frozenset(
-    {
-        "Present Position",
-        "Present Speed",
-        "Present Velocity",
-        "Present Load",
-        "Present Current",
-        "Present Voltage",
-        "Present Temperature",
-        "Moving",
-        "Realtime Tick",
-        "Goal Position 2",
-    }
-)
-
-
-def _direction(value: int) -> int:
-    """Magnitude in bits 0-9, direction in bit 10 (clear = counter-clockwise)."""
-    magnitude = min(abs(value), (1 << DIRECTION_BIT) - 1)
-    return magnitude | 1 << DIRECTION_BIT if value < 0 else magnitude

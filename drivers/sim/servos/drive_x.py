@@ -19,7 +19,7 @@ MAX_POSITION_OFFSET = 1024
 """Homing Offset beyond this is ignored in position mode (e-Manual, Homing Offset)."""
 
 FOLLOWING_TICKS = 10
-"""Distance between wanted and real position from which on it is a following error."""
+"""Distance between commanded and real position from which on it is a following error."""
 
 _MOTION = struct.Struct("<hii")
 """Present Current (or Load), Present Velocity and Present Position, side by side as well."""
@@ -58,7 +58,7 @@ class XDrive(Drive):
     """Plans and senses for one X-series servo. See :class:`~drivers.sim.servos.drive.Drive`."""
 
     def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
-        super().__init__(registers, plant, now_s, "Present Velocity")
+        super().__init__(registers, plant, now_s)
         table = registers.table
         acceleration = table["Profile Acceleration"]
         self.ticks_s2 = acceleration.scale / table.rad_per_tick
@@ -72,7 +72,6 @@ class XDrive(Drive):
         self.configure()
 
     def configure(self) -> None:
-        """Take over the EEPROM settings; to be called when one of them changed."""
         registers = self.registers
         self.mode = registers.get("Operating Mode")
         self.goals = _GOALS[self.mode]
@@ -87,13 +86,12 @@ class XDrive(Drive):
         self.reach = self._reach(registers.get("Current Limit")) if self.has_current else math.inf
 
     def _reach(self, current: int) -> float:
-        """How far from its rest a current can pull the skin, ticks."""
+        """How far from its rest a current can stretch the skin, ticks."""
         spring = self.plant.skin.spring
         return abs(current) / self.full_current / spring if spring > 0.0 else math.inf
 
     # ------------------------------------------------------------ planning
     def plan(self, now_s: float) -> None:
-        """Move as the goal registers and the operating mode say, from the present motion on."""
         mode = self.mode
         if mode in (POSITION, EXTENDED, CURRENT_POSITION):
             self._plan_position(now_s, mode)
@@ -103,7 +101,7 @@ class XDrive(Drive):
             self._plan_speed(now_s, mode)
 
     def _plan_position(self, now_s: float, mode: int) -> None:
-        """To Goal Position, as far as the current pulls the skin."""
+        """To Goal Position, or as far as the current can stretch the skin."""
         plant = self.plant
         acceleration, speed, register = _PROFILE.unpack_from(self.registers.memory, self._profile_at)
         reach = self.reach
@@ -112,7 +110,7 @@ class XDrive(Drive):
         goal = min(max(self.to_shaft(register), plant.rest - reach), plant.rest + reach)
         now = plant.motion(now_s)
         if speed and self.timed:
-            plan = plan_timed(now_s, now.position, now.velocity, goal, speed * 1e-3, acceleration * 1e-3)
+            plan = plan_timed(now_s, now, goal, speed * 1e-3, acceleration * 1e-3)
             if abs(plan.at(now_s + 0.5 * plan.duration).velocity) <= self.top_speed:
                 plant.trajectory = plan
                 return
@@ -122,7 +120,7 @@ class XDrive(Drive):
             top, profile = min(speed * self.ticks_s, top), Profile.RECTANGULAR
             if acceleration:
                 limit, profile = min(acceleration * self.ticks_s2, limit), Profile.TRAPEZOIDAL
-        plant.trajectory = plan_move(now_s, now.position, now.velocity, goal, top, limit, profile)
+        plant.trajectory = plan_move(now_s, now, goal, top, limit, profile)
 
     def _plan_current(self, now_s: float) -> None:
         """The shaft goes where the skin's spring balances the current; without a spring it turns."""
@@ -130,9 +128,9 @@ class XDrive(Drive):
         now, plant, top = self.plant.motion(now_s), self.plant, self.top_speed
         if plant.skin.spring > 0.0:
             goal = plant.rest + share / plant.skin.spring
-            plant.trajectory = plan_move(now_s, now.position, now.velocity, goal, top, plant.top_acceleration)
+            plant.trajectory = plan_move(now_s, now, goal, top, plant.top_acceleration)
         else:
-            plant.trajectory = plan_speed(now_s, now.position, now.velocity, share * top, plant.top_acceleration)
+            plant.trajectory = plan_speed(now_s, now, share * top, plant.top_acceleration)
 
     def _plan_speed(self, now_s: float, mode: int) -> None:
         registers, now, top = self.registers, self.plant.motion(now_s), self.top_speed
@@ -143,21 +141,18 @@ class XDrive(Drive):
             speed = registers.get("Goal Velocity") * self.ticks_s
             acceleration = registers.get("Profile Acceleration") * self.ticks_s2
         speed = self.side * min(max(speed, -top), top)
-        self.plant.trajectory = plan_speed(
-            now_s, now.position, now.velocity, speed, acceleration or self.plant.top_acceleration
-        )
+        self.plant.trajectory = plan_speed(now_s, now, speed, acceleration or self.plant.top_acceleration)
 
     # ------------------------------------------------------------ sensing
     def sense(self, now_s: float) -> float:
-        """Write what the sensors see at `now_s` into memory; returns the load (-1 to 1)."""
-        motion, wanted, load = self.look(now_s)
-        values = self._values(now_s, motion, wanted, load)
+        motion, commanded, load = self.observe(now_s)
+        values = self._values(now_s, motion, commanded, load)
         self._layout.pack_into(self.registers.memory, self.first_sensed, *values)
         return load
 
     def sense_motion(self, now_s: float) -> None:
         """Only current, velocity and position, which is what control loops read."""
-        motion, _, load = self.look(now_s)
+        motion, _, load = self.observe(now_s)
         side = self.side
         _MOTION.pack_into(
             self.registers.memory,
@@ -167,12 +162,12 @@ class XDrive(Drive):
             round(self.mirror + side * motion.position) + self.offset,
         )
 
-    def _values(self, now_s: float, motion: Motion, wanted: Motion, load: float) -> tuple[int, ...]:
+    def _values(self, now_s: float, motion: Motion, commanded: Motion, load: float) -> tuple[int, ...]:
         """X-series registers 120-146, in order of address."""
         plant, side, ticks_s = self.plant, self.side, self.ticks_s
         powered, speed = plant.powered, motion.velocity
         running = powered and plant.trajectory.moving(now_s)
-        arrived = abs(wanted.position - motion.position) < FOLLOWING_TICKS
+        arrived = abs(commanded.position - motion.position) < FOLLOWING_TICKS
         profile = plant.trajectory.profile << 4 if running else 0
         push = 0.8 * speed / plant.top_speed + 0.2 * load if powered else 0.0
         return (
@@ -183,8 +178,8 @@ class XDrive(Drive):
             side * round(load * self.full_current),
             side * round(speed / ticks_s),
             round(self.mirror + side * motion.position) + self.offset,
-            side * round(wanted.velocity / ticks_s),
-            round(self.mirror + side * wanted.position) + self.offset,
+            side * round(commanded.velocity / ticks_s),
+            round(self.mirror + side * commanded.position) + self.offset,
             round(10.0 * plant.voltage(load)),
             min(max(round(plant.temperature_c), 0), 255),
         )

@@ -1,6 +1,6 @@
-"""How a simulated shaft moves: pieces of constant acceleration, evaluated when somebody looks.
+"""Trajectories of simulated shafts: moves, timed moves, velocity ramps and stops of piecewise constant acceleration.
 
-Units are position steps (ticks) and seconds. A trajectory is planned when a goal is written and read at any
+Units are position steps (ticks) and seconds. A trajectory is planned when a goal is written and evaluated at any
 later time, so a bus at rest costs nothing.
 """
 
@@ -14,8 +14,8 @@ class Motion(NamedTuple):
     """Position (ticks), velocity (ticks/s) and acceleration (ticks/s²) at one moment."""
 
     position: float
-    velocity: float
-    acceleration: float
+    velocity: float = 0.0
+    acceleration: float = 0.0
 
 
 class Profile:
@@ -33,27 +33,29 @@ class Trajectory:
     Parameters
     ----------
     start_s : time of the first piece.
-    position, velocity : motion at that time.
-    pieces : (duration in seconds, acceleration) in order.
-    goal : position it ends at, set exactly (rounding must not leave a servo a hair off its goal); None where
-        it never ends (velocity control).
+    start : motion at that time.
+    pieces : (duration in seconds, acceleration) in order; those without a duration are left out.
+    goal : position it ends at, set exactly, without rounding errors; None where it never ends (velocity control).
     profile : a `Profile` number.
+
+    Attributes
+    ----------
+    duration : of all pieces, seconds. end : position where they end.
     """
 
-    __slots__ = ("_end", "_pieces", "duration", "profile", "start_s")
+    __slots__ = ("_end_velocity", "_pieces", "duration", "end", "profile", "start_s")
 
     def __init__(
         self,
         start_s: float,
-        position: float,
-        velocity: float,
+        start: Motion,
         pieces: list[tuple[float, float]],
         goal: float | None = None,
         profile: int = Profile.STEP,
     ) -> None:
         self.start_s, self.profile = start_s, profile
         self._pieces: list[tuple[float, float, float, float]] = []
-        at = 0.0
+        at, position, velocity = 0.0, start.position, start.velocity
         for duration, acceleration in pieces:
             if duration <= 0.0:
                 continue
@@ -62,51 +64,39 @@ class Trajectory:
             velocity += acceleration * duration
             at += duration
         self.duration = at
-        self._end = (position, velocity) if goal is None else (goal, 0.0)
-
-    @property
-    def end(self) -> float:
-        """Position where the pieces end."""
-        return self._end[0]
+        self.end, self._end_velocity = (position, velocity) if goal is None else (goal, 0.0)
 
     def moving(self, now_s: float) -> bool:
-        """Whether the pieces are still running."""
+        """Whether the pieces have not ended."""
         return now_s - self.start_s < self.duration
 
     def at(self, now_s: float) -> Motion:
         """Motion at a time; before the start it is the start's."""
         t = max(now_s - self.start_s, 0.0)
         if t >= self.duration:
-            position, velocity = self._end
-            return Motion(position + velocity * (t - self.duration), velocity, 0.0)
-        piece = next(piece for piece in reversed(self._pieces) if t >= piece[0])
-        begin, position, velocity, acceleration = piece
+            velocity = self._end_velocity
+            return Motion(self.end + velocity * (t - self.duration), velocity, 0.0)
+        begin, position, velocity, acceleration = next(piece for piece in reversed(self._pieces) if t >= piece[0])
         t -= begin
         return Motion(position + (velocity + 0.5 * acceleration * t) * t, velocity + acceleration * t, acceleration)
 
 
 def hold(now_s: float, position: float) -> Trajectory:
     """Stand still."""
-    return Trajectory(now_s, position, 0.0, [], position)
+    return Trajectory(now_s, Motion(position), [], position)
 
 
 def plan_move(
-    now_s: float,
-    position: float,
-    velocity: float,
-    goal: float,
-    top_speed: float,
-    acceleration: float,
-    profile: int = Profile.TRAPEZOIDAL,
+    now_s: float, start: Motion, goal: float, top_speed: float, acceleration: float, profile: int = Profile.TRAPEZOIDAL
 ) -> Trajectory:
     """Quickest move to rest at `goal`: a trapezoid, or a triangle where it is too short.
 
     Parameters
     ----------
     top_speed, acceleration : above zero, ticks/s and ticks/s².
-    profile : number to report; a trapezoid that never cruises is reported as triangular.
+    profile : number to report; a trapezoid without a constant velocity is reported as triangular.
     """
-    distance = goal - position
+    velocity, distance = start.velocity, goal - start.position
     stop = velocity * abs(velocity) / (2.0 * acceleration)
     side = 1.0 if distance >= stop else -1.0
     cruise = side * top_speed
@@ -121,39 +111,32 @@ def plan_move(
     push = math.copysign(acceleration, cruise - velocity)
     level_s = level / cruise if cruise else 0.0
     pieces = [(ramp_up, push), (level_s, 0.0), (ramp_down, -side * acceleration)]
-    return Trajectory(now_s, position, velocity, pieces, goal, profile)
+    return Trajectory(now_s, start, pieces, goal, profile)
 
 
-def plan_timed(
-    now_s: float, position: float, velocity: float, goal: float, total_s: float, ramp_s: float
-) -> Trajectory:
+def plan_timed(now_s: float, start: Motion, goal: float, total_s: float, ramp_s: float = 0.0) -> Trajectory:
     """Move to rest at `goal` in exactly `total_s`, with ramps of `ramp_s` (at most half of it).
 
     The cruising speed v follows from D = (v0 + v)/2 ramp + v (total - 2 ramp) + v/2 ramp.
     """
     ramp_s = min(ramp_s, 0.5 * total_s)
-    speed = (goal - position - 0.5 * velocity * ramp_s) / (total_s - ramp_s)
+    speed = (goal - start.position - 0.5 * start.velocity * ramp_s) / (total_s - ramp_s)
     if ramp_s <= 0.0:
-        return Trajectory(now_s, position, speed, [(total_s, 0.0)], goal, Profile.RECTANGULAR)
-    pieces = [(ramp_s, (speed - velocity) / ramp_s), (total_s - 2.0 * ramp_s, 0.0), (ramp_s, -speed / ramp_s)]
+        return Trajectory(now_s, start._replace(velocity=speed), [(total_s, 0.0)], goal, Profile.RECTANGULAR)
+    pieces = [(ramp_s, (speed - start.velocity) / ramp_s), (total_s - 2.0 * ramp_s, 0.0), (ramp_s, -speed / ramp_s)]
     profile = Profile.TRAPEZOIDAL if total_s > 2.0 * ramp_s else Profile.TRIANGULAR
-    return Trajectory(now_s, position, velocity, pieces, goal, profile)
+    return Trajectory(now_s, start, pieces, goal, profile)
 
 
-def plan_speed(now_s: float, position: float, velocity: float, goal_velocity: float, acceleration: float) -> Trajectory:
+def plan_speed(now_s: float, start: Motion, goal_velocity: float, acceleration: float) -> Trajectory:
     """Ramp to a velocity and keep it."""
-    change = goal_velocity - velocity
+    change = goal_velocity - start.velocity
     pieces = [(abs(change) / acceleration, math.copysign(acceleration, change))]
-    return Trajectory(now_s, position, velocity, pieces, None, Profile.RECTANGULAR)
+    return Trajectory(now_s, start, pieces, None, Profile.RECTANGULAR)
 
 
-def plan_stop(now_s: float, position: float, velocity: float, acceleration: float) -> Trajectory:
+def plan_stop(now_s: float, start: Motion, acceleration: float) -> Trajectory:
     """Slow down to rest, wherever that is."""
-    time = abs(velocity) / acceleration
-    return Trajectory(
-        now_s,
-        position,
-        velocity,
-        [(time, -math.copysign(acceleration, velocity))],
-        position + 0.5 * velocity * time,
-    )
+    time = abs(start.velocity) / acceleration
+    pieces = [(time, -math.copysign(acceleration, start.velocity))]
+    return Trajectory(now_s, start, pieces, start.position + 0.5 * start.velocity * time)

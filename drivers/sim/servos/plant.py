@@ -1,4 +1,4 @@
-"""What hangs on a simulated servo: shaft, skin, heat and supply. Everything is computed when it is looked at."""
+"""Physics of one simulated servo: shaft, load by the skin, heat and supply, all computed at the time of a look-up."""
 
 from __future__ import annotations
 
@@ -26,48 +26,33 @@ class Skin:
     friction: float = 0.02
 
 
-@dataclass(slots=True)
-class Heat:
-    """Winding temperature: a first-order lag behind ambient + rise x load²."""
-
-    ambient_c: float = 30.0
-    rise_c: float = 60.0
-    lag_s: float = 200.0
-    temperature_c: float = 30.0
-    at_s: float = 0.0
-
-    def advance(self, now_s: float, load: float) -> None:
-        """Let `load` (share of stall torque) act since the last call."""
-        target = self.ambient_c + self.rise_c * load * load
-        share = 1.0 - math.exp(-max(now_s - self.at_s, 0.0) / self.lag_s)
-        self.temperature_c += (target - self.temperature_c) * share
-        self.at_s = max(now_s, self.at_s)
-
-
 class Plant:
-    """Shaft of one servo.
+    """Shaft and motor of one servo.
 
     Parameters
     ----------
-    now_s, position : where it stands when it is switched on (ticks of the bare shaft, no offset).
+    now_s, position : time of power-up, and the shaft's position then (ticks of the bare shaft, no offset).
     top_speed : no-load speed, ticks/s.
     supply_v : voltage of the bus.
     skin : its load.
 
     Attributes
     ----------
-    trajectory : what the motor was told.
-    powered : the motor holds and moves the shaft; otherwise it stands where it is left.
+    trajectory : the motion commanded to the motor.
+    powered : the motor holds and moves the shaft; otherwise the shaft stays where it is left.
     jammed_at : position at which the shaft is stuck, or None.
+    jammed_since : when it got stuck, or None.
     forced_c : temperature set from outside, or None.
     """
 
     RAMP_S = 0.03
-    """Time from rest to the no-load speed: the quickest a motor can be, whatever its profile says."""
+    """Time from rest to the no-load speed: the shortest possible, whatever the profile."""
     STIFFNESS = 0.02
     """Share of stall torque per tick of following error of a jammed shaft."""
     RESISTANCE_V = 0.4
     """Drop of the supply at full load, volts."""
+    AMBIENT_C, RISE_C, LAG_S = 30.0, 60.0, 200.0
+    """Winding temperature: a first-order lag of 200 s behind ambient + rise x load²."""
 
     def __init__(self, now_s: float, position: float, top_speed: float, supply_v: float, skin: Skin) -> None:
         self.skin = skin
@@ -78,20 +63,14 @@ class Plant:
         self.powered = False
         self.jammed_at: float | None = None
         self.jammed_since: float | None = None
-        self.heat = Heat(at_s=now_s)
         self.forced_c: float | None = None
-
-    def wanted(self, now_s: float) -> Motion:
-        """Motion that the motor was told."""
-        return self.trajectory.at(now_s)
+        self._winding_c, self._heated_s = self.AMBIENT_C, now_s
 
     def motion(self, now_s: float) -> Motion:
         """Motion of the shaft."""
-        if self.jammed_at is not None:
-            return Motion(self.jammed_at, 0.0, 0.0)
-        return self.trajectory.at(now_s)
+        return self.trajectory.at(now_s) if self.jammed_at is None else Motion(self.jammed_at)
 
-    def load(self, motion: Motion, wanted: Motion) -> float:
+    def load(self, motion: Motion, commanded: Motion) -> float:
         """Torque the motor gives, as a share of its stall torque (-1 to 1)."""
         if not self.powered:
             return 0.0
@@ -100,7 +79,7 @@ class Plant:
         if motion.velocity:
             load += math.copysign(skin.friction, motion.velocity)
         if self.jammed_at is not None:
-            load += self.STIFFNESS * (wanted.position - motion.position)
+            load += self.STIFFNESS * (commanded.position - motion.position)
         return min(max(load, -1.0), 1.0)
 
     def voltage(self, load: float) -> float:
@@ -109,15 +88,18 @@ class Plant:
 
     @property
     def temperature_c(self) -> float:
-        """Temperature of the motor when `warm` was last called, or the one set from outside."""
-        return self.heat.temperature_c if self.forced_c is None else self.forced_c
+        """Temperature of the motor when `heat` was last called, or the one set from outside."""
+        return self._winding_c if self.forced_c is None else self.forced_c
 
-    def warm(self, now_s: float, load: float) -> None:
-        """Let `load` (share of stall torque) have heated the motor since the last call."""
-        self.heat.advance(now_s, load)
+    def heat(self, now_s: float, load: float) -> None:
+        """Let `load` (share of stall torque) heat the motor since the last call."""
+        target = self.AMBIENT_C + self.RISE_C * load * load
+        share = 1.0 - math.exp(-max(now_s - self._heated_s, 0.0) / self.LAG_S)
+        self._winding_c += (target - self._winding_c) * share
+        self._heated_s = max(now_s, self._heated_s)
 
     def jam(self, now_s: float, stuck: bool) -> None:
-        """Hold the shaft where it is, or let it go (it then goes on from there)."""
+        """Hold the shaft where it is, or release it (it then goes on from there)."""
         if stuck and self.jammed_at is None:
             self.jammed_at = self.trajectory.at(now_s).position
             self.jammed_since = now_s

@@ -1,7 +1,6 @@
-"""The memory of a simulated Dynamixel servo: its control table as bytes, with access rules and ranges.
+"""Register memory of a simulated servo: reads, and whether a write is allowed or with which error it is refused.
 
-What a write *does* is the device's business; this module says what a read returns and whether a write is
-allowed, and with which error number it is refused.
+The effects of a write are in ``device``.
 """
 
 from __future__ import annotations
@@ -17,16 +16,8 @@ GOALS = frozenset({"Goal PWM", "Goal Current", "Goal Velocity", "Goal Position"}
 
 Change = tuple[Item, int]
 
-_CODES = {
-    (size, signed, big_endian): struct.Struct("<>"[big_endian] + (code.lower() if signed else code))
-    for size, code in ((1, "B"), (2, "H"), (4, "I"))
-    for signed in (False, True)
-    for big_endian in (False, True)
-}
-
-
-def _cell(item: Item) -> struct.Struct:
-    return _CODES[item.size, item.signed, item.big_endian]
+_CODES = {1: "B", 2: "H", 4: "I"}
+"""Format of an unsigned item by its size, for ``struct``; in small letters signed."""
 
 
 class Registers:
@@ -38,7 +29,7 @@ class Registers:
 
     Attributes
     ----------
-    memory : (table.size,) bytes as they would be read, but for the indirect area.
+    memory : (table.size,) bytes as a host reads them, except for the indirect area.
     locked : nothing below ``table.eeprom_end`` may be written (torque is on, or Lock is set).
     goals_locked : the bus watchdog has tripped, so goals may not be written.
     extended : Goal Position may leave one turn (operating modes 4 and 5).
@@ -48,7 +39,7 @@ class Registers:
         self.table = table
         self.memory = bytearray(table.size)
         self.locked = self.goals_locked = self.extended = False
-        self._cells = {name: (_cell(item), item.address, item.sign_bit) for name, item in table.items()}
+        self._cells = {name: (_format(item), item.address, item.sign_bit) for name, item in table.items()}
         self._layouts: dict[tuple[int, int], tuple[Item, ...] | ErrorNumber] = {}
         self._pointers: dict[int, int] = {}
         self._slots = frozenset(address for _, data, count in table.indirect for address in range(data, data + count))
@@ -62,13 +53,13 @@ class Registers:
         self.remap()
 
     def get(self, name: str) -> int:
-        """Value of an item as it lies in memory; KeyError where the model has none of that name."""
+        """Value of an item in memory; KeyError where the model has none of that name."""
         cell, address, sign_bit = self._cells[name]
         value: int = cell.unpack_from(self.memory, address)[0]
         return value if sign_bit is None else from_magnitude(value, sign_bit)
 
     def put(self, name: str, value: int) -> None:
-        """Set an item whatever its access."""
+        """Set an item whatever its access and range."""
         item = self.table[name]
         self.memory[item.address : item.end] = item.encode(value)
 
@@ -86,7 +77,7 @@ class Registers:
         return bytes(memory[pointers.get(at, at)] for at in range(address, address + length))
 
     def span(self, address: int, length: int) -> tuple[int, int]:
-        """First and last-plus-one address that a read looks at, through the pointers."""
+        """First and last-plus-one address that a read reaches through the pointers."""
         if not self._pointers or address + length <= self._first_slot:
             return address, address + length
         seen = [self._pointers.get(at, at) for at in range(address, address + length)]
@@ -96,7 +87,7 @@ class Registers:
     def parse(self, address: int, data: bytes) -> list[Change] | ErrorNumber:
         """The items a write changes, or why it is refused. Nothing is changed here.
 
-        A write is refused as a whole: with Access (7) where it touches no item, a read-only one or a locked
+        A write is refused as a whole: with Access (7) where it reaches no item, a read-only one or a locked
         one, with Data Length (5) where it ends inside an item, with Data Range (4) or Data Limit (6) for a value.
         """
         if not data:
@@ -108,9 +99,10 @@ class Registers:
             return layout
         changes = []
         for item in layout:
-            value = _cell(item).unpack_from(data, item.address - address)[0]
-            if item.sign_bit is not None:
-                value = from_magnitude(value, item.sign_bit)
+            cell, _, sign_bit = self._cells[item.name]
+            value = cell.unpack_from(data, item.address - address)[0]
+            if sign_bit is not None:
+                value = from_magnitude(value, sign_bit)
             error = self._refusal(item, value)
             if error:
                 return error
@@ -119,16 +111,15 @@ class Registers:
 
     def store(self, item: Item, value: int) -> None:
         """Put a value that `parse` allowed."""
-        raw = value if item.sign_bit is None else to_magnitude(value, item.sign_bit)
-        _cell(item).pack_into(self.memory, item.address, raw)
+        cell, address, sign_bit = self._cells[item.name]
+        cell.pack_into(self.memory, address, value if sign_bit is None else to_magnitude(value, sign_bit))
 
     def _layout(self, address: int, length: int) -> tuple[Item, ...] | ErrorNumber:
         """The items that a write of this size at this address covers; cached, as hosts repeat themselves."""
-        key = (address, length)
-        layout = self._layouts.get(key)
-        if layout is None:
-            layout = self._layouts[key] = self._walk(address, length)
-        return layout
+        key = address, length
+        if key not in self._layouts:
+            self._layouts[key] = self._walk(*key)
+        return self._layouts[key]
 
     def _walk(self, address: int, length: int) -> tuple[Item, ...] | ErrorNumber:
         items, end = [], address + length
@@ -174,7 +165,7 @@ class Registers:
                     self._pointers[data + k] = target
 
     def _parse_indirect(self, address: int, data: bytes) -> list[Change] | ErrorNumber:
-        """A write to Indirect Data is a write to the items that its pointers spell, run by run."""
+        """A write to Indirect Data is a write to the addresses that its pointers name, run by run."""
         changes: list[Change] = []
         targets = [self._pointers.get(at, at) for at in range(address, address + len(data))]
         start = 0
@@ -192,6 +183,11 @@ class Registers:
         if address not in self._slots:
             return self.parse(address, data)
         items = [self.table.by_address.get(at) for at in range(address, address + len(data))]
-        if None in items or any(item.address not in self._slots for item in items if item):
+        if any(item is None or item.address not in self._slots for item in items):
             return ErrorNumber.ACCESS
         return [(item, byte) for item, byte in zip(items, data, strict=True) if item]
+
+
+def _format(item: Item) -> struct.Struct:
+    code = _CODES[item.size]
+    return struct.Struct("<>"[item.big_endian] + (code.lower() if item.signed else code))

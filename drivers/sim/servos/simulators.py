@@ -1,48 +1,29 @@
-"""What stands in for families of servos with control tables, and what ``omote simulate`` can be told of them."""
+"""Simulators of the families Dynamixel and Feetech: their chains of servos and the options of ``omote simulate``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from drivers.base.options import option, parse_ids
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
-from drivers.sim.servos.bus import SimulatedChain
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.legacy import LegacyChain
-from drivers.sim.servos.mixed import MixedChain
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.simulator import Servos, Setting, Simulator
 from drivers.tables.models import check_dynamixel, check_feetech
 
 
-def make_servos(servos: Iterable[object], model: str | int, baud: int, now_s: float) -> list[SimulatedServo]:
-    """Simulated servos for ids, or for anything that has an ``id`` and a ``model`` (a ``ServoSpec``)."""
-    return [
-        SimulatedServo(
-            int(getattr(servo, "id", servo)),  # type: ignore[call-overload]
-            getattr(servo, "model", model),
-            now_s=now_s,
-            baud=baud,
-        )
-        for servo in servos
-    ]
-
-
-def make_chain(servos: list[SimulatedServo], now_s: float, seed: int = 0) -> Chain:
-    """A wire with these servos, of the protocol they speak, or of both."""
-    protocols = {servo.table.protocol for servo in servos}
-    if len(protocols) > 1:
-        return MixedChain(servos, now_s, seed=seed)
-    kind = LegacyChain if protocols == {1} else SimulatedChain
-    return kind(servos, now_s, seed=seed)
+def ids_and_models(servos: Iterable[Any], model: str | int) -> list[tuple[int, str | int]]:
+    """(id, model) of servos given as ids, which get `model`, or as specs with ``id`` and ``model``."""
+    return [(int(getattr(servo, "id", servo)), getattr(servo, "model", model)) for servo in servos]
 
 
 @dataclass(frozen=True, kw_only=True)
 class DynamixelOptions:
-    """What ``omote simulate dynamixel`` can be told."""
+    """Options of ``omote simulate dynamixel``."""
 
     ids: str = option("Ids of the servos: 1-24 or 1,3,7-9.", "1-24")
     model: str = option("Model of the servos.", "xl330-m288")
@@ -50,26 +31,20 @@ class DynamixelOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FeetechOptions:
-    """What ``omote simulate feetech`` can be told."""
+class FeetechOptions(DynamixelOptions):
+    """Options of ``omote simulate feetech``."""
 
     ids: str = option("Ids of the servos: 1-24 or 1,3,7-9.", "1-6")
     model: str = option("Model of the servos.", "sts3215")
-    baud: int = option("Baud rate the servos listen at.", 1_000_000, at_least=300)
 
 
 def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Chain:
     made = [SimulatedServo(servo, model, now_s=setting.now_s, baud=setting.baud) for servo, model in servos]
-    return make_chain(made, setting.now_s, setting.seed)
+    return Chain(made, setting.now_s, seed=setting.seed)
 
 
-def _dynamixel(options: DynamixelOptions, setting: Setting) -> Chain:
-    check_dynamixel(options.model)
-    return _far_end([(servo, options.model) for servo in parse_ids(options.ids)], {}, setting)
-
-
-def _feetech(options: FeetechOptions, setting: Setting) -> Chain:
-    check_feetech(options.model)
+def _alone(check_model: Callable[[str], object], options: DynamixelOptions, setting: Setting) -> Chain:
+    check_model(options.model)
     return _far_end([(servo, options.model) for servo in parse_ids(options.ids)], {}, setting)
 
 
@@ -80,7 +55,7 @@ def _decoder(line: Line) -> Decoder:
 
 DYNAMIXEL = Simulator(
     far_end=_far_end,
-    alone=_dynamixel,
+    alone=partial(_alone, check_dynamixel),
     options=DynamixelOptions,
     decoder=_decoder,
     help="""Serve simulated Dynamixel servos until interrupted; prints `ready PATH`.
@@ -92,7 +67,7 @@ DYNAMIXEL = Simulator(
 )
 FEETECH = Simulator(
     far_end=_far_end,
-    alone=_feetech,
+    alone=partial(_alone, check_feetech),
     options=FeetechOptions,
     decoder=_decoder,
     help="""Serve simulated Feetech STS or SCS servos until interrupted; prints `ready PATH`.

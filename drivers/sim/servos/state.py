@@ -1,4 +1,4 @@
-"""The state of one simulated servo and what it does by itself; instructions come on top in ``device``.
+"""State of one simulated servo: registers, motor, hardware errors, bus watchdog, heat; ``device`` adds instructions.
 
 A servo takes the time as an argument and never sleeps.
 """
@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from drivers.packets.packet import ALERT
-from drivers.sim.servos.drive import Drive
+from drivers.sim.servos.drive import Drive, speed_unit
 from drivers.sim.servos.drive_word import FeetechDrive, WordDrive
 from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM, XDrive
 from drivers.sim.servos.plant import Plant, Skin
@@ -20,6 +21,8 @@ TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""
 WATCHDOG_STEP_S = 0.02
 HEALTH_PERIOD_S = 0.1
+BOOT_S = 0.25
+"""How long a servo is deaf after a reboot."""
 
 
 def same_rate(first: int, second: int) -> bool:
@@ -27,17 +30,15 @@ def same_rate(first: int, second: int) -> bool:
     return abs(first - second) <= 0.03 * second
 
 
-class Heard:
+@dataclass(slots=True)
+class LastInstruction:
     """When the last instruction went over the wire; shared by the servos of a bus."""
 
-    __slots__ = ("at_s",)
-
-    def __init__(self, at_s: float) -> None:
-        self.at_s = at_s
+    at_s: float
 
 
 class ServoState:
-    """A servo with its control table, motor and faults, as far as it needs no instructions.
+    """A servo with its control table, motor and faults, without instructions.
 
     Parameters
     ----------
@@ -45,10 +46,9 @@ class ServoState:
     model : model name or number.
     now_s : time of power-up.
     firmware : version; None = a current one.
-    baud : bit rate in its Baud Rate register; a rate the model lacks keeps the register's initial value.
+    baud : bit rate in its Baud Rate register; for a rate the model lacks the register keeps its initial value.
     position : Present Position at power-up, ticks; None = the middle of the range.
     skin : load on the shaft.
-    boot_s : how long it is deaf after a reboot.
 
     Attributes
     ----------
@@ -56,8 +56,8 @@ class ServoState:
     watchdog_ignored : keeps turning when its bus watchdog trips (330-size firmware does, in current mode).
     forced_alert : sets the alert bit without a hardware error.
     eeprom_busy_s : how long it is deaf after a write below ``table.eeprom_end``.
-    next_health_s : when it looks after heat, supply and load again.
-    heard : when the last instruction went over the wire; a bus gives all its servos the same object.
+    next_health_s : when heat, supply and load are checked again.
+    last_instruction : when the last instruction went over the wire; a bus gives all its servos the same object.
     on_change : called when id, secondary id or baud rate changed.
     """
 
@@ -71,17 +71,16 @@ class ServoState:
         baud: int = 1_000_000,
         position: float | None = None,
         skin: Skin | None = None,
-        boot_s: float = 0.25,
     ) -> None:
         self.table = table = load_table(model, firmware)
         self.registers = Registers(table)
         self.registers.reset(0, table.size)
         self.eeprom_writes: Counter[str] = Counter()
         self.on_change: Callable[[], None] = lambda: None
-        self.boot_s, self.deaf_until = boot_s, now_s
+        self.deaf_until = now_s
         self.watchdog_ignored = self.forced_alert = self.shut_down = False
         self.eeprom_busy_s = 0.0
-        self.heard = Heard(now_s)
+        self.last_instruction = LastInstruction(now_s)
         self.next_health_s = now_s
         self._sensed_at = -1.0
         self._pending: list[Change] = []
@@ -91,26 +90,15 @@ class ServoState:
         self.registers.put("ID", device_id)
         self.force_baud(baud, self.baud)
         start = float(table.center if position is None else position)
-        self.plant = Plant(now_s, start, self._no_load_speed(), table.voltage / 10, skin or Skin())
-        self.drive = self._make_drive(now_s)
+        top_speed = (table.top_speed or table["Velocity Limit"].initial) * speed_unit(table)
+        self.plant = Plant(now_s, start, top_speed, table.voltage / 10, skin or Skin())
+        kind: type[Drive] = WordDrive
+        if "Goal Velocity" in table:
+            kind = XDrive if "Profile Velocity" in table else FeetechDrive
+        self.drive = kind(self.registers, self.plant, now_s)
         self._boot(now_s)
 
-    def _no_load_speed(self) -> float:
-        table = self.table
-        if table.top_speed:
-            speed = table["Present Speed"] if "Present Speed" in table else table["Present Velocity"]
-            return table.top_speed * speed.scale / table.rad_per_tick
-        limit = table["Velocity Limit"]
-        return limit.initial * limit.scale / table.rad_per_tick
-
-    def _make_drive(self, now_s: float) -> Drive:
-        """The motor control that fits the control table."""
-        if "Profile Velocity" in self.table:
-            return XDrive(self.registers, self.plant, now_s)
-        kind = FeetechDrive if "Goal Velocity" in self.table else WordDrive
-        return kind(self.registers, self.plant, now_s)
-
-    # ------------------------------------------------------------ what the bus needs to know
+    # ------------------------------------------------------------ settings that the bus reads
     @property
     def id(self) -> int:
         """Number on the bus."""
@@ -156,7 +144,7 @@ class ServoState:
         if self._has_error_register:
             self.registers.put("Hardware Error Status", bits)
 
-    # ------------------------------------------------------------ what tests and tools look at
+    # ------------------------------------------------------------ access for tests and tools
     @property
     def torque(self) -> bool:
         """Whether the motor is on."""
@@ -169,12 +157,12 @@ class ServoState:
 
     def position_ticks(self, now_s: float) -> int:
         """Present Position."""
-        self.look(now_s)
+        self.update(now_s)
         return self.drive.to_register(self.plant.motion(now_s).position)
 
     def register(self, name: str, now_s: float) -> int:
         """Value of any register, up to date; KeyError where the model has none of that name."""
-        self.look(now_s)
+        self.update(now_s)
         self._sense(now_s)
         return self.registers.get(name)
 
@@ -202,20 +190,20 @@ class ServoState:
                 registers.put("Torque Enable", 0)
             self._set_power(False, now_s)
 
-    # ------------------------------------------------------------ what happens by itself
-    def look(self, now_s: float) -> None:
-        """Catch up: bus watchdog, heat, supply, overload."""
-        self.watch(now_s)
+    # ------------------------------------------------------------ watchdog, faults, health
+    def update(self, now_s: float) -> None:
+        """Check bus watchdog, heat, supply and overload up to now."""
+        self.check_watchdog(now_s)
         if now_s >= self.next_health_s:
             self.next_health_s = now_s + HEALTH_PERIOD_S
             self.check_health(now_s)
 
-    def watch(self, now_s: float) -> None:
-        """Trip the bus watchdog when no instruction (for any servo) was heard for its time."""
+    def check_watchdog(self, now_s: float) -> None:
+        """Trip the bus watchdog where no instruction (for any servo) arrived within its time."""
         if not self.plant.powered or "Bus Watchdog" not in self.table:
             return
         period = self.registers.get("Bus Watchdog")
-        due = self.heard.at_s + period * WATCHDOG_STEP_S
+        due = self.last_instruction.at_s + period * WATCHDOG_STEP_S
         if not 0 < period < 128 or now_s <= due:
             return
         self.registers.put("Bus Watchdog", TRIPPED)
@@ -227,7 +215,7 @@ class ServoState:
         small = self.table.model.startswith(("xl330", "xc330"))
         return self.watchdog_ignored or (small and self.registers.get("Operating Mode") == CURRENT)
 
-    def suffer(self, kind: str, value: float, begins: bool, now_s: float) -> None:
+    def change_fault(self, kind: str, value: float, begins: bool, now_s: float) -> None:
         """A fault of this servo begins or ends; kinds as in ``drivers.sim.wire.faults``."""
         plant = self.plant
         if kind == "alert":
@@ -248,11 +236,7 @@ class ServoState:
             self.check_health(now_s)
 
     def force_baud(self, baud: int, otherwise: int = 0) -> None:
-        """Set the bit rate it listens at, whatever the wire says.
-
-        This is how a bus comes to have a servo at the wrong rate. A rate the model lacks counts as `otherwise`,
-        or as its lowest.
-        """
+        """Set the bit rate it listens at; one that the model lacks counts as `otherwise`, or as its lowest."""
         rates = self.table.baud
         near = min(rates, key=lambda rate: abs(rate - baud))
         if not same_rate(near, baud):
@@ -260,9 +244,9 @@ class ServoState:
         self.registers.put("Baud Rate", rates.index(near))
 
     def check_health(self, now_s: float) -> None:
-        """Latch the hardware errors whose causes are there now."""
+        """Latch the hardware errors whose causes are present."""
         load = self._sense(now_s)
-        self.plant.warm(now_s, load)
+        self.plant.heat(now_s, load)
         bits = self.drive.hardware_errors(now_s, load)
         if bits:
             self.latch(bits, now_s)
@@ -301,7 +285,7 @@ class ServoState:
             self._set_power(True, now_s)
 
     def _reset_goals(self, now_s: float) -> None:
-        """Goal Position where the shaft is; current and PWM at their limits but where they are the goal."""
+        """Goal Position where the shaft is; current and PWM at their limits, or 0 in the mode that they control."""
         registers = self.registers
         registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))
         if "Goal PWM" not in self.table:
@@ -312,7 +296,8 @@ class ServoState:
         if "Goal Current" in self.table:
             registers.put("Goal Current", 0 if mode == CURRENT else registers.get("Current Limit"))
 
-    def _one_turn(self, now_s: float) -> None:
+    def _wrap_turns(self, now_s: float) -> None:
+        """Bring the shaft's position back into one turn, and Goal Position to it."""
         self._sensed_at = -1.0
         turn = self.table.ticks_per_turn
         position = self.plant.motion(now_s).position

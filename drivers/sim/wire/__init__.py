@@ -1,4 +1,4 @@
-"""A simulated wire: how long bytes take, who hears and answers, and what faults do to it.
+"""A simulated wire: the time bytes take, the base class of devices on it, and its faults.
 
 In: bytes and times. Out: replies and when they are due. Imports base, packets.
 """

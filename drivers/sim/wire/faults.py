@@ -1,4 +1,4 @@
-"""Faults of a simulated bus by name: what can go wrong, when, and how a reply is spoilt.
+"""Parse, schedule and inject faults of a simulated bus: lost, late and corrupted replies, misbehaving servos and ports.
 
 A fault is written ``kind[:ids][:value][:key=value ...]``, for example::
 
@@ -16,32 +16,29 @@ seconds.
 
 from __future__ import annotations
 
+import itertools
+import math
 import random
+from bisect import insort
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from drivers.base.errors import DriverError
-from drivers.packets.packet import encode_status
-
-Encoder = Callable[[int, int, bytes], bytes]
-"""Makes a status packet of (id, error byte, data)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Kind:
-    """One sort of fault.
+class Kind(NamedTuple):
+    """One kind of fault.
 
     Attributes
     ----------
-    scope : ``"reply"`` (spoils replies), ``"servo"`` (changes a servo) or ``"bus"``.
-    value : how the value is read; None = it takes none.
-    default : value when none is given; None with `value` set = it must be given.
-    help : what it does, for the command line.
+    scope : ``"reply"`` (corrupts replies), ``"servo"`` (changes a servo) or ``"bus"``.
+    value : how the value is read; None: it takes none.
+    default : value where none is given; None with `value` set: it must be given.
     """
 
     scope: str
-    help: str
     value: Callable[[str], Any] | None = None
     default: Any = None
 
@@ -57,30 +54,28 @@ def _integer(text: str) -> int:
 
 
 KINDS: dict[str, Kind] = {
-    "mute": Kind("servo", "neither hears nor answers (loose cable)"),
-    "silent": Kind("reply", "hears and obeys, but its answers are lost"),
-    "late": Kind("reply", "answers late by VALUE", _seconds, 0.045),
-    "drop": Kind("reply", "loses a reply (use every= or p=)"),
-    "crc": Kind("reply", "answers with a wrong CRC"),
-    "flip": Kind("reply", "one bit of the answer is flipped"),
-    "short": Kind("reply", "answers with only VALUE data bytes", _integer, 1),
-    "wrongid": Kind("reply", "answers under the id VALUE", _integer),
-    "noise": Kind("reply", "VALUE random bytes before the answer", _integer, 5),
-    "alert": Kind("servo", "alert bit set, data valid, no hardware error"),
-    "hw": Kind("servo", "latches the hardware error bits VALUE", _integer, 0x20),
-    "volts": Kind("servo", "supply at VALUE volts", float),
-    "temp": Kind("servo", "motor at VALUE degrees", float),
-    "stall": Kind("servo", "shaft stuck where it is"),
-    "watchdog-ignored": Kind("servo", "keeps turning when its bus watchdog trips"),
-    "dup": Kind("servo", "a second servo has the same id; their replies collide"),
-    "baud": Kind("servo", "listens at VALUE bits per second", _integer),
-    "eeprom-busy": Kind("servo", "deaf for VALUE after each permanent write", _seconds, 0.02),
-    "echo": Kind("bus", "the adapter gives back every byte it was sent"),
-    "chain-stop": Kind("bus", "nobody answers behind a silent servo"),
-    "slow-reader": Kind(
-        "bus", "what comes back reaches the host in bursts, one every VALUE (a starved reader)", _seconds, 0.2
-    ),
-    "unplug": Kind("bus", "the port goes away; for= brings it back, as=PATH under another name"),
+    "mute": Kind("servo"),  # neither hears nor answers (loose cable)
+    "silent": Kind("reply"),  # hears and obeys, but its answers are lost
+    "late": Kind("reply", _seconds, 0.045),  # answers late by the value
+    "drop": Kind("reply"),  # loses a reply (use every= or p=)
+    "crc": Kind("reply"),  # answers with a wrong CRC
+    "flip": Kind("reply"),  # one bit of the answer is flipped
+    "short": Kind("reply", _integer, 1),  # answers with only so many data bytes
+    "wrongid": Kind("reply", _integer),  # answers under this id
+    "noise": Kind("reply", _integer, 5),  # so many random bytes before the answer
+    "alert": Kind("servo"),  # alert bit set, data valid, no hardware error
+    "hw": Kind("servo", _integer, 0x20),  # latches these hardware error bits
+    "volts": Kind("servo", float),  # supply at so many volts
+    "temp": Kind("servo", float),  # motor at so many degrees Celsius
+    "stall": Kind("servo"),  # shaft stuck where it is
+    "watchdog-ignored": Kind("servo"),  # keeps turning when its bus watchdog trips
+    "dup": Kind("servo"),  # a second servo has the same id; their replies collide
+    "baud": Kind("servo", _integer),  # listens at so many bits per second
+    "eeprom-busy": Kind("servo", _seconds, 0.02),  # deaf for so long after each permanent write
+    "echo": Kind("bus"),  # the adapter gives back every byte it was sent
+    "chain-stop": Kind("bus"),  # nobody answers behind a silent servo
+    "slow-reader": Kind("bus", _seconds, 0.2),  # replies reach the host in bursts, one every so long
+    "unplug": Kind("bus"),  # the port goes away; for= brings it back, as=PATH under another name
 }
 
 
@@ -100,8 +95,19 @@ class Fault:
     spec: str = ""
 
     def concerns(self, device_id: int) -> bool:
-        """Whether it is about this servo."""
+        """Whether it applies to this servo."""
         return self.ids is None or device_id in self.ids
+
+
+_OPTIONS: dict[str, tuple[str, Callable[[str], Any]]] = {
+    "every": ("every", int),
+    "p": ("chance", float),
+    "count": ("count", int),
+    "at": ("at_s", _seconds),
+    "for": ("for_s", _seconds),
+    "as": ("alias", str),
+}
+"""Attribute of `Fault` and type of each key."""
 
 
 def _bad(spec: str, why: str) -> DriverError:
@@ -122,17 +128,30 @@ def parse_fault(spec: str) -> Fault:
     kind = KINDS.get(name)
     if kind is None:
         raise _bad(spec, f"there is no fault {name!r}")
-    fault = Fault(name, value=kind.default, spec=spec)
     words = [part for part in parts if "=" not in part]
+    ids, value = None, kind.default
     if kind.scope != "bus":
         if not words:
             raise _bad(spec, "the servo ids are missing (use * for all)")
-        fault = replace(fault, ids=_parse_ids(spec, words.pop(0)))
-    fault = _parse_value(spec, kind, fault, words)
+        ids = _parse_ids(spec, words.pop(0))
+    if words and kind.value is not None:
+        value = _convert(spec, kind.value, words.pop(0), name)
+    if words:
+        raise _bad(spec, f"{words[0]!r} is one word too many")
+    if kind.value is not None and value is None:
+        raise _bad(spec, f"{name} needs a value")
+    fault = Fault(name, ids, value, spec=spec)
     for part in parts:
         if "=" in part:
-            fault = _parse_option(spec, fault, part)
+            fault = _with_option(fault, part)
     return fault
+
+
+def _convert(spec: str, read: Callable[[str], Any], text: str, name: str) -> Any:
+    try:
+        return read(text)
+    except ValueError:
+        raise _bad(spec, f"{text!r} is not a value for {name}") from None
 
 
 def _parse_ids(spec: str, text: str) -> frozenset[int] | None:
@@ -150,109 +169,65 @@ def _parse_ids(spec: str, text: str) -> frozenset[int] | None:
     return frozenset(ids)
 
 
-def _parse_value(spec: str, kind: Kind, fault: Fault, words: list[str]) -> Fault:
-    if words and kind.value is not None:
-        text = words.pop(0)
-        try:
-            fault = replace(fault, value=kind.value(text))
-        except ValueError:
-            raise _bad(spec, f"{text!r} is not a value for {fault.kind}") from None
-    if words:
-        raise _bad(spec, f"{words[0]!r} is one word too many")
-    if kind.value is not None and fault.value is None:
-        raise _bad(spec, f"{fault.kind} needs a value")
-    return fault
-
-
-_OPTIONS: dict[str, tuple[str, Callable[[str], Any]]] = {
-    "every": ("every", int),
-    "p": ("chance", float),
-    "count": ("count", int),
-    "at": ("at_s", _seconds),
-    "for": ("for_s", _seconds),
-    "as": ("alias", str),
-}
-
-
-def _parse_option(spec: str, fault: Fault, part: str) -> Fault:
+def _with_option(fault: Fault, part: str) -> Fault:
     key, _, text = part.partition("=")
     if key not in _OPTIONS:
-        raise _bad(spec, f"there is no option {key!r} (there are {', '.join(_OPTIONS)})")
+        raise _bad(fault.spec, f"there is no option {key!r} (there are {', '.join(_OPTIONS)})")
     attribute, read = _OPTIONS[key]
-    try:
-        changes: dict[str, Any] = {attribute: read(text)}
-    except ValueError:
-        raise _bad(spec, f"{text!r} is not a value for {key}") from None
+    changes: dict[str, Any] = {attribute: _convert(fault.spec, read, text, key)}
     fault = replace(fault, **changes)
     if fault.every < 1 or not 0.0 <= fault.chance <= 1.0 or fault.at_s < 0.0:
-        raise _bad(spec, f"{part!r} is out of range")
+        raise _bad(fault.spec, f"{part!r} is out of range")
     return fault
 
 
-class Spoiler:
-    """Decides when a reply fault strikes, and spoils the bytes.
+class ReplyFault:
+    """Decides which replies a fault of scope ``"reply"`` hits, and corrupts their bytes.
 
     Parameters
     ----------
-    fault : a fault of scope ``"reply"``.
-    rng : source of chance, shared by the bus so that a run can be repeated.
-
-    Attributes
-    ----------
-    struck : replies it has hit.
-    late_s : by how much it delays a reply it hits.
+    fault : the fault.
+    rng : random numbers, shared by the bus so that a run can be repeated.
     """
 
     def __init__(self, fault: Fault, rng: random.Random) -> None:
         self.fault, self._rng = fault, rng
-        self._seen: dict[int, int] = {}
-        self.struck = 0
-        self.late_s: float = fault.value if fault.kind == "late" else 0.0
+        self._seen: Counter[int] = Counter()
+        self._hits = 0
 
-    def strikes(self, device_id: int) -> bool:
+    def hits(self, device_id: int) -> bool:
         """Whether it hits this reply of this servo; counts it."""
         fault = self.fault
-        if not fault.concerns(device_id) or (fault.count is not None and self.struck >= fault.count):
+        if not fault.concerns(device_id) or (fault.count is not None and self._hits >= fault.count):
             return False
-        seen = self._seen[device_id] = self._seen.get(device_id, 0) + 1
-        if seen % fault.every or (fault.chance < 1.0 and self._rng.random() >= fault.chance):
+        self._seen[device_id] += 1
+        if self._seen[device_id] % fault.every or (fault.chance < 1.0 and self._rng.random() >= fault.chance):
             return False
-        self.struck += 1
+        self._hits += 1
         return True
 
-    def status(
-        self, frame: bytes, device_id: int, error: int, data: bytes, encode: Encoder = encode_status
+    def corrupt(
+        self,
+        frame: bytes,
+        first: int,
+        shorten: Callable[[bytes, int], bytes],
+        readdress: Callable[[bytes, int], bytes],
     ) -> bytes | None:
-        """A status packet spoilt; None = it never arrives. `encode` makes one of the wire's protocol."""
+        """A reply with this fault; None: it never arrives. For the parameters see :meth:`FaultSet.corrupt`."""
         kind, value = self.fault.kind, self.fault.value
         if kind in ("silent", "drop"):
             return None
         if kind == "short":
-            return encode(device_id, error, data[:value])
+            return shorten(frame, value)
         if kind == "wrongid":
-            return encode(value, error, data)
-        return self._bytes(frame, 4)
-
-    def part(self, frame: bytes) -> bytes | None:
-        """A device's part of a joint reply (ERR, ID, data, CRC) spoilt; None = it never arrives."""
-        kind, value = self.fault.kind, self.fault.value
-        if kind in ("silent", "drop"):
-            return None
-        if kind == "short":
-            return frame[: 2 + value] + frame[-2:]
-        if kind == "wrongid":
-            return frame[:1] + bytes((value,)) + frame[2:]
-        return self._bytes(frame, 0)
-
-    def _bytes(self, frame: bytes, first: int) -> bytes:
-        kind = self.fault.kind
+            return readdress(frame, value)
         if kind == "crc":
             return frame[:-1] + bytes((frame[-1] ^ 0x55,))
         if kind == "flip":
             at = self._rng.randrange(first, len(frame))
             return frame[:at] + bytes((frame[at] ^ 1 << self._rng.randrange(8),)) + frame[at + 1 :]
         if kind == "noise":
-            return self._rng.randbytes(self.fault.value) + frame
+            return self._rng.randbytes(value) + frame
         return frame
 
 
@@ -262,7 +237,7 @@ class FaultSet:
     Parameters
     ----------
     on_change : called with (fault, begins, time) when one begins or ends.
-    seed : of the chance.
+    seed : of the random numbers.
     kinds : faults that the bus can have.
     """
 
@@ -273,13 +248,17 @@ class FaultSet:
         kinds: Iterable[str] = KINDS,
     ) -> None:
         self._kinds = frozenset(kinds)
-        self.spoilers: list[Spoiler] = []
+        self.reply_faults: list[ReplyFault] = []
         self.active: list[Fault] = []
-        self.next_change_s = float("inf")
         self._on_change = on_change
         self._rng = random.Random(seed)
         self._due: list[tuple[float, int, bool, Fault]] = []
-        self._order = 0
+        self._order = itertools.count()
+
+    @property
+    def next_change_s(self) -> float:
+        """When the next fault begins or ends; infinity: none does."""
+        return self._due[0][0] if self._due else math.inf
 
     def add(self, faults: Iterable[str | Fault], now_s: float) -> None:
         """Set faults; their ``at`` counts from now.
@@ -293,15 +272,14 @@ class FaultSet:
             if fault.kind not in self._kinds:
                 raise _bad(fault.spec, f"a bus of this kind has only {', '.join(sorted(self._kinds))}")
         for fault in wanted:
-            self._schedule(now_s + fault.at_s, True, fault)
+            insort(self._due, (now_s + fault.at_s, next(self._order), True, fault))
             if fault.for_s is not None:
-                self._schedule(now_s + fault.at_s + fault.for_s, False, fault)
+                insort(self._due, (now_s + fault.at_s + fault.for_s, next(self._order), False, fault))
         self.advance(now_s)
 
     def clear(self, kind: str | None, now_s: float) -> None:
         """End the faults of a kind (None: all), also those that have not begun."""
         self._due = [due for due in self._due if kind is not None and due[3].kind != kind]
-        self._set_next()
         for fault in [fault for fault in self.active if kind is None or fault.kind == kind]:
             self._end(fault, now_s)
 
@@ -310,53 +288,45 @@ class FaultSet:
         while self._due and self._due[0][0] <= now_s:
             time_s, _, begins, fault = self._due.pop(0)
             (self._begin if begins else self._end)(fault, time_s)
-        self._set_next()
 
-    def spoil_status(
-        self, frame: bytes, device_id: int, error: int, data: bytes, encode: Encoder
+    def corrupt(
+        self,
+        frame: bytes,
+        device_id: int,
+        *,
+        first: int = 0,
+        shorten: Callable[[bytes, int], bytes] = lambda frame, size: frame[:size],
+        readdress: Callable[[bytes, int], bytes] = lambda frame, device_id: frame,
     ) -> tuple[bytes | None, float]:
-        """A status packet as it arrives (None: it does not) and how late it is."""
-        late_s, spoilt = 0.0, frame
-        for spoiler in self.spoilers:
-            if not spoiler.strikes(device_id):
+        """A reply as it arrives (None: it does not), and how late it is, seconds.
+
+        Parameters
+        ----------
+        frame : the reply. device_id : who sends it.
+        first : the first byte in which a bit may be flipped.
+        shorten : gives a frame with only so many data bytes. readdress : gives a frame from another id.
+        """
+        late_s, arrived = 0.0, frame
+        for reply_fault in self.reply_faults:
+            if not reply_fault.hits(device_id):
                 continue
-            late_s += spoiler.late_s
-            result = spoiler.status(spoilt, device_id, error, data, encode)
-            if result is None:
+            if reply_fault.fault.kind == "late":
+                late_s += reply_fault.fault.value
+            corrupted = reply_fault.corrupt(arrived, first, shorten, readdress)
+            if corrupted is None:
                 return None, late_s
-            spoilt = result
-        return spoilt, late_s
-
-    def spoil_part(self, part: bytes, device_id: int) -> tuple[bytes | None, float]:
-        """A device's part of a joint reply as it arrives (None: it does not) and how late it is."""
-        late_s, spoilt = 0.0, part
-        for spoiler in self.spoilers:
-            if not spoiler.strikes(device_id):
-                continue
-            late_s += spoiler.late_s
-            result = spoiler.part(spoilt)
-            if result is None:
-                return None, late_s
-            spoilt = result
-        return spoilt, late_s
-
-    def _schedule(self, time_s: float, begins: bool, fault: Fault) -> None:
-        self._order += 1
-        self._due.append((time_s, self._order, begins, fault))
-        self._due.sort(key=lambda due: due[:2])
-
-    def _set_next(self) -> None:
-        self.next_change_s = self._due[0][0] if self._due else float("inf")
+            arrived = corrupted
+        return arrived, late_s
 
     def _begin(self, fault: Fault, time_s: float) -> None:
         self.active.append(fault)
         if KINDS[fault.kind].scope == "reply":
-            self.spoilers.append(Spoiler(fault, self._rng))
+            self.reply_faults.append(ReplyFault(fault, self._rng))
         self._on_change(fault, True, time_s)
 
     def _end(self, fault: Fault, time_s: float) -> None:
         if fault not in self.active:
             return
         self.active.remove(fault)
-        self.spoilers = [spoiler for spoiler in self.spoilers if spoiler.fault is not fault]
+        self.reply_faults = [each for each in self.reply_faults if each.fault is not fault]
         self._on_change(fault, False, time_s)

@@ -1,4 +1,4 @@
-"""What stands in for a family: how its far end is made, and what ``omote simulate`` can be told of it."""
+"""Definition of a family's simulator: how its simulated far end is made, and the options of ``omote simulate``."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Servos = Sequence[tuple[int, Any]]
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """What every simulated far end is made in.
+    """What every simulated far end is made with.
 
     Attributes
     ----------
     now_s : time. baud : rate of the wire. seed : of random faults.
-    names : names of all parameters, for what is served alone and speaks of them; empty for a driver's far end.
+    names : names of all parameters, for a head that is served alone; empty for a driver's far end.
     """
 
     now_s: float
@@ -34,7 +34,7 @@ class Setting:
 
 
 def simulator_of(kind: str) -> Simulator:
-    """What stands in for a family.
+    """The simulator of a family.
 
     Raises
     ------
@@ -58,24 +58,24 @@ def simulator_of(kind: str) -> Simulator:
 
 @dataclass(frozen=True, kw_only=True)
 class BoardOptions:
-    """What ``omote simulate`` can be told of every board."""
+    """Options of ``omote simulate`` for every board."""
 
     baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Simulator:
-    """What stands in for a family.
+    """The simulator of a family.
 
     Attributes
     ----------
     far_end : makes what a driver of the family expects at the other end of its wire, from the ids and models of its
         servos and from what the driver gives as ``far_end()``, plain values that can travel to another process.
     alone : makes what ``omote simulate KIND`` serves, from an instance of ``options``.
-    options : dataclass of the command's options (:mod:`drivers.base.options`), the rate ``baud`` among them, which is
-        the family's where none is given; those of serving come besides.
+    options : dataclass of the command's options (:mod:`drivers.base.options`), the bit rate ``baud`` among them;
+        the options of serving are added.
     help : the command's help; its last line is an example.
-    decoder : makes what shows the traffic of a far end in words.
+    decoder : makes the decoder that shows the traffic of a far end in words.
     """
 
     far_end: Callable[[Servos, Mapping[str, Any], Setting], Line]
@@ -83,3 +83,22 @@ class Simulator:
     options: type
     help: str
     decoder: Callable[[Line], Decoder] = field(default=lambda line: TextDecoder())
+
+
+def make_line(
+    family: str, servos: Servos, now_s: float, *, baud: int = 1_000_000, seed: int = 0, options: Mapping[str, Any] = {}
+) -> Line:
+    """The simulated far end of any family, from plain values, as they travel to a child process.
+
+    Parameters
+    ----------
+    family : a kind of bus; the models of Dynamixel and Feetech servos decide their protocol.
+    servos : id and model of each. now_s : time.
+    baud : rate of the wire. seed : of random faults.
+    options : what the family's driver gives as ``far_end()``.
+
+    Raises
+    ------
+    DriverError : unknown family or model, or servos that cannot share a wire.
+    """
+    return simulator_of(family).far_end(servos, options, Setting(now_s=now_s, baud=baud, seed=seed))

@@ -1,4 +1,4 @@
-"""Time on the wire: ten bits a byte both ways at the port's bit rate, return delays, the USB latency timer.
+"""Replies on a simulated wire and the time they take: bits per byte, return delays, collisions, the USB latency timer.
 
 One wire carries one byte at a time, so an instruction waits until the wire is free, and replies follow each other.
 """
@@ -6,8 +6,7 @@ One wire carries one byte at a time, so an instruction waits until the wire is f
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-from drivers.sim.wire.replies import Reply
+from typing import NamedTuple, Protocol
 
 BITS_PER_BYTE = 10
 USB_PACKET = 62
@@ -17,10 +16,45 @@ USB_FRAME_S = 0.5e-3
 """Bytes that arrive within this time reach the host together, when the last of them has arrived."""
 
 Timed = tuple[float, bytes]
+"""When bytes arrive, and the bytes."""
+
+
+class Sender(Protocol):
+    """A device whose replies begin after a pause."""
+
+    @property
+    def return_delay_s(self) -> float:
+        """Pause between a packet and its answer."""
+
+
+class Reply(NamedTuple):
+    """Bytes one servo puts on the wire.
+
+    Attributes
+    ----------
+    data : the bytes.
+    servo : whose Return Delay Time comes before them; None: they follow the bytes before at once.
+    late_s : further delay, by a fault.
+    """
+
+    data: bytes
+    servo: Sender | None
+    late_s: float = 0.0
+
+
+def collide(replies: list[Reply]) -> list[Reply]:
+    """What the host receives of replies sent at the same moment: a wire that idles high carries their bitwise and."""
+    if len(replies) < 2:
+        return replies
+    mixed = bytearray(b"\xff" * max(len(reply.data) for reply in replies))
+    for reply in replies:
+        for at, byte in enumerate(reply.data):
+            mixed[at] &= byte
+    return [replies[0]._replace(data=bytes(mixed))]
 
 
 class WireTiming:
-    """Bookkeeping of when the wire is free.
+    """Keeps track of when the wire is free.
 
     Parameters
     ----------
@@ -32,7 +66,7 @@ class WireTiming:
         self._free_s = 0.0
 
     def arrival(self, now_s: float, size: int, baud: int) -> float:
-        """When the last byte of an instruction written now reaches the servos."""
+        """When the last byte of an instruction of `size` bytes written now reaches the servos."""
         self._free_s = max(now_s, self._free_s) + size * BITS_PER_BYTE / baud
         return self._free_s
 
@@ -43,27 +77,24 @@ class WireTiming:
             delay = reply.servo.return_delay_s if reply.servo else 0.0
             self._free_s += delay + reply.late_s + len(reply.data) * BITS_PER_BYTE / baud
             timed.append((self._free_s, reply.data))
-        return _through_bridge(timed, self.latency_s) if self.latency_s > 0.0 else _by_frames(timed)
+        return _through_bridge(timed, self.latency_s) if self.latency_s > 0.0 else _join(timed, USB_FRAME_S)
 
 
 def without_timing(replies: Sequence[Reply], now_s: float) -> list[Timed]:
     """(time, bytes) on a wire that takes no time; a late reply still delays those behind it."""
-    timed: list[Timed] = []
+    timed = []
     for reply in replies:
         now_s += reply.late_s
-        if timed and timed[-1][0] == now_s:
-            timed[-1] = (now_s, timed[-1][1] + reply.data)
-        else:
-            timed.append((now_s, reply.data))
-    return timed
+        timed.append((now_s, reply.data))
+    return _join(timed, 0.0)
 
 
-def _by_frames(timed: list[Timed]) -> list[Timed]:
-    """Neighbours in time put together; the last byte of all keeps its time."""
+def _join(timed: list[Timed], within_s: float) -> list[Timed]:
+    """Bytes that arrive together or less than `within_s` after the first of them, at the time of the last of them."""
     out: list[Timed] = []
     begun_s = 0.0
     for time_s, data in timed:
-        if out and time_s - begun_s < USB_FRAME_S:
+        if out and (time_s - begun_s < within_s or time_s == begun_s):
             out[-1] = (time_s, out[-1][1] + data)
         else:
             begun_s = time_s

@@ -21,7 +21,7 @@ from drivers.base.errors import DriverError, PortLost
 from drivers.core.speed_limit import BURST_S
 from drivers.dynamixel.bus import DynamixelBus
 from drivers.sim.serving.virtual import VirtualClock, VirtualLink
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 
 IDS = tuple(range(1, 7))
@@ -90,7 +90,7 @@ class Rig:
 
     def __init__(self) -> None:
         self.clock = VirtualClock()
-        self.chain = SimulatedChain([SimulatedServo(i) for i in IDS])
+        self.chain = Chain([SimulatedServo(i) for i in IDS])
         specs = [ServoSpec(i, f"servo{i}", "xl330-m288", -1.0, 1.0, SPEED, 60.0) for i in IDS]
         link = VirtualLink(self.chain, self.clock)
         bus = open_bus("dynamixel", specs, port=link, clock=self.clock, margin_s=MARGIN_S)

@@ -111,7 +111,9 @@ def test_mixed_models_are_read_with_one_bulk_read(monkeypatch: pytest.MonkeyPatc
     with SimulatedBus(servos) as wire, open_bus("dynamixel", servos, port=wire.path, slow_group=0, **CALM) as bus:
         bus.start()
         handle = wire.chain.handle
-        monkeypatch.setattr(wire.chain, "handle", lambda packet, now_s: (seen.append(packet), handle(packet, now_s))[1])
+        monkeypatch.setattr(
+            wire.chain, "handle", lambda packet, now_s: (seen.append(packet[1]), handle(packet, now_s))[1]
+        )
         assert bus.read().fresh.all()
     assert [packet.instruction for packet in seen[:1]] == [Instruction.BULK_READ]
     reads = {Instruction.SYNC_READ, Instruction.BULK_READ, Instruction.FAST_SYNC_READ}

@@ -6,7 +6,9 @@ import pytest
 
 from drivers.base.errors import DriverError
 from drivers.maestro.protocol import MaestroError, crc7
-from drivers.sim.boards.maestro import Maestro, MaestroReader
+from drivers.sim.boards.maestro import SIMULATOR, Maestro, MaestroOptions, MaestroReader
+from drivers.sim.wire.simulator import Setting, make_line
+from drivers.sim.wire.timing import Reply
 
 
 def send(board: Maestro, text: str, now_s: float = 0.0) -> str:
@@ -150,3 +152,71 @@ def test_states_for_tools_and_faults():
         board.place(1, 5, 0.0)
     with pytest.raises(DriverError, match="only drop, echo"):
         Maestro(faults=("crc:1",))
+
+
+@pytest.mark.parametrize(
+    ("highest", "board", "channels"), [(3, "micro", 6), (3, "mini", 12), (12, "mini", 18), (23, "mini", 24)]
+)
+def test_a_board_is_as_large_as_its_channels_need(highest: int, board: str, channels: int) -> None:
+    line = make_line("maestro", [(0, "rc-90"), (highest, "rc-90")], 0.0, options={"board": board})
+    assert isinstance(line, Maestro)
+    assert len(line.channels) == channels
+
+
+def test_the_channel_at_the_end_exists_and_the_one_behind_it_does_not():
+    for command in ("84 {:02X} 70 2E", "87 {:02X} 01 00", "89 {:02X} 01 00", "90 {:02X}"):
+        board = Maestro(channels=12)
+        send(board, command.format(11))
+        assert board.errors == MaestroError(0)
+        send(board, command.format(12))
+        assert board.errors == MaestroError.PROTOCOL
+
+
+def test_a_micro_maestro_lacks_the_commands_of_the_larger_ones():
+    for command in ("9F 01 00 70 2E", "93", "8A 00 00 00 00"):
+        board = Maestro(channels=6)
+        assert send(board, command) == ""
+        assert board.errors == MaestroError.PROTOCOL
+        assert Maestro(channels=12).feed(bytes.fromhex(command), 0.0) in ([], [Reply(b"\0", None)])
+
+
+def test_an_error_about_a_missing_channel_sends_the_others_home():
+    board = Maestro()
+    for command in ("90 40", "87 40 01 00"):
+        send(board, "84 00 70 2E")
+        assert pulse(board, 0) == 1500
+        send(board, command)
+        assert pulse(board, 0) == 0
+
+
+def test_a_reset_forgets_speeds_and_errors():
+    board = Maestro()
+    send(board, "87 00 05 00 89 01 06 00 01")
+    assert (board.speeds[0], board.accelerations[1], board.errors) == (5, 6, MaestroError.PROTOCOL)
+    board.faults.add(["volts:*:3:for=1s"], 0.0)
+    assert (board.speeds[0], board.accelerations[1], board.errors) == (0, 0, MaestroError(0))
+    send(board, "87 00 7F 01", 2.0)
+    assert board.speeds[0] == 255
+
+
+def test_limits_and_the_fault_of_a_position_are_those_of_its_channel():
+    board = Maestro(limits_us=(800.0, 1600.0))
+    send(board, "84 01 00 7F 84 02 01 00")
+    assert (pulse(board, 1), pulse(board, 2)) == (1600, 800)
+    board.faults.add(["silent:1"], 0.0)
+    assert send(board, "90 01") == ""
+    assert send(board, "90 02") == "80 0C"
+
+
+def test_options_of_the_command_line():
+    setting = Setting(now_s=0.0, baud=115_200)
+    board = SIMULATOR.alone(MaestroOptions(channels=18, device=3, crc=True), setting)
+    assert len(board.channels) == 18
+    message = bytes.fromhex("AA 03 04 02 70 2E")
+    board.feed(message + bytes((crc7(message),)), 0.0)
+    assert pulse(board, 2) == 1500
+    with pytest.raises(DriverError, match="no Maestro has so many"):
+        SIMULATOR.alone(MaestroOptions(channels=7), setting)
+    far_end = make_line("maestro", [(0, "rc-90")], 0.0, options={"crc": True, "limits_us": (500.0, 2500.0)})
+    far_end.feed(message + bytes((crc7(message),)), 0.0)
+    assert pulse(far_end, 2) == 0, "another device"

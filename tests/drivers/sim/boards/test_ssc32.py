@@ -10,8 +10,11 @@ import pytest
 import serial
 
 from drivers.sim import Ssc32
-from drivers.sim.boards.ssc32 import MAX_LINE, VERSION, LineReader
+from drivers.sim.boards.ssc32 import SIMULATOR, VERSION, LineReader
 from drivers.sim.serving.serve import serve
+from drivers.sim.wire.simulator import Setting
+
+MAX_LINE = 2048
 
 
 def send(board: Ssc32, text: str, now_s: float = 0.0) -> bytes:
@@ -99,3 +102,54 @@ def test_served_to_a_serial_program(tmp_path: Path):
         thread.join(30)
         os.close(reading)
     assert os.listdir(tmp_path) == []
+
+
+def test_the_longest_line_is_kept_and_a_longer_one_dropped():
+    reader = LineReader()
+    assert reader.feed(b"x" * MAX_LINE) == []
+    assert reader.pending == MAX_LINE
+    assert reader.feed(b"\r") == ["X" * MAX_LINE]
+    assert reader.feed(b"y" * (MAX_LINE + 1) + b"\rQ\r") == ["Y" * (MAX_LINE + 1), "Q"]
+
+
+def test_escape_forgets_the_line_that_has_begun():
+    reader = LineReader()
+    assert reader.feed(b"#1P15") == []
+    assert reader.feed(b"00\x1b#2P16") == []
+    assert reader.feed(b"00\r") == ["#2P1600"]
+
+
+def test_stop_ends_a_move_where_it_is():
+    board = Ssc32()
+    send(board, "#1P1000\r")
+    send(board, "#1P2000T1000\r", 1.0)
+    send(board, "STOP1\r", 1.25)
+    assert (pulse(board, 1, 1.25), pulse(board, 1, 5.0)) == (1250, 1250)
+    assert send(board, "Q\r", 1.3) == b"."
+
+
+def test_the_last_channel_and_the_ends_of_a_pulse():
+    board = Ssc32()
+    for line, channel, expected in (("#31P500", 31, 500), ("#31P2500", 31, 2500), ("#0P1500", 0, 1500), ("#0P0", 0, 0)):
+        send(board, line + "\r")
+        assert pulse(board, channel) == expected
+    for line in ("#31P499", "#32P1500", "STOP32", "QP32"):
+        send(board, line + "\r")
+    assert (board.refused, pulse(board, 31)) == (4, 2500)
+    board.faults.add(["silent:3"], 0.0)
+    assert send(board, "QP3\rQP4\r") == b"\0"
+
+
+def test_a_speed_counts_only_where_it_is_slower_than_the_time():
+    board = Ssc32()
+    send(board, "#1P1000#2P1000\r")
+    send(board, "#1P2000S2000#2P1500T4000\r", 0.0)
+    assert (pulse(board, 1, 2.0), pulse(board, 2, 2.0)) == (1500, 1250)
+
+
+def test_it_is_served_alone_and_to_a_driver_alike():
+    setting = Setting(now_s=0.0, baud=115_200, seed=4)
+    for board in (SIMULATOR.alone(SIMULATOR.options(), setting), SIMULATOR.far_end([], {}, setting)):
+        board.faults.add(["noise:*:3"], 0.0)
+        expected = Ssc32(seed=4, faults=("noise:*:3",))
+        assert send(board, "Q\r") == send(expected, "Q\r") != b"."

@@ -1,20 +1,16 @@
-"""drivers.sim.boards.textboard and drivers.sim.boards.linehead: simulated boards that read lines."""
+"""drivers.sim.boards.textboard: a simulated board that parses the lines of a template."""
 
 from __future__ import annotations
 
-import pytest
+from drivers.sim.boards.textboard import SIMULATOR, Message, TextBoard, TextOptions
+from drivers.sim.wire.simulator import Setting
 
-from drivers.omote.protocol import checksum
-from drivers.sim.boards.linehead import MAX_LINE, LineHead
-from drivers.sim.boards.maestro import Maestro
-from drivers.sim.boards.textboard import TextBoard
-from drivers.sim.serving.farend import make_line
-
+MAX_LINE = 4096
 TEXTS = {"template": "#{ch}P{us}", "end": "T{time_ms}\r", "off": "#{ch}P0\r"}
 ASKED = TEXTS | {"query": "?{ch}\r", "answer": "{ch}={us}\r"}
 
 
-def say(board: TextBoard | LineHead, data: bytes, now_s: float = 0.0) -> bytes:
+def say(board: TextBoard, data: bytes, now_s: float = 0.0) -> bytes:
     return b"".join(reply.data for reply in board.feed(data, now_s))
 
 
@@ -24,7 +20,7 @@ def test_a_text_board_reads_what_its_template_writes_in_any_pieces() -> None:
         board = TextBoard(TEXTS, [1, 2], ["jaw", "brow"])
         say(board, line[:cut])
         say(board, line[cut:])
-        assert (board.told, board.refused) == ({1: None, 2: 1600.0}, 0)
+        assert (board.values, board.refused) == ({1: None, 2: 1600.0}, 0)
 
 
 def test_a_text_board_answers_and_passes_over_what_it_does_not_know() -> None:
@@ -37,55 +33,67 @@ def test_a_text_board_answers_and_passes_over_what_it_does_not_know() -> None:
 def test_a_move_at_the_very_end_is_done_after_a_pause() -> None:
     board = TextBoard(TEXTS, [1], ["jaw"])
     say(board, b"#1P150")
-    assert board.told == {1: None}
+    assert board.values == {1: None}
     for packet in board.reader.flush():
         board.handle(packet, 1.0)
-    assert board.told == {1: 150.0}
+    assert board.values == {1: 150.0}
 
 
-@pytest.mark.parametrize(
-    ("line", "answer"),
-    [
-        ("HELLO", f"OK HELLO head protocol=1 parameters=2 max_line={MAX_LINE}"),
-        ("#7 PING a b", "#7 OK PONG a b"),
-        ("set jaw 0.5 brow -1", "OK SET 2"),
-        ("GET jaw", "OK GET jaw=0"),
-        ("RELEASE ALL", "OK RELEASE 2"),
-        ("SET jaw", "ERR 21 SET name value [name value ...]"),
-        ("SET jaw nan", "ERR 22 'nan' is not a number"),
-        ("SET chin 1", "ERR 23 unknown name 'chin'"),
-        ("DANCE", "ERR 20 there is no command 'DANCE' (there are HELLO, PING, SET, RELEASE, GET)"),
-        ("PING*00", "ERR 13 wrong checksum"),
-        ("x" * (MAX_LINE + 1), f"ERR 10 a line has at most {MAX_LINE} bytes"),
-    ],
-)
-def test_a_line_head_answers_every_line(line: str, answer: str) -> None:
-    head = LineHead(["jaw", "brow"])
-    assert say(head, line.encode() + b"\r\n") == answer.encode() + b"\n"
-    assert head.refused == answer.startswith("ERR")
+def test_each_placeholder_that_names_a_servo_is_understood() -> None:
+    by_name = TextBoard({"template": "{name}={deg}\n", "off": "{name} off\n"}, [4, 5], ["jaw", "brow"])
+    say(by_name, b"brow=-12.5\njaw=3\nchin=9\n")
+    assert (by_name.values, by_name.refused) == ({4: 3.0, 5: -12.5}, 1)
+    say(by_name, b"brow off\n")
+    assert by_name.values == {4: 3.0, 5: None}
+    by_id = TextBoard({"template": "{id}:{us}\n"}, [4, 5], ["jaw", "brow"])
+    say(by_id, b"5:1500\n6:1500\n")
+    assert (by_id.values, by_id.refused) == ({4: None, 5: 1500.0}, 1)
+    alone = TextBoard({"template": "P{us}\n"}, [9], ["jaw"])
+    say(alone, b"P900\n")
+    assert alone.values == {9: 900.0}
 
 
-def test_a_line_head_takes_all_or_nothing_and_answers_with_a_checksum() -> None:
-    head = LineHead(["jaw", "brow"])
-    say(head, b"SET jaw 0.5 chin 1\n")
-    assert head.values == {"jaw": None, "brow": None}
-    body = b"#3 SET jaw 0.5"
-    answer = say(head, body + b"*%02X\n" % checksum(body))
-    assert answer == b"#3 OK SET 1*%02X\n" % checksum(b"#3 OK SET 1")
-    assert head.values["jaw"] == 0.5
+def test_a_servo_that_is_off_answers_zero_and_a_brown_out_switches_all_off() -> None:
+    board = TextBoard(ASKED, [1], ["jaw"])
+    assert say(board, b"?1\r") == b"1=0\r"
+    say(board, b"#1P1500T9\r")
+    board.faults.add(["volts:*:3:for=1s"], 1.0)
+    assert board.values == {1: None}
+    assert say(board, b"?1\r", 1.5) == b""
+    assert say(board, b"?1\r", 2.5) == b"1=0\r"
 
 
-def test_a_line_head_lets_go_after_silence() -> None:
-    head = LineHead(["jaw"])
-    say(head, b"SET jaw 1\n", 0.0)
-    assert head.describe(0.9)[0]["value"] == 1.0
-    assert head.describe(1.2)[0]["value"] is None
+def test_texts_before_between_and_behind_moves_are_no_noise() -> None:
+    texts = {"template": "{ch}:{us}", "begin": "<", "separator": ",", "end": ">\n"}
+    board = TextBoard(texts, [1, 2], ["jaw", "brow"])
+    say(board, b"<1:1000,2:2000>\n")
+    assert (board.values, board.refused) == ({1: 1000.0, 2: 2000.0}, 0)
 
 
-@pytest.mark.parametrize(
-    ("highest", "board", "channels"), [(3, "micro", 6), (3, "mini", 12), (12, "mini", 18), (23, "mini", 24)]
-)
-def test_a_board_is_as_large_as_its_channels_need(highest: int, board: str, channels: int) -> None:
-    line = make_line("maestro", [(0, "rc-90"), (highest, "rc-90")], 0.0, options={"board": board})
-    assert isinstance(line, Maestro)
-    assert len(line.channels) == channels
+def test_what_is_unknown_is_passed_over_by_the_line_or_where_it_is_too_long_by_the_byte() -> None:
+    board = TextBoard(TEXTS, [1], ["jaw"])
+    assert board.reader.feed(b"nonsense\r#") == [Message("noise", {}, 9)]
+    assert board.reader.pending == 1
+    assert board.reader.flush() == [Message("noise", {}, 1)]
+    assert board.reader.feed(b"x" * MAX_LINE) == []
+    assert board.reader.feed(b"x") == [Message("noise", {}, 1)]
+    assert board.reader.pending == MAX_LINE
+    assert board.reader.take_pending() == b"x" * MAX_LINE
+    assert board.reader.pending == 0
+
+
+def test_the_size_of_a_message_is_that_of_its_bytes() -> None:
+    board = TextBoard(TEXTS, [1], ["jaw"])
+    (move, end) = board.reader.feed(b"#1P1500T20\r")
+    assert (board.size(move), board.size(end)) == (7, 4)
+    assert move == Message("move", {"ch": "1", "us": "1500"}, 7)
+
+
+def test_options_of_the_command_line_write_line_ends_as_in_a_robot_file() -> None:
+    options = TextOptions(template=r"S{ch},{us}\n", off=r"D{ch}\r", ids="3,5-6")
+    board = SIMULATOR.alone(options, Setting(now_s=0.0, baud=115_200))
+    say(board, b"S5,1500\nS6,900\nD5\r")
+    assert board.values == {3: None, 5: None, 6: 900.0}
+    assert [row["name"] for row in board.describe(0.0)] == ["servo3", "servo5", "servo6"]
+    far_end = SIMULATOR.far_end([(3, "rc-180")], {"texts": TEXTS, "names": ["jaw"]}, Setting(now_s=0.0, baud=115_200))
+    assert far_end.describe(0.0) == [{"id": 3, "name": "jaw", "us": None}]

@@ -12,16 +12,16 @@ import pytest
 
 from drivers.base.errors import PortBusy, PortError
 from drivers.sim.serving.control import MAX_LINE, Commands, ControlSocket, Lines
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 
 
 @pytest.fixture
-def chain() -> SimulatedChain:
-    return SimulatedChain([SimulatedServo(1), SimulatedServo(2, "xl320")])
+def chain() -> Chain:
+    return Chain([SimulatedServo(1), SimulatedServo(2, "xl320")])
 
 
-def test_faults_are_set_listed_and_cleared(chain: SimulatedChain):
+def test_faults_are_set_listed_and_cleared(chain: Chain):
     commands = Commands(chain)
     assert commands.handle("fault mute:1 crc:2:every=3") == "ok"
     assert commands.handle("faults") == "ok mute:1 crc:2:every=3"
@@ -31,7 +31,7 @@ def test_faults_are_set_listed_and_cleared(chain: SimulatedChain):
     assert commands.handle("faults") == "ok"
 
 
-def test_servos_and_a_hand(chain: SimulatedChain):
+def test_servos_and_a_hand(chain: Chain):
     commands = Commands(chain)
     assert commands.handle("place 1 1500") == "ok"
     answer = commands.handle("servos")
@@ -52,7 +52,7 @@ def test_servos_and_a_hand(chain: SimulatedChain):
         ("place 1", "not enough values"),
     ],
 )
-def test_bad_lines_are_answered_with_the_reason(chain: SimulatedChain, line: str, why: str):
+def test_bad_lines_are_answered_with_the_reason(chain: Chain, line: str, why: str):
     answer = Commands(chain).handle(line)
     assert answer.startswith("error ")
     assert why in answer
@@ -108,3 +108,29 @@ def test_a_dead_socket_is_replaced_a_living_one_and_a_file_are_not(tmp_path: Pat
     assert path.read_text() == "data"
     with pytest.raises(PortError, match="cannot make the control socket"):
         ControlSocket(tmp_path / "none" / "s", str)
+
+
+def test_specs_with_spaces_are_quoted_and_words_may_be(chain: Chain):
+    commands = Commands(chain)
+    assert commands.handle("fault 'unplug:at=9s:as=/tmp/a b' mute:1") == "ok"
+    assert commands.handle("faults") == "ok mute:1"
+    chain.faults.advance(float("inf"))
+    assert commands.handle("faults") == "ok mute:1 'unplug:at=9s:as=/tmp/a b'"
+
+
+def test_all_faults_are_cleared_where_no_kind_is_named(chain: Chain):
+    commands = Commands(chain)
+    commands.handle("fault mute:1 echo crc:1:at=9s")
+    assert commands.handle("clear") == "ok"
+    assert (chain.faults.active, chain.faults.next_change_s) == ([], float("inf"))
+
+
+def test_the_hint_of_a_refused_fault_is_given(chain: Chain):
+    assert "kinds: alert, baud" in Commands(chain).handle("fault nonsense")
+
+
+def test_the_longest_line_is_kept():
+    lines = Lines()
+    assert lines.feed(b"x" * 4096) == []
+    assert lines.feed(b"\n") == ["x" * 4096]
+    assert lines.feed(b"\xff\n") == ["\ufffd"]

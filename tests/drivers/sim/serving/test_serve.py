@@ -15,8 +15,12 @@ import serial
 from drivers.base.errors import DriverError
 from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusReader, encode_instruction
-from drivers.sim.serving.serve import PAUSE_S, PortServer, make_servos, serve_dynamixel
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.port.serialport import SerialPort
+from drivers.sim.serving.serve import EARLY_S, POLL_STEP_S, PortServer, make_server, serve, serve_dynamixel
+from drivers.sim.servos.chain import Chain
+from drivers.sim.servos.device import SimulatedServo
+from drivers.sim.servos.simulators import ids_and_models
+from drivers.sim.wire.line import PAUSE_S
 
 
 def test_it_calls_back_serves_and_cleans_up(tmp_path: Path, capsys):
@@ -76,15 +80,14 @@ def test_bad_settings_are_refused_before_anybody_is_told(tmp_path: Path, options
 
 
 def test_the_loop_sleeps_until_something_is_due():
-    chain = SimulatedChain(make_servos([1], "xl330-m288", 1_000_000, 0.0))
+    chain = Chain([SimulatedServo(1)])
     server = PortServer(chain)
     try:
         assert server._timeout() is None  # at rest nothing wakes it but its descriptors
         chain.faults.add(["mute:1:at=60s"], time.monotonic())
         assert 59 < server._timeout() <= 60
         chain.faults.clear(None, 0.0)
-        chain.reader.feed_frames(b"\xff\xff\xfd\x00")
-        server._read_s = time.monotonic()
+        server._queue.receive(b"\xff\xff\xfd\x00", time.monotonic())
         assert 0 < server._timeout() <= PAUSE_S
     finally:
         server.port.close()
@@ -94,11 +97,7 @@ def test_servos_from_ids_and_from_specs():
     class Spec:
         id, model = 7, "xl320"
 
-    servos = make_servos([2, Spec()], "xm430-w210", 57_600, 0.0)
-    assert [(s.id, s.table.model, s.baud) for s in servos] == [
-        (2, "xm430-w210", 57_600),
-        (7, "xl320", 57_600),
-    ]
+    assert ids_and_models([2, Spec()], "xm430-w210") == [(2, "xm430-w210"), (7, "xl320")]
 
 
 def test_another_program_sets_faults_through_the_socket(tmp_path: Path):
@@ -131,3 +130,115 @@ def test_a_port_that_cannot_be_made_leaves_no_socket(tmp_path: Path):
     with pytest.raises(DriverError, match="cannot make the link"):
         serve_dynamixel([1], link=tmp_path / "none" / "port", commands=tmp_path / "control")
     assert os.listdir(tmp_path) == []
+
+
+def test_what_passes_is_shown_and_any_byte_ends_a_server_without_commands():
+    server, seen = PortServer(Chain([SimulatedServo(1)]), "memory://shown"), []
+    server.tap = lambda sent, data: seen.append((sent, len(data)))
+    ours, theirs = socket.socketpair()
+    thread = threading.Thread(target=server.run, args=(ours,))
+    thread.start()
+    port = SerialPort("memory://shown")
+    port.open()
+    port.write(encode_instruction(1, I.PING))
+    data = b""
+    while len(data) < 14:
+        data += port.read(time.monotonic() + 20)
+    port.close()
+    theirs.sendall(b"x")
+    thread.join(30)
+    assert not thread.is_alive()
+    assert (seen[0], sum(size for sent, size in seen if not sent)) == ((True, 10), 14)
+    assert not server.port.is_open
+    server.close()
+    ours.close()
+    theirs.close()
+
+
+def test_commands_come_by_lines_until_their_end():
+    lines: list[str] = []
+    server = PortServer(Chain([SimulatedServo(1)]), "memory://lines", on_line=lines.append)
+    ours, theirs = socket.socketpair()
+    theirs.sendall(b"one\ntw")
+    theirs.sendall(b"o\nrest")
+    theirs.close()
+    server.run(ours)
+    assert lines == ["one", "two"]
+    ours.close()
+
+
+def test_an_unplug_drops_what_is_under_way_and_comes_back_where_it_was():
+    chain = Chain([SimulatedServo(1)])
+    server = PortServer(chain, "memory://plug")
+    server._queue.receive(encode_instruction(1, I.PING) + b"\xff\xff", 1.0)
+    assert server._queue.replies and chain.reader.pending
+    chain.faults.add(["unplug"], 1.0)
+    assert (server.port.is_open, list(server._queue.replies), chain.reader.pending) == (False, [], 0)
+    chain.faults.clear("unplug", 2.0)
+    assert (server.port.is_open, server.port.path) == (True, "memory://plug")
+    server.close()
+
+
+def test_a_server_wakes_early_for_a_reply_and_polls_after_it():
+    server = PortServer(Chain([SimulatedServo(1)]), "memory://early", wire=True)
+    now_s = time.monotonic()
+    server._queue.replies.append((now_s + 60.0, b"x"))
+    assert 59.0 < server._timeout() <= 60.0 - EARLY_S
+    server._queue.replies.clear()
+    server._prompt, server._replied_s = True, time.monotonic() + 60.0
+    assert server._timeout() == POLL_STEP_S
+    server._prompt = False
+    assert server._timeout() is None
+    server.close()
+
+
+def test_settings_of_a_server_reach_its_line_and_its_wire():
+    settings = {"servos": [(1, "xl320")], "link": "memory://made", "baud": 57_600, "faults": ["mute:1"], "seed": 5,
+                "wire": True, "latency_s": 0.016, "family": "dynamixel", "options": {}}  # fmt: skip
+    server = make_server(settings)
+    assert [servo.baud for servo in server.line.servos] == [57_600]
+    assert server._queue._timing.latency_s == 0.016
+    assert server._queue._baud == 57_600
+    assert server.on_line("faults") == "ok mute:1"
+    server.close()
+    server = make_server(settings | {"wire": False})
+    assert server._queue._timing is None
+    server.close()
+    with pytest.raises(DriverError, match="nonsense"):
+        make_server(settings | {"faults": ["nonsense"]})
+    make_server(settings).close()  # the name is free again
+
+
+@pytest.mark.parametrize(("wire", "age_s", "polls"), [(True, 0.0, True), (False, 0.0, False), (True, 60.0, False)])
+def test_a_server_polls_for_a_client_that_writes_at_once_on_a_wire_that_takes_time(wire, age_s, polls):
+    server = PortServer(Chain([SimulatedServo(1)]), "memory://polls", wire=wire)
+    port = SerialPort("memory://polls")
+    port.open()
+    try:
+        port.write(b"\xff")
+        server._receive()  # accepts the client
+        end = time.monotonic() + 20
+        while not server.line.reader.pending and time.monotonic() < end:
+            # a reply in the future has just been sent, however slow this machine is
+            server._replied_s = time.monotonic() + 30.0 - age_s
+            server._receive()
+        assert server.line.reader.pending == 1
+        assert (server._prompt, server._replied_s) == (polls, 0.0)
+    finally:
+        port.close()
+        server.close()
+
+
+def test_the_server_is_shown_before_clients_may_come():
+    reading, writing = os.pipe()
+    os.close(writing)
+    calls: list[str] = []
+    serve(
+        Chain([SimulatedServo(1)]),
+        "memory://order",
+        lambda path: calls.append(path),
+        stop=reading,
+        on_server=lambda server: calls.append(type(server).__name__),
+    )
+    os.close(reading)
+    assert calls == ["PortServer", "memory://order"]

@@ -7,24 +7,22 @@ import pytest
 from drivers.packets.packet import ALERT, BROADCAST_ID, StatusPacket, StatusReader, decode_fast, encode_instruction
 from drivers.packets.packet import ErrorNumber as E
 from drivers.packets.packet import Instruction as I
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 
 
-def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> SimulatedChain:
+def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> Chain:
     servos = [SimulatedServo(i, model, position=2000.0 + i, **options) for i in ids or (1, 2, 3)]
-    return SimulatedChain(servos, faults=faults)
+    return Chain(servos, faults=faults)
 
 
-def wire(bus: SimulatedChain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
+def wire(bus: Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
     """What comes back, as one run of bytes."""
     frame = encode_instruction(device, instruction, params)
     return b"".join(reply.data for reply in bus.feed(frame, now_s))
 
 
-def ask(
-    bus: SimulatedChain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0
-) -> list[StatusPacket]:
+def ask(bus: Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> list[StatusPacket]:
     """The status packets that come back."""
     return StatusReader().feed(wire(bus, device, instruction, params, now_s))
 
@@ -65,7 +63,7 @@ def test_any_packet_feeds_every_watchdog():
 
 
 def test_two_servos_of_one_id_collide():
-    bus = SimulatedChain([SimulatedServo(1, position=0x0F0.__float__()), SimulatedServo(1, position=0xA0A.__float__())])
+    bus = Chain([SimulatedServo(1, position=0x0F0.__float__()), SimulatedServo(1, position=0xA0A.__float__())])
     data = wire(bus, 1, I.READ, POSITION)
     assert data[9:11] == bytes((0xF0 & 0x0A, 0x00 & 0x0A))
     assert StatusReader().feed(data) == []

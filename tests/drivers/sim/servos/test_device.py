@@ -306,3 +306,117 @@ def test_load_register_of_models_without_current():
     write(device, "Torque Enable", 1)
     write(device, "Goal Position", 3048)
     assert read(device, "Present Load", 9.0) == 100
+
+
+def test_the_ramps_of_a_time_based_profile_take_profile_acceleration_in_milliseconds():
+    device = servo()
+    write(device, "Drive Mode", 4)
+    write(device, "Torque Enable", 1)
+    write(device, "Profile Velocity", 1000)
+    write(device, "Profile Acceleration", 200)
+    write(device, "Goal Position", 3048)
+    cruise = 1000 / 0.8
+    assert device.plant.motion(0.1).velocity == pytest.approx(cruise / 2)
+    assert device.plant.motion(0.5).velocity == pytest.approx(cruise)
+
+
+@pytest.mark.parametrize(("goal_current", "sign"), [(175, 1), (-175, -1)])
+def test_without_a_spring_current_turns_the_shaft_for_ever(goal_current: int, sign: int):
+    device = servo()
+    write(device, "Operating Mode", 0)
+    write(device, "Torque Enable", 1)
+    write(device, "Goal Current", goal_current)
+    assert device.plant.motion(5.0).velocity == pytest.approx(sign * 0.1 * device.plant.top_speed)
+
+
+def test_velocity_is_bounded_by_its_limit_and_reversed_by_the_drive_mode():
+    device = servo()
+    write(device, "Drive Mode", 1)
+    write(device, "Velocity Limit", 100)
+    write(device, "Operating Mode", 1)
+    write(device, "Torque Enable", 1)
+    write(device, "Goal Velocity", 100)
+    assert read(device, "Present Velocity", 5.0) == 100
+    assert device.plant.motion(5.0).velocity < 0
+    device.registers.put("Goal Velocity", 300)
+    device.drive.plan(5.0)
+    assert read(device, "Present Velocity", 9.0) == 100
+
+
+def test_profile_acceleration_ramps_the_velocity_mode():
+    device = servo()
+    write(device, "Operating Mode", 1)
+    write(device, "Torque Enable", 1)
+    write(device, "Profile Acceleration", 10)
+    write(device, "Goal Velocity", 100)
+    ramp_s = 0.064 * 100 / 10
+    assert read(device, "Present Velocity", ramp_s / 2) == pytest.approx(50, abs=1)
+    assert read(device, "Present Velocity", ramp_s + 0.01) == 100
+
+
+def test_a_goal_switches_torque_on_only_with_its_bit_and_without_shutdown():
+    device = servo()
+    write(device, "Goal Position", 2500)
+    assert not device.torque
+    write(device, "Drive Mode", 8)
+    for name in ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position"):
+        write(device, "Torque Enable", 0)
+        write(device, name, 1)
+        assert device.torque, name
+
+
+def test_permanent_writes_are_counted_and_keep_the_servo_deaf_for_the_longest():
+    device = servo()
+    device.eeprom_busy_s = 0.5
+    write(device, "Homing Offset", 1, 1.0)
+    write(device, "Homing Offset", 2, 1.1)
+    write(device, "LED", 1, 1.2)
+    assert (device.eeprom_writes, device.deaf_until) == ({"Homing Offset": 2}, 1.6)
+    device.eeprom_busy_s = 0.0
+    write(device, "Homing Offset", 3, 1.3)
+    assert device.deaf_until == 1.6
+
+
+def test_torque_that_is_on_is_not_switched_on_again():
+    device = servo()
+    write(device, "Torque Enable", 1)
+    write(device, "Profile Velocity", 1)
+    write(device, "Goal Position", 3000)
+    before = device.plant.trajectory
+    write(device, "Torque Enable", 1, 0.5)
+    assert device.plant.trajectory is before
+
+
+def test_sensors_are_read_again_after_a_write_at_the_same_moment():
+    device = servo()
+    write(device, "Torque Enable", 1)
+    write(device, "Goal Position", 3000)
+    write(device, "Profile Velocity", 1)
+    assert read(device, "Moving Status", 0.1) & 2
+    write(device, "Torque Enable", 0, 0.1)
+    assert not read(device, "Moving Status", 0.1) & 2
+
+
+def test_an_old_servo_gets_its_torque_back_with_its_limit_without_a_reboot():
+    device = servo("ax-12a")
+    write(device, "Torque Enable", 1)
+    device.latch(0x20, 0.0)
+    assert (device.torque, read(device, "Torque Limit", 0.0)) == (False, 0)
+    item = device.table["Torque Enable"]
+    device.write(item.address, b"\1", 1.0)
+    assert (device.torque, device.hardware_error, device.shut_down) == (True, 0, False)
+    assert device.registers.get("Torque Limit") == device.table["Torque Limit"].initial
+
+
+def test_any_bytes_of_the_table_may_be_read_and_none_behind_it():
+    device = servo()
+    size = device.table.size
+    error, data = device.read(0, size, 1.0)
+    assert (error, len(data)) == (0, size)
+    assert device.read(size - 1, 1, 1.0)[0] == 0
+    assert device.read(size, 1, 1.0) == (E.ACCESS, b"")
+    assert device.read(0, 0, 1.0) == (E.ACCESS, b"")
+    tick = device.table["Realtime Tick"].address
+    assert device.read(tick, 2, 2.0)[1] == (2000).to_bytes(2, "little")
+    assert device.read(tick - 1, 2, 3.0)[1][1:] == (3000 & 0xFF).to_bytes(1, "little")
+    assert device.read(146, 1, 4.0)[1] == b"\x1e"

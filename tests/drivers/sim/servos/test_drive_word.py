@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drivers.sim.servos.drive_word import SENSED, FeetechDrive, WordDrive
-from drivers.sim.servos.motion import Profile, hold
+from drivers.sim.servos.motion import Motion, Profile, hold, plan_speed
 from drivers.sim.servos.plant import Plant, Skin
 from drivers.sim.servos.registers import Registers
 from drivers.tables.tables import load_table
@@ -87,3 +87,74 @@ def test_goal_time_is_for_the_scs_series_only():
         one.registers.put("Goal Position", one.registers.table.center + 100)
         one.plan(0.0)
         assert (one.plant.trajectory.duration == pytest.approx(2.0)) is (seconds is not None)
+
+
+def test_the_wheel_of_an_ax_turns_by_magnitude_and_direction():
+    one = drive("ax-12a", CW_Angle_Limit=0, CCW_Angle_Limit=0, Moving_Speed=512)
+    one.plan(0.0)
+    assert one.plant.motion(9.0).velocity == pytest.approx(512 / 1023 * 1000.0)
+    one.registers.put("Moving Speed", 512 | 1024)
+    one.plan(9.0)
+    assert one.plant.motion(20.0).velocity == pytest.approx(-512 / 1023 * 1000.0)
+    one.registers.put("CCW Angle Limit", 1)
+    one.registers.put("Goal Position", 1)
+    one.plan(20.0)
+    assert one.plant.trajectory.end == 1.0
+
+
+@pytest.mark.parametrize(
+    ("mode", "name", "value", "velocity"),
+    [(1, "Goal Velocity", -100, -100 * 50 / 50), (2, "Goal Time", 250, 250.0), (2, "Goal Time", -2000, -1000.0)],
+)
+def test_speed_and_pwm_modes_of_feetech(mode: int, name: str, value: int, velocity: float):
+    one = drive("sts3215", Operating_Mode=mode)
+    one.registers.put(name, value)
+    one.plan(0.0)
+    expected = velocity if mode == 2 else -100 * one.ticks_s
+    assert one.plant.motion(9.0).velocity == pytest.approx(expected)
+
+
+def test_step_mode_adds_to_where_the_last_step_ends():
+    one = drive("sts3215", Operating_Mode=3, Goal_Position=100)
+    centre = one.plant.motion(0.0).position
+    one.plan(0.0)
+    one.plan(0.01)
+    assert one.plant.trajectory.end == centre + 200.0
+
+
+def test_goal_velocity_and_acceleration_of_feetech():
+    one = drive("sts3215", Goal_Position=3000, Goal_Velocity=200, Acceleration=10)
+    one.plan(0.0)
+    assert one.plant.motion(0.05).acceleration == pytest.approx(1000.0)
+    assert one.plant.motion(0.5).velocity == pytest.approx(200 * one.ticks_s)
+    one.registers.put("Goal Velocity", 0)
+    one.plan(0.0)
+    assert max(one.plant.motion(0.01 * k).velocity for k in range(200)) > 200 * one.ticks_s
+
+
+def test_homing_offset_and_turns_of_an_sts():
+    one = drive("sts3215", Homing_Offset=100)
+    one.plant.trajectory = hold(0.0, 2148.0)
+    one.sense(0.0)
+    assert one.registers.get("Present Position") == 2048
+    one.plant.trajectory = hold(0.0, 9000.0)
+    one.sense(0.0)
+    assert one.registers.get("Present Position") == 4095
+    one.registers.put("Phase", 0x10)
+    one.sense(0.0)
+    assert one.registers.get("Present Position") == 8900
+
+
+def test_sensed_registers_of_an_ax():
+    one = drive("ax-12a")
+    one.plant.powered = True
+    one.plant.trajectory = plan_speed(0.0, Motion(100.0, -200.0), -200.0, 1.0)
+    one.plant.supply_v, one.plant.forced_c = 11.0, 36.6
+    one.sense(0.25)
+    get = one.registers.get
+    assert (get("Present Position"), get("Moving")) == (50, 1)
+    assert get("Present Speed") == -round(200 / one.ticks_s)
+    assert (get("Present Voltage"), get("Present Temperature")) == (110, 37)
+    one.plant.powered = False
+    one.sense(0.25)
+    assert get("Moving") == 0

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from drivers.sim.servos.motion import Motion, plan_speed
-from drivers.sim.servos.plant import Heat, Plant, Skin
+from drivers.sim.servos.plant import Plant, Skin
 
 AT_REST = Motion(2048.0, 0.0, 0.0)
 
@@ -46,30 +46,32 @@ def test_the_supply_sags_under_load():
 
 
 def test_heat_follows_the_square_of_the_load_with_a_lag():
-    heat = Heat(lag_s=100.0)
-    heat.advance(100.0, 0.5)
-    assert heat.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
-    heat.advance(50.0, 1.0)  # time does not run back
-    assert heat.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
-    heat.advance(1e6, 0.0)
-    assert heat.temperature_c == pytest.approx(30.0)
+    motor = plant()
+    motor.heat(200.0, 0.5)
+    assert motor.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
+    motor.heat(50.0, 1.0)  # time does not run back
+    assert motor.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-1)))
+    motor.heat(400.0, 0.5)
+    assert motor.temperature_c == pytest.approx(30 + 15 * (1 - math.exp(-2)))
+    motor.heat(1e6, 0.0)
+    assert motor.temperature_c == pytest.approx(30.0)
 
 
 def test_a_temperature_from_outside_wins():
     hot = plant()
     hot.forced_c = 80.0
-    hot.warm(10.0, 1.0)
+    hot.heat(10.0, 1.0)
     assert hot.temperature_c == 80.0
 
 
 def test_a_jammed_shaft_stays_pushes_and_goes_on_from_where_it_is():
     stuck = plant()
-    stuck.trajectory = plan_speed(0.0, 2048.0, 0.0, 100.0, 1e6)
+    stuck.trajectory = plan_speed(0.0, AT_REST, 100.0, 1e6)
     stuck.jam(1.0, True)
     held = stuck.motion(1.0)
     assert held.position == pytest.approx(2148.0, abs=0.1)
     assert stuck.motion(5.0) == held
-    assert stuck.load(stuck.motion(1.1), stuck.wanted(1.1)) == pytest.approx(0.2, abs=0.01)
+    assert stuck.load(stuck.motion(1.1), stuck.trajectory.at(1.1)) == pytest.approx(0.2, abs=0.01)
     stuck.jam(6.0, True)
     assert stuck.jammed_since == 1.0
     stuck.jam(7.0, False)
@@ -83,3 +85,31 @@ def test_placing_moves_even_a_jammed_shaft():
     limp.jam(0.0, True)
     limp.place(1.0, 100.0)
     assert limp.motion(2.0).position == 100.0
+
+
+def test_the_skin_by_default_pulls_back_and_rubs():
+    motor = Plant(0.0, 2048.0, 1000.0, 5.0, Skin())
+    motor.powered = True
+    still = Motion(3048.0)
+    assert motor.load(still, still) == pytest.approx(0.04)
+    moving = Motion(2048.0, 5.0, 1e4)
+    assert motor.load(moving, moving) == pytest.approx(0.012 + 0.02)
+    assert motor.load(Motion(-1e6), AT_REST) == -1.0
+
+
+def test_the_motor_takes_thirty_milliseconds_to_its_top_speed():
+    assert plant().top_acceleration == pytest.approx(1000.0 / 0.03)
+
+
+def test_a_shaft_that_is_placed_stays_there_and_starts_cold():
+    motor = plant()
+    motor.place(1.0, 100.0)
+    assert (motor.motion(5.0), motor.jammed_at, motor.temperature_c) == (Motion(100.0), None, 30.0)
+
+
+def test_heat_is_counted_from_power_up():
+    motor = Plant(1000.0, 0.0, 1000.0, 5.0, Skin())
+    motor.heat(1000.0, 1.0)
+    assert motor.temperature_c == 30.0
+    motor.heat(1200.0, 1.0)
+    assert motor.temperature_c == pytest.approx(30 + 60 * (1 - math.exp(-1)))

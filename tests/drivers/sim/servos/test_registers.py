@@ -179,3 +179,90 @@ def test_magnitudes_and_high_bytes_first(model: str, name: str, data: str, value
     made.store(parsed, number)
     assert made.get(name) == value
     assert made.read(item.address, 2) == bytes.fromhex(data)
+
+
+@pytest.mark.parametrize("model", ["xl330-m288", "xm430-w350", "xl320", "ax-12a", "mx1-28", "sts3215", "scs0009"])
+def test_every_fixed_range_is_allowed_up_to_both_ends_and_no_further(model: str):
+    made = Registers(load_table(model))
+    made.reset(0, made.table.size)
+    tried = 0
+    for item in made.table.values():
+        if not item.writable or item.upper:
+            continue
+        span = (1 << 8 * item.size) - 1
+        for end, step in ((item.minimum, -1), (item.maximum, 1)):
+            if end is None or item.minimum is None:
+                continue
+            if item.values is None:
+                ((changed, value),) = made.parse(item.address, item.encode(end))
+                assert (changed.name, value) == (item.name, end)
+            beyond = end + step
+            if item.decode(item.encode(beyond)) == beyond and -span <= beyond <= span:
+                assert made.parse(item.address, item.encode(beyond)) == E.DATA_RANGE, item.name
+                tried += 1
+        if item.values is not None:
+            assert not isinstance(made.parse(item.address, item.encode(item.values[-1])), E)
+    assert tried > 3
+
+
+def test_limit_registers_are_allowed_up_to_both_ends(registers: Registers):
+    for address, value, size in ((104, 445, 4), (104, -445, 4), (100, 885, 2), (102, -1750, 2), (116, 0, 4)):
+        assert registers.parse(address, le(value, size))[0][1] == value
+    registers.put("Max Position Limit", 3000)
+    assert registers.parse(116, le(3000))[0][1] == 3000
+
+
+@pytest.mark.parametrize("goal", [1_048_575, -1_048_575])
+def test_extended_positions_reach_256_turns_both_ways(registers: Registers, goal: int):
+    registers.extended = True
+    assert registers.parse(116, le(goal))[0][1] == goal
+    assert registers.parse(104, le(446)) == E.DATA_LIMIT, "other goals keep their limits"
+
+
+def test_the_lock_ends_where_the_ram_begins(registers: Registers):
+    registers.locked = True
+    end = registers.table.eeprom_end
+    for item in registers.table.values():
+        if item.writable and item.minimum is None and item.values is None and not item.upper:
+            refused = registers.parse(item.address, bytes(item.size)) == E.ACCESS
+            assert refused is (item.address < end), item.name
+
+
+def test_a_pointer_to_its_own_slot_or_to_another_is_plain_memory(registers: Registers):
+    registers.memory[168:172] = le(208, 2) + le(210, 2)
+    registers.memory[172:174] = le(registers.table.size, 2)
+    registers.remap()
+    registers.memory[208:212] = b"\x11\x22\x33\x44"
+    assert registers.read(208, 3) == b"\x11\x22\x33"
+
+
+def test_each_slot_has_its_own_pointer_and_reads_may_begin_before_the_slots():
+    made = Registers(load_table("xm430-w350"))
+    made.reset(0, made.table.size)
+    (first, second) = made.table.indirect
+    for pointers, _, count in (first, second):
+        made.memory[pointers + 2 * (count - 1) : pointers + 2 * count] = le(65, 2)
+    made.remap()
+    made.put("LED", 1)
+    for _, data, count in (first, second):
+        assert made.read(data + count - 2, 2) == b"\0\1"
+        assert made.span(data + count - 1, 1) == (65, 66)
+    _, data, count = first
+    assert made.read(data - 1, 2) == bytes(made.memory[data - 1 : data + 1])
+    assert made.span(data - 1, 1) == (data - 1, data)
+    assert made.parse(second[1] + second[2] - 1, b"\0")[0][0].name == "LED"
+
+
+def test_an_indirect_write_is_refused_as_a_whole(registers: Registers):
+    registers.memory[168:174] = le(65, 2) + le(132, 2) + le(10, 2)
+    registers.remap()
+    assert registers.parse(208, b"\x01\x00") == E.ACCESS
+    assert [item.name for item, _ in registers.parse(208, b"\x01")] == ["LED"]
+    assert registers.parse(208 + 27, b"\x01\x02") == E.ACCESS, "behind the last slot"
+
+
+def test_repeated_writes_are_judged_again(registers: Registers):
+    assert registers.parse(116, le(2000))[0][1] == 2000
+    registers.put("Max Position Limit", 1000)
+    assert registers.parse(116, le(2000)) == E.DATA_LIMIT
+    assert registers.parse(117, le(1)) == registers.parse(117, le(1)) == E.ACCESS

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.base.errors import DriverError
 from drivers.packets.packet import StatusPacket, StatusReader, encode_status
-from drivers.sim.wire.faults import KINDS, Fault, FaultSet, Spoiler, parse_fault
+from drivers.sim.wire.faults import KINDS, Fault, FaultSet, ReplyFault, parse_fault
 
 
 @pytest.mark.parametrize(
@@ -66,14 +66,13 @@ def test_unreadable_specs_are_named_with_the_reason(spec: str, why: str):
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_has_a_help_line_and_can_be_written(kind: str):
     entry = KINDS[kind]
-    assert entry.help
     value = ":7" if entry.value and entry.default is None else ""
     assert parse_fault(f"{kind}{'' if entry.scope == 'bus' else ':1'}{value}").kind == kind
 
 
 def strikes(spec: str, ids: list[int]) -> list[bool]:
-    spoiler = Spoiler(parse_fault(spec), random.Random(1))
-    return [spoiler.strikes(device) for device in ids]
+    reply_fault = ReplyFault(parse_fault(spec), random.Random(1))
+    return [reply_fault.hits(device) for device in ids]
 
 
 def test_every_counts_each_servo_for_itself():
@@ -90,48 +89,52 @@ def test_chance_is_about_right_and_repeatable():
     assert hits == strikes("drop:*:p=0.1", [1] * 5000)
 
 
-def spoil(spec: str, data: bytes = b"\1\2\3\4") -> bytes | None:
-    frame = encode_status(5, 0x80, data)
-    return Spoiler(parse_fault(spec), random.Random(1)).status(frame, 5, 0x80, data)
+def corrupted(spec: str, data: bytes = b"\1\2\3\4") -> bytes | None:
+    """A status packet of servo 5 as a servo on a wire with this fault sends it."""
+    faults = FaultSet(lambda *change: None, seed=1)
+    faults.add([spec], 0.0)
+    return faults.corrupt(
+        encode_status(5, 0x80, data),
+        5,
+        first=4,
+        shorten=lambda frame, size: encode_status(5, 0x80, data[:size]),
+        readdress=lambda frame, other: encode_status(other, 0x80, data),
+    )[0]
 
 
 def test_what_happens_to_a_status_packet():
     frame = encode_status(5, 0x80, b"\1\2\3\4")
-    assert spoil("drop:*") is None
-    assert spoil("silent:*") is None
-    assert StatusReader().feed(spoil("short:*:2")) == [StatusPacket(5, 0x80, b"\1\2")]
-    assert StatusReader().feed(spoil("wrongid:*:9")) == [StatusPacket(9, 0x80, b"\1\2\3\4")]
-    assert spoil("crc:*")[:-1] == frame[:-1]
-    assert spoil("crc:*")[-1] != frame[-1]
-    assert spoil("noise:*:6")[6:] == frame
-    assert len(spoil("noise:*:6")) == len(frame) + 6
-    assert spoil("late:*") == frame
+    assert corrupted("drop:*") is None
+    assert corrupted("silent:*") is None
+    assert StatusReader().feed(corrupted("short:*:2")) == [StatusPacket(5, 0x80, b"\1\2")]
+    assert StatusReader().feed(corrupted("wrongid:*:9")) == [StatusPacket(9, 0x80, b"\1\2\3\4")]
+    assert corrupted("crc:*")[:-1] == frame[:-1]
+    assert corrupted("crc:*")[-1] != frame[-1]
+    assert corrupted("noise:*:6")[6:] == frame
+    assert len(corrupted("noise:*:6")) == len(frame) + 6
+    assert corrupted("late:*") == frame
 
 
 def test_flip_changes_exactly_one_bit_behind_the_header():
     frame = encode_status(5, 0x80, b"\1\2\3\4")
     places = set()
-    spoiler = Spoiler(parse_fault("flip:*"), random.Random(1))
+    faults = FaultSet(lambda *change: None)
+    faults.add(["flip:*"], 0.0)
     for _ in range(300):
-        spoilt = spoiler.status(frame, 5, 0x80, b"\1\2\3\4")
-        difference = int.from_bytes(spoilt, "big") ^ int.from_bytes(frame, "big")
+        changed = faults.corrupt(frame, 5, first=4)[0]
+        difference = int.from_bytes(changed, "big") ^ int.from_bytes(frame, "big")
         assert difference.bit_count() == 1
-        assert spoilt[:4] == frame[:4]
+        assert changed[:4] == frame[:4]
         places.add(difference)
     assert len(places) > 60
 
 
-def test_what_happens_to_a_part_of_a_joint_reply():
-    part = bytes((0, 5, 1, 2, 3, 4, 0xAA, 0xBB))
-
-    def spoilt(spec: str) -> bytes | None:
-        return Spoiler(parse_fault(spec), random.Random(1)).part(part)
-
-    assert spoilt("drop:*") is None
-    assert spoilt("short:*:1") == bytes((0, 5, 1, 0xAA, 0xBB))
-    assert spoilt("wrongid:*:9") == bytes((0, 9, 1, 2, 3, 4, 0xAA, 0xBB))
-    assert spoilt("crc:*")[:-1] == part[:-1]
-    assert spoilt("late:*") == part
+def test_without_a_frame_format_data_is_cut_and_late_replies_add_up():
+    faults = FaultSet(lambda *change: None)
+    faults.add(["short:1:2", "late:*:0.5", "late:1:0.25", "silent:2"], 0.0)
+    assert faults.corrupt(b"abcd", 1) == (b"ab", 0.75)
+    assert faults.corrupt(b"abcd", 2) == (None, 0.5)
+    assert faults.corrupt(b"abcd", 3) == (b"abcd", 0.5)
 
 
 def recorded(*specs: str | Fault, now_s: float = 0.0) -> tuple[FaultSet, list[tuple[str, bool, float]]]:
@@ -155,7 +158,7 @@ def test_clearing_ends_what_runs_and_forgets_what_was_to_come():
     faults, seen = recorded("crc:1", "crc:2:at=5s", "mute:2")
     faults.clear("crc", 1.0)
     assert seen[-1] == ("crc", False, 1.0)
-    assert faults.spoilers == []
+    assert faults.reply_faults == []
     assert faults.next_change_s == float("inf")
     faults.clear(None, 2.0)
     assert faults.active == []
@@ -184,3 +187,65 @@ def test_a_bus_may_have_few_kinds_of_fault():
     with pytest.raises(DriverError, match=r"'mute:1': a bus of this kind has only echo, unplug"):
         faults.add(["unplug", "mute:1"], 0.0)
     assert [fault.kind for fault in faults.active] == ["echo"]
+
+
+def test_ids_are_inclusive_and_end_at_252():
+    assert parse_fault("mute:0,3-5,252").ids == {0, 3, 4, 5, 252}
+    for spec in ("mute:253", "mute:250-253", "mute:"):
+        with pytest.raises(DriverError):
+            parse_fault(spec)
+
+
+@pytest.mark.parametrize("spec", ["crc:7:p=0", "crc:7:p=1", "crc:7:every=1", "crc:7:at=0", "noise:1:0"])
+def test_values_at_their_ends_are_allowed(spec: str):
+    assert parse_fault(spec).spec == spec
+
+
+def test_a_wrong_option_among_good_ones_is_named():
+    with pytest.raises(DriverError, match=r"'p=2' is out of range"):
+        parse_fault("crc:7:every=2:p=2:count=1")
+
+
+@pytest.mark.parametrize(
+    ("kind", "scope", "default"),
+    [("late", "reply", 0.045), ("short", "reply", 1), ("noise", "reply", 5), ("hw", "servo", 0x20),
+     ("eeprom-busy", "servo", 0.02), ("slow-reader", "bus", 0.2)],
+)  # fmt: skip
+def test_defaults_of_the_documentation(kind: str, scope: str, default: float):
+    assert (KINDS[kind].scope, parse_fault(kind if scope == "bus" else f"{kind}:1").value) == (scope, default)
+
+
+def test_a_chance_is_taken_only_where_it_is_below_one():
+    rng = random.Random(1)
+    before = rng.getstate()
+    assert all(ReplyFault(parse_fault("drop:*"), rng).hits(1) for _ in range(9))
+    assert rng.getstate() == before
+    assert not any(ReplyFault(parse_fault("drop:*:p=0"), rng).hits(1) for _ in range(99))
+
+
+def test_a_hit_that_chance_spares_is_not_counted():
+    fault = ReplyFault(parse_fault("drop:*:p=0.5:count=3"), random.Random(3))
+    assert sum(fault.hits(1) for _ in range(99)) == 3
+
+
+def test_faults_due_at_one_moment_change_in_the_order_they_were_set():
+    faults, seen = recorded("mute:1:at=1s", "echo:at=1s", "stall:1:at=0.5s")
+    faults.advance(1.0)
+    assert [kind for kind, _, _ in seen] == ["stall", "mute", "echo"]
+
+
+def test_equal_faults_end_one_by_one():
+    faults, seen = recorded("crc:1:for=1s", "crc:1")
+    assert len(faults.reply_faults) == 2
+    faults.advance(1.0)
+    assert (len(faults.reply_faults), len(faults.active)) == (1, 1)
+    assert seen[-1] == ("crc", False, 1.0)
+
+
+def test_the_same_seed_gives_the_same_noise():
+    def noise(seed: int) -> bytes | None:
+        faults = FaultSet(lambda *change: None, seed)
+        faults.add(["noise:*:8"], 0.0)
+        return faults.corrupt(b"", 1)[0]
+
+    assert noise(4) == noise(4) != noise(5)

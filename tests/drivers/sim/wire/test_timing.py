@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.packets.packet import BROADCAST_ID, InstructionPacket
+from drivers.packets.packet import BROADCAST_ID, encode_instruction
 from drivers.packets.packet import Instruction as I
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.wire.replies import Reply
-from drivers.sim.wire.timing import USB_FRAME_S, WireTiming, without_timing
+from drivers.sim.wire.timing import USB_FRAME_S, Reply, WireTiming, collide, without_timing
 
 IDS = bytes(range(1, 25))
 POSITION = b"\x84\0\4\0"
@@ -22,8 +21,8 @@ def transaction(
     servos = [SimulatedServo(i) for i in IDS]
     for servo in servos:
         servo.registers.put("Return Delay Time", delay)
-    bus, timing = SimulatedChain(servos), WireTiming(latency_s)
-    packet = InstructionPacket(BROADCAST_ID, instruction, params)
+    bus, timing = Chain(servos), WireTiming(latency_s)
+    (packet,) = bus.reader.feed(encode_instruction(BROADCAST_ID, instruction, params))
     at_s = timing.arrival(1.0, bus.size(packet), baud)
     return timing.deliveries(bus.handle(packet, at_s), baud)
 
@@ -86,3 +85,41 @@ def test_without_timing_only_lateness_counts():
     replies = [Reply(b"a", None), Reply(b"b", None), Reply(b"c", None, 0.5), Reply(b"d", None)]
     assert without_timing(replies, 1.0) == [(1.0, b"ab"), (1.5, b"cd")]
     assert without_timing([], 1.0) == []
+
+
+def test_one_reply_passes():
+    assert collide([]) == []
+    assert collide([Reply(b"ab", None, 0.1)]) == [Reply(b"ab", None, 0.1)]
+
+
+def test_a_wire_that_idles_high_carries_the_bitwise_and():
+    mixed = collide([Reply(b"\xff\xf0\x55", None, 0.1), Reply(b"\xff\x0f\x0f\x12", None)])
+    assert mixed == [Reply(b"\xff\x00\x05\x12", None, 0.1)]
+
+
+def test_bytes_reach_the_host_together_within_half_a_millisecond_of_the_first():
+    timing = WireTiming()
+    timing.arrival(0.0, 0, 1_000_000)
+    out = timing.deliveries([Reply(b"a", None), Reply(b"b", None, 0.0004), Reply(b"c", None, 0.0002)], 1_000_000)
+    assert [data for _, data in out] == [b"ab", b"c"]
+    assert [time for time, _ in out] == pytest.approx([0.00042, 0.00063])
+
+
+def test_the_return_delay_comes_before_the_bytes():
+    timing = WireTiming()
+    timing.arrival(2.0, 10, 100_000)
+    out = timing.deliveries([Reply(b"abc", SimulatedServo(1))], 100_000)
+    assert out == [(pytest.approx(2.001 + 500e-6 + 3 * 10 / 100_000), b"abc")]
+
+
+def test_full_usb_packets_go_at_once():
+    timing = WireTiming(0.016)
+    timing.arrival(0.0, 0, 1_000_000)
+    out = timing.deliveries([Reply(b"x" * 62, None), Reply(b"y" * 125, None)], 1_000_000)
+    assert [(len(data), time) for time, data in out] == [
+        (62, pytest.approx(62e-5)),
+        (62, pytest.approx(187e-5)),
+        (62, pytest.approx(187e-5)),
+        (1, pytest.approx(187e-5 + 0.016)),
+    ]
+    assert WireTiming(0.016).deliveries([], 1_000_000) == []

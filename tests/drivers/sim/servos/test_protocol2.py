@@ -1,4 +1,4 @@
-"""drivers.sim.servos.bus: packets in, replies out, without a port."""
+"""drivers.sim.servos.protocol2: packets in, replies out, without a port."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import pytest
 
 from drivers.packets.packet import (
     BROADCAST_ID,
-    InstructionPacket,
     StatusPacket,
     StatusReader,
     decode_fast,
@@ -14,24 +13,22 @@ from drivers.packets.packet import (
 )
 from drivers.packets.packet import ErrorNumber as E
 from drivers.packets.packet import Instruction as I
-from drivers.sim.servos.bus import SimulatedChain
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 
 
-def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> SimulatedChain:
+def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> Chain:
     servos = [SimulatedServo(i, model, position=2000.0 + i, **options) for i in ids or (1, 2, 3)]
-    return SimulatedChain(servos, faults=faults)
+    return Chain(servos, faults=faults)
 
 
-def wire(bus: SimulatedChain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
+def wire(bus: Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
     """What comes back, as one run of bytes."""
     frame = encode_instruction(device, instruction, params)
     return b"".join(reply.data for reply in bus.feed(frame, now_s))
 
 
-def ask(
-    bus: SimulatedChain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0
-) -> list[StatusPacket]:
+def ask(bus: Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> list[StatusPacket]:
     """The status packets that come back."""
     return StatusReader().feed(wire(bus, device, instruction, params, now_s))
 
@@ -58,7 +55,7 @@ def test_broadcast_ping_is_answered_in_order_of_id():
 
 
 def test_vendor_example_of_a_ping_byte_by_byte():
-    bus = SimulatedChain([SimulatedServo(i, "xm430-w210", firmware=38) for i in (1, 2)])
+    bus = Chain([SimulatedServo(i, "xm430-w210", firmware=38) for i in (1, 2)])
     sent = bytes.fromhex("FFFFFD00FE0300013142")
     assert b"".join(reply.data for reply in bus.feed(sent, 0.0)).hex().upper() == (
         "FFFFFD00010700550006042 6655D".replace(" ", "") + "FFFFFD0002070055000604266F6D"
@@ -267,5 +264,60 @@ def test_status_packets_on_the_wire_are_not_instructions():
 
 @pytest.mark.parametrize("params", [b"", POSITION, b"\x74\0\xff\xff\xfd\0"])
 def test_size_on_the_wire_counts_the_stuffing(params: bytes):
-    packet = InstructionPacket(1, I.WRITE, params)
-    assert chain().size(packet) == len(encode_instruction(*packet))
+    bus, frame = chain(), encode_instruction(1, I.WRITE, params)
+    (packet,) = bus.reader.feed(frame)
+    assert bus.size(packet) == len(frame)
+
+
+def fast(*faults: str) -> bytes:
+    return wire(chain(faults=faults), BROADCAST_ID, I.FAST_SYNC_READ, POSITION + bytes((1, 2)))
+
+
+def test_what_faults_do_to_a_part_of_a_joint_reply():
+    """Each part is error byte, id, four bytes of data and two of CRC; eight bytes of the packet's head come first."""
+    good = fast()
+    assert fast("short:1:1") == good[:11] + good[14:]
+    assert fast("short:2:0") == good[:18] + good[22:]
+    assert fast("wrongid:2:9") == good[:17] + b"\x09" + good[18:]
+    noisy = fast("noise:2:3")
+    assert (noisy[:16], noisy[19:]) == (good[:16], good[16:])
+    flipped = fast("flip:2")
+    assert (int.from_bytes(flipped[16:], "big") ^ int.from_bytes(good[16:], "big")).bit_count() == 1
+
+
+def test_bulk_packets_end_with_their_last_whole_entry():
+    bus = chain()
+    entry = b"\1" + words(65, 1) + b"\1"
+    wire(bus, BROADCAST_ID, I.BULK_WRITE, entry + b"\2" + words(65, 1))
+    wire(bus, 1, I.BULK_WRITE, b"\3" + words(65, 1) + b"\1")
+    assert [servo.register("LED", 0.0) for servo in bus.servos] == [1, 0, 0]
+    wire(bus, BROADCAST_ID, I.BULK_WRITE, b"\2" + words(65, 1) + b"\1")
+    assert bus.servo(2).register("LED", 0.0) == 1
+
+
+def test_a_reboot_is_answered_with_the_alert_of_before():
+    bus = chain(1)
+    bus.servo(1).latch(0x20, 0.0)
+    assert ask(bus, 1, I.REBOOT) == [StatusPacket(1, 0x80, b"")]
+    assert ask(bus, 1, I.PING, now_s=1.0)[0].error == 0
+
+
+def test_refusals_carry_the_alert():
+    bus = chain(1)
+    bus.servo(1).latch(0x20, 0.0)
+    for instruction, params, error in (
+        (0x33, b"", E.INSTRUCTION),
+        (I.READ, words(227, 2), E.ACCESS),
+        (I.REG_WRITE, words(132) + le(0), E.ACCESS),
+        (I.ACTION, b"", E.INSTRUCTION),
+        (I.CLEAR, b"", E.DATA_RANGE),
+        (I.FACTORY_RESET, b"\7", E.DATA_RANGE),
+    ):
+        assert ask(bus, 1, instruction, params) == [StatusPacket(1, 0x80 | error, b"")]
+
+
+def test_silent_twins_do_not_collide_in_group_reads():
+    bus = Chain([SimulatedServo(1, position=5.0), SimulatedServo(1, position=9.0), SimulatedServo(2, position=7.0)])
+    bus.faults.add(["silent:1"], 0.0)
+    replies = ask(bus, BROADCAST_ID, I.SYNC_READ, POSITION + b"\1\2")
+    assert replies == [StatusPacket(2, 0, le(7))]

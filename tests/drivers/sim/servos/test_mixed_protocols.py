@@ -8,20 +8,20 @@ from dynamixel_sdk import PacketHandler, PortHandler
 from drivers.packets import packet as two
 from drivers.packets import packet1 as one
 from drivers.sim import SimulatedBus
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.mixed import MixedChain
 
 PING1 = one.encode(1, one.Instruction1.PING)
 PING2 = two.encode_instruction(2, two.Instruction.PING)
 BOTH = (PING1 + PING2, PING2 + PING1)
 
 
-def chain(*faults: str, ids: tuple[int, int] = (1, 2)) -> MixedChain:
+def chain(*faults: str, ids: tuple[int, int] = (1, 2)) -> Chain:
     old, new = SimulatedServo(ids[0], "ax-12a"), SimulatedServo(ids[1], "xl330-m288")
-    return MixedChain([old, new], faults=faults)
+    return Chain([old, new], faults=faults)
 
 
-def talk(bus: MixedChain, data: bytes, now_s: float = 0.0) -> bytes:
+def talk(bus: Chain, data: bytes, now_s: float = 0.0) -> bytes:
     return b"".join(reply.data for reply in bus.feed(data, now_s))
 
 

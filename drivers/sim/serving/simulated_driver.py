@@ -1,4 +1,4 @@
-"""kind = "simulated": any family's own driver over a bus that is simulated beside it."""
+"""Bus kind "simulated": the driver of any family over a simulated bus that it starts and ends."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from drivers.sim.serving.simulated import SimulatedBus
 TRANSPORTS = ("pty", "tcp", "memory")
 
 
-class SimulatedWire(WireBus):
-    """What a driver gets from :func:`simulated`: simulated servos of its own.
+class SimulatedDriver(WireBus):
+    """Mixin that :func:`simulated` adds to a driver: it starts the simulated bus that the driver opens.
 
-    They live in a child process from ``open`` to ``close`` and keep their state over ``reconnect``.
+    The bus runs in a child process from ``open`` to ``close`` and keeps its state over ``reconnect``.
 
     Parameters
     ----------
     servos : the servos in the order of all arrays; the simulated ones have the same ids and models.
-    port : path that shall point at the simulated port, so that other programs can find it; empty for a private one.
+    port : path that shall point at the simulated port, so that other programs can find it; empty: a private one.
     transport : ``"pty"`` (a pseudo-terminal), ``"tcp"`` (this machine's loopback) or ``"memory"`` (a thread of this
-        process serves); empty takes a pseudo-terminal where the system has them, else TCP.
+        process serves); empty: a pseudo-terminal where the system has them, else TCP.
     faults, wire, latency_s, seed, process : see :class:`drivers.sim.serving.simulated.SimulatedBus`.
     options : see the driver.
 
@@ -71,21 +71,17 @@ class SimulatedWire(WireBus):
         }
 
     def open(self) -> None:
-        """Start the simulated servos if they do not run yet, and take their port."""
+        """Start the simulated bus if it does not run yet, and open its port."""
         if self.simulation is None:
-            self._simulate()
+            simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
+            self.simulation = simulation.__enter__()
+            self._use_path(simulation.path)
         try:
             super().open()
         except BaseException:
             if not self.running:
                 self._release()
             raise
-
-    def _simulate(self) -> None:
-        simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
-        simulation.__enter__()
-        self.simulation = simulation
-        self._use_path(simulation.path)
 
     def _private_link(self) -> str:
         if self._transport == "tcp":
@@ -97,15 +93,14 @@ class SimulatedWire(WireBus):
 
     def _release(self) -> None:
         super()._release()
-        simulation, self.simulation = self.simulation, None
-        if simulation is not None:
-            simulation.close()
-        folder, self._folder = self._folder, None
-        if folder is not None:
-            folder.cleanup()
+        if self.simulation is not None:
+            self.simulation.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+        self.simulation = self._folder = None
 
 
 @cache
 def simulated(driver: type[WireBus], family: str) -> type[WireBus]:
-    """The driver of a family, with simulated servos of its own."""
-    return type(f"Simulated{driver.__name__}", (SimulatedWire, driver), {"family": family})
+    """The driver of a family over a simulated bus of its own."""
+    return type(f"Simulated{driver.__name__}", (SimulatedDriver, driver), {"family": family})

@@ -1,4 +1,4 @@
-"""drivers.sim.servos.legacy: Protocol 1.0 servos, AX and MX, Feetech STS and SCS, on a wire without a port."""
+"""drivers.sim.servos.protocol1: Protocol 1.0 servos, AX and MX, Feetech STS and SCS, on a wire without a port."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ from dynamixel_sdk import GroupSyncWrite, PacketHandler, PortHandler
 from drivers.packets.packet1 import BROADCAST_ID, Error1, Packet1, Reader1, encode
 from drivers.packets.packet1 import Instruction1 as I
 from drivers.sim import SimulatedBus
-from drivers.sim.serving.serve import make_chain, make_servos
+from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-from drivers.sim.servos.legacy import LegacyChain
-from drivers.sim.servos.mixed import MixedChain
 from drivers.sim.servos.plant import Skin
+from drivers.sim.wire.simulator import make_line
 
 NO_LOAD = Skin(spring=0.0, inertia=0.0, friction=0.0)
 
 
-def chain(model: str = "ax-12a", ids: tuple[int, ...] = (1, 2, 3), faults: tuple[str, ...] = ()) -> LegacyChain:
-    return LegacyChain([SimulatedServo(i, model, skin=NO_LOAD) for i in ids], faults=faults)
+def chain(model: str = "ax-12a", ids: tuple[int, ...] = (1, 2, 3), faults: tuple[str, ...] = ()) -> Chain:
+    return Chain([SimulatedServo(i, model, skin=NO_LOAD) for i in ids], faults=faults)
 
 
-def ask(bus: LegacyChain, device: int, code: int, params: bytes | str = b"", now_s: float = 0.0) -> list[Packet1]:
+def ask(bus: Chain, device: int, code: int, params: bytes | str = b"", now_s: float = 0.0) -> list[Packet1]:
     body = bytes.fromhex(params) if isinstance(params, str) else params
     data = b"".join(reply.data for reply in bus.feed(encode(device, code, body), now_s))
     return Reader1().feed(data)
@@ -43,7 +42,7 @@ def test_ping_of_the_vendor_byte_by_byte():
 def test_read_temperature_of_the_vendor():
     bus = chain(ids=(1,))
     bus.servo(1).plant.forced_c = 32.0
-    bus.servo(1).look(0.0)
+    bus.servo(1).update(0.0)
     (reply,) = bus.feed(bytes.fromhex("FF FF 01 04 02 2B 01 CC"), 1.0)
     assert reply.data == bytes.fromhex("FF FF 01 03 00 20 DB")
 
@@ -248,7 +247,7 @@ def test_reply_faults_speak_protocol_1():
 
 
 def test_clocks_may_differ_by_three_percent():
-    bus = LegacyChain([SimulatedServo(1, "ax-12a", baud=115_200)])
+    bus = Chain([SimulatedServo(1, "ax-12a", baud=115_200)])
     assert bus.servo(1).baud == 117_647
     bus.set_line_baud(115_200)
     assert len(ask(bus, 1, I.PING)) == 1
@@ -258,7 +257,9 @@ def test_clocks_may_differ_by_three_percent():
 
 @pytest.mark.parametrize("params", [b"", b"\x1e\xff\xff"])
 def test_size_on_the_wire(params: bytes):
-    assert chain().size(Packet1(1, I.WRITE, params)) == len(encode(1, I.WRITE, params))
+    bus, frame = chain(), encode(1, I.WRITE, params)
+    (packet,) = bus.reader.feed(frame)
+    assert bus.size(packet) == len(frame)
 
 
 def test_scs_knows_no_sync_read():
@@ -266,9 +267,12 @@ def test_scs_knows_no_sync_read():
 
 
 def test_the_models_decide_the_protocol():
-    assert isinstance(make_chain(make_servos([1], "sts3215", 1_000_000, 0.0), 0.0), LegacyChain)
-    mixed = make_servos([1], "sts3215", 1_000_000, 0.0) + make_servos([2], "xl320", 1_000_000, 0.0)
-    assert isinstance(make_chain(mixed, 0.0), MixedChain)
+    def protocols(*servos: tuple[int, str]) -> list[int]:
+        return [protocol.NUMBER for protocol in make_line("feetech", servos, 0.0).protocols]
+
+    assert protocols((1, "sts3215")) == [1]
+    assert protocols((1, "xl320")) == [2]
+    assert protocols((1, "xl320"), (2, "sts3215")) == [1, 2]
 
 
 # ---------------------------------------------------------------- served
@@ -301,3 +305,31 @@ def test_a_feetech_child_process_answers_bare_bytes():
     ):
         port.write(bytes.fromhex("FF FF FE 06 82 38 02 01 02 3C"))
         assert Reader1().feed(port.read(16)) == [Packet1(1, 0, word(2048)), Packet1(2, 0, word(2048))]
+
+
+@pytest.mark.parametrize(("level", "answered"), [(0, False), (1, True)])
+def test_group_reads_are_answered_from_level_1_on(level: int, answered: bool):
+    bus = chain("mx1-28")
+    bus.servo(1).registers.put("Status Return Level", level)
+    assert bool(ask(bus, BROADCAST_ID, I.BULK_READ, "00 02 01 24")) is answered
+
+
+def test_broken_or_addressed_group_reads_are_not_answered():
+    bus = chain("mx1-28")
+    assert ask(bus, BROADCAST_ID, I.BULK_READ, "00 02 01 24 02") == []
+    assert ask(bus, 1, I.BULK_READ, "00 02 01 24") == []
+    sts = chain("sts3215")
+    assert len(ask(sts, BROADCAST_ID, I.SYNC_READ, "38 02 01 02")) == 2
+    assert ask(sts, 1, I.SYNC_READ, "38 02 01") == []
+    assert ask(sts, BROADCAST_ID, I.SYNC_READ, "38") == []
+
+
+def test_chain_stop_ends_a_group_read_of_either_maker():
+    for model, code, params in (("mx1-28", I.BULK_READ, "00 02 01 24 02 09 24 02 03 24"),
+                                ("sts3215", I.SYNC_READ, "38 02 01 09 03")):  # fmt: skip
+        assert [packet.id for packet in ask(chain(model), BROADCAST_ID, code, params)] == [1, 3]
+        assert [packet.id for packet in ask(chain(model, faults=("chain-stop",)), BROADCAST_ID, code, params)] == [1]
+
+
+def test_an_alert_is_reported_as_input_voltage():
+    assert ask(chain(faults=("alert:1",)), 1, I.PING) == [Packet1(1, Error1.INPUT_VOLTAGE, b"")]
