@@ -9,7 +9,7 @@ from drivers.base.bus import ServoSpec
 from drivers.protocol1.bus import Protocol1Bus
 from drivers.protocol1.exchange import Exchanges
 from drivers.servos.port import Port
-from drivers.tables.models import check_feetech
+from drivers.tables.tables import check_feetech
 
 
 class FeetechBus(Protocol1Bus):

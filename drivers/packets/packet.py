@@ -1,6 +1,6 @@
-"""Dynamixel Protocol 2.0 packets as pure functions: checksum, byte stuffing, encoding, stream readers.
+"""Dynamixel Protocol 2.0 packets: CRC-16, byte stuffing, encoding and decoding, stream readers.
 
-Nothing here opens a port; driver and simulated bus share it. Layout (ROBOTIS e-Manual, Protocol 2.0)::
+Drivers and simulated servos share it. Layout (ROBOTIS e-Manual, Protocol 2.0)::
 
     FF FF FD 00 | ID | LEN_L LEN_H | INST [ERR] PARAMETERS | CRC_L CRC_H
 
@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Iterable, Sequence
-from enum import IntEnum, IntFlag
+from collections.abc import Sequence
+from enum import IntEnum
 from functools import lru_cache
 from typing import NamedTuple
 
-from drivers.packets.framing import FrameReader
+from drivers.packets.framing import FrameReader, P
 
 HEADER = b"\xff\xff\xfd"
 STUFFED = b"\xff\xff\xfd\xfd"
@@ -29,7 +29,7 @@ MAX_LENGTH = 2048
 
 _PREFIX = HEADER + b"\x00"
 _HEAD_SIZE = 7
-_MAX_EXPLANATIONS = 3  # each one followed makes a chance match of a CRC likelier
+_MAX_STATES = 3  # every further CRC state followed makes an accidental match likelier
 
 
 class Instruction(IntEnum):
@@ -43,7 +43,6 @@ class Instruction(IntEnum):
     FACTORY_RESET = 0x06
     REBOOT = 0x08
     CLEAR = 0x10
-    BACKUP = 0x20
     STATUS = 0x55
     SYNC_READ = 0x82
     SYNC_WRITE = 0x83
@@ -64,16 +63,6 @@ class ErrorNumber(IntEnum):
     DATA_LENGTH = 5
     DATA_LIMIT = 6
     ACCESS = 7
-
-
-class HardwareError(IntFlag):
-    """Hardware Error Status (70) and Shutdown (63) of X-series servos. XL-320 orders its bits differently."""
-
-    INPUT_VOLTAGE = 0x01
-    OVERHEATING = 0x04
-    MOTOR_ENCODER = 0x08
-    ELECTRICAL_SHOCK = 0x10
-    OVERLOAD = 0x20
 
 
 class InstructionPacket(NamedTuple):
@@ -114,10 +103,7 @@ def _byte_table() -> list[int]:
 
 
 def _word_table(table: list[int]) -> array[int]:
-    """CRC of each pair of bytes, shape (65536,): a 16-bit state is used up by one look-up per pair.
-
-    An array and not a list: 128 KiB stay in the processor's cache, two megabytes of integers do not.
-    """
+    """CRC of each pair of bytes, (65536,): one look-up per pair. An array, because 128 KiB stay in the cache."""
     words = array("H")
     for high in table:
         shifted, first = (high << 8) & 0xFFFF, high >> 8
@@ -163,8 +149,7 @@ def _head(device_id: int, length: int, instruction: int) -> tuple[bytes, int]:
 
 
 def _encode(device_id: int, instruction: int, params: bytes) -> bytes:
-    if HEADER in params:
-        params = params.replace(HEADER, STUFFED)
+    params = stuff(params)
     head, crc = _head(device_id, len(params) + 3, instruction)
     crc = crc16(params, crc)
     return head + params + bytes((crc & 0xFF, crc >> 8))
@@ -193,13 +178,8 @@ def encode_status(device_id: int, error: int = 0, params: bytes = b"") -> bytes:
     return _encode(device_id, Instruction.STATUS, bytes((error,)) + params)
 
 
-def fast_reply_size(lengths: Iterable[int]) -> int:
-    """Bytes of a fast read's joint reply to reads of `lengths` bytes: 8 + sum(4 + L)."""
-    return 8 + sum(4 + length for length in lengths)
-
-
 def encode_fast_head(lengths: Sequence[int]) -> bytes:
-    """First bytes of a fast read's joint reply, up to INST. Its LEN is that of the full, unstuffed reply."""
+    """First bytes of a fast read's joint reply to reads of `lengths` bytes, up to INST; LEN counts the full reply."""
     length = 1 + sum(4 + length for length in lengths)
     return _PREFIX + bytes((BROADCAST_ID, length & 0xFF, length >> 8, Instruction.STATUS))
 
@@ -220,9 +200,9 @@ def encode_fast_part(device_id: int, error: int, data: bytes, crc: int) -> tuple
 def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusPacket]:
     """Replies in a joint packet, decoded by position. It may be cut short or damaged in places.
 
-    A device's CRC covers everything before it, so one damaged byte would fail all later devices. After a
-    mismatch each explanation is followed (data damaged, CRC damaged at the device, CRC damaged on the way):
-    later devices stay readable and only the damaged one is left out.
+    A device's CRC covers everything before it, so one damaged byte would fail all later devices. After a mismatch
+    the decoder goes on from every CRC state that damage can explain (in the data, in the CRC at the device, or in
+    the CRC on the wire), so only the damaged device is left out.
 
     Parameters
     ----------
@@ -249,26 +229,17 @@ def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusP
             if part[1] == device_id:
                 replies.append(StatusPacket(device_id, part[0], part[2:]))
         else:
-            sums = sums if len(sums) <= _MAX_EXPLANATIONS else set()
+            sums = sums if len(sums) <= _MAX_STATES else set()
         states = {crc16(tail, total) for total in sums | {claimed}}
         states |= {crc16(bytes((total & 0xFF, total >> 8)), total) for total in sums}
         at = end + 2
     return replies
 
 
-class PacketReader(FrameReader):
-    """Frames of Protocol 2.0, header to CRC, still stuffed.
-
-    Parameters
-    ----------
-    max_length : largest LEN that is believed.
-    """
+class PacketReader(FrameReader[P]):
+    """Finds frames of Protocol 2.0, header to CRC, still stuffed."""
 
     MARK = _PREFIX
-
-    def __init__(self, max_length: int = MAX_LENGTH) -> None:
-        super().__init__()
-        self._max_length = max_length
 
     def _seek_header(self) -> bool:
         """Drop what cannot begin a frame; True when a whole frame head lies at the start of the buffer."""
@@ -278,21 +249,16 @@ class PacketReader(FrameReader):
             if at < 0:
                 self._drop(len(buffer) - _header_tail(buffer))
                 return False
-            if at:
-                self._drop(at)
+            self._drop(at)
             if len(buffer) > 3 and buffer[3]:
                 self._drop(3)
                 continue
             if len(buffer) < _HEAD_SIZE:
                 return False
-            if self._plausible():
+            if 3 <= buffer[5] | buffer[6] << 8 <= MAX_LENGTH and buffer[4] not in (0xFD, 0xFF):
                 return True
             self.broken_frames += 1
             self._drop(3)
-
-    def _plausible(self) -> bool:
-        buffer = self._buffer
-        return 3 <= buffer[5] | buffer[6] << 8 <= self._max_length and buffer[4] not in (0xFD, 0xFF)
 
     def _next(self) -> bytes | None:
         buffer = self._buffer
@@ -336,50 +302,31 @@ def _checks(frame: bytes | bytearray) -> bool:
     return crc16(frame[:-2]) == frame[-2] | frame[-1] << 8
 
 
-class InstructionReader(PacketReader):
-    """Yields the instructions in a byte stream; status packets (a wire's echo) are passed over."""
+class InstructionReader(PacketReader[InstructionPacket]):
+    """Finds the instructions in a byte stream; status packets are skipped."""
 
-    def feed(self, data: bytes) -> list[InstructionPacket]:
-        """Add received bytes; return the instructions completed by them."""
-        return _instructions(self.feed_frames(data))
+    def _decode(self, frames: list[bytes]) -> list[InstructionPacket]:
+        return [
+            InstructionPacket(frame[4], frame[7], unstuff(frame[8:-2]))
+            for frame in frames
+            if frame[7] != Instruction.STATUS
+        ]
 
-    def flush(self) -> list[InstructionPacket]:
-        """Give up on an incomplete packet; return the instructions found behind its header."""
-        return _instructions(self.flush_frames())
 
+class StatusReader(PacketReader[StatusPacket]):
+    """Finds the status packets in a byte stream; instruction packets (echoed by an adapter) are skipped.
 
-class StatusReader(PacketReader):
-    """Yields the status packets in a byte stream; instruction packets (a wire's echo) are passed over.
-
-    A joint reply of a fast read comes as one packet of id `BROADCAST_ID`, error 0, whose `params` are
-    everything behind INST but the last CRC, not unstuffed. To keep what a damaged or cut one holds, collect
-    the raw bytes and use `decode_fast` instead.
+    A joint reply of a fast read comes as one packet of id `BROADCAST_ID`, error 0, whose `params` are everything
+    behind INST but the last CRC, not unstuffed. `decode_fast` also reads one that is damaged or cut short.
     """
 
-    def feed(self, data: bytes) -> list[StatusPacket]:
-        """Add received bytes; return the status packets completed by them."""
-        return _statuses(self.feed_frames(data))
-
-    def flush(self) -> list[StatusPacket]:
-        """Give up on an incomplete packet; return the status packets found behind its header."""
-        return _statuses(self.flush_frames())
-
-
-def _instructions(frames: list[bytes]) -> list[InstructionPacket]:
-    return [
-        InstructionPacket(frame[4], frame[7], unstuff(frame[8:-2]))
-        for frame in frames
-        if frame[7] != Instruction.STATUS
-    ]
-
-
-def _statuses(frames: list[bytes]) -> list[StatusPacket]:
-    replies = []
-    for frame in frames:
-        if frame[7] != Instruction.STATUS or len(frame) < 11:
-            continue
-        if frame[4] == BROADCAST_ID:
-            replies.append(StatusPacket(BROADCAST_ID, 0, frame[8:-2]))
-        else:
-            replies.append(StatusPacket(frame[4], frame[8], unstuff(frame[9:-2])))
-    return replies
+    def _decode(self, frames: list[bytes]) -> list[StatusPacket]:
+        replies = []
+        for frame in frames:
+            if frame[7] != Instruction.STATUS or len(frame) < 11:
+                continue
+            if frame[4] == BROADCAST_ID:
+                replies.append(StatusPacket(BROADCAST_ID, 0, frame[8:-2]))
+            else:
+                replies.append(StatusPacket(frame[4], frame[8], unstuff(frame[9:-2])))
+        return replies

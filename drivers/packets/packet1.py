@@ -1,4 +1,4 @@
-"""Dynamixel Protocol 1.0 packets (AX, MX; Feetech uses them too) as pure functions.
+"""Dynamixel Protocol 1.0 packets, which Feetech servos use too: encoding, checksum and a stream reader.
 
 Layout (ROBOTIS e-Manual, Protocol 1.0)::
 
@@ -84,18 +84,13 @@ def encode(device_id: int, code: int, params: bytes = b"") -> bytes:
     return HEADER + body + bytes((checksum(body),))
 
 
-class Reader1(FrameReader):
-    """Yields the packets in a byte stream."""
+class Reader1(FrameReader[Packet1]):
+    """Finds the packets of either direction in a byte stream."""
 
     MARK = HEADER
 
-    def feed(self, data: bytes) -> list[Packet1]:
-        """Add received bytes; return the packets completed by them."""
-        return _packets(self.feed_frames(data))
-
-    def flush(self) -> list[Packet1]:
-        """Give up on the incomplete packet (the sender paused); return valid ones found behind its header."""
-        return _packets(self.flush_frames())
+    def _decode(self, frames: list[bytes]) -> list[Packet1]:
+        return [Packet1(frame[2], frame[4], frame[5:-1]) for frame in frames]
 
     def _next(self) -> bytes | None:
         buffer = self._buffer
@@ -120,7 +115,3 @@ class Reader1(FrameReader):
                 return frame
             self.broken_frames += 1
             self._drop(1)
-
-
-def _packets(frames: list[bytes]) -> list[Packet1]:
-    return [Packet1(frame[2], frame[4], frame[5:-1]) for frame in frames]

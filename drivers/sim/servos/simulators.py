@@ -15,7 +15,7 @@ from drivers.sim.servos.legacy import LegacyChain
 from drivers.sim.servos.mixed import MixedChain
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.simulator import Servos, Setting, Simulator
-from drivers.tables.models import check_dynamixel, check_feetech
+from drivers.tables.tables import check_dynamixel, check_feetech
 
 
 def make_servos(servos: Iterable[object], model: str | int, baud: int, now_s: float) -> list[SimulatedServo]:
