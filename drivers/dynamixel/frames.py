@@ -1,18 +1,19 @@
-"""Packets of many servos at once, for the cycle: goals put into a frame made before, all replies checked in one go.
+"""Precomputed packets of a control cycle: a sync write of goals, and group reads whose replies are checked at once.
 
-What is not exactly as expected (a reply missing, late, damaged or stuffed) is not decoded here: ``None`` sends the
-caller to the careful readers in ``packet`` and ``sdk``.
+Replies that are not exactly as expected (one missing, late, damaged or stuffed) are not decoded here: the caller uses
+the general readers of ``packet`` and ``sdk`` then.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.packets.packet import BROADCAST_ID, HEADER, Instruction, crc16, encode_fast_head, encode_instruction
+from drivers.servos.telemetry import Rows
 
 Octets = NDArray[np.uint8]
 
@@ -37,7 +38,7 @@ class GoalFrame:
     """
 
     def __init__(self, ids: Sequence[int], address: int, size: int, places: NDArray[np.int64]) -> None:
-        from drivers.core.kernels import put_goals  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import put_goals  # start-up: loads numba
 
         self._put_goals = put_goals
         self._size, self._places = size, places
@@ -62,25 +63,8 @@ class Run(NamedTuple):
     length: int
 
     def among(self, ids: Collection[int]) -> Run:
-        """The same of those of its servos that are among `ids`."""
+        """The same run of those of its servos that are in `ids`."""
         return self._replace(ids=tuple(servo for servo in self.ids if servo in ids))
-
-
-class Rows(NamedTuple):
-    """Replies of the servos of one run, in its order: `errors` (k,) and `data` (k, length), uint8."""
-
-    errors: Octets
-    data: Octets
-
-
-class Quick(Protocol):
-    """Something that understands replies only where they are as expected."""
-
-    def prepare(self) -> None:
-        """Get ready; called while the wire is busy."""
-
-    def take(self, data: bytes, now_s: float) -> bool:
-        """Whether it has taken them; else nothing has changed."""
 
 
 class GroupRead:
@@ -100,7 +84,7 @@ class GroupRead:
     """
 
     def __init__(self, runs: Sequence[Run], fast: bool = False) -> None:
-        from drivers.core.kernels import check_joint, check_replies  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import check_joint, check_replies  # start-up: loads numba
 
         self._check = check_joint if fast else check_replies
         self.runs, self.fast = tuple(runs), fast
@@ -143,7 +127,7 @@ class GroupRead:
 
 
 def _spans(wanted: Mapping[int, int], fast: bool) -> NDArray[np.int64]:
-    """Each servo's id, where its error byte stands and where its reply ends; see ``core.kernels.check_replies``."""
+    """Each servo's id, where its error byte lies and where its reply ends; see ``core.kernels.check_replies``."""
     error, extra, begin = (0, PART_SIZE, HEAD_SIZE) if fast else (HEAD_SIZE, STATUS_SIZE, 0)
     spans = np.empty((len(wanted), 3), np.int64)
     for k, (servo, length) in enumerate(wanted.items()):

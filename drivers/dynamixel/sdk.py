@@ -34,12 +34,14 @@ from typing import Any
 
 from dynamixel_sdk import protocol2_packet_handler, robotis_def
 
-from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Quick, Rows, Run
+from drivers.dynamixel.compiled_read import CompiledRead
+from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Run
 from drivers.dynamixel.port import Port
 from drivers.packets import packet
 from drivers.packets.packet import Instruction, StatusPacket, StatusReader, encode_instruction
 from drivers.servos import exchange
 from drivers.servos.exchange import Exchange, settled
+from drivers.servos.telemetry import Rows
 
 PING_DATA = 3
 PING_SLOT_MS = 3.0
@@ -160,26 +162,26 @@ class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protoco
         got = self.read_rows(port, group)
         return got if isinstance(got, Exchange) else Exchange(_replies(group.runs, got), (), False)
 
-    def read_rows(self, port: Port, group: GroupRead, sweep: Quick | None = None) -> list[Rows] | Got:
-        """Ask a group that was made before. None of it may be in ``port.suspects``.
+    def read_rows(self, port: Port, group: GroupRead, compiled: CompiledRead | None = None) -> list[Rows] | Got:
+        """Send a group read and collect the replies. None of its servos may be in ``port.suspects``.
 
         Parameters
         ----------
-        sweep : takes what it can by itself.
+        compiled : takes the replies where they are as expected.
 
         Returns
         -------
-        list of Rows : what every servo said, run by run, when all is as it should be (nothing more where `sweep`
-            has taken it); otherwise an Exchange with whatever arrived.
+        list of Rows : the replies run by run, when all are as expected (empty where `compiled` has taken them);
+            otherwise an Exchange with whatever arrived.
         """
         port.suspects.update(group.wanted)  # until they have answered, so also when this is interrupted
         self.send(port, group.frame)
         try:
             port.expect(group.size)
-            if sweep is not None:
-                sweep.prepare()
+            if compiled is not None:
+                compiled.prepare()
             data = self.fill(port, group.size)
-            taken = sweep is not None and sweep.take(data, port.clock())
+            taken = compiled is not None and compiled.take(data, port.clock())
             rows = [] if taken else group.decode(data)
             if rows is not None:
                 port.suspects.difference_update(group.wanted)

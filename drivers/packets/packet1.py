@@ -57,6 +57,11 @@ class Packet1(NamedTuple):
     code: int
     params: bytes
 
+    @property
+    def error(self) -> int:
+        """The error byte of a status packet."""
+        return self.code
+
 
 def checksum(body: bytes) -> int:
     """CHK of the bytes from ID to the last parameter."""

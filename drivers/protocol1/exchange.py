@@ -1,4 +1,4 @@
-"""Questions and answers on a wire with Protocol 1.0 framing, every answer checked for sender and length."""
+"""Request-reply transactions of Protocol 1.0 framing: every reply is checked for sender and length."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ class Exchanges(exchange.Exchanges[Packet1]):
         return Reader1()
 
     def is_refusal(self, reply: Packet1) -> bool:
-        """Whether a reply says no, so that it may be without the data asked for."""
+        """Whether a reply refuses the request, so that it may be without the data asked for."""
         return bool(reply.code & self.refusals)
 
-    def tell(self, port: Port, frame: bytes) -> None:
-        """Clear the input and send one packet whose answer nobody waits for."""
+    def send_only(self, port: Port, frame: bytes) -> None:
+        """Clear the input and send one packet without waiting for a reply."""
         self.send(port, frame)
         port.is_using = False
 
     def hello(self, port: Port, servo: int) -> Exchange[Packet1]:
-        """Ask a servo for the first ``HELLO`` bytes of its registers."""
+        """Read the first ``HELLO`` bytes of a servo's registers."""
         return self.exchange(port, _read_frame(servo, 0, HELLO), {servo: HELLO})
 
     def pings(self, port: Port, servo: int) -> bool:
@@ -62,7 +62,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
         return got is not None and got.code != Instruction1.PING
 
     def read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[Packet1]:
-        """Read by ``"sync"`` (Feetech STS), ``"bulk"`` (Dynamixel MX), or ``""``: one question each."""
+        """Read by ``"sync"`` (Feetech STS), ``"bulk"`` (Dynamixel MX), or ``""``: one request each."""
         if manner:
             return self.exchange(port, _group_frame(ids, address, size, manner), dict.fromkeys(ids, size))
         replies: dict[int, Packet1] = {}
@@ -78,7 +78,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
         return (self.longest - 8) // width
 
     def sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[Packet1]:
-        """The usual case quickly; anything else carefully."""
+        """The replies: at once where they came in order and complete, else by a stream reader."""
         replies = _in_order(data, wanted)
         if replies is None:
             return super().sort(port, wanted, data)
@@ -87,7 +87,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
 
 
 def _in_order(data: bytes, wanted: Mapping[int, int]) -> dict[int, Packet1] | None:
-    """The usual case, quickly: exactly the replies asked for, in order. None when it is not that."""
+    """The replies where `data` is exactly those asked for, in order; else None."""
     at, replies = 0, {}
     if len(data) != len(wanted) * STATUS_SIZE + sum(wanted.values()):
         return None

@@ -1,4 +1,4 @@
-"""Questions and answers on a wire with servos, every answer checked for sender and length, in any protocol."""
+"""Request-reply transactions with servos: every reply is checked for sender and length, in any protocol."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ _LATE_CHUNKS = 16
 
 
 class Reply(Protocol):
-    """What a servo sent: its `id`, and the data in `params`."""
+    """A status packet: the servo's `id`, its `error` byte, and the data in `params`."""
 
     @property
-    def id(self) -> int:
-        """Who sent it."""
+    def id(self) -> int: ...
 
     @property
-    def params(self) -> bytes:
-        """Its data."""
+    def error(self) -> int: ...
+
+    @property
+    def params(self) -> bytes: ...
 
 
 R = TypeVar("R", bound=Reply)
@@ -42,7 +43,7 @@ class Reader(Protocol[R_co]):
 
 
 class Exchange(NamedTuple, Generic[R]):
-    """What came back for one question.
+    """The replies to one request.
 
     Attributes
     ----------
@@ -59,7 +60,7 @@ class Exchange(NamedTuple, Generic[R]):
 
 
 class Exchanges(ABC, Generic[R]):
-    """Transactions of a driver. The hooks of a protocol are the abstract methods below.
+    """Transactions of a driver; a protocol implements the abstract methods.
 
     Attributes
     ----------
@@ -86,15 +87,15 @@ class Exchanges(ABC, Generic[R]):
 
     @abstractmethod
     def is_refusal(self, reply: R) -> bool:
-        """Whether a reply says no, so that it may be without the data asked for."""
+        """Whether a reply refuses the request, so that it may be without the data asked for."""
 
     @abstractmethod
     def hello(self, port: Port, servo: int) -> Exchange[R]:
-        """Greet a servo by a question whose answer is like no other. It may be in ``port.suspects``."""
+        """Send the greeting, a request whose reply has a length of its own. The servo may be in ``port.suspects``."""
 
     @abstractmethod
     def read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[R]:
-        """Read the same registers of servos that are in step; parameters as for :meth:`read_group`."""
+        """Read the same registers of servos that owe no reply; parameters as for :meth:`read_group`."""
 
     # ------------------------------------------------------------------ one servo
 
@@ -108,8 +109,8 @@ class Exchanges(ABC, Generic[R]):
             port.is_using = False
             raise
 
-    def tell(self, port: Port, frame: bytes) -> None:
-        """Send a packet, or several, that nobody answers."""
+    def send_only(self, port: Port, frame: bytes) -> None:
+        """Send a packet, or several, that no servo answers."""
         port.is_using = True
         try:
             port.transmit(frame)
@@ -119,8 +120,8 @@ class Exchanges(ABC, Generic[R]):
     def ask(self, port: Port, servo: int, code: int, params: bytes, length: int) -> Exchange[R]:
         """One instruction to one servo and its reply of ``length`` data bytes.
 
-        A servo that missed its time before must first answer a greeting: its replies come in order, so whatever it
-        still owed has arrived by then. Never ask for as many bytes as the answer to a greeting has.
+        A servo that missed a deadline must first answer a greeting: its replies come in order, so a late one has
+        arrived by then. Never ask for as many bytes as the reply to a greeting has.
         """
         if servo in port.suspects and code != self.greeting and not self.revive(port, servo):
             return Exchange({}, (servo,), False)
@@ -131,11 +132,11 @@ class Exchanges(ABC, Generic[R]):
         return self.ask(port, servo, Instruction.READ, self.number(address) + self.number(size), size)
 
     def write(self, port: Port, servo: int, address: int, data: bytes) -> Exchange[R]:
-        """Write registers of one servo and wait until it agrees."""
+        """Write registers of one servo and wait for its status."""
         return self.ask(port, servo, Instruction.WRITE, self.number(address) + data, 0)
 
     def revive(self, port: Port, servo: int) -> bool:
-        """Greet a servo that missed its time; True when it is in step again."""
+        """Greet a servo that missed a deadline; True when it answers again."""
         return not self.hello(port, servo).missing
 
     # ------------------------------------------------------------------ many servos
@@ -143,11 +144,11 @@ class Exchanges(ABC, Generic[R]):
     def read_group(self, port: Port, ids: Sequence[int], address: int, size: int, manner: str = "sync") -> Exchange[R]:
         """Read the same registers of many servos, keeping every reply that arrived.
 
-        Servos in ``port.suspects`` are not asked and count as missing until :meth:`revive` brought them back.
+        Servos in ``port.suspects`` are not asked and count as missing until they answered :meth:`revive`.
 
         Parameters
         ----------
-        manner : how, as the protocol knows it, such as ``"sync"``.
+        manner : how, as the protocol names it, such as ``"sync"``.
         """
         left_out = tuple(servo for servo in ids if servo in port.suspects)
         asked = tuple(servo for servo in ids if servo not in left_out)
@@ -157,9 +158,9 @@ class Exchanges(ABC, Generic[R]):
         return got._replace(missing=got.missing + left_out)
 
     def write_group(self, port: Port, address: int, size: int, rows: bytes) -> None:
-        """Sync writes, as many as the rows need, that nobody answers; parameters as for :meth:`group_frames`."""
+        """Send the sync writes of :meth:`group_frames`, which no servo answers."""
         for frame in self.group_frames(address, size, rows):
-            self.tell(port, frame)
+            self.send_only(port, frame)
 
     def group_frames(self, address: int, size: int, rows: bytes) -> list[bytes]:
         """Sync writes of some registers of many servos.
@@ -167,7 +168,7 @@ class Exchanges(ABC, Generic[R]):
         Parameters
         ----------
         address, size : the registers.
-        rows : for each servo its id and `size` bytes, one behind the other.
+        rows : for each servo its id and `size` bytes, concatenated.
 
         Raises
         ------
@@ -211,7 +212,7 @@ class Exchanges(ABC, Generic[R]):
         return data
 
     def sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[R]:
-        """The replies in ``data`` and in what still comes, whatever lies between them."""
+        """The replies in ``data`` and in what still arrives, whatever lies between them."""
         reader, box, late = self.make_reader(), _Sorter(wanted, self.is_refusal), 0
         box.take(reader.feed(data))
         while len(box.replies) < len(wanted) and late < _LATE_CHUNKS:
@@ -226,7 +227,7 @@ class Exchanges(ABC, Generic[R]):
 
 
 class _Sorter(Generic[R]):
-    """Sorts replies into those asked for and strays; two under one id are both worth nothing.
+    """Sorts replies into those asked for and strays; two under one id are both discarded.
 
     Parameters
     ----------
@@ -257,7 +258,7 @@ class _Sorter(Generic[R]):
 
 
 def settled(port: Port, wanted: Mapping[int, int], replies: dict[int, R], corrupt: bool) -> Exchange[R]:
-    """Who answered is in step; the others stay suspects."""
+    """The exchange of these replies; servos without one stay suspects."""
     missing = tuple(servo for servo in wanted if servo not in replies)
     port.suspects.difference_update(replies)
     return Exchange(replies, missing, corrupt and bool(missing))

@@ -1,4 +1,4 @@
-"""A serial port with the state of a conversation: who owes an answer, when the wire is free, who is talking."""
+"""Serial port for request-reply transactions: reply deadlines, servos that owe a reply, and a lock against threads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ BITS_PER_BYTE = 10
 
 
 class Port:
-    """An exclusive, blocking :class:`~drivers.port.serialport.SerialPort` for questions and answers.
+    """An exclusive, blocking :class:`~drivers.port.serialport.SerialPort` for requests and replies.
 
     Methods have the names that dynamixel-sdk gives them.
 
@@ -25,7 +25,7 @@ class Port:
     ----------
     clock, sleep : monotonic seconds, and the way to let them pass.
     port_name : device path.
-    suspects : ids that did not answer when they should have; see :class:`~drivers.servos.exchange.Exchanges`.
+    suspects : ids that missed a deadline and may still reply late; see :class:`~drivers.servos.exchange.Exchanges`.
     stray : replies thrown away.
     """
 

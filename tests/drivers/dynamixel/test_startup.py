@@ -13,6 +13,7 @@ from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import BusError, CorruptReply, NoReply, ServoFault, ServoRefused, WrongModel
 from drivers.dynamixel import startup
 from drivers.dynamixel.startup import Policy
+from drivers.servos import startup as shared_startup
 from drivers.sim.serving.virtual import VirtualBus
 from drivers.tables.tables import load_table
 from tests.drivers.contract import SERVOS, settle
@@ -324,7 +325,7 @@ def test_lost_answers_are_asked_for_again_when_switching_off(wire: VirtualBus) -
 
 def test_a_torque_that_does_not_come_on_leaves_nobody_on(wire: VirtualBus, monkeypatch: pytest.MonkeyPatch) -> None:
     wire.servo(7).latch(0x20)  # as if it happened after the check
-    monkeypatch.setattr(startup.Startup, "_clear_faults", lambda *_: [])
+    monkeypatch.setattr(startup.Startup, "clear_faults", lambda *_: [])
     error = refuses(wire, ServoFault, r'did not switch their motor on: "neck" \(id 7\) \(hardware error 0x20\)')
     assert error.servo_ids == (7,)
     assert torques(wire) == [False] * 3
@@ -343,7 +344,7 @@ def test_old_firmware_is_not_asked_for_what_it_lacks(wire: VirtualBus, monkeypat
     )
     for firmware, expected in ((45, False), (52, True)):
         del asked[:]
-        monkeypatch.setattr(startup, "load_table", lambda number, _, f=firmware: load_table(number, f))
+        monkeypatch.setattr(shared_startup, "load_table", lambda model, _=None, f=firmware: load_table(model, f))
         with bus_on(wire) as bus:
             bus.start()
         assert ("startup" in asked) is expected

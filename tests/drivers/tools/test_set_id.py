@@ -1,4 +1,4 @@
-"""drivers.tools.rename over simulated servos: the id changes, or nothing does."""
+"""drivers.tools.set_id over simulated servos: the id changes, or nothing does."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 from drivers.base.errors import CorruptReply, NoReply, ServoRefused
 from drivers.sim import SimulatedBus
-from drivers.tools.rename import set_id
+from drivers.tools.set_id import set_id
 
 FAMILIES = [("xl330-m288", 2), ("xl320", 2), ("ax-12a", 1), ("sts3215", 1), ("scs0009", 1)]
 
