@@ -139,7 +139,8 @@ class DynamixelBus(ServoBus):
 
     def _ask(self) -> BusState:
         """One sync read of all servos and one slow value of some."""
-        for servo in self._telemetry.take_forgetful():
+        unmapped, self._telemetry.unmapped = sorted(self._telemetry.unmapped), set()
+        for servo in unmapped:
             self._map_again(servo)
         state = self._telemetry.cycle(self._clock, self._running, self.scale)
         if self._running:
@@ -160,7 +161,7 @@ class DynamixelBus(ServoBus):
 
     def _clear_watchdogs(self) -> None:
         """Clear tripped watchdogs with the goal where the servo is, so that nothing jumps."""
-        for servo in self._telemetry.take_tripped():
+        for servo in sorted(self._telemetry.tripped):
             try:
                 self._registers.put(servo, "watchdog", 0, tries=1)
                 goal = self._startup().goals_at_present([servo])[servo]
@@ -169,7 +170,7 @@ class DynamixelBus(ServoBus):
             except PortLost:
                 raise
             except BusError as error:
-                log.warning("watchdog not cleared yet: %s", error)
-                self._telemetry.retry_tripped(servo)  # its register may read 0 now: it would never be seen again
+                log.warning("watchdog not cleared yet: %s", error)  # and not forgotten: its register may read 0 now
                 continue
+            self._telemetry.tripped.discard(servo)
             self._hold(self.ids.index(servo), goal)

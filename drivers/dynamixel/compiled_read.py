@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from drivers.base.bus import BusState, Floats
 from drivers.dynamixel.frames import GroupRead
 from drivers.servos.layout import ReadRequest
-from drivers.servos.telemetry import read_only
+from drivers.servos.telemetry import Octets, make_state, read_only
 
 
 class CompiledRead:
@@ -38,7 +38,7 @@ class CompiledRead:
         self,
         requests: Sequence[ReadRequest],
         read: GroupRead,
-        octets: NDArray[np.uint8],
+        octets: Octets,
         known: Floats,
         axes: Floats,
         slow_values: Callable[[], Sequence[NDArray[Any]]],
@@ -61,22 +61,7 @@ class CompiledRead:
         """Allocate the state that `take` fills; called while the wire is busy."""
         self.state = None
         self._out = np.empty((4, len(self._all)))
-        position, velocity, current, age = (read_only(row) for row in self._out)
-        error, volts, celsius, hardware, torque = self._slow_values()
-        self._next = BusState(
-            time_s=np.nan,
-            position_rad=position,
-            velocity_rad_s=velocity,
-            current_a=current,
-            fresh=self._all,
-            age_s=age,
-            error=error,
-            silent=self._none,
-            voltage_v=volts,
-            temperature_c=celsius,
-            hardware_error=hardware,
-            torque=torque,
-        )
+        self._next = make_state(np.nan, self._out, self._all, self._none, self._slow_values())
 
     def take(self, data: bytes, now_s: float) -> bool:
         """Whether the replies are as expected: then `state` holds them; else nothing has changed."""

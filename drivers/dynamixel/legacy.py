@@ -25,7 +25,8 @@ from collections.abc import Sequence
 from dynamixel_sdk import protocol1_packet_handler, robotis_def
 
 from drivers.dynamixel.port import Port
-from drivers.packets.packet1 import BROADCAST_ID, HEADER, Error1, Instruction1, Packet1, Reader1, encode
+from drivers.dynamixel.sdk import SdkExchanges
+from drivers.packets.packet1 import BROADCAST_ID, Error1, Instruction1, Packet1, Reader1, encode
 from drivers.protocol1.bus import Protocol1Bus
 from drivers.protocol1.exchange import Exchanges
 
@@ -33,20 +34,20 @@ _FRAME = 259
 """More than any packet has."""
 
 
-class Packets1(Exchanges, protocol1_packet_handler.Protocol1PacketHandler):  # type: ignore[misc]  # without types
+class Packets1(SdkExchanges[Packet1], Exchanges, protocol1_packet_handler.Protocol1PacketHandler):  # type: ignore[misc]  # without types
     """The SDK's Protocol 1.0 packet handler with its faults overridden, and omote's own group transactions."""
 
     longest = 143  # the receive buffer of AX and RX
     refusals = Error1.ANGLE_LIMIT | Error1.RANGE | Error1.CHECKSUM | Error1.INSTRUCTION
 
+    id_at, code_at = 2, 4
+
     def txPacket(self, port: Port, txpacket: list[int]) -> int:
-        """Sum and send a packet of the SDK's making (S5, S11)."""
-        if port.is_using:
-            return int(robotis_def.COMM_PORT_BUSY)
-        self.send(port, encode(txpacket[2], txpacket[4], _params(txpacket)))
-        if txpacket[2] != BROADCAST_ID:
-            port.suspects.add(txpacket[2])  # until its answer was taken, which some callers never do
-        return int(robotis_def.COMM_SUCCESS)
+        """Send a packet that the SDK makes (S5, S11)."""
+        result = super().txPacket(port, txpacket)
+        if result == robotis_def.COMM_SUCCESS and txpacket[2] != BROADCAST_ID:
+            port.suspects.add(txpacket[2])  # until its reply was taken, which some callers never do
+        return result
 
     def rxPacket(self, port: Port) -> tuple[list[int], int]:
         """The next packet of a servo (S5, S12)."""
@@ -58,27 +59,22 @@ class Packets1(Exchanges, protocol1_packet_handler.Protocol1PacketHandler):  # t
                 if packets:
                     rest = b"".join(encode(*packet) for packet in packets[1:])
                     port._held[:0] = rest + reader.take_pending()
-                    return _frame(packets[0]), robotis_def.COMM_SUCCESS
+                    return self._frame(packets[0]), robotis_def.COMM_SUCCESS
             return [], result
         finally:
             port.is_using = False
 
-    def txRxPacket(self, port: Port, txpacket: list[int]) -> tuple[list[int] | None, int, int]:
-        """One instruction and its reply, whose id and length must be those asked for (S4)."""
-        if port.is_using:
-            return None, robotis_def.COMM_PORT_BUSY, 0
-        servo, code = txpacket[2], txpacket[4]
-        if servo == BROADCAST_ID:
-            result = self.txPacket(port, txpacket)
-            port.is_using = False
-            return None, result, 0
-        params = _params(txpacket)
-        length = params[1] if code == Instruction1.READ else 0
-        got = self.ask(port, servo, code, params, length)
-        reply = got.replies.get(servo)
-        if reply is None:
-            return None, robotis_def.COMM_RX_CORRUPT if got.corrupt else robotis_def.COMM_RX_TIMEOUT, 0
-        return _frame(reply), robotis_def.COMM_SUCCESS, reply.code
+    def _params(self, txpacket: Sequence[int]) -> bytes:
+        if len(txpacket) != 4 + txpacket[3]:
+            given = f"packet of {4 + txpacket[3]} bytes was given {len(txpacket)}"
+            raise ValueError(f"{given}: its parameters are cut short")
+        return bytes(txpacket[5:-1])
+
+    def _reply_length(self, code: int, params: bytes) -> int:
+        return params[1] if code == Instruction1.READ else 0
+
+    def _frame(self, reply: Packet1) -> list[int]:
+        return [*encode(*reply)[:-1], 0]
 
     def readRx(self, port: Port, dxl_id: int, length: int) -> tuple[list[int], int, int]:
         """The answer of one servo to a read or a bulk read: the next packet with its id and length (S4, S10)."""
@@ -101,15 +97,3 @@ class LegacyBus(Protocol1Bus):
     MODELS = ("ax-12a",)
     PACKETS = Packets1
     PORT = Port
-
-
-def _params(txpacket: Sequence[int]) -> bytes:
-    """Parameters of an instruction packet of the SDK; too little data leaves its list too short (S11)."""
-    if len(txpacket) != 4 + txpacket[3]:
-        raise ValueError(f"packet of {4 + txpacket[3]} bytes was given {len(txpacket)}: its parameters are cut short")
-    return bytes(txpacket[5:-1])
-
-
-def _frame(packet: Packet1) -> list[int]:
-    """A packet as the SDK hands it on."""
-    return list(HEADER + bytes((packet.id, len(packet.params) + 2, packet.code)) + packet.params + b"\0")

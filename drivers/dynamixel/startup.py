@@ -60,20 +60,16 @@ class Startup(startup.Startup[StatusPacket]):
         super().__init__(registers, policy)
         self._indirect = indirect
 
-    def identity(self, reply: StatusPacket, expected: ControlTable) -> tuple[int, int]:
-        """Model number and firmware in a reply to a ping."""
+    def _identity(self, reply: StatusPacket, expected: ControlTable) -> tuple[int, int]:
         return reply.params[0] | reply.params[1] << 8, reply.params[2]
 
-    def release(self, servo: int) -> None:
-        """Switch one servo off and verify it."""
+    def _release(self, servo: int) -> None:
         self.registers.put(servo, "torque", 0)
 
-    def slack(self, turn: int) -> float:
-        """Steps that a position may lie outside of a turn."""
+    def _slack(self, turn: int) -> float:
         return OUT_OF_TURN_TICKS
 
-    def why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
-        """Hardware errors of servos whose motor did not switch on."""
+    def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
         latched = self.registers.get_all(ids, "hardware")
         return {servo: f"hardware error 0x{latched.get(servo, 0):02X}" for servo in ids}
 
@@ -82,7 +78,7 @@ class Startup(startup.Startup[StatusPacket]):
         self.registers.put_all(dict.fromkeys([servo.id for servo in servos], 2), "status_level")
         return super().bring_up(servos)
 
-    def clear_faults(self, ids: Sequence[int]) -> list[int]:
+    def _clear_faults(self, ids: Sequence[int]) -> list[int]:
         """Reboot servos with a latched error where that is allowed; input voltage alone is ignored."""
         registers = self.registers
         latched = registers.get_all(ids, "hardware")
@@ -106,7 +102,7 @@ class Startup(startup.Startup[StatusPacket]):
         """Input voltage alone, where it does not switch the motor off."""
         return bits == INPUT_VOLTAGE and not self.registers.get(servo, "shutdown") & INPUT_VOLTAGE
 
-    def write_settings(self, servo: int, held: bool) -> None:
+    def _write_settings(self, servo: int, held: bool) -> None:
         """Operating mode, drive mode and return delay: read, and written only where they differ."""
         registers, table = self.registers, self.registers.tables[servo]
         wanted: dict[str, int] = {"mode": 2 if table.model == "xl320" else 3}
@@ -132,10 +128,10 @@ class Startup(startup.Startup[StatusPacket]):
         registers.put(servo, name, new, tries=EEPROM_TRIES)  # it is deaf for a while after
         if registers.get(servo, name, tries=EEPROM_TRIES) != new:
             message = f"servo {registers.label(servo)} did not keep {registers.register_name(servo, name)} = {new}"
-            raise self.error(ServoRefused, message, "", servo)
+            raise self.registers.error(ServoRefused, message, "", servo)
         self.note(servo, name, old, new)
 
-    def prepare(self, servos: Sequence[ServoSpec]) -> None:
+    def _prepare(self, servos: Sequence[ServoSpec]) -> None:
         """Indirect addresses, limits of speed and acceleration, and the bus watchdog: cleared, then armed."""
         ids = [servo.id for servo in servos]
         if self._indirect:
@@ -152,7 +148,7 @@ class Startup(startup.Startup[StatusPacket]):
         self.registers.put_all(dict.fromkeys(watched, 0), "watchdog")
         self.registers.set_all(dict.fromkeys(watched, self.policy.watchdog_steps), "watchdog")
 
-    def disarm(self, ids: Sequence[int]) -> None:
+    def _disarm(self, ids: Sequence[int]) -> None:
         """Switch the watchdogs of servos off; a failure is ignored."""
         with suppress(NoReply, CorruptReply, ServoRefused):
             self.registers.set_all(dict.fromkeys(self.registers.having(ids, "watchdog"), 0), "watchdog")

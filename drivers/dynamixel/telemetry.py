@@ -6,9 +6,8 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from drivers.base.bus import BusReport, BusState
+from drivers.base.bus import BusReport, BusState, Flags
 from drivers.core.scale import Scale, Ticks
 from drivers.dynamixel.compiled_read import CompiledRead
 from drivers.dynamixel.frames import GoalFrame, Run
@@ -19,7 +18,7 @@ from drivers.dynamixel.sdk import Got, Packets, group_read
 from drivers.servos import telemetry
 from drivers.servos.exchange import Exchange
 from drivers.servos.layout import Block, ReadRequest, block_of
-from drivers.servos.telemetry import Rows
+from drivers.servos.telemetry import Octets, Rows, Values
 from drivers.tables.tables import TRIPPED
 
 log = logging.getLogger(__name__)
@@ -35,6 +34,11 @@ class Telemetry(telemetry.Telemetry):
     ----------
     registers, ids, report, slow_group : see :class:`~drivers.servos.telemetry.Telemetry`.
     feedback, fast : see :class:`~drivers.dynamixel.bus.DynamixelBus`.
+
+    Attributes
+    ----------
+    tripped, unmapped : servos whose watchdog was found tripped, and those that lost their pointers because they were
+        rebooted or without power; the bus removes those that it has seen to.
     """
 
     slow_s = 0.5
@@ -44,18 +48,12 @@ class Telemetry(telemetry.Telemetry):
     _port: Port
 
     def __init__(
-        self,
-        registers: Registers,
-        ids: Sequence[int],
-        report: BusReport,
-        feedback: str = "full",
-        fast: bool = True,
-        slow_group: int = 4,
+        self, registers: Registers, ids: Sequence[int], report: BusReport, feedback: str, fast: bool, slow_group: int
     ) -> None:
         super().__init__(registers, ids, report, slow_group)
         self._feedback, self._may_be_fast = feedback, fast
-        self._tripped: set[int] = set()
-        self._forgetful: set[int] = set()
+        self.tripped: set[int] = set()
+        self.unmapped: set[int] = set()
         self.rebuild()
 
     def rebuild(self, indirect: Mapping[int, Block] = {}) -> None:
@@ -73,20 +71,8 @@ class Telemetry(telemetry.Telemetry):
         self._fast = self._may_be_fast and all(table.fast_read for table in tables.values())
         self._joint_failures = 0
         self._compiled: CompiledRead | None = None
-        self._tripped.clear()
-        self._forgetful.clear()
-
-    def take_tripped(self) -> list[int]:
-        """Servos whose watchdog was found tripped since the last call."""
-        return _emptied(self._tripped) if self._tripped else []
-
-    def retry_tripped(self, servo: int) -> None:
-        """Return a servo once more at the next :meth:`take_tripped`."""
-        self._tripped.add(servo)
-
-    def take_forgetful(self) -> list[int]:
-        """Servos that have lost their pointers since the last call: they have been rebooted, or were without power."""
-        return _emptied(self._forgetful) if self._forgetful else []
+        self.tripped.clear()
+        self.unmapped.clear()
 
     def send_goals(self, ticks: Ticks) -> None:
         """One sync write per group, all written at once. ``(n,)`` steps."""
@@ -154,14 +140,7 @@ class Telemetry(telemetry.Telemetry):
 
     # ------------------------------------------------------------------ replies
 
-    def _store(
-        self,
-        request: ReadRequest,
-        values: Mapping[str, NDArray[np.int64]],
-        errors: NDArray[np.uint8],
-        now: float,
-        running: bool,
-    ) -> None:
+    def _store(self, request: ReadRequest, values: Values, errors: Octets, now: float, running: bool) -> None:
         if request.group.layout.indirect and "position" in values:
             mapped = self._still_mapped(request.ids, values)
             if not mapped.all():
@@ -170,18 +149,18 @@ class Telemetry(telemetry.Telemetry):
         super()._store(request, values, errors, now, running)
         if "watchdog" in values and running:
             for servo in [i for i, value in zip(request.ids, values["watchdog"], strict=True) if value == TRIPPED]:
-                if servo not in self._tripped:
-                    self._tripped.add(servo)
+                if servo not in self.tripped:
+                    self.tripped.add(servo)
                     self.report.count("watchdog", servo)
                     self._log("watchdog of servo %s tripped", self._registers.label(servo))
 
-    def _still_mapped(self, ids: Sequence[int], values: Mapping[str, NDArray[np.int64]]) -> NDArray[np.bool_]:
+    def _still_mapped(self, ids: Sequence[int], values: Values) -> Flags:
         """Which servos still have their pointers: without them all registers read 0, also the position."""
         vital = [values[name] for name in ("temperature", "hardware", "torque", "watchdog") if name in values]
-        mapped: NDArray[np.bool_] = np.any(vital, axis=0)
+        mapped: Flags = np.any(vital, axis=0)
         for servo in [servo for servo, has in zip(ids, mapped, strict=True) if not has]:
-            if servo not in self._forgetful:
-                self._forgetful.add(servo)
+            if servo not in self.unmapped:
+                self.unmapped.add(servo)
                 self.report.count("reset", servo)
                 self._log("servo %s was rebooted or without power", self._registers.label(servo))
         return mapped
@@ -189,9 +168,3 @@ class Telemetry(telemetry.Telemetry):
 
 def _run(request: ReadRequest) -> Run:
     return Run(request.ids, request.block.address, request.block.size)
-
-
-def _emptied(ids: set[int]) -> list[int]:
-    found = sorted(ids)
-    ids.clear()
-    return found

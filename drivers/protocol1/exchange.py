@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
 
-from drivers.packets.packet1 import BROADCAST_ID, HEADER, Error1, Instruction1, Packet1, Reader1, checksum, encode
+from drivers.packets.packet1 import BROADCAST_ID, Instruction1, Packet1, Reader1, encode
 from drivers.protocol1 import HELLO
 from drivers.servos import exchange
 from drivers.servos.exchange import Exchange
@@ -24,24 +23,14 @@ class Exchanges(exchange.Exchanges[Packet1]):
     """
 
     status_size = STATUS_SIZE
+    number_size = 1
+    refusals = 0
+    reader = Reader1
     longest = 250
-    refusals = Error1.NONE
 
     def encode(self, servo: int, code: int, params: bytes = b"") -> bytes:
         """The packet of an instruction."""
         return encode(servo, code, params)
-
-    def number(self, value: int) -> bytes:
-        """An address or a length: one byte."""
-        return bytes((value,))
-
-    def make_reader(self) -> Reader1:
-        """Finds replies in what arrives."""
-        return Reader1()
-
-    def is_refusal(self, reply: Packet1) -> bool:
-        """Whether a reply refuses the request, so that it may be without the data asked for."""
-        return bool(reply.code & self.refusals)
 
     def send_only(self, port: Port, frame: bytes) -> None:
         """Clear the input and send one packet without waiting for a reply."""
@@ -61,8 +50,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
         got = self.exchange(port, frame, {servo: 0}).replies.get(servo)
         return got is not None and got.code != Instruction1.PING
 
-    def read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[Packet1]:
-        """Read by ``"sync"`` (Feetech STS), ``"bulk"`` (Dynamixel MX), or ``""``: one request each."""
+    def _read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[Packet1]:
         if manner:
             return self.exchange(port, _group_frame(ids, address, size, manner), dict.fromkeys(ids, size))
         replies: dict[int, Packet1] = {}
@@ -73,34 +61,8 @@ class Exchanges(exchange.Exchanges[Packet1]):
             corrupt |= got.corrupt
         return Exchange(replies, tuple(servo for servo in ids if servo not in replies), corrupt)
 
-    def rows_at_most(self, width: int) -> int:
-        """Rows of so many bytes that one sync write carries."""
+    def _rows_at_most(self, width: int) -> int:
         return (self.longest - 8) // width
-
-    def sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[Packet1]:
-        """The replies: at once where they came in order and complete, else by a stream reader."""
-        replies = _in_order(data, wanted)
-        if replies is None:
-            return super().sort(port, wanted, data)
-        port.suspects.difference_update(replies)
-        return Exchange(replies, (), False)
-
-
-def _in_order(data: bytes, wanted: Mapping[int, int]) -> dict[int, Packet1] | None:
-    """The replies where `data` is exactly those asked for, in order; else None."""
-    at, replies = 0, {}
-    if len(data) != len(wanted) * STATUS_SIZE + sum(wanted.values()):
-        return None
-    for servo, length in wanted.items():
-        end = at + STATUS_SIZE + length
-        body = data[at + 2 : end - 1]
-        if data[at : at + 2] != HEADER or body[0] != servo or body[1] != length + 2:
-            return None
-        if checksum(body) != data[end - 1]:
-            return None
-        replies[servo] = Packet1(servo, body[2], body[3:])
-        at = end
-    return replies
 
 
 @lru_cache(maxsize=1024)

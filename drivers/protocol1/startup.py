@@ -75,16 +75,15 @@ class Startup(startup.Startup[Packet1]):
     registers: Registers
     policy: Policy
 
-    def identity(self, reply: Packet1, expected: ControlTable) -> tuple[int, int]:
-        """Model number and firmware in a reply to the greeting."""
+    def _identity(self, reply: Packet1, expected: ControlTable) -> tuple[int, int]:
         return identity(reply, [expected])
 
-    def accepts(self, expected: ControlTable, number: int) -> bool:
+    def _accepts(self, expected: ControlTable, number: int) -> bool:
         """Whether a number is the configured model's. One that no source gives may be any that no other model has."""
         unknown = expected.number >= UNNUMBERED and number not in known_models()
         return number == expected.number or unknown
 
-    def greet(self, servo: int) -> Packet1:
+    def _greet(self, servo: int) -> Packet1:
         """A servo's first registers; one that answers pings only is told to answer everything."""
         registers = self.registers
         try:
@@ -98,23 +97,20 @@ class Startup(startup.Startup[Packet1]):
         self.note(servo, "status_level", 0, 2)
         return reply
 
-    def release(self, servo: int) -> None:
-        """Switch one servo off and verify it."""
+    def _release(self, servo: int) -> None:
         self._write_surely(servo, "torque", 0, TRIES)
 
-    def slack(self, turn: int) -> float:
-        """Steps that a position may lie outside of a turn."""
+    def _slack(self, turn: int) -> float:
         return OUT_OF_TURN * turn
 
-    def why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
-        """Error flags of servos whose motor did not switch on."""
+    def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
         return {servo: f"error flags 0x{self.registers.flags.get(servo, 0):02X}" for servo in ids}
 
-    def least_voltage(self, ids: Sequence[int]) -> Mapping[int, int]:
+    def _least_voltage(self, ids: Sequence[int]) -> Mapping[int, int]:
         """Least voltage that servos need by id, 0.1 V; not read where the policy has it."""
-        return super().least_voltage(ids) if self.policy.min_voltage_v is None else {}
+        return super()._least_voltage(ids) if self.policy.min_voltage_v is None else {}
 
-    def clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
+    def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
         """Look at hardware errors; torque brings servos back that shut down, where that is allowed."""
         self._faulted = self._faults(ids)
         if self._faulted and not self.policy.reboot_faulted:
@@ -141,7 +137,7 @@ class Startup(startup.Startup[Packet1]):
                 bad[servo] = bits
         return bad
 
-    def prepare(self, servos: Sequence[ServoSpec]) -> None:
+    def _prepare(self, servos: Sequence[ServoSpec]) -> None:
         """Write limits of speed, acceleration and torque."""
         registers, ids = self.registers, [servo.id for servo in servos]
         registers.set_all({servo.id: speed_steps(servo, registers) for servo in servos}, "speed")
@@ -167,7 +163,7 @@ class Startup(startup.Startup[Packet1]):
 
     # ------------------------------------------------------------------ permanent registers
 
-    def write_settings(self, servo: int, held: bool) -> None:
+    def _write_settings(self, servo: int, held: bool) -> None:
         """Permanent registers this driver depends on: read, and written only where they differ, with torque off."""
         registers = self.registers
         wanted = self._wanted(servo)

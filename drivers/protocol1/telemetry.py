@@ -14,6 +14,7 @@ from drivers.protocol1.layout import GoalRows, layout_of
 from drivers.protocol1.registers import Registers
 from drivers.servos import telemetry
 from drivers.servos.layout import Group, ReadRequest
+from drivers.servos.telemetry import Octets, Values
 
 
 class Telemetry(telemetry.Telemetry):
@@ -80,19 +81,12 @@ class Telemetry(telemetry.Telemetry):
                 got = self._packets.read_group(self._port, request.ids, block.address, block.size, manner)
                 self._accept([request], got, clock(), running)
 
-    def _store(
-        self,
-        request: ReadRequest,
-        values: Mapping[str, NDArray[np.int64]],
-        errors: NDArray[np.uint8],
-        now: float,
-        running: bool,
-    ) -> None:
+    def _store(self, request: ReadRequest, values: Values, errors: Octets, now: float, running: bool) -> None:
         super()._store(request, values, errors, now, running)
         if "moving" in values:
             self.moving[request.group.index[request.group.slots(request.ids)]] = values["moving"] != 0
 
-    def _note_errors(self, ids: Sequence[int], where: NDArray[np.intp], errors: NDArray[np.uint8]) -> None:
+    def _note_errors(self, ids: Sequence[int], where: NDArray[np.intp], errors: Octets) -> None:
         """Those error flags that are about a servo's state raise an alert."""
         causes = [self._registers.causes(servo, flags) for servo, flags in zip(ids, errors.tolist(), strict=True)]
         self._hardware[where] = causes

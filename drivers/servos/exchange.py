@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar, Generic, NamedTuple, Protocol, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
+from drivers.packets.framing import FrameReader
 from drivers.packets.packet import BROADCAST_ID, Instruction
 from drivers.servos.port import Port
 
@@ -26,20 +27,6 @@ class Reply(Protocol):
 
 
 R = TypeVar("R", bound=Reply)
-R_co = TypeVar("R_co", bound=Reply, covariant=True)
-
-
-class Reader(Protocol[R_co]):
-    """Finds the replies in a byte stream, and counts what was none."""
-
-    broken_frames: int
-    noise_bytes: int
-
-    def feed(self, data: bytes) -> Sequence[R_co]:
-        """Add received bytes; return the replies completed by them."""
-
-    def flush(self) -> Sequence[R_co]:
-        """Give up on an incomplete reply; return those found behind its header."""
 
 
 class Exchange(NamedTuple, Generic[R]):
@@ -60,15 +47,21 @@ class Exchange(NamedTuple, Generic[R]):
 
 
 class Exchanges(ABC, Generic[R]):
-    """Transactions of a driver; a protocol implements the abstract methods.
+    """Transactions of a driver; a protocol sets the attributes and implements the abstract methods.
 
     Attributes
     ----------
     status_size : bytes of a reply without data.
+    number_size : bytes of an address or a length in a packet.
+    refusals : bits of the error byte that refuse the request, so that the reply may be without the data asked for.
+    reader : finds replies in received bytes.
     greeting : instruction that a servo in ``port.suspects`` may be sent at once, where it is not a plain read.
     """
 
     status_size: ClassVar[int]
+    number_size: ClassVar[int]
+    refusals: ClassVar[int]
+    reader: ClassVar[type[FrameReader[Any]]]
     greeting: ClassVar[int] = -1
 
     # ------------------------------------------------------------------ hooks
@@ -78,26 +71,18 @@ class Exchanges(ABC, Generic[R]):
         """The packet of an instruction."""
 
     @abstractmethod
-    def number(self, value: int) -> bytes:
-        """An address or a length, as packets carry it."""
-
-    @abstractmethod
-    def make_reader(self) -> Reader[R]:
-        """Finds replies in what arrives."""
-
-    @abstractmethod
-    def is_refusal(self, reply: R) -> bool:
-        """Whether a reply refuses the request, so that it may be without the data asked for."""
-
-    @abstractmethod
     def hello(self, port: Port, servo: int) -> Exchange[R]:
         """Send the greeting, a request whose reply has a length of its own. The servo may be in ``port.suspects``."""
 
     @abstractmethod
-    def read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[R]:
+    def _read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[R]:
         """Read the same registers of servos that owe no reply; parameters as for :meth:`read_group`."""
 
     # ------------------------------------------------------------------ one servo
+
+    def number(self, value: int) -> bytes:
+        """An address or a length, as packets carry it."""
+        return value.to_bytes(self.number_size, "little")
 
     def send(self, port: Port, frame: bytes) -> None:
         """Clear the input and send one packet; the port stays in use until the reply was taken."""
@@ -154,7 +139,7 @@ class Exchanges(ABC, Generic[R]):
         asked = tuple(servo for servo in ids if servo not in left_out)
         if not asked:
             return Exchange({}, left_out, False)
-        got = self.read_asked(port, asked, address, size, manner)
+        got = self._read_asked(port, asked, address, size, manner)
         return got._replace(missing=got.missing + left_out)
 
     def write_group(self, port: Port, address: int, size: int, rows: bytes) -> None:
@@ -177,11 +162,11 @@ class Exchanges(ABC, Generic[R]):
         width = size + 1
         if not rows or len(rows) % width:
             raise ValueError(f"rows: {len(rows)} bytes are not whole rows of 1 + {size}")
-        head, step = self.number(address) + self.number(size), self.rows_at_most(width) * width
+        head, step = self.number(address) + self.number(size), self._rows_at_most(width) * width
         parts = (rows[at : at + step] for at in range(0, len(rows), step))
         return [self.encode(BROADCAST_ID, Instruction.SYNC_WRITE, head + part) for part in parts]
 
-    def rows_at_most(self, width: int) -> int:
+    def _rows_at_most(self, width: int) -> int:
         """Rows of so many bytes that one sync write carries; by default as many as there can be servos."""
         return BROADCAST_ID
 
@@ -199,11 +184,11 @@ class Exchanges(ABC, Generic[R]):
         self.send(port, frame)
         try:
             port.expect(size)
-            return self.sort(port, wanted, self.fill(port, size))
+            return self._sort(port, wanted, self._fill(port, size))
         finally:
             port.is_using = False
 
-    def fill(self, port: Port, size: int) -> bytes:
+    def _fill(self, port: Port, size: int) -> bytes:
         """Received bytes, at least ``size`` of them unless the deadline passes."""
         data = more = port.link.read(port.deadline_s)
         while more and len(data) < size:
@@ -211,9 +196,9 @@ class Exchanges(ABC, Generic[R]):
             data += more
         return data
 
-    def sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[R]:
+    def _sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[R]:
         """The replies in ``data`` and in what still arrives, whatever lies between them."""
-        reader, box, late = self.make_reader(), _Sorter(wanted, self.is_refusal), 0
+        reader, box, late = self.reader(), _Sorter[R](wanted, self.refusals), 0
         box.take(reader.feed(data))
         while len(box.replies) < len(wanted) and late < _LATE_CHUNKS:
             data = port.link.read(port.deadline_s)
@@ -232,11 +217,11 @@ class _Sorter(Generic[R]):
     Parameters
     ----------
     wanted : data bytes expected, by servo id.
-    is_refusal : whether a reply may be without them.
+    refusals : bits of the error byte with which a reply may be without them.
     """
 
-    def __init__(self, wanted: Mapping[int, int], is_refusal: Callable[[R], bool]) -> None:
-        self._wanted, self._is_refusal = wanted, is_refusal
+    def __init__(self, wanted: Mapping[int, int], refusals: int) -> None:
+        self._wanted, self._refusals = wanted, refusals
         self.replies: dict[int, R] = {}
         self.twice: set[int] = set()
         self.stray = 0
@@ -245,7 +230,7 @@ class _Sorter(Generic[R]):
         """Sort some more."""
         for reply in arrived:
             length = self._wanted.get(reply.id)
-            refused = self._is_refusal(reply) and not reply.params
+            refused = reply.error & self._refusals and not reply.params
             if length is None or (len(reply.params) != length and not refused):
                 self.stray += 1
             elif self.replies.setdefault(reply.id, reply) is not reply:

@@ -17,7 +17,7 @@ from drivers.base.bus import ServoSpec
 from drivers.base.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel, together
 from drivers.servos.exchange import R
 from drivers.servos.layout import Block
-from drivers.servos.registers import E, Registers
+from drivers.servos.registers import Registers
 from drivers.tables.tables import ControlTable, load_table, model_name
 
 log = logging.getLogger(__name__)
@@ -92,27 +92,27 @@ class Startup(ABC, Generic[R]):
     # ------------------------------------------------------------------ hooks
 
     @abstractmethod
-    def identity(self, reply: R, expected: ControlTable) -> tuple[int, int]:
+    def _identity(self, reply: R, expected: ControlTable) -> tuple[int, int]:
         """Model number and firmware in a servo's reply to the greeting."""
 
-    def accepts(self, expected: ControlTable, number: int) -> bool:
+    def _accepts(self, expected: ControlTable, number: int) -> bool:
         """Whether a model number is the configured model's."""
         return number == expected.number
 
-    def greet(self, servo: int) -> R:
+    def _greet(self, servo: int) -> R:
         """A servo's reply to the greeting."""
         return self.registers.hello(servo)
 
     @abstractmethod
-    def release(self, servo: int) -> None:
+    def _release(self, servo: int) -> None:
         """Switch one servo off and verify it."""
 
-    def least_voltage(self, ids: Sequence[int]) -> Mapping[int, int]:
+    def _least_voltage(self, ids: Sequence[int]) -> Mapping[int, int]:
         """Least voltage that servos need by id, 0.1 V."""
         return self.registers.get_all(ids, "min_voltage")
 
     @abstractmethod
-    def clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
+    def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
         """Look at hardware errors; returns servos that were rebooted.
 
         Raises
@@ -121,22 +121,22 @@ class Startup(ABC, Generic[R]):
         """
 
     @abstractmethod
-    def write_settings(self, servo: int, held: bool) -> None:
+    def _write_settings(self, servo: int, held: bool) -> None:
         """Permanent registers this driver depends on: read, and written only where they differ, with torque off."""
 
     @abstractmethod
-    def prepare(self, servos: Sequence[ServoSpec]) -> None:
+    def _prepare(self, servos: Sequence[ServoSpec]) -> None:
         """Write the registers that must be right before torque comes on."""
 
     @abstractmethod
-    def slack(self, turn: int) -> float:
+    def _slack(self, turn: int) -> float:
         """Steps that a position may lie outside of a turn of so many."""
 
     @abstractmethod
-    def why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
+    def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
         """Why motors did not switch on, by id."""
 
-    def disarm(self, ids: Sequence[int]) -> None:
+    def _disarm(self, ids: Sequence[int]) -> None:
         """Switch off what watches servos whose motors are off."""
 
     # ------------------------------------------------------------------ up
@@ -149,18 +149,18 @@ class Startup(ABC, Generic[R]):
         NoReply, CorruptReply : some did not answer.
         WrongModel : one is not the configured model.
         """
-        replies = self.registers.each([servo.id for servo in servos], self.greet)
+        replies = self.registers.each([servo.id for servo in servos], self._greet)
         wrong: dict[int, BusError] = {}
         for servo in servos:
             expected = load_table(servo.model)
-            number, firmware = self.identity(replies[servo.id], expected)
-            if self.accepts(expected, number):
+            number, firmware = self._identity(replies[servo.id], expected)
+            if self._accepts(expected, number):
                 self.registers.tables[servo.id] = load_table(expected.number, firmware)
                 continue
             label = self.registers.label(servo.id)
             message = f"servo {label} is {model_name(number)}, configured is {servo.model}"
             hint = "correct the configuration, or the servo's id with `omote scan PORT`"
-            wrong[servo.id] = self.error(WrongModel, message, hint, servo.id)
+            wrong[servo.id] = self.registers.error(WrongModel, message, hint, servo.id)
         if wrong:
             raise together(wrong)
 
@@ -174,22 +174,18 @@ class Startup(ABC, Generic[R]):
         ids = [servo.id for servo in servos]
         held = self.take_over(ids)
         self.wait_for_voltage(ids)
-        rebooted = self.clear_faults(ids)
+        rebooted = self._clear_faults(ids)
         for servo in ids:
-            self.write_settings(servo, servo in held and servo not in rebooted)
+            self._write_settings(servo, servo in held and servo not in rebooted)
         low, high = self.registers.get_all(ids, "min_ticks"), self.registers.get_all(ids, "max_ticks")
         self.started.limits = {servo: (low[servo], high[servo]) for servo in ids if servo in low and servo in high}
-        self.prepare(servos)
+        self._prepare(servos)
         try:
             self.torque_on(ids)
         except BaseException:
             self.switch_off(ids)
             raise
         return self.started
-
-    def error(self, kind: type[E], message: str, hint: str, *ids: int) -> E:
-        """An error about servos on this port."""
-        return self.registers.error(kind, message, hint, *ids)
 
     def take_over(self, ids: Sequence[int]) -> list[int]:
         """Servos whose torque is on and stays on.
@@ -202,11 +198,11 @@ class Startup(ABC, Generic[R]):
         if not held or self.policy.takeover == "adopt":
             return held
         if self.policy.takeover == "release":
-            self.registers.each(held, self.release)
+            self.registers.each(held, self._release)
             return []
         message = f"servos hold with torque already: {', '.join(map(self.registers.label, held))}"
         hint = 'stop the program that drives them, or start with takeover="adopt" or "release"'
-        raise self.error(ServoRefused, message, hint, *held)
+        raise self.registers.error(ServoRefused, message, hint, *held)
 
     def wait_for_voltage(self, ids: Sequence[int]) -> None:
         """Wait for the supply: switching torque on while it ramps up latches input-voltage errors.
@@ -216,7 +212,7 @@ class Startup(ABC, Generic[R]):
         ServoFault : it stays too low.
         """
         registers, least_v = self.registers, self.policy.min_voltage_v
-        need = self.least_voltage(ids)
+        need = self._least_voltage(ids)
         if least_v is not None:
             need = dict.fromkeys(ids, round(least_v * 10))
         port = registers.port
@@ -234,19 +230,21 @@ class Startup(ABC, Generic[R]):
             f"{len(low)} servos have too little supply voltage: {registers.label(worst)} reads "
             f"{low[worst] / 10:.1f} V, needs {need[worst] / 10:.1f} V"
         )
-        raise self.error(ServoFault, message, "check the power supply and its cable", *sorted(low))
+        raise self.registers.error(ServoFault, message, "check the power supply and its cable", *sorted(low))
 
     def fault(self, what: str, bad: Mapping[int, int]) -> BusError:
         """The error of servos with a hardware error; their bits by id."""
         which = ", ".join(f"{self.registers.label(servo)} 0x{bits:02X}" for servo, bits in bad.items())
         hint = "support the head, then start with reboot_faulted=true, or switch the power off and on"
-        return self.error(ServoFault, f"servos {what} a hardware error: {which}", hint, *sorted(bad))
+        return self.registers.error(ServoFault, f"servos {what} a hardware error: {which}", hint, *sorted(bad))
 
     def locked(self, servo: int, name: str, old: int, new: int) -> BusError:
         """The error of a permanent register that must change while the servo holds."""
         what = f"{self.registers.register_name(servo, name)} must change from {old} to {new}"
         message = f"servo {self.registers.label(servo)} holds with torque, and {what}"
-        return self.error(ServoRefused, message, 'support the head, then start with takeover="release"', servo)
+        return self.registers.error(
+            ServoRefused, message, 'support the head, then start with takeover="release"', servo
+        )
 
     def note(self, servo: int, name: str, old: int, new: int) -> None:
         """Log that a permanent register was written."""
@@ -266,9 +264,11 @@ class Startup(ABC, Generic[R]):
         registers.put_all(dict.fromkeys(ids, 1), "torque")
         off = [servo for servo, torque in registers.get_all(ids, "torque").items() if torque != 1]
         if off:
-            why = self.why_off(off)
+            why = self._why_off(off)
             which = ", ".join(f"{registers.label(servo)} ({why[servo]})" for servo in off)
-            raise self.error(ServoFault, f"servos did not switch their motor on: {which}", self.not_on_hint, *off)
+            raise self.registers.error(
+                ServoFault, f"servos did not switch their motor on: {which}", self.not_on_hint, *off
+            )
         self.started.ticks = registers.get_all(ids, "position")
 
     def goals_at_present(self, ids: Sequence[int]) -> dict[int, int]:
@@ -281,11 +281,11 @@ class Startup(ABC, Generic[R]):
         goals = {}
         for servo, value in self.registers.get_all(ids, "position").items():
             turn = self.registers.tables[servo].ticks_per_turn
-            slack = self.slack(turn)
+            slack = self._slack(turn)
             if not -slack <= value < turn + slack:
                 where = f"outside one turn of {turn} steps"
                 message = f"servo {self.registers.label(servo)} reads position {value}, {where}"
-                raise self.error(ServoFault, message, self.out_of_turn_hint, servo)
+                raise self.registers.error(ServoFault, message, self.out_of_turn_hint, servo)
             low, high = self.started.limits.get(servo, (0, turn - 1))
             goals[servo] = min(max(value, low), high)
         return goals
@@ -308,14 +308,16 @@ class Startup(ABC, Generic[R]):
                 open_ids = [servo for servo in open_ids if not self._confirmed_off(servo)]
                 if not open_ids:
                     break
-            self.disarm([servo for servo in known if servo not in open_ids])
+            self._disarm([servo for servo in known if servo not in open_ids])
         except PortLost as error:
             lost = error
         if not open_ids:
             return
         which = ", ".join(map(registers.label, open_ids)) + (f" ({lost})" if lost else "")
         message = f"not confirmed off on {registers.port.port_name}: {which}"
-        raise self.error(NoReply if lost is None else PortLost, message, self.not_off_hint, *open_ids) from lost
+        raise self.registers.error(
+            NoReply if lost is None else PortLost, message, self.not_off_hint, *open_ids
+        ) from lost
 
     def _confirmed_off(self, servo: int) -> bool:
         try:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.base.bus import BusReport, BusState
+from drivers.base.bus import BusReport, BusState, Flags, Floats
 from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.core.scale import Scale
 from drivers.packets.packet import ALERT
@@ -27,11 +27,16 @@ FAILED_GREETINGS = 3
 """Greetings without an answer that one cycle may wait for."""
 
 
+Octets = NDArray[np.uint8]
+Values = Mapping[str, NDArray[np.int64]]
+"""Values of k servos by short name, (k,) each."""
+
+
 class Rows(NamedTuple):
     """Replies of k servos to one request, in its order: `errors` (k,) and `data` (k, size), uint8."""
 
-    errors: NDArray[np.uint8]
-    data: NDArray[np.uint8]
+    errors: Octets
+    data: Octets
 
 
 class Telemetry(ABC):
@@ -150,22 +155,8 @@ class Telemetry(ABC):
     def state(self, scale: Scale, now: float) -> BusState:
         """The latest measurements in SI units."""
         silent = np.isin(self.ids, self._silent) if self._silent else np.zeros(len(self.ids), bool)
-        error, volts, celsius, hardware, torque = self._slow_values()
-        position, velocity, current, age = read_only(scale.measured(self._known, now))
-        return BusState(
-            time_s=now,
-            position_rad=position,
-            velocity_rad_s=velocity,
-            current_a=current,
-            fresh=read_only(self._fresh.copy()),
-            age_s=age,
-            error=error,
-            silent=read_only(silent),
-            voltage_v=volts,
-            temperature_c=celsius,
-            hardware_error=hardware,
-            torque=torque,
-        )
+        fresh = read_only(self._fresh.copy())
+        return make_state(now, scale.measured(self._known, now), fresh, read_only(silent), self._slow_values())
 
     def _slow_values(self) -> tuple[NDArray[Any], ...]:
         """Error, supply, temperature, hardware error and torque, read-only; new arrays only where something changed."""
@@ -235,15 +226,8 @@ class Telemetry(ABC):
         """Decode and store the replies of all servos of a request."""
         self._store(request, request.block.decode(rows.data), rows.errors, now, running)
 
-    def _store(
-        self,
-        request: ReadRequest,
-        values: Mapping[str, NDArray[np.int64]],
-        errors: NDArray[np.uint8],
-        now: float,
-        running: bool,
-    ) -> None:
-        """Store values by short name and error bytes of the servos of a request, (k,) each."""
+    def _store(self, request: ReadRequest, values: Values, errors: Octets, now: float, running: bool) -> None:
+        """Store values and error bytes (k,) of the servos of a request."""
         group, _, ids = request
         slots = group.slots(ids)
         where = group.index[slots]
@@ -262,7 +246,7 @@ class Telemetry(ABC):
         if "torque" in values:
             self._note_torque(ids, where, values, running)
 
-    def _note_errors(self, ids: Sequence[int], where: NDArray[np.intp], errors: NDArray[np.uint8]) -> None:
+    def _note_errors(self, ids: Sequence[int], where: NDArray[np.intp], errors: Octets) -> None:
         """Keep the error bytes of k servos, and report alerts that are new."""
         rising = errors & ~self._error[where] & ALERT
         self._error[where] = errors
@@ -272,9 +256,7 @@ class Telemetry(ABC):
             self._log("servo %s reports a hardware error", self._registers.label(servo))
             self._check_first(servo)
 
-    def _note_torque(
-        self, ids: Sequence[int], where: NDArray[np.intp], values: Mapping[str, NDArray[np.int64]], running: bool
-    ) -> None:
+    def _note_torque(self, ids: Sequence[int], where: NDArray[np.intp], values: Values, running: bool) -> None:
         """Keep whether motors are on, and report those that switched off by themselves."""
         now_on = values["torque"] == 1
         if "torque_limit" in values:  # a servo that shut down has 0 there
@@ -284,6 +266,35 @@ class Telemetry(ABC):
         for servo in [servo for servo, off in zip(ids, lost, strict=True) if off and running]:
             self.report.count("torque_lost", servo)
             self._log("servo %s let go: its torque is off", self._registers.label(servo))
+
+
+def make_state(
+    time_s: float, measured: Floats, fresh: Flags, silent: Flags, slow_values: Sequence[NDArray[Any]]
+) -> BusState:
+    """A state, read-only.
+
+    Parameters
+    ----------
+    measured : (4, n): position, velocity, current and age.
+    fresh, silent : (n,), read-only already.
+    slow_values : error, supply, temperature, hardware error and torque, (n,) each, read-only already.
+    """
+    position, velocity, current, age = (read_only(row) for row in measured)
+    error, volts, celsius, hardware, torque = slow_values
+    return BusState(
+        time_s=time_s,
+        position_rad=position,
+        velocity_rad_s=velocity,
+        current_a=current,
+        fresh=fresh,
+        age_s=age,
+        error=error,
+        silent=silent,
+        voltage_v=volts,
+        temperature_c=celsius,
+        hardware_error=hardware,
+        torque=torque,
+    )
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
