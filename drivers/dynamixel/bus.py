@@ -17,13 +17,13 @@ import numpy as np
 from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError, PortLost
 from drivers.dynamixel.indirect import set_up
-from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
 from drivers.dynamixel.startup import Policy, Startup
 from drivers.dynamixel.telemetry import Telemetry
 from drivers.servos.bus import ServoBus
 from drivers.servos.layout import Block
+from drivers.servos.port import Port
 from drivers.servos.startup import Started
 from drivers.tables.tables import load_table
 

@@ -6,16 +6,21 @@ the general readers of ``packet`` and ``sdk`` then.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.packets.packet import BROADCAST_ID, HEADER, Instruction, crc16, encode_fast_head, encode_instruction
-from drivers.servos.telemetry import Rows
-
-Octets = NDArray[np.uint8]
+from drivers.packets.packet import (
+    BROADCAST_ID,
+    HEADER,
+    Instruction,
+    StatusPacket,
+    crc16,
+    encode_fast_head,
+    encode_instruction,
+)
 
 HEAD_SIZE = 8
 """Bytes of a status packet before its error byte."""
@@ -56,23 +61,19 @@ class GoalFrame:
 
 
 class Run(NamedTuple):
-    """Servos of which the same bytes are read: `ids`, first `address` and `length`."""
+    """Part of a group read: servos of which the same registers are read, first `address` and `length`."""
 
     ids: tuple[int, ...]
     address: int
     length: int
 
-    def among(self, ids: Collection[int]) -> Run:
-        """The same run of those of its servos that are in `ids`."""
-        return self._replace(ids=tuple(servo for servo in self.ids if servo in ids))
-
 
 class GroupRead:
-    """A read of many servos that is asked again and again: one sync read, or a bulk read where addresses differ.
+    """A read of many servos that is sent repeatedly: one sync read, or a bulk read where addresses differ.
 
     Parameters
     ----------
-    runs : who is asked for what.
+    runs : servos with the registers that are read.
     fast : all of them answer in one joint packet.
 
     Attributes
@@ -88,9 +89,8 @@ class GroupRead:
 
         self._check = check_joint if fast else check_replies
         self.runs, self.fast = tuple(runs), fast
-        self.ids = tuple(servo for run in runs for servo in run.ids)
         self.wanted = {servo: run.length for run in runs for servo in run.ids}
-        self.frame = self._sync() if len(runs) == 1 else self._bulk()
+        self.frame = encode_instruction(BROADCAST_ID, *self._instruction())
         self.spans = _spans(self.wanted, fast)
         self.size = int(self.spans[-1, 2])
         heads = (
@@ -99,31 +99,22 @@ class GroupRead:
         self.heads = np.frombuffer(b"".join(heads), np.uint8).reshape(-1, HEAD_SIZE)
         self.states = np.array([crc16(head) for head in heads], np.int64)
 
-    def _sync(self) -> bytes:
-        (run,) = self.runs
-        kind = Instruction.FAST_SYNC_READ if self.fast else Instruction.SYNC_READ
-        return encode_instruction(BROADCAST_ID, kind, _words(run.address, run.length) + bytes(run.ids))
+    def _instruction(self) -> tuple[Instruction, bytes]:
+        spans = [_words(run.address, run.length) for run in self.runs]
+        if len(spans) == 1:
+            code = Instruction.FAST_SYNC_READ if self.fast else Instruction.SYNC_READ
+            return code, spans[0] + bytes(self.runs[0].ids)
+        entries = [bytes((i,)) + span for run, span in zip(self.runs, spans, strict=True) for i in run.ids]
+        return Instruction.FAST_BULK_READ if self.fast else Instruction.BULK_READ, b"".join(entries)
 
-    def _bulk(self) -> bytes:
-        kind = Instruction.FAST_BULK_READ if self.fast else Instruction.BULK_READ
-        entries = [bytes((servo,)) + _words(run.address, run.length) for run in self.runs for servo in run.ids]
-        return encode_instruction(BROADCAST_ID, kind, b"".join(entries))
-
-    def decode(self, data: bytes) -> list[Rows] | None:
-        """What the servos of each run said, where `data` is exactly what was asked for; else None."""
-        if len(data) != self.size:
-            return None
+    def decode(self, data: bytes) -> dict[int, StatusPacket] | None:
+        """Replies by servo id, where `data` is exactly what was asked for; else None."""
         octets = np.frombuffer(data, np.uint8)
-        if not self._check(octets, self.spans, self.heads, self.states):
+        if len(data) != self.size or not self._check(octets, self.spans, self.heads, self.states):
             return None
-        at, begin, replies = (0, HEAD_SIZE, []) if self.fast else (HEAD_SIZE, 0, [])
-        for run in self.runs:
-            size = (PART_SIZE if self.fast else STATUS_SIZE) + run.length
-            end = begin + size * len(run.ids)
-            rows = octets[begin:end].reshape(-1, size)
-            replies.append(Rows(rows[:, at], rows[:, -2 - run.length : -2]))
-            begin = end
-        return replies
+        skip = 2 if self.fast else 1  # error byte, and in a joint reply the id
+        spans = self.spans.tolist()
+        return {i: StatusPacket(i, data[error], data[error + skip : end - 2]) for i, error, end in spans}
 
 
 def _spans(wanted: Mapping[int, int], fast: bool) -> NDArray[np.int64]:

@@ -1,6 +1,6 @@
 """Bus of Dynamixel servos with Protocol 1.0, and dynamixel-sdk's packet handler for them with its faults overridden.
 
-:class:`Packets1` runs on :class:`~drivers.dynamixel.port.Port` (which overrides S3, S6 to S9 and S12) and can be
+:class:`Packets1` runs on :class:`~drivers.servos.port.Port` (which overrides S3, S6 to S9 and S12) and can be
 given to any SDK code. The numbers are those of ``drivers/dynamixel/sdk.py``, where they apply to Protocol 1.0 too;
 each has a test in tests/drivers/dynamixel/test_legacy.py that shows it on the bare SDK:
 
@@ -24,11 +24,11 @@ from collections.abc import Sequence
 
 from dynamixel_sdk import protocol1_packet_handler, robotis_def
 
-from drivers.dynamixel.port import Port
 from drivers.dynamixel.sdk import SdkExchanges
 from drivers.packets.packet1 import BROADCAST_ID, Error1, Instruction1, Packet1, Reader1, encode
 from drivers.protocol1.bus import Protocol1Bus
 from drivers.protocol1.exchange import Exchanges
+from drivers.servos.port import Port
 
 _FRAME = 259
 """More than any packet has."""
@@ -96,4 +96,3 @@ class LegacyBus(Protocol1Bus):
 
     MODELS = ("ax-12a",)
     PACKETS = Packets1
-    PORT = Port

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from drivers.dynamixel.port import Port
 from drivers.dynamixel.sdk import Packets
 from drivers.packets.packet import ErrorNumber, Instruction, StatusPacket
 from drivers.servos import registers
 from drivers.servos.layout import NAMES
+from drivers.servos.port import Port
 from drivers.tables.tables import Item
 
 _REASONS = {number.value: number.name.lower().replace("_", " ") for number in ErrorNumber}

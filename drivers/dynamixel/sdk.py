@@ -1,6 +1,6 @@
 """dynamixel-sdk's packet handler for Protocol 2.0 with its known faults overridden, and omote's group transactions.
 
-:class:`Port` (in drivers/dynamixel/port.py) and :class:`Packets` are the SDK's handlers and can be given to any SDK
+:class:`Port` (in drivers/servos/port.py) and :class:`Packets` are the SDK's handlers and can be given to any SDK
 code. What is overridden; each fault has a test in tests/drivers/dynamixel/test_sdk.py that shows it on the bare SDK:
 
 ====  ========================================================================================================
@@ -36,12 +36,11 @@ from dynamixel_sdk import protocol2_packet_handler, robotis_def
 
 from drivers.dynamixel.compiled_read import CompiledRead
 from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Run
-from drivers.dynamixel.port import Port
 from drivers.packets import packet
 from drivers.packets.packet import Instruction, StatusPacket, StatusReader, encode_instruction
 from drivers.servos import exchange
 from drivers.servos.exchange import Exchange, R, settled
-from drivers.servos.telemetry import Rows
+from drivers.servos.port import Port
 
 PING_DATA = 3
 PING_SLOT_MS = 3.0
@@ -186,21 +185,14 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
         return found
 
     def _read_asked(self, port: Any, ids: tuple[int, ...], address: int, size: int, manner: str) -> Got:
-        group = group_read((Run(ids, address, size),), manner == "fast")
-        got = self.read_rows(port, group)
-        return got if isinstance(got, Exchange) else Exchange(_replies(group.runs, got), (), False)
+        return self.read_prepared(port, group_read((Run(ids, address, size),), manner == "fast"))
 
-    def read_rows(self, port: Port, group: GroupRead, compiled: CompiledRead | None = None) -> list[Rows] | Got:
+    def read_prepared(self, port: Port, group: GroupRead, compiled: CompiledRead | None = None) -> Got:
         """Send a group read and collect the replies. None of its servos may be in ``port.suspects``.
 
         Parameters
         ----------
-        compiled : takes the replies where they are as expected.
-
-        Returns
-        -------
-        list of Rows : the replies run by run, when all are as expected (empty where `compiled` has taken them);
-            otherwise an Exchange with whatever arrived.
+        compiled : takes the replies where they are as expected; then they are not returned.
         """
         port.suspects.update(group.wanted)  # until they have answered, so also when this is interrupted
         self.send(port, group.frame)
@@ -210,10 +202,10 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
                 compiled.prepare()
             data = self._fill(port, group.size)
             taken = compiled is not None and compiled.take(data, port.clock())
-            rows = [] if taken else group.decode(data)
-            if rows is not None:
+            replies = {} if taken else group.decode(data)
+            if replies is not None:
                 port.suspects.difference_update(group.wanted)
-                return rows
+                return Exchange(replies, (), False)
             if not group.fast:
                 return self._sort(port, group.wanted, data)
             got = self._decode_joint(port, group, data)
@@ -250,14 +242,12 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
 
         Late bytes of that reply are no packet, so they cannot be taken for one.
         """
-        behind = set(got.missing[1:])
-        runs = tuple(run for run in (run.among(behind) for run in group.runs) if run.ids)
+        asked = [(tuple(i for i in run.ids if i in got.missing[1:]), run) for run in group.runs]
+        runs = tuple(run._replace(ids=ids) for ids, run in asked if ids)
         lost = not got.replies
         if not runs:
             return got._replace(joint_lost=lost)
-        more = self.read_rows(port, group_read(runs, False))
-        if not isinstance(more, Exchange):
-            more = Exchange(_replies(runs, more), (), False)
+        more = self.read_prepared(port, group_read(runs, False))
         return Exchange(got.replies | more.replies, got.missing[:1] + more.missing, got.corrupt or more.corrupt, lost)
 
 
@@ -265,15 +255,6 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
 def group_read(runs: tuple[Run, ...], fast: bool) -> GroupRead:
     """A group read, made once for the same servos and registers."""
     return GroupRead(runs, fast)
-
-
-def _replies(runs: Sequence[Run], rows: Sequence[Rows]) -> dict[int, StatusPacket]:
-    """The replies of all runs by servo id."""
-    return {
-        servo: StatusPacket(servo, error, data.tobytes())
-        for run, (errors, block) in zip(runs, rows, strict=True)
-        for servo, error, data in zip(run.ids, errors.tolist(), block, strict=True)
-    }
 
 
 def _restuffed(packet_in: list[int], change: Any) -> list[int]:

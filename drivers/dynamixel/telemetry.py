@@ -12,13 +12,13 @@ from drivers.core.scale import Scale, Ticks
 from drivers.dynamixel.compiled_read import CompiledRead
 from drivers.dynamixel.frames import GoalFrame, Run
 from drivers.dynamixel.layout import layout_of
-from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Got, Packets, group_read
 from drivers.servos import telemetry
 from drivers.servos.exchange import Exchange
 from drivers.servos.layout import Block, ReadRequest, block_of
-from drivers.servos.telemetry import Octets, Rows, Values
+from drivers.servos.port import Port
+from drivers.servos.telemetry import Octets, Values
 from drivers.tables.tables import TRIPPED
 
 log = logging.getLogger(__name__)
@@ -115,21 +115,13 @@ class Telemetry(telemetry.Telemetry):
         suspects = self._port.suspects
         asked = [request.without(suspects) for request in requests] if suspects else requests
         asked = [request for request in asked if request.ids]
-        got: list[Rows] | Got = Exchange({}, (), False)
+        got: Got = Exchange({}, (), False)
         if asked:
             read = compiled.read if compiled else group_read(tuple([_run(request) for request in asked]), fast)
-            got = self._packets.read_rows(self._port, read, compiled)
-        if compiled is not None and compiled.state is not None:
-            self._joint_failures = 0
-            return
-        now = clock()
-        if isinstance(got, Exchange):
-            self._note_joint(got, fast)
-            self._accept(requests, got, now, running)
-            return
-        self._joint_failures = 0
-        for request, rows in zip(asked, got, strict=True):
-            self._take(request, rows, now, running)
+            got = self._packets.read_prepared(self._port, read, compiled)
+        self._note_joint(got, fast)
+        if compiled is None or compiled.state is None:
+            self._accept(requests, got, clock(), running)
 
     def _note_joint(self, got: Got, fast: bool) -> None:
         """Use plain reads when nobody answers fast ones, though they answer."""

@@ -105,7 +105,6 @@ def _crc_table(shifts: int) -> array[int]:
 
 
 _BYTES, _WORDS = _crc_table(8), _crc_table(16)
-_UNPACKERS = [struct.Struct(f">{n}H") for n in range(64)]
 
 
 def crc16(data: bytes | bytearray | memoryview, crc: int = 0) -> int:
@@ -115,8 +114,7 @@ def crc16(data: bytes | bytearray | memoryview, crc: int = 0) -> int:
     """
     words = _WORDS
     pairs, odd = divmod(len(data), 2)
-    unpack = _UNPACKERS[pairs] if pairs < 64 else struct.Struct(f">{pairs}H")
-    for word in unpack.unpack_from(data):
+    for word in struct.unpack_from(f">{pairs}H", data):
         crc = words[crc ^ word]
     if odd:
         crc = _BYTES[crc ^ data[-1] << 8]

@@ -65,7 +65,6 @@ class Protocol1Bus(ServoBus):
     MODELS: ClassVar[tuple[str, ...]]
     """A model of each series that the family has: their tables decode the identity of a servo that is found."""
     PACKETS: ClassVar[type[Exchanges]] = Exchanges
-    PORT: ClassVar[type[Port]] = Port
 
     def __init__(
         self,
@@ -83,7 +82,7 @@ class Protocol1Bus(ServoBus):
     ) -> None:
         super().__init__(servos, clock=clock)
         self.policy = Policy(**policy)
-        self._port = port if isinstance(port, Port) else self.PORT(port, baud, margin_s)
+        self._port = port if isinstance(port, Port) else Port(port, baud, margin_s)
         self._keep = watchdog_ms > 0 and os.name == "posix"
         self._switch: DeadManSwitch | None = None
         self._unkept, self._checked_s = False, 0.0

@@ -6,7 +6,7 @@ import logging
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +30,6 @@ FAILED_GREETINGS = 3
 Octets = NDArray[np.uint8]
 Values = Mapping[str, NDArray[np.int64]]
 """Values of k servos by short name, (k,) each."""
-
-
-class Rows(NamedTuple):
-    """Replies of k servos to one request, in its order: `errors` (k,) and `data` (k, size), uint8."""
-
-    errors: Octets
-    data: Octets
 
 
 class Telemetry(ABC):
@@ -219,12 +212,9 @@ class Telemetry(ABC):
                     self.report.count("refused", reply.id)
             if good:
                 data = np.frombuffer(b"".join([reply.params for reply in good]), np.uint8).reshape(len(good), -1)
-                rows = Rows(np.array([reply.error for reply in good], np.uint8), data)
-                self._take(request._replace(ids=tuple(reply.id for reply in good)), rows, now, running)
-
-    def _take(self, request: ReadRequest, rows: Rows, now: float, running: bool) -> None:
-        """Decode and store the replies of all servos of a request."""
-        self._store(request, request.block.decode(rows.data), rows.errors, now, running)
+                errors = np.array([reply.error for reply in good], np.uint8)
+                answered = request._replace(ids=tuple(reply.id for reply in good))
+                self._store(answered, request.block.decode(data), errors, now, running)
 
     def _store(self, request: ReadRequest, values: Values, errors: Octets, now: float, running: bool) -> None:
         """Store values and error bytes (k,) of the servos of a request."""

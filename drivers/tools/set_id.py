@@ -12,11 +12,11 @@ from typing import Any
 
 from drivers.base.bus import ServoInfo
 from drivers.base.errors import BusError, NoReply, ServoRefused
-from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers as Registers2
 from drivers.dynamixel.sdk import Packets
 from drivers.packets.packet import MAX_ID, Instruction
 from drivers.protocol1.registers import Registers as Registers1
+from drivers.servos.port import Port
 from drivers.servos.registers import Registers
 from drivers.tables.tables import FEETECH, load_table
 from drivers.tools.scan_protocol1 import identity, registers_on

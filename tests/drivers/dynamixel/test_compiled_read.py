@@ -80,7 +80,7 @@ def test_an_undisturbed_cycle_is_taken_and_gives_what_nobody_can_change(
 ) -> None:
     bus.read()
     with monkeypatch.context() as patch:
-        patch.setattr(Telemetry, "_take", None)  # a careful look would fail
+        patch.setattr(Telemetry, "_store", None)  # the general way would fail
         bus.write([0.1, 0.1, 0.1])
         first = bus.read()
         kept = first.position_rad.copy()

@@ -8,8 +8,8 @@ import dynamixel_sdk as bare
 import pytest
 
 from drivers.dynamixel.legacy import Packets1
-from drivers.dynamixel.port import Port
 from drivers.packets.packet1 import Error1
+from drivers.servos.port import Port
 from drivers.sim import SimulatedBus
 
 POSITION = 36

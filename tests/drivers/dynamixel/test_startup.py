@@ -325,7 +325,7 @@ def test_lost_answers_are_asked_for_again_when_switching_off(wire: VirtualBus) -
 
 def test_a_torque_that_does_not_come_on_leaves_nobody_on(wire: VirtualBus, monkeypatch: pytest.MonkeyPatch) -> None:
     wire.servo(7).latch(0x20)  # as if it happened after the check
-    monkeypatch.setattr(startup.Startup, "clear_faults", lambda *_: [])
+    monkeypatch.setattr(startup.Startup, "_clear_faults", lambda *_: [])
     error = refuses(wire, ServoFault, r'did not switch their motor on: "neck" \(id 7\) \(hardware error 0x20\)')
     assert error.servo_ids == (7,)
     assert torques(wire) == [False] * 3
