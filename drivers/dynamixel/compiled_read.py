@@ -74,7 +74,7 @@ class CompiledRead:
             self._places, self._fields, self._scales, self.axes, now_s, self._octets, self._known, self._out,
         ):  # fmt: skip
             return False
-        object.__setattr__(self._next, "time_s", now_s)  # frozen for everybody else
+        object.__setattr__(self._next, "time_s", now_s)  # frozen once it is handed out
         self.state = self._next
         return True
 

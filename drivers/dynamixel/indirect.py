@@ -74,7 +74,7 @@ def set_up(registers: Registers, ids: Sequence[int]) -> dict[int, Block]:
 
 
 def _write_pointers(registers: Registers, ids: Sequence[int], wanted: Pointers) -> list[int]:
-    """Write the pointers of servos with one packet, again where they do not read back; returns who has them."""
+    """Write pointers with one packet, again where they do not read back; returns the servos that have them."""
     packets, port, size = registers.packets, registers.port, len(wanted.values)
     done: list[int] = []
     for _ in range(_TRIES):

@@ -7,15 +7,15 @@ each has a test in tests/drivers/dynamixel/test_legacy.py that shows it on the b
 ====  ========================================================================================================
 S4    a reply must have the id **and the length** that was asked for, and a servo that missed its time must
       answer a greeting before it is asked for data again; the SDK takes any packet of the servo, so also the
-      adapter's echo of the question itself, whose parameters it then returns as register values
+      adapter's echo of the request itself, whose parameters it then returns as register values
 S5    ``is_using`` is reset on every way out of a transaction
 S10   the error flags of every reply are kept, also of bulk reads
 S11   packets with too little data are refused instead of failing in the checksum
 P1    ``GroupBulkRead`` works (4.1.0 hands ``bulkReadTx`` an argument too many for Protocol 1.0)
 ====  ========================================================================================================
 
-S1, S2 (stuffing), S14 and S15 (fast reads) do not exist in Protocol 1.0. S13: goals are sent by sync write, which
-nobody answers.
+S1, S2 (stuffing), S14 and S15 (fast reads) do not exist in Protocol 1.0. S13: goals are sent by sync write, which no
+servo answers.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Packets1(SdkExchanges[Packet1], Exchanges, protocol1_packet_handler.Protoc
         return [*encode(*reply)[:-1], 0]
 
     def readRx(self, port: Port, dxl_id: int, length: int) -> tuple[list[int], int, int]:
-        """The answer of one servo to a read or a bulk read: the next packet with its id and length (S4, S10)."""
+        """The reply of one servo to a read or a bulk read: the next packet with its id and length (S4, S10)."""
         while True:
             frame, result = self.rxPacket(port)
             if result != robotis_def.COMM_SUCCESS:

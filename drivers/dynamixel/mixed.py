@@ -33,7 +33,7 @@ class MixedBus(WireBus):
 
     Parameters
     ----------
-    servos : the servos in the order of all arrays; their models decide who is spoken to how.
+    servos : the servos in the order of all arrays; their models decide the protocol.
     options : see :class:`~drivers.dynamixel.bus.DynamixelBus` and :class:`~drivers.dynamixel.legacy.LegacyBus`.
     """
 

@@ -8,7 +8,7 @@ S1    transmitted packets are byte-stuffed (the SDK builds the stuffed packet an
 S2    unstuffing scans the bytes as received, so it is the inverse of stuffing
 S3    input left over from before is thrown away ahead of every instruction
 S4    a reply must have the id **and the length** that was asked for; a servo that missed its time must answer
-      a ping before it is asked for data again, so a late reply never answers another question
+      a ping before it is asked for data again, so a late reply never answers another request
 S5    ``is_using`` is reset on every way out of a transaction
 S6    everything an unplugged device raises becomes PortLost
 S7    the timeout is wire time plus a margin from the adapter's latency timer, not 34 ms
@@ -155,11 +155,11 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
         return list(head + reply.params + b"\0\0")
 
     def broadcastPing(self, port: Port) -> tuple[dict[int, list[int]], int]:
-        """Model number and firmware of everybody who answers, by id; waits without spinning (S12)."""
+        """Model number and firmware of all servos that answer, by id; waits without spinning (S12)."""
         found = {servo: [m[0] | m[1] << 8, m[2]] for servo, m in self.ping_all(port).items()}
         return found, robotis_def.COMM_SUCCESS if found else robotis_def.COMM_RX_TIMEOUT
 
-    # ------------------------------------------------------------------ exchanges the driver uses
+    # ------------------------------------------------------------------ transactions of the driver
 
     def encode(self, servo: int, code: int, params: bytes = b"") -> bytes:
         """The packet of an instruction."""

@@ -125,7 +125,7 @@ class Startup(startup.Startup[StatusPacket]):
     def _write_eeprom(self, servo: int, name: str, old: int, new: int) -> None:
         registers = self.registers
         registers.put(servo, "torque", 0)
-        registers.put(servo, name, new, tries=EEPROM_TRIES)  # it is deaf for a while after
+        registers.put(servo, name, new, tries=EEPROM_TRIES)  # it does not answer for a while after
         if registers.get(servo, name, tries=EEPROM_TRIES) != new:
             message = f"servo {registers.label(servo)} did not keep {registers.register_name(servo, name)} = {new}"
             raise self.registers.error(ServoRefused, message, "", servo)

@@ -24,7 +24,7 @@ from drivers.tables.tables import TRIPPED
 log = logging.getLogger(__name__)
 
 JOINT_FAILURES = 2
-"""Fast reads in a row that nobody answers before plain ones are used."""
+"""Fast reads in a row that no servo answers before plain ones are used."""
 
 
 class Telemetry(telemetry.Telemetry):
@@ -124,11 +124,11 @@ class Telemetry(telemetry.Telemetry):
             self._accept(requests, got, clock(), running)
 
     def _note_joint(self, got: Got, fast: bool) -> None:
-        """Use plain reads when nobody answers fast ones, though they answer."""
+        """Use plain reads when servos answer them, but no fast ones."""
         self._joint_failures = self._joint_failures + 1 if fast and got.joint_lost and got.replies else 0
         if self._joint_failures >= JOINT_FAILURES:
             self._fast = False
-            log.warning("nobody answers fast sync reads; using plain ones")
+            log.warning("no servo answers fast reads; using plain ones")
 
     # ------------------------------------------------------------------ replies
 

@@ -19,7 +19,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
     Attributes
     ----------
     longest : longest packet, in bytes, that its servos take.
-    refusals : flags of the error byte that say why an instruction was refused; the others are about the servo.
+    refusals : flags of the error byte that refuse an instruction; the others are about the servo's state.
     """
 
     status_size = STATUS_SIZE

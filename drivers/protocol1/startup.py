@@ -84,7 +84,7 @@ class Startup(startup.Startup[Packet1]):
         return number == expected.number or unknown
 
     def _greet(self, servo: int) -> Packet1:
-        """A servo's first registers; one that answers pings only is told to answer everything."""
+        """A servo's first registers; one that answers only pings is set to answer everything."""
         registers = self.registers
         try:
             return registers.hello(servo)
@@ -197,7 +197,7 @@ class Startup(startup.Startup[Packet1]):
         wanted = {"status_level": 1 if feetech else 2}
         low, high = registers.get(servo, "min_ticks"), registers.get(servo, "max_ticks")
         if low == high == 0:
-            wanted["max_ticks"] = last  # it would turn for ever
+            wanted["max_ticks"] = last  # it would turn without end
         elif low == high == last:
             wanted["min_ticks"] = 0  # MX: several turns
         if registers.item(servo, "mode"):
@@ -216,7 +216,7 @@ class Startup(startup.Startup[Packet1]):
         registers = self.registers
         for _ in range(tries):
             registers.put_unanswered(servo, name, value)
-            if registers.get(servo, name, tries) == value:  # it hears nothing for a while after a permanent write
+            if registers.get(servo, name, tries) == value:  # it does not answer for a while after a permanent write
                 return
         message = f"servo {registers.label(servo)} did not take {registers.register_name(servo, name)} = {value}"
         hint = "switch its power off and on: a locked servo opens only then"

@@ -37,7 +37,7 @@ class Exchange(NamedTuple, Generic[R]):
     replies : by servo id; only those with the right sender, length and checksum.
     missing : ids that were asked and are not in ``replies``.
     corrupt : True when damaged bytes arrived too, so that a missing reply may have been one of them.
-    joint_lost : True when nobody answered a fast read, whoever answered the plain one after it.
+    joint_lost : True when no servo answered a fast read, whatever the plain read after it brought.
     """
 
     replies: dict[int, R]

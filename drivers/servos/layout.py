@@ -65,7 +65,7 @@ class Block:
 
     @cached_property
     def size(self) -> int:
-        """Bytes to read. Never as many as the answer to a greeting has, see ``Exchanges.hello``."""
+        """Bytes to read. Never as many as the reply to a greeting has, see ``Exchanges.hello``."""
         return max(item.end for item in self.items.values()) - self.address
 
     @cached_property

@@ -158,12 +158,12 @@ class Telemetry(ABC):
             self._slow_state = tuple(read_only(array.copy()) for array in slow)
         return self._slow_state
 
-    # ------------------------------------------------------------------ who answers
+    # ------------------------------------------------------------------ silent servos
 
     def _revive(self, now: float) -> None:
         """Greet servos that missed a reply: at once the first time, then one silent servo a second."""
         suspects, failed = self._port.suspects, 0
-        for servo in [i for i in self._silent if i not in suspects]:  # it answered another question, as in recover()
+        for servo in [i for i in self._silent if i not in suspects]:  # it answered another request, as in recover()
             self._silent.remove(servo)
             self._returned(servo)
         for servo in [i for i in self.ids if i in suspects and i not in self._silent]:
@@ -255,7 +255,7 @@ class Telemetry(ABC):
         self._torque[where] = now_on
         for servo in [servo for servo, off in zip(ids, lost, strict=True) if off and running]:
             self.report.count("torque_lost", servo)
-            self._log("servo %s let go: its torque is off", self._registers.label(servo))
+            self._log("servo %s switched its torque off by itself", self._registers.label(servo))
 
 
 def make_state(

@@ -99,7 +99,7 @@ class ControlTable(Mapping[str, Item]):
     Attributes
     ----------
     model, number, firmware : ``"xl330-m288"``, 1200, 52.
-    protocol : 1 or 2: the framing it speaks.
+    protocol : 1 or 2: its framing.
     group_read : how many servos are read at once with Protocol 1.0 framing: ``"sync"``, ``"bulk"``, or ``""`` for
         one by one.
     lock : what closes the EEPROM to writes: ``"torque"``, or ``"Lock"`` for the register of that name.

@@ -1,4 +1,4 @@
-"""Set the id of a servo of either protocol, the one permanent change that a bus cannot be run without.
+"""Set the id of a servo of either protocol.
 
 Nothing is written before the servo has answered, the new id has proved free and the motor is off.
 """
@@ -87,7 +87,7 @@ def set_id(port: str, baud: int, protocol: int, old: int, new: int, *, release: 
     with _registers(port, baud, protocol) as registers:
         info = _find(registers, old)
         if info is None:
-            message = f"nobody has the id {old} on {port} at {baud} baud"
+            message = f"no servo has the id {old} on {port} at {baud} baud"
             raise NoReply(message, hint=f"omote scan {port}", port=port, servo_ids=(old,))
         taken = _find(registers, new) if new != old else None
         if taken is not None:
@@ -104,7 +104,7 @@ def set_id(port: str, baud: int, protocol: int, old: int, new: int, *, release: 
         changed = _await(registers, new)
         if changed is None or changed.model_number != info.model_number:
             message = f"servo {old} on {port} did not take the id {new}"
-            raise _error(message, "`omote scan` shows who is there", port, old)
+            raise _error(message, "`omote scan` lists the servos", port, old)
         if locks and changed.model.startswith(FEETECH):  # an AX opens only without power
             _write(registers, new, "Lock", 1)
         return changed

@@ -63,7 +63,7 @@ def _switch_on(bus: SimulatedBus, model: str) -> None:
 
 @pytest.mark.parametrize("protocol", [1, 2])
 def test_nobody_there_is_told_with_the_next_step(protocol: int) -> None:
-    with SimulatedBus([1]) as bus, pytest.raises(NoReply, match="nobody has the id 9") as caught:
+    with SimulatedBus([1]) as bus, pytest.raises(NoReply, match="no servo has the id 9") as caught:
         set_id(bus.path, 1_000_000, protocol, 9, 2)
     assert "omote scan" in caught.value.hint
 
