@@ -18,7 +18,7 @@ MODELS = {"xl330-m288": "dynamixel", "mx1-28": "dynamixel", "ax-12a": "dynamixel
 
 @pytest.fixture(params=MODELS)
 def wire(request: pytest.FixtureRequest) -> VirtualBus:
-    servos = [replace(servo, model=request.param) for servo in SERVOS]
+    servos = [replace(servo, model=request.param, max_speed_rad_s=1.5) for servo in SERVOS]
     return VirtualBus(servos, MODELS[request.param], driver={"margin_s": 0.05, "watchdog_ms": 0})
 
 
@@ -42,6 +42,7 @@ def test_a_port_is_open_between_open_and_close(wire: VirtualBus) -> None:
 
 def test_recovery_begins_where_the_servo_is_and_leaves_the_others_alone(wire: VirtualBus, bus: Bus) -> None:
     settle(bus, [0.1, 0.1, 0.1], 0.02)
+    wire.clock.sleep(0.5)
     others = [wire.servo(i).position_ticks for i in (1, 7)]
     wire.servo(2).put("Torque Enable", 0)
     read_until(bus, lambda state: not state.torque[1])
