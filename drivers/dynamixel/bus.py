@@ -38,22 +38,16 @@ class DynamixelBus(ServoBus):
 
     Parameters
     ----------
-    servos : the servos in the order of all arrays.
-    port : device path; ``/dev/serial/by-id/...`` survives a replug.
-    baud : rate on the wire.
+    servos, port, baud, margin_s, clock : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
     feedback : ``"full"`` reads velocity and current with every position, and by indirect addressing temperature,
         hardware error, torque and watchdog too; ``"position"`` reads only the position.
     fast : use fast reads where every servo's firmware has them.
     indirect : use indirect addressing where the model has it.
-    margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
     slow_group : servos asked at once for what is not in the feedback (supply, and torque, error and watchdog where
         they are not), so that each is asked every half second; 0 asks only about servos that raise an alert.
-    clock : monotonic seconds.
     policy : fields of :class:`~drivers.dynamixel.startup.Policy`, such as ``watchdog_ms``.
 
-    Raises
-    ------
-    DriverError : unknown model, or an option that does not fit.
+    Raises DriverError for an unknown model or an option that does not fit.
     """
 
     _port: Port
@@ -81,7 +75,7 @@ class DynamixelBus(ServoBus):
         self._tables([load_table(servo.model) for servo in self.servos])
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, fast, slow_group)
         self._may_map = indirect and feedback == "full"
-        self._mapped: dict[int, Block] = {}
+        self._group({})
         self._remapped: Counter[int] = Counter()
         self._goals = np.zeros(len(self.ids), np.int32)
         self._heard_s = 0.0

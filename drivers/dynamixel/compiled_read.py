@@ -23,8 +23,7 @@ class CompiledRead:
 
     Parameters
     ----------
-    requests : what they are asked, each servo once.
-    read : the packet that asks it.
+    requests, read : the blocks to read, each servo once, and the packet that asks for them.
     octets, known : measurements of the servos, see ``drivers.core.kernels.take_replies``.
     axes : of their ``Scale``.
     slow_values : returns error, supply, temperature, hardware error and torque, (n,) each, read-only.

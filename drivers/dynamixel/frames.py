@@ -71,10 +71,7 @@ class Run(NamedTuple):
 class GroupRead:
     """A read of many servos that is sent repeatedly: one sync read, or a bulk read where addresses differ.
 
-    Parameters
-    ----------
-    runs : servos with the registers that are read.
-    fast : all of them answer in one joint packet.
+    Where it is `fast`, all of them answer in one joint packet.
 
     Attributes
     ----------

@@ -49,15 +49,9 @@ def pointers_of(table: ControlTable) -> Pointers | None:
 
 
 def set_up(registers: Registers, ids: Sequence[int]) -> dict[int, Block]:
-    """Set the pointers of servos that can have them, and read them back.
+    """Set the pointers of servos and read them back; returns the block to read by id.
 
-    Returns
-    -------
-    dict : the block to read, by id; servos that have no indirect area, refuse or do not answer are left out.
-
-    Raises
-    ------
-    PortLost
+    Servos that have no indirect area, refuse or do not answer are left out. Raises PortLost.
     """
     done: dict[int, Block] = {}
     groups: dict[tuple[object, ...], list[int]] = {}

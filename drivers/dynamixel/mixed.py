@@ -19,7 +19,7 @@ from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.core.wirebus import WireBus
 from drivers.dynamixel.bus import DynamixelBus
 from drivers.dynamixel.legacy import LegacyBus
-from drivers.protocol1.bus import LAST_ID
+from drivers.packets.packet import MAX_ID
 from drivers.tables.tables import load_table
 
 ONLY_LEGACY = {"singles", "torque_limit"}
@@ -89,7 +89,7 @@ class MixedBus(WireBus):
             found: dict[int, ServoInfo] = {}
             if ids is None:
                 found = {info.id: info for info in self._new.discover()}
-                ids = range(LAST_ID + 1)
+                ids = range(MAX_ID + 1)
             for half, chosen in [(half, half.ids) for half in self._halves] + [(half, ids) for half in self._halves]:
                 missing = [servo for servo in ids if servo in chosen and servo not in found]
                 if missing:

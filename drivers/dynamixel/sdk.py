@@ -190,9 +190,7 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
     def read_prepared(self, port: Port, group: GroupRead, compiled: CompiledRead | None = None) -> Got:
         """Send a group read and collect the replies. None of its servos may be in ``port.suspects``.
 
-        Parameters
-        ----------
-        compiled : takes the replies where they are as expected; then they are not returned.
+        Replies that `compiled` takes, because they are as expected, are not returned.
         """
         port.suspects.update(group.wanted)  # until they have answered, so also when this is interrupted
         self.send(port, group.frame)

@@ -25,12 +25,7 @@ EEPROM_TRIES = 10
 
 @dataclass(frozen=True)
 class Policy(startup.Policy):
-    """What start-up may do.
-
-    Attributes
-    ----------
-    watchdog_ms : a servo stops by itself when it receives nothing for so long; 0 switches that off.
-    """
+    """What start-up may do. A servo that receives nothing for `watchdog_ms` stops by itself; 0 switches that off."""
 
     watchdog_ms: int = 200
 
@@ -41,13 +36,7 @@ class Policy(startup.Policy):
 
 
 class Startup(startup.Startup[StatusPacket]):
-    """Start-up and stop sequence.
-
-    Parameters
-    ----------
-    registers, policy : see :class:`~drivers.servos.startup.Startup`.
-    indirect : map registers side by side where the models have indirect addressing.
-    """
+    """Start-up and stop sequence; `indirect` maps registers side by side where the models have indirect addressing."""
 
     out_of_turn_hint = "clear its homing offset and turn count: switch its power off and on"
     not_on_hint = "switch their power off and on, or start with reboot_faulted=true"
@@ -79,10 +68,14 @@ class Startup(startup.Startup[StatusPacket]):
         return super().bring_up(servos)
 
     def _clear_faults(self, ids: Sequence[int]) -> list[int]:
-        """Reboot servos with a latched error where that is allowed; input voltage alone is ignored."""
+        """Reboot servos with a latched error where that is allowed; input voltage alone may be ignored."""
         registers = self.registers
         latched = registers.get_all(ids, "hardware")
-        bad = {servo: bits for servo, bits in latched.items() if bits and not self._passable(servo, bits)}
+        bad = {
+            servo: bits
+            for servo, bits in latched.items()
+            if bits and (bits != INPUT_VOLTAGE or registers.get(servo, "shutdown") & INPUT_VOLTAGE)
+        }
         if not bad:
             return []
         if not self.policy.reboot_faulted:
@@ -97,10 +90,6 @@ class Startup(startup.Startup[StatusPacket]):
         if still:
             raise self.fault("latched", still)
         return list(bad)
-
-    def _passable(self, servo: int, bits: int) -> bool:
-        """Input voltage alone, where it does not switch the motor off."""
-        return bits == INPUT_VOLTAGE and not self.registers.get(servo, "shutdown") & INPUT_VOLTAGE
 
     def _write_settings(self, servo: int, held: bool) -> None:
         """Operating mode, drive mode and return delay: read, and written only where they differ."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from drivers.dynamixel.sdk import Got, Packets, group_read
 from drivers.servos import telemetry
 from drivers.servos.exchange import Exchange
 from drivers.servos.layout import Block, ReadRequest, block_of
-from drivers.servos.port import Port
 from drivers.servos.telemetry import Octets, Values
 from drivers.tables.tables import TRIPPED
 
@@ -32,7 +31,6 @@ class Telemetry(telemetry.Telemetry):
 
     Parameters
     ----------
-    registers, ids, report, slow_group : see :class:`~drivers.servos.telemetry.Telemetry`.
     feedback, fast : see :class:`~drivers.dynamixel.bus.DynamixelBus`.
 
     Attributes
@@ -45,7 +43,6 @@ class Telemetry(telemetry.Telemetry):
     checked_first = frozenset({"hardware", "torque", "watchdog"})
 
     _packets: Packets
-    _port: Port
 
     def __init__(
         self, registers: Registers, ids: Sequence[int], report: BusReport, feedback: str, fast: bool, slow_group: int
@@ -54,14 +51,11 @@ class Telemetry(telemetry.Telemetry):
         self._feedback, self._may_be_fast = feedback, fast
         self.tripped: set[int] = set()
         self.unmapped: set[int] = set()
-        self.rebuild()
 
-    def rebuild(self, indirect: Mapping[int, Block] = {}) -> None:
-        """Group the servos by their control tables, and forget their positions and who was silent.
+    def rebuild(self, indirect: Mapping[int, Block]) -> None:
+        """Group the servos by their control tables, and forget their positions.
 
-        Parameters
-        ----------
-        indirect : by id, the block that is read through pointers that were set up.
+        `indirect` holds, by id, the block that is read through pointers that were set up.
         """
         tables = self._registers.tables
         self._regroup([layout_of(tables[servo], self._feedback, indirect.get(servo)) for servo in self.ids])
@@ -95,7 +89,7 @@ class Telemetry(telemetry.Telemetry):
         """The usual read of all servos in one go."""
         compiled = self._compiled
         if compiled is None or compiled.axes is not scale.axes or compiled.read.fast != self._fast:
-            read = group_read(tuple([_run(request) for request in self._feedbacks]), self._fast)
+            read = group_read(_runs(self._feedbacks), self._fast)
             compiled = CompiledRead(self._feedbacks, read, self._octets, self._known, scale.axes, self._slow_values)
             self._compiled = compiled
         return compiled
@@ -117,7 +111,7 @@ class Telemetry(telemetry.Telemetry):
         asked = [request for request in asked if request.ids]
         got: Got = Exchange({}, (), False)
         if asked:
-            read = compiled.read if compiled else group_read(tuple([_run(request) for request in asked]), fast)
+            read = compiled.read if compiled else group_read(_runs(asked), fast)
             got = self._packets.read_prepared(self._port, read, compiled)
         self._note_joint(got, fast)
         if compiled is None or compiled.state is None:
@@ -158,5 +152,5 @@ class Telemetry(telemetry.Telemetry):
         return mapped
 
 
-def _run(request: ReadRequest) -> Run:
-    return Run(request.ids, request.block.address, request.block.size)
+def _runs(requests: Iterable[ReadRequest]) -> tuple[Run, ...]:
+    return tuple([Run(ids, block.address, block.size) for _, block, ids in requests])

@@ -13,9 +13,7 @@ from drivers.tables.tables import check_feetech
 class FeetechBus(Protocol1Bus):
     """Feetech servos on one serial port; options as for :class:`~drivers.protocol1.bus.Protocol1Bus`.
 
-    Raises
-    ------
-    DriverError : a model that is not Feetech's, or an option that does not fit.
+    Raises DriverError for a model that is not Feetech's or an option that does not fit.
     """
 
     MODELS = ("sts3215", "scs0009")

@@ -146,17 +146,11 @@ def _encode(device_id: int, instruction: int, params: bytes) -> bytes:
 
 
 def encode_instruction(device_id: int, instruction: int, params: bytes = b"") -> bytes:
-    """One instruction packet, stuffed and with its CRC.
-
-    Parameters
-    ----------
-    device_id : 0 to 252, or `BROADCAST_ID`.
-    instruction : an `Instruction`.
-    params : bytes after INST, not stuffed.
+    """One instruction packet, stuffed and with its CRC; `params` are the bytes after INST, not stuffed.
 
     Raises
     ------
-    ValueError : an id no packet can carry.
+    ValueError : an id other than 0 to 252 and `BROADCAST_ID`.
     """
     if not 0 <= device_id <= BROADCAST_ID or device_id == 0xFD:
         raise ValueError(f"device_id {device_id}: a packet carries 0-252, or 254 for all")
@@ -175,11 +169,9 @@ def encode_fast_head(lengths: Sequence[int]) -> bytes:
 
 
 def encode_fast_part(device_id: int, error: int, data: bytes, crc: int) -> tuple[bytes, int]:
-    """One device's part of a joint reply, unstuffed, and the CRC to carry on from.
+    """One device's part of a joint reply, unstuffed, and the CRC of the reply up to its end.
 
-    Parameters
-    ----------
-    crc : CRC of all bytes of the reply before this part, earlier devices' CRCs included.
+    `crc` is that of all bytes of the reply before this part, earlier devices' CRCs included.
     """
     part = bytes((error, device_id)) + data
     crc = crc16(part, crc)
@@ -197,11 +189,7 @@ def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusP
     Parameters
     ----------
     data : received bytes; anything before the joint packet's header is skipped.
-    devices : (id, bytes read) in request order.
-
-    Returns
-    -------
-    list of StatusPacket : the devices whose id and CRC are right, in request order.
+    devices : (id, bytes read) in request order; so are the replies, of devices whose id and CRC are right.
     """
     head = encode_fast_head([length for _, length in devices])
     start = data.find(head)

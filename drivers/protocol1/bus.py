@@ -18,6 +18,7 @@ import numpy as np
 from drivers.base.bus import BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
 from drivers.base.errors import DriverError
 from drivers.core.dead_man_switch import DeadManSwitch
+from drivers.packets.packet import MAX_ID
 from drivers.port.serialport import SerialPort
 from drivers.protocol1 import startup
 from drivers.protocol1.exchange import Exchanges
@@ -31,7 +32,6 @@ from drivers.tables.tables import ControlTable, load_table
 
 log = logging.getLogger(__name__)
 
-LAST_ID = 252
 SWITCH_CHECK_S = 1.0
 """Time between two checks of whether the dead man's switch still runs."""
 
@@ -54,9 +54,7 @@ class Protocol1Bus(ServoBus):
     clock : monotonic seconds.
     policy : fields of :class:`~drivers.protocol1.startup.Policy`, such as ``torque_limit``.
 
-    Raises
-    ------
-    DriverError : unknown model, or an option that does not fit.
+    Raises DriverError for an unknown model or an option that does not fit.
     """
 
     _registers: Registers
@@ -97,7 +95,7 @@ class Protocol1Bus(ServoBus):
         """Servos that answer; ``ids`` None asks every id by itself, which takes a while (nothing better is safe)."""
         with self._losing():
             found = []
-            for servo in range(LAST_ID + 1) if ids is None else ids:
+            for servo in range(MAX_ID + 1) if ids is None else ids:
                 reply = self._registers.packets.hello(self._port, servo).replies.get(servo)
                 if reply is not None:
                     found.append(self._info(servo, *startup.identity(reply, map(load_table, self.MODELS))))

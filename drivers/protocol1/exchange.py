@@ -10,8 +10,6 @@ from drivers.servos import exchange
 from drivers.servos.exchange import Exchange
 from drivers.servos.port import Port
 
-STATUS_SIZE = 6
-
 
 class Exchanges(exchange.Exchanges[Packet1]):
     """Transactions of a driver.
@@ -22,7 +20,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
     refusals : flags of the error byte that refuse an instruction; the others are about the servo's state.
     """
 
-    status_size = STATUS_SIZE
+    status_size = 6
     number_size = 1
     refusals = 0
     reader = Reader1

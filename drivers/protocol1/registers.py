@@ -14,12 +14,7 @@ from drivers.tables.tables import ControlTable, Item
 
 
 class Registers(registers.Registers[Packet1]):
-    """Registers by servo id and short name; parameters as for :class:`~drivers.servos.registers.Registers`.
-
-    Attributes
-    ----------
-    flags : error byte of the last reply by id.
-    """
+    """Registers by servo id and short name; `flags` holds the error byte of the last reply by id."""
 
     greeting = "a greeting"
     packets: Exchanges

@@ -30,12 +30,7 @@ UNNUMBERED = 0x10000
 
 @dataclass(frozen=True)
 class Policy(startup.Policy):
-    """What start-up may do.
-
-    Attributes
-    ----------
-    torque_limit : share of the stall torque that motors may give, above 0 to 1; None leaves it as it is.
-    """
+    """What start-up may do. `torque_limit` is the share of the stall torque, above 0 to 1; None leaves it as it is."""
 
     torque_limit: float | None = None
 
@@ -131,9 +126,7 @@ class Startup(startup.Startup[Packet1]):
         registers, bad = self.registers, {}
         for servo in ids:
             bits = registers.causes(servo, registers.flags.get(servo, 0))
-            if bits == Error1.INPUT_VOLTAGE and not registers.get(servo, "shutdown") & bits:
-                continue
-            if bits:
+            if bits and (bits != Error1.INPUT_VOLTAGE or registers.get(servo, "shutdown") & bits):
                 bad[servo] = bits
         return bad
 
@@ -209,9 +202,7 @@ class Startup(startup.Startup[Packet1]):
     def _write_surely(self, servo: int, name: str, value: int, tries: int) -> None:
         """Write until it reads back, without depending on replies to writes, which a servo may not send.
 
-        Raises
-        ------
-        ServoRefused : it keeps another value. NoReply, CorruptReply
+        Raises ServoRefused where it keeps another value.
         """
         registers = self.registers
         for _ in range(tries):

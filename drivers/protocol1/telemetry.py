@@ -20,12 +20,9 @@ FULL = ("position", "velocity", "load", "voltage", "temperature", "hardware", "m
 
 
 def layout_of(table: ControlTable, feedback: str = "full") -> Layout:
-    """Layout of a control table. The goal's block has time and speed too, where they lie beside it.
+    """Layout of a control table; `feedback` ``"full"`` reads all measurements, ``"position"`` position and speed.
 
-    Parameters
-    ----------
-    table : the model's.
-    feedback : ``"full"`` reads everything that is measured, ``"position"`` position and speed only.
+    The goal's block has time and speed too, where they lie beside it.
     """
     feetech = item_of(table, "hardware") is not None  # Dynamixel reports errors in the error byte
     full: tuple[str, ...] = FULL if feetech else FULL[:5]
@@ -38,13 +35,7 @@ def layout_of(table: ControlTable, feedback: str = "full") -> Layout:
 
 
 class GoalRows:
-    """Rows of the sync write that sends goals to a group.
-
-    Parameters
-    ----------
-    group : k servos.
-    speeds : (k,) steps of their speed registers that a goal may be approached with.
-    """
+    """Rows of the sync write that sends goals to a group, each with the speed (k,) to approach it, in steps."""
 
     def __init__(self, group: Group, speeds: Sequence[int]) -> None:
         self.block, self._index = group.layout.goal, group.index
@@ -65,7 +56,6 @@ class Telemetry(telemetry.Telemetry):
 
     Parameters
     ----------
-    registers, ids, report, slow_group : see :class:`~drivers.servos.telemetry.Telemetry`.
     feedback, singles : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
 
     Attributes
@@ -85,12 +75,7 @@ class Telemetry(telemetry.Telemetry):
         self.moving = np.zeros(len(self.ids), bool)
 
     def rebuild(self, speeds: Mapping[int, int]) -> None:
-        """Group the servos by their control tables, and forget their positions and who was silent.
-
-        Parameters
-        ----------
-        speeds : by id, steps of the speed register that goals are approached with.
-        """
+        """Group the servos by their control tables, and forget their positions; `speeds` of goals in steps by id."""
         self._regroup([layout_of(self._registers.tables[servo], self._feedback) for servo in self.ids])
         self._goals = [GoalRows(group, [speeds[servo] for servo in group.ids]) for group in self._groups]
         self._next_single = dict.fromkeys(self._groups, 0)

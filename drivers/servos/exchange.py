@@ -129,11 +129,8 @@ class Exchanges(ABC, Generic[R]):
     def read_group(self, port: Port, ids: Sequence[int], address: int, size: int, manner: str = "sync") -> Exchange[R]:
         """Read the same registers of many servos, keeping every reply that arrived.
 
-        Servos in ``port.suspects`` are not asked and count as missing until they answered :meth:`revive`.
-
-        Parameters
-        ----------
-        manner : how, as the protocol names it, such as ``"sync"``.
+        Servos in ``port.suspects`` are not asked and count as missing until they answered :meth:`revive`. `manner` is
+        the protocol's name of the kind of read, such as ``"sync"``.
         """
         left_out = tuple(servo for servo in ids if servo in port.suspects)
         asked = tuple(servo for servo in ids if servo not in left_out)
@@ -148,16 +145,9 @@ class Exchanges(ABC, Generic[R]):
             self.send_only(port, frame)
 
     def group_frames(self, address: int, size: int, rows: bytes) -> list[bytes]:
-        """Sync writes of some registers of many servos.
+        """Sync writes of `size` bytes from `address` of many servos.
 
-        Parameters
-        ----------
-        address, size : the registers.
-        rows : for each servo its id and `size` bytes, concatenated.
-
-        Raises
-        ------
-        ValueError : `rows` does not hold whole rows.
+        `rows` holds for each servo its id and its bytes; raises ValueError where they are not whole rows.
         """
         width = size + 1
         if not rows or len(rows) % width:
@@ -173,12 +163,7 @@ class Exchanges(ABC, Generic[R]):
     # ------------------------------------------------------------------ on the wire
 
     def exchange(self, port: Port, frame: bytes, wanted: Mapping[int, int]) -> Exchange[R]:
-        """Send a packet and collect the replies to it.
-
-        Parameters
-        ----------
-        wanted : data bytes expected, by servo id, in the order of the replies.
-        """
+        """Send a packet and collect the replies; `wanted`: data bytes expected by servo id, in the replies' order."""
         size = len(wanted) * self.status_size + sum(wanted.values())
         port.suspects.update(wanted)  # until they have answered, so also when this is interrupted
         self.send(port, frame)
@@ -214,10 +199,7 @@ class Exchanges(ABC, Generic[R]):
 class _Sorter(Generic[R]):
     """Sorts replies into those asked for and strays; two under one id are both discarded.
 
-    Parameters
-    ----------
-    wanted : data bytes expected, by servo id.
-    refusals : bits of the error byte with which a reply may be without them.
+    `wanted` holds the data bytes expected by servo id, `refusals` the error bits with which a reply may lack them.
     """
 
     def __init__(self, wanted: Mapping[int, int], refusals: int) -> None:

@@ -123,11 +123,9 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self.link.write(packet)
 
     def more(self, missing: int) -> bytes:
-        """The next bytes of a reply that lacks so many: sleeps while the wire carries them, and polls at the end.
+        """The next bytes of a reply that lacks so many, empty when none came until the deadline.
 
-        Returns
-        -------
-        bytes : empty when none came until the deadline.
+        It sleeps while the wire carries them, and polls at the end.
         """
         due_s = min(self.clock() + missing * self._byte_s, self.deadline_s)
         pause = due_s - WAKE_EARLY_S - self.clock()

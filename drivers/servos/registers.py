@@ -22,14 +22,10 @@ E = TypeVar("E", bound=DriverError)
 class Registers(ABC, Generic[R]):
     """Registers by servo id and short name (see ``layout.NAMES``); a protocol implements the hooks.
 
-    Parameters
-    ----------
-    packets, port : the wire.
-    servos : by id, for messages.
-
     Attributes
     ----------
     tables : control table by id.
+    names : names of servos by id, for messages.
     greeting : what error messages call the request of :meth:`hello`.
     """
 
@@ -47,8 +43,7 @@ class Registers(ABC, Generic[R]):
         """Why a servo refused what it was asked; empty where it did not."""
 
     def span(self, table: ControlTable, item: Item) -> tuple[int, int, str]:
-        """(address, size, manner) of the read that contains a register, see ``Exchanges.read_group``; manner empty: one
-        servo after the other."""
+        """(address, size, manner) of the read that contains a register, see ``Exchanges.read_group``."""
         return item.address, item.size, "sync"
 
     def title(self, item: Item, name: str) -> str:
@@ -87,21 +82,11 @@ class Registers(ABC, Generic[R]):
     # ------------------------------------------------------------------ one servo
 
     def hello(self, servo: int, tries: int = TRIES) -> R:
-        """A servo's reply to a greeting.
-
-        Raises
-        ------
-        NoReply, CorruptReply
-        """
+        """A servo's reply to a greeting; raises NoReply or CorruptReply."""
         return self._with_retries(servo, self.greeting, partial(self.packets.hello, self.port, servo), tries)
 
     def get(self, servo: int, name: str, tries: int = TRIES) -> int:
-        """One register.
-
-        Raises
-        ------
-        NoReply, CorruptReply, ServoRefused
-        """
+        """One register; raises NoReply, CorruptReply or ServoRefused."""
         item = self._known(servo, name)
         at, size, _ = self.span(self.tables[servo], item)
         ask = partial(self.packets.read, self.port, servo, at, size)
@@ -109,12 +94,7 @@ class Registers(ABC, Generic[R]):
         return item.decode(reply.params[item.address - at :])
 
     def put(self, servo: int, name: str, value: int, tries: int = TRIES) -> None:
-        """Write one register and wait for the servo's status.
-
-        Raises
-        ------
-        NoReply, CorruptReply, ServoRefused
-        """
+        """Write one register and wait for the servo's status; raises as :meth:`get` does."""
         item = self._known(servo, name)
         ask = partial(self.packets.write, self.port, servo, item.address, item.encode(value))
         self._with_retries(servo, f"writing {self.title(item, name)} = {value}", ask, tries)
@@ -127,13 +107,7 @@ class Registers(ABC, Generic[R]):
     def info(self, servo: int, number: int, firmware: int, find_table: Callable[[], ControlTable]) -> ServoInfo:
         """Description of a servo; without measurements where its model is unknown or it stops answering.
 
-        Parameters
-        ----------
-        find_table : returns its control table or raises DriverError.
-
-        Raises
-        ------
-        PortLost
+        `find_table` returns its control table or raises DriverError. Raises PortLost.
         """
         try:
             table = self.tables[servo] = find_table()
@@ -184,12 +158,7 @@ class Registers(ABC, Generic[R]):
         return [frame for key, rows in groups.items() for frame in self.packets.group_frames(*key, rows)]
 
     def set_all(self, values: Mapping[int, int], name: str) -> None:
-        """Write one register of many servos and make sure that each has it.
-
-        Raises
-        ------
-        NoReply, CorruptReply, ServoRefused
-        """
+        """Write one register of many servos and make sure that each has it; raises as :meth:`get` does."""
         self.put_all(values, name)
         has = self.get_all(list(values), name)
         self.each(

@@ -69,11 +69,6 @@ class Started:
 class Startup(ABC, Generic[R]):
     """The steps of start-up and stop; a protocol implements the hooks.
 
-    Parameters
-    ----------
-    registers : the wire and its servos.
-    policy : what start-up may do.
-
     Attributes
     ----------
     started : what was found and done.
@@ -115,9 +110,7 @@ class Startup(ABC, Generic[R]):
     def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
         """Look at hardware errors; returns servos that were rebooted.
 
-        Raises
-        ------
-        ServoFault : a servo has an error, and the policy does not allow to bring it back.
+        Raises ServoFault where a servo has an error and the policy does not allow to bring it back.
         """
 
     @abstractmethod
@@ -144,10 +137,7 @@ class Startup(ABC, Generic[R]):
     def identify(self, servos: Sequence[ServoSpec]) -> None:
         """Greet every servo, compare its model and load its control table.
 
-        Raises
-        ------
-        NoReply, CorruptReply : some did not answer.
-        WrongModel : one is not the configured model.
+        Raises WrongModel where one is not the configured model; NoReply or CorruptReply where some did not answer.
         """
         replies = self.registers.each([servo.id for servo in servos], self._greet)
         wrong: dict[int, BusError] = {}
@@ -167,9 +157,7 @@ class Startup(ABC, Generic[R]):
     def bring_up(self, servos: Sequence[ServoSpec]) -> Started:
         """Start identified servos where they are.
 
-        Raises
-        ------
-        BusError : something is not as it must be; torque was switched off again where it had been switched on.
+        Raises BusError where that is not safe; torque was switched off again where it had been switched on.
         """
         ids = [servo.id for servo in servos]
         held = self.take_over(ids)
@@ -178,7 +166,7 @@ class Startup(ABC, Generic[R]):
         for servo in ids:
             self._write_settings(servo, servo in held and servo not in rebooted)
         low, high = self.registers.get_all(ids, "min_ticks"), self.registers.get_all(ids, "max_ticks")
-        self.started.limits = {servo: (low[servo], high[servo]) for servo in ids if servo in low and servo in high}
+        self.started.limits = {servo: (low[servo], high[servo]) for servo in low}
         self._prepare(servos)
         try:
             self.torque_on(ids)
@@ -207,9 +195,7 @@ class Startup(ABC, Generic[R]):
     def wait_for_voltage(self, ids: Sequence[int]) -> None:
         """Wait for the supply: switching torque on while it ramps up latches input-voltage errors.
 
-        Raises
-        ------
-        ServoFault : it stays too low.
+        Raises ServoFault where it stays too low.
         """
         registers, least_v = self.registers, self.policy.min_voltage_v
         need = self._least_voltage(ids)

@@ -26,7 +26,6 @@ PROBE_S = 1.0
 FAILED_GREETINGS = 3
 """Greetings without an answer that one cycle may wait for."""
 
-
 Octets = NDArray[np.uint8]
 Values = Mapping[str, NDArray[np.int64]]
 """Values of k servos by short name, (k,) each."""
@@ -37,9 +36,7 @@ class Telemetry(ABC):
 
     Parameters
     ----------
-    registers : the wire and the control tables.
     ids : n servo ids in the order of all arrays.
-    report : counters to add to.
     slow_group : servos that are asked at once for a slow value; 0 asks only servos that raise an alert.
 
     Attributes
@@ -85,12 +82,7 @@ class Telemetry(ABC):
     # ------------------------------------------------------------------ every cycle
 
     def _regroup(self, layouts: Sequence[Layout]) -> None:
-        """Group servos with equal layouts, and forget where they are: they may have been moved since.
-
-        Parameters
-        ----------
-        layouts : n, in the order of the servos.
-        """
+        """Group servos by their n layouts, and forget where they are: they may have been moved since."""
         members: dict[tuple[object, ...], list[int]] = {}
         for index, layout in enumerate(layouts):
             members.setdefault(layout.key, []).append(index)
@@ -261,13 +253,10 @@ class Telemetry(ABC):
 def make_state(
     time_s: float, measured: Floats, fresh: Flags, silent: Flags, slow_values: Sequence[NDArray[Any]]
 ) -> BusState:
-    """A state, read-only.
+    """A state of read-only arrays.
 
-    Parameters
-    ----------
-    measured : (4, n): position, velocity, current and age.
-    fresh, silent : (n,), read-only already.
-    slow_values : error, supply, temperature, hardware error and torque, (n,) each, read-only already.
+    `measured` is (4, n): position, velocity, current and age. `slow_values` are error, supply, temperature, hardware
+    error and torque, (n,) each; they, `fresh` and `silent` are read-only already.
     """
     position, velocity, current, age = (read_only(row) for row in measured)
     error, volts, celsius, hardware, torque = slow_values

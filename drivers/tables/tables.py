@@ -211,9 +211,7 @@ def model_name(number: int) -> str:
 def model_number(model: str | int) -> int:
     """Number of a model name in any case, with ``_`` or ``-`` and with or without the connector letter.
 
-    Raises
-    ------
-    DriverError : there is no such model; the hint lists names that look like it.
+    Raises DriverError where there is no such model; the hint lists names that look like it.
     """
     numbers = {name: number for number, name in known_models().items()}
     if isinstance(model, int):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.base.bus import ServoInfo
 from drivers.packets.packet1 import MAX_ID, Instruction1, Reader1, encode
@@ -32,8 +32,7 @@ FEETECH_ID, DYNAMIXEL_ID = 5, 3
 """Where either maker keeps the id; the model number is at 3 and at 0."""
 
 
-@dataclass(frozen=True)
-class Heard:
+class Heard(NamedTuple):
     """Result of one round of pings: the ids that answered, and whether other bytes arrived, too."""
 
     ids: tuple[int, ...]
@@ -41,17 +40,7 @@ class Heard:
 
 
 def ping_all(link: SerialPort, tell: Callable[[int], None] = lambda servo: None) -> Heard:
-    """Ping every id of an open port once.
-
-    Parameters
-    ----------
-    link : the port, open at the rate to try.
-    tell : called with each id as it is pinged.
-
-    Raises
-    ------
-    PortLost
-    """
+    """Ping every id of an open port once; `tell` is called with each id. Raises PortLost."""
     reader, heard = Reader1(), Counter[int]()
     gap_s = PING_BYTES * 10.0 / link.baud + RETURN_DELAY_S + SLACK_S
     last_s = WAIT_S + (latency_s(link.path) or 0.0)
@@ -73,12 +62,7 @@ def registers_on(port: str | SerialPort, baud: int) -> Registers:
 
 
 def describe(link: SerialPort, servo: int) -> ServoInfo | None:
-    """What a servo is; None where it does not answer. An unknown model keeps its number and lacks all else.
-
-    Raises
-    ------
-    PortLost
-    """
+    """What a servo is; None where it does not answer. An unknown model keeps its number and lacks all else."""
     registers = registers_on(link, link.baud)
     found = identity(registers, servo)
     return None if found is None else registers.info(servo, *found, lambda: load_table(*found))

@@ -64,16 +64,12 @@ def _write(registers: Registers[Any], servo: int, name: str, value: int) -> None
 
 
 def set_id(port: str, baud: int, protocol: int, old: int, new: int, *, release: bool = False) -> ServoInfo:
-    """Give the servo ``old`` the id ``new``.
+    """Give the servo ``old`` the id ``new``; returns it under its new id.
 
     Parameters
     ----------
     port, baud, protocol : where it is; Protocol 2 or 1 (AX, MX, Feetech).
     release : switch its motor off where it is on.
-
-    Returns
-    -------
-    ServoInfo : the servo under its new id.
 
     Raises
     ------
@@ -112,12 +108,10 @@ def set_id(port: str, baud: int, protocol: int, old: int, new: int, *, release: 
 
 def _await(registers: Registers[Any], servo: int) -> ServoInfo | None:
     """The servo as soon as it answers again."""
-    end_s = time.monotonic() + SETTLE_S
-    while time.monotonic() < end_s:
+    found, end_s = None, time.monotonic() + SETTLE_S
+    while found is None and time.monotonic() < end_s:
         found = _find(registers, servo)
-        if found is not None:
-            return found
-    return None
+    return found
 
 
 def _error(message: str, hint: str, port: str, servo: int) -> BusError:

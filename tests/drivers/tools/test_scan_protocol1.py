@@ -75,6 +75,16 @@ def test_echoes_are_no_servos(in_virtual_time: Callable[[Answer], FarEnd]) -> No
     assert ping_all(in_virtual_time(lambda p: encode(*p))).ids == ()
 
 
+def test_the_last_id_is_waited_for_longer_and_the_others_no_longer_than_a_ping_takes(
+    in_virtual_time: Callable[[Answer], FarEnd],
+) -> None:
+    far_end = in_virtual_time(lambda packet: b"")
+    begin_s = far_end.clock()
+    ping_all(far_end)
+    gap_s = 12 * 10 / 1_000_000 + 0.0016
+    assert far_end.clock() - begin_s == pytest.approx(254 * gap_s + scan_protocol1.WAIT_S, rel=0.01)
+
+
 AX = bytes((12, 0, 24, 5, 1, 250))
 STS = bytes((3, 10, 0, 9, 3, 5))
 SCS = bytes((3, 10, 0, 5, 4, 5))
