@@ -98,7 +98,7 @@ def set_id(
 
     Example: omote set-id /dev/ttyUSB0 1 12
     """
-    from drivers.tools.rename import set_id as change  # start-up: --help does without it
+    from drivers.tools.set_id import set_id as change  # start-up: --help does without it
 
     info = change(port, baud, protocol, old, new, release=release)
     console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}", soft_wrap=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from drivers import open_bus
 from drivers.base.bus import ServoInfo, ServoSpec
 from drivers.port.serialport import SerialPort
-from drivers.tools.probe1 import describe, ping_all
+from drivers.tools.scan_protocol1 import describe, ping_all
 
 BAUDS = {
     2: (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600),

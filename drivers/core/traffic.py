@@ -116,7 +116,7 @@ class Decoder2(PacketDecoder):
 
     def __init__(self, tables: Mapping[int, ControlTable] = {}, default: ControlTable | None = None) -> None:
         super().__init__(tables, default)
-        self._readers = {True: v2.PacketReader(), False: v2.PacketReader()}
+        self._readers = {True: v2.StatusReader(), False: v2.StatusReader()}
         self._fast: list[tuple[int, int, int]] = []
         self._pinged = False
 

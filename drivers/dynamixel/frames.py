@@ -1,20 +1,26 @@
-"""Packets of many servos at once, for the cycle: goals put into a frame made before, all replies checked in one go.
+"""Precomputed packets of a control cycle: a sync write of goals, and group reads whose replies are checked at once.
 
-What is not exactly as expected (a reply missing, late, damaged or stuffed) is not decoded here: ``None`` sends the
-caller to the careful readers in ``packet`` and ``sdk``.
+Replies that are not exactly as expected (one missing, late, damaged or stuffed) are not decoded here: the caller uses
+the general readers of ``packet`` and ``sdk`` then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.packets.packet import BROADCAST_ID, HEADER, Instruction, crc16, encode_fast_head, encode_instruction
-
-Octets = NDArray[np.uint8]
+from drivers.packets.packet import (
+    BROADCAST_ID,
+    HEADER,
+    Instruction,
+    StatusPacket,
+    crc16,
+    encode_fast_head,
+    encode_instruction,
+)
 
 HEAD_SIZE = 8
 """Bytes of a status packet before its error byte."""
@@ -37,7 +43,7 @@ class GoalFrame:
     """
 
     def __init__(self, ids: Sequence[int], address: int, size: int, places: NDArray[np.int64]) -> None:
-        from drivers.core.kernels import put_goals  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import put_goals  # start-up: loads numba
 
         self._put_goals = put_goals
         self._size, self._places = size, places
@@ -55,41 +61,17 @@ class GoalFrame:
 
 
 class Run(NamedTuple):
-    """Servos of which the same bytes are read: `ids`, first `address` and `length`."""
+    """Part of a group read: servos of which the same registers are read, first `address` and `length`."""
 
     ids: tuple[int, ...]
     address: int
     length: int
 
-    def among(self, ids: Collection[int]) -> Run:
-        """The same of those of its servos that are among `ids`."""
-        return self._replace(ids=tuple(servo for servo in self.ids if servo in ids))
-
-
-class Rows(NamedTuple):
-    """Replies of the servos of one run, in its order: `errors` (k,) and `data` (k, length), uint8."""
-
-    errors: Octets
-    data: Octets
-
-
-class Quick(Protocol):
-    """Something that understands replies only where they are as expected."""
-
-    def prepare(self) -> None:
-        """Get ready; called while the wire is busy."""
-
-    def take(self, data: bytes, now_s: float) -> bool:
-        """Whether it has taken them; else nothing has changed."""
-
 
 class GroupRead:
-    """A read of many servos that is asked again and again: one sync read, or a bulk read where addresses differ.
+    """A read of many servos that is sent repeatedly: one sync read, or a bulk read where addresses differ.
 
-    Parameters
-    ----------
-    runs : who is asked for what.
-    fast : all of them answer in one joint packet.
+    Where it is `fast`, all of them answer in one joint packet.
 
     Attributes
     ----------
@@ -100,13 +82,12 @@ class GroupRead:
     """
 
     def __init__(self, runs: Sequence[Run], fast: bool = False) -> None:
-        from drivers.core.kernels import check_joint, check_replies  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import check_joint, check_replies  # start-up: loads numba
 
         self._check = check_joint if fast else check_replies
         self.runs, self.fast = tuple(runs), fast
-        self.ids = tuple(servo for run in runs for servo in run.ids)
         self.wanted = {servo: run.length for run in runs for servo in run.ids}
-        self.frame = self._sync() if len(runs) == 1 else self._bulk()
+        self.frame = encode_instruction(BROADCAST_ID, *self._instruction())
         self.spans = _spans(self.wanted, fast)
         self.size = int(self.spans[-1, 2])
         heads = (
@@ -115,35 +96,26 @@ class GroupRead:
         self.heads = np.frombuffer(b"".join(heads), np.uint8).reshape(-1, HEAD_SIZE)
         self.states = np.array([crc16(head) for head in heads], np.int64)
 
-    def _sync(self) -> bytes:
-        (run,) = self.runs
-        kind = Instruction.FAST_SYNC_READ if self.fast else Instruction.SYNC_READ
-        return encode_instruction(BROADCAST_ID, kind, _words(run.address, run.length) + bytes(run.ids))
+    def _instruction(self) -> tuple[Instruction, bytes]:
+        spans = [_words(run.address, run.length) for run in self.runs]
+        if len(spans) == 1:
+            code = Instruction.FAST_SYNC_READ if self.fast else Instruction.SYNC_READ
+            return code, spans[0] + bytes(self.runs[0].ids)
+        entries = [bytes((i,)) + span for run, span in zip(self.runs, spans, strict=True) for i in run.ids]
+        return Instruction.FAST_BULK_READ if self.fast else Instruction.BULK_READ, b"".join(entries)
 
-    def _bulk(self) -> bytes:
-        kind = Instruction.FAST_BULK_READ if self.fast else Instruction.BULK_READ
-        entries = [bytes((servo,)) + _words(run.address, run.length) for run in self.runs for servo in run.ids]
-        return encode_instruction(BROADCAST_ID, kind, b"".join(entries))
-
-    def decode(self, data: bytes) -> list[Rows] | None:
-        """What the servos of each run said, where `data` is exactly what was asked for; else None."""
-        if len(data) != self.size:
-            return None
+    def decode(self, data: bytes) -> dict[int, StatusPacket] | None:
+        """Replies by servo id, where `data` is exactly what was asked for; else None."""
         octets = np.frombuffer(data, np.uint8)
-        if not self._check(octets, self.spans, self.heads, self.states):
+        if len(data) != self.size or not self._check(octets, self.spans, self.heads, self.states):
             return None
-        at, begin, replies = (0, HEAD_SIZE, []) if self.fast else (HEAD_SIZE, 0, [])
-        for run in self.runs:
-            size = (PART_SIZE if self.fast else STATUS_SIZE) + run.length
-            end = begin + size * len(run.ids)
-            rows = octets[begin:end].reshape(-1, size)
-            replies.append(Rows(rows[:, at], rows[:, -2 - run.length : -2]))
-            begin = end
-        return replies
+        skip = 2 if self.fast else 1  # error byte, and in a joint reply the id
+        spans = self.spans.tolist()
+        return {i: StatusPacket(i, data[error], data[error + skip : end - 2]) for i, error, end in spans}
 
 
 def _spans(wanted: Mapping[int, int], fast: bool) -> NDArray[np.int64]:
-    """Each servo's id, where its error byte stands and where its reply ends; see ``core.kernels.check_replies``."""
+    """Each servo's id, where its error byte lies and where its reply ends; see ``core.kernels.check_replies``."""
     error, extra, begin = (0, PART_SIZE, HEAD_SIZE) if fast else (HEAD_SIZE, STATUS_SIZE, 0)
     spans = np.empty((len(wanted), 3), np.int64)
     for k, (servo, length) in enumerate(wanted.items()):

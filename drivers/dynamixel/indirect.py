@@ -1,8 +1,7 @@
-"""Indirect addressing: registers that lie apart are mapped side by side, so that one read brings all of them.
+"""Indirect addressing of Dynamixel servos: registers that lie apart are mapped side by side and read in one go.
 
-X-series servos keep a row of pointers in RAM (Indirect Address); reading the bytes behind it (Indirect Data) reads
-what the pointers point at. Where the row lies depends on model and firmware. It is RAM: nothing wears, and a servo
-that reboots forgets it.
+X-series servos keep pointers in RAM (Indirect Address); reading the bytes behind them (Indirect Data) reads the
+registers that they point at. Their address depends on model and firmware. A servo that reboots loses them.
 """
 
 from __future__ import annotations
@@ -10,7 +9,8 @@ from __future__ import annotations
 import logging
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from drivers.dynamixel.layout import INDIRECT, item_of
 from drivers.dynamixel.registers import Registers
@@ -22,16 +22,8 @@ _TRIES = 2
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Pointers:
-    """Registers side by side in the indirect area of a control table.
-
-    Attributes
-    ----------
-    address : first pointer.
-    values : the pointers' bytes.
-    block : the registers where they can be read through the pointers.
-    """
+class Pointers(NamedTuple):
+    """Pointers to registers: `address` of the first, their bytes, and the block that is read through them."""
 
     address: int
     values: bytes
@@ -39,7 +31,7 @@ class Pointers:
 
 
 def pointers_of(table: ControlTable) -> Pointers | None:
-    """What ``layout.INDIRECT`` names side by side, as far as the model has it; None where it cannot be mapped."""
+    """Pointers to the registers of ``layout.INDIRECT`` that the model has; None where they cannot be mapped."""
     items = {name: item for name in INDIRECT if (item := item_of(table, name)) is not None}
     if not {"position", "temperature", "hardware", "torque"} <= set(items):
         return None
@@ -57,33 +49,26 @@ def pointers_of(table: ControlTable) -> Pointers | None:
 
 
 def set_up(registers: Registers, ids: Sequence[int]) -> dict[int, Block]:
-    """Set the pointers of servos that can have them, and read them back.
+    """Set the pointers of servos and read them back; returns the block to read by id.
 
-    Returns
-    -------
-    dict : the block to read, by id; servos that have no indirect area, refuse or keep silent are left out.
-
-    Raises
-    ------
-    PortLost : the port went away.
+    Servos that have no indirect area, refuse or do not answer are left out. Raises PortLost.
     """
     done: dict[int, Block] = {}
-    groups: dict[tuple[int, int, bytes], tuple[Pointers, list[int]]] = {}
-    for servo in ids:
-        wanted = pointers_of(registers.tables[servo])
-        if wanted is not None:
-            key = wanted.address, wanted.block.address, wanted.values
-            groups.setdefault(key, (wanted, []))[1].append(servo)
-    for wanted, members in groups.values():
-        done |= dict.fromkeys(_point(registers, members, wanted), wanted.block)
-    refused = [servo for _, members in groups.values() for servo in members if servo not in done]
+    groups: dict[tuple[object, ...], list[int]] = {}
+    pointers = {servo: found for servo in ids if (found := pointers_of(registers.tables[servo]))}
+    for servo, wanted in pointers.items():
+        groups.setdefault((wanted.address, wanted.block.address, wanted.values), []).append(servo)
+    for members in groups.values():
+        wanted = pointers[members[0]]
+        done |= dict.fromkeys(_write_pointers(registers, members, wanted), wanted.block)
+    refused = [servo for members in groups.values() for servo in members if servo not in done]
     if refused:
         log.warning("no indirect addressing for %s: read plainly", ", ".join(map(registers.label, refused)))
     return done
 
 
-def _point(registers: Registers, ids: Sequence[int], wanted: Pointers) -> list[int]:
-    """Write the pointers of servos with one packet, once more where they are not there; returns who has them."""
+def _write_pointers(registers: Registers, ids: Sequence[int], wanted: Pointers) -> list[int]:
+    """Write pointers with one packet, again where they do not read back; returns the servos that have them."""
     packets, port, size = registers.packets, registers.port, len(wanted.values)
     done: list[int] = []
     for _ in range(_TRIES):

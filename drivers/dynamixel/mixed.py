@@ -1,13 +1,13 @@
-"""Dynamixel servos of both protocols on one wire: two drivers that share a port and take turns.
+"""Bus of Dynamixel servos of both protocols on one wire: two drivers that share a port and take turns.
 
-Neither protocol's servos understand the other's packets: to Protocol 1.0 a Protocol 2.0 header reads ``FF FF``, id
-253, length 0, which is no packet.
+Servos ignore packets of the other protocol: to Protocol 1.0 a Protocol 2.0 header is ``FF FF``, id 253, length 0.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -19,15 +19,13 @@ from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.core.wirebus import WireBus
 from drivers.dynamixel.bus import DynamixelBus
 from drivers.dynamixel.legacy import LegacyBus
-from drivers.protocol1.bus import LAST_ID
+from drivers.packets.packet import MAX_ID
 from drivers.tables.tables import load_table
 
-ONLY_LEGACY = ("singles", "torque_limit")
-"""Options that mean nothing to Protocol 2.0."""
-LEGACY = (
-    *ONLY_LEGACY,
-    *("feedback", "slow_group", "watchdog_ms", "takeover", "reboot_faulted", "min_voltage_v", "voltage_wait_s"),
-)
+ONLY_LEGACY = {"singles", "torque_limit"}
+"""Options of Protocol 1.0 alone."""
+ONLY_NEW = {"baud", "margin_s", "fast", "indirect"}
+"""Options of Protocol 2.0 alone, and of the port."""
 
 
 class MixedBus(WireBus):
@@ -35,7 +33,7 @@ class MixedBus(WireBus):
 
     Parameters
     ----------
-    servos : the servos in the order of all arrays; their models decide who is spoken to how.
+    servos : the servos in the order of all arrays; their models decide the protocol.
     options : see :class:`~drivers.dynamixel.bus.DynamixelBus` and :class:`~drivers.dynamixel.legacy.LegacyBus`.
     """
 
@@ -50,10 +48,10 @@ class MixedBus(WireBus):
         super().__init__(servos, clock=clock)
         new = [servo for servo in self.servos if load_table(servo.model).protocol == 2]
         old = [servo for servo in self.servos if servo not in new]
-        mine = {key: value for key, value in options.items() if key not in ONLY_LEGACY}
-        theirs = {key: value for key, value in options.items() if key in LEGACY}
-        self._new = DynamixelBus(new, port=port, clock=clock, **mine)
-        self._old = LegacyBus(old, port=self._new._port, clock=clock, **theirs)
+        for_new = {key: value for key, value in options.items() if key not in ONLY_LEGACY}
+        for_old = {key: value for key, value in options.items() if key not in ONLY_NEW}
+        self._new = DynamixelBus(new, port=port, clock=clock, **for_new)
+        self._old = LegacyBus(old, port=self._new._port, clock=clock, **for_old)
         self._halves: tuple[DynamixelBus | LegacyBus, ...] = (self._new, self._old)
         self._index = [np.array([self.ids.index(servo) for servo in half.ids]) for half in self._halves]
 
@@ -73,7 +71,7 @@ class MixedBus(WireBus):
         self._new._use_path(path)
 
     def _open_link(self) -> None:
-        for half in self._halves:  # the port is one and the same; each half forgets what it knew of it
+        for half in self._halves:  # it is one port; each half resets its state
             half.open()
 
     def _close_link(self) -> None:
@@ -86,24 +84,17 @@ class MixedBus(WireBus):
     # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
-        """Who is there, in either protocol: each id first in the one it is configured for, then in the other."""
+        """Servos that answer: each id is asked in the protocol it is configured for, then in the other."""
         with self._losing():
             found: dict[int, ServoInfo] = {}
             if ids is None:
                 found = {info.id: info for info in self._new.discover()}
-                ids = range(LAST_ID + 1)
-            for half in self._halves:
-                self._find(half, [servo for servo in ids if servo in half.ids], found)
-            for half in self._halves:
-                self._find(half, list(ids), found)
+                ids = range(MAX_ID + 1)
+            for half, chosen in [(half, half.ids) for half in self._halves] + [(half, ids) for half in self._halves]:
+                missing = [servo for servo in ids if servo in chosen and servo not in found]
+                if missing:
+                    found |= {info.id: info for info in half.discover(missing)}
             return [info for _, info in sorted(found.items())]
-
-    @staticmethod
-    def _find(half: DynamixelBus | LegacyBus, ids: Sequence[int], found: dict[int, ServoInfo]) -> None:
-        """Add those of the ids that are not found yet and answer a half."""
-        missing = [servo for servo in ids if servo not in found]
-        if missing:
-            found |= {info.id: info for info in half.discover(missing)}
 
     def _bring_up(self) -> Floats:
         here = np.zeros(len(self.ids))
@@ -118,7 +109,7 @@ class MixedBus(WireBus):
         return here
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
-        """Bring servos back that let go; see the halves."""
+        """Bring servos back that switched off or were rebooted; see the drivers of both protocols."""
         with self._losing():
             for half in self._halves:
                 chosen = [servo for servo in half.ids if ids is None or servo in ids]
@@ -137,7 +128,7 @@ class MixedBus(WireBus):
         raise kind("; ".join(map(str, failed)), hint=failed[0].hint, port=self.path, servo_ids=left) from failed[0]
 
     def _stop_halves(self) -> list[DriverError]:
-        """Stop both, whatever becomes of the first and whatever they believe of themselves; what they raised."""
+        """Switch the servos of both halves off, also where the first fails or is not running; returns the errors."""
         failed = []
         for half in self._halves:
             half._running = False
@@ -170,19 +161,16 @@ class MixedBus(WireBus):
     def report(self) -> BusReport:
         """Counters of both halves together."""
         report = super().report()
+        errors = Counter(report.errors)
         for half in self._halves:
             part = half.report()
             part.errors.pop("port_lost", None)  # this bus has counted it
-            _add(report.errors, part.errors)
+            errors.update(part.errors)
             report.errors_by_servo |= part.errors_by_servo
             report.limits_hit += part.limits_hit
             report.speed_limited += part.speed_limited
             report.eeprom_writes += part.eeprom_writes
             report.silent = tuple(sorted((*report.silent, *part.silent)))
             report.stray = part.stray  # both count it in the port
+        report.errors = dict(errors)
         return report
-
-
-def _add(total: dict[str, int], more: Mapping[str, int]) -> None:
-    for key, count in more.items():
-        total[key] = total.get(key, 0) + count

@@ -1,12 +1,12 @@
-"""Named registers of the servos with Protocol 2.0 on one port."""
+"""Registers of servos with Protocol 2.0 by name: reasons of refusal, and writes without a reply."""
 
 from __future__ import annotations
 
-from drivers.dynamixel.port import Port
 from drivers.dynamixel.sdk import Packets
 from drivers.packets.packet import ErrorNumber, Instruction, StatusPacket
 from drivers.servos import registers
 from drivers.servos.layout import NAMES
+from drivers.servos.port import Port
 from drivers.tables.tables import Item
 
 _REASONS = {number.value: number.name.lower().replace("_", " ") for number in ErrorNumber}
@@ -25,11 +25,15 @@ class Registers(registers.Registers[StatusPacket]):
         return _REASONS.get(number, f"error {number}") if number else ""
 
     def title(self, item: Item, name: str) -> str:
-        """How messages call a register: as X-series do, also with an XL-320, which has other names for some."""
+        """The X-series' name of a register, also for an XL-320, which has other names for some."""
         return NAMES[name][0]
 
-    def tell(self, servo: int, name: str, value: int) -> None:
-        """Write one register without waiting for an answer."""
+    def hardware_error(self, servo: int) -> int:
+        """Hardware error bits of a servo."""
+        return self.get(servo, "hardware")
+
+    def put_unanswered(self, servo: int, name: str, value: int) -> None:
+        """Write one register without waiting for a reply."""
         item = self._known(servo, name)
         params = self.packets.number(item.address) + item.encode(value)
-        self.packets.tell(self.port, self.packets.encode(servo, Instruction.WRITE, params))
+        self.packets.send_only(self.port, self.packets.encode(servo, Instruction.WRITE, params))

@@ -1,14 +1,14 @@
-"""dynamixel-sdk with its known faults overridden, all in this one place.
+"""dynamixel-sdk's packet handler for Protocol 2.0 with its known faults overridden, and omote's group transactions.
 
-:class:`Port` (in drivers/dynamixel/port.py) and :class:`Packets` are the SDK's handlers and can be given to any
-SDK code. What is mended; each fault has a test in tests/drivers/dynamixel/test_sdk.py that shows it on the bare SDK:
+:class:`Port` (in drivers/servos/port.py) and :class:`Packets` are the SDK's handlers and can be given to any SDK
+code. What is overridden; each fault has a test in tests/drivers/dynamixel/test_sdk.py that shows it on the bare SDK:
 
 ====  ========================================================================================================
 S1    transmitted packets are byte-stuffed (the SDK builds the stuffed packet and throws it away)
 S2    unstuffing scans the bytes as received, so it is the inverse of stuffing
 S3    input left over from before is thrown away ahead of every instruction
 S4    a reply must have the id **and the length** that was asked for; a servo that missed its time must answer
-      a ping before it is asked for data again, so a late reply never answers another question
+      a ping before it is asked for data again, so a late reply never answers another request
 S5    ``is_using`` is reset on every way out of a transaction
 S6    everything an unplugged device raises becomes PortLost
 S7    the timeout is wire time plus a margin from the adapter's latency timer, not 34 ms
@@ -21,40 +21,92 @@ S13   goals are sent without waiting for a status packet
 S14   group reads keep what arrived; fast ones are decoded by position, each servo with its own CRC
 ====  ========================================================================================================
 
-What of this is the same in every protocol stands in drivers/servos/exchange.py (S3 to S5, S13) and
-drivers/servos/port.py (S7, S9).
+What is the same in every protocol is in drivers/servos/exchange.py (S3 to S5, S13) and drivers/servos/port.py (S7, S9).
 S15 (``fastBulkRead`` mixes up ids and lengths) is avoided by never using it.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 from dynamixel_sdk import protocol2_packet_handler, robotis_def
 
-from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Quick, Rows, Run
-from drivers.dynamixel.port import Port
+from drivers.dynamixel.compiled_read import CompiledRead
+from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Run
 from drivers.packets import packet
 from drivers.packets.packet import Instruction, StatusPacket, StatusReader, encode_instruction
 from drivers.servos import exchange
-from drivers.servos.exchange import Exchange, settled
+from drivers.servos.exchange import Exchange, R, settled
+from drivers.servos.port import Port
 
 PING_DATA = 3
 PING_SLOT_MS = 3.0
 _LATE_CHUNKS = 16
-
-
 Got = Exchange[StatusPacket]
-"""What came back for one question, in this protocol's packets."""
 
 
-class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[misc]
-    """The SDK's Protocol 2.0 packet handler with its faults overridden, and group transactions of our own."""
+class SdkExchanges(exchange.Exchanges[R]):
+    """Overrides that the SDK's packet handlers of both protocols share: sending, and an instruction with its reply.
+
+    Attributes
+    ----------
+    id_at, code_at : where id and instruction lie in a packet that the SDK makes.
+    unanswered : instructions that no servo answers.
+    """
+
+    id_at: ClassVar[int]
+    code_at: ClassVar[int]
+    unanswered: ClassVar[tuple[int, ...]] = ()
+
+    @abstractmethod
+    def _params(self, txpacket: Sequence[int]) -> bytes:
+        """Parameters of a packet that the SDK makes; ValueError where too little data left its list too short (S11)."""
+
+    @abstractmethod
+    def _reply_length(self, code: int, params: bytes) -> int:
+        """Data bytes of the reply to an instruction."""
+
+    @abstractmethod
+    def _frame(self, reply: R) -> list[int]:
+        """A reply as the SDK returns packets."""
+
+    def txPacket(self, port: Port, txpacket: list[int]) -> int:
+        """Send a packet that the SDK makes, stuffed and with its checksum (S1, S3, S5, S11)."""
+        if port.is_using:
+            return int(robotis_def.COMM_PORT_BUSY)
+        self.send(port, self.encode(txpacket[self.id_at], txpacket[self.code_at], self._params(txpacket)))
+        return int(robotis_def.COMM_SUCCESS)
+
+    def txRxPacket(self, port: Port, txpacket: list[int]) -> tuple[list[int] | None, int, int]:
+        """One instruction and its reply; the reply's id and length must be those asked for (S4)."""
+        if port.is_using:
+            return None, robotis_def.COMM_PORT_BUSY, 0
+        servo, code = txpacket[self.id_at], txpacket[self.code_at]
+        if servo == packet.BROADCAST_ID or code in self.unanswered:
+            result = self.txPacket(port, txpacket)
+            port.is_using = False
+            return None, result, 0
+        params = self._params(txpacket)
+        got = self.ask(port, servo, code, params, self._reply_length(code, params))
+        reply = got.replies.get(servo)
+        if reply is None:
+            return None, robotis_def.COMM_RX_CORRUPT if got.corrupt else robotis_def.COMM_RX_TIMEOUT, 0
+        return self._frame(reply), robotis_def.COMM_SUCCESS, reply.error
+
+
+class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2PacketHandler):  # type: ignore[misc]
+    """The SDK's Protocol 2.0 packet handler with its faults overridden, and omote's own group transactions."""
 
     status_size = STATUS_SIZE
+    number_size = 2
+    refusals = 0x7F
+    reader = StatusReader
     greeting = Instruction.PING
+    id_at, code_at = 4, 7
+    unanswered = (Instruction.ACTION,)
 
     # ------------------------------------------------------------------ what the SDK calls by its own names
 
@@ -69,13 +121,6 @@ class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protoco
     def removeStuffing(self, packet_in: list[int]) -> list[int]:
         """The packet with its parameters unstuffed and its length set (S2)."""
         return _restuffed(packet_in, packet.unstuff)
-
-    def txPacket(self, port: Port, txpacket: list[int]) -> int:
-        """Stuff, sum and send a packet of the SDK's making (S1, S3, S5)."""
-        if port.is_using:
-            return int(robotis_def.COMM_PORT_BUSY)
-        self.send(port, encode_instruction(txpacket[4], txpacket[7], _params(txpacket)))
-        return int(robotis_def.COMM_SUCCESS)
 
     def rxPacket(self, port: Port, fast_option: bool) -> tuple[list[int], int]:
         """The next status packet of a servo, or a joint one where ``fast_option`` (S2, S5, S12)."""
@@ -93,54 +138,39 @@ class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protoco
         finally:
             port.is_using = False
 
-    def txRxPacket(self, port: Port, txpacket: list[int]) -> tuple[list[int] | None, int, int]:
-        """One instruction and its reply; the reply's id and length must be those asked for (S4)."""
-        if port.is_using:
-            return None, robotis_def.COMM_PORT_BUSY, 0
-        servo, instruction = txpacket[4], txpacket[7]
-        if servo == packet.BROADCAST_ID or instruction == Instruction.ACTION:
-            result = self.txPacket(port, txpacket)
-            port.is_using = False
-            return None, result, 0
-        params = _params(txpacket)
-        got = self.ask(port, servo, instruction, params, _reply_length(instruction, params))
-        reply = got.replies.get(servo)
-        if reply is None:
-            return None, robotis_def.COMM_RX_CORRUPT if got.corrupt else robotis_def.COMM_RX_TIMEOUT, 0
-        return list(_frame(reply)), robotis_def.COMM_SUCCESS, reply.error
+    def _params(self, txpacket: Sequence[int]) -> bytes:
+        length = txpacket[5] | txpacket[6] << 8
+        if len(txpacket) != 7 + length:
+            raise ValueError(f"packet of {7 + length} bytes was given {len(txpacket)}: its parameters are cut short")
+        return bytes(txpacket[8 : 5 + length])
+
+    def _reply_length(self, code: int, params: bytes) -> int:
+        if code == Instruction.READ:
+            return params[2] | params[3] << 8
+        return PING_DATA if code == Instruction.PING else 0
+
+    def _frame(self, reply: StatusPacket) -> list[int]:
+        length = len(reply.params) + 4
+        head = packet.HEADER + bytes((0, reply.id, length & 0xFF, length >> 8, Instruction.STATUS, reply.error))
+        return list(head + reply.params + b"\0\0")
 
     def broadcastPing(self, port: Port) -> tuple[dict[int, list[int]], int]:
-        """Model number and firmware of everybody who answers, by id; waits without spinning (S12)."""
+        """Model number and firmware of all servos that answer, by id; waits without spinning (S12)."""
         found = {servo: [m[0] | m[1] << 8, m[2]] for servo, m in self.ping_all(port).items()}
         return found, robotis_def.COMM_SUCCESS if found else robotis_def.COMM_RX_TIMEOUT
 
-    # ------------------------------------------------------------------ exchanges the driver uses
+    # ------------------------------------------------------------------ transactions of the driver
 
     def encode(self, servo: int, code: int, params: bytes = b"") -> bytes:
         """The packet of an instruction."""
         return encode_instruction(servo, code, params)
-
-    def number(self, value: int) -> bytes:
-        """An address or a length: two bytes."""
-        return value.to_bytes(2, "little")
-
-    def make_reader(self) -> StatusReader:
-        """Finds replies in what arrives."""
-        return StatusReader()
-
-    def is_refusal(self, reply: StatusPacket) -> bool:
-        """Whether a reply says no, so that it may be without the data asked for."""
-        return bool(reply.error & 0x7F)
 
     def hello(self, port: Any, servo: int) -> Got:
         """A servo's answer to a ping (``params``: model number low, high, firmware)."""
         return self.ask(port, servo, Instruction.PING, b"", PING_DATA)
 
     def ping_all(self, port: Port) -> dict[int, bytes]:
-        """Three bytes (model low, high, firmware) of everybody who answers a broadcast ping, by id.
-
-        Takes the best part of a second: a servo may wait for its turn in the order of ids.
-        """
+        """Three bytes (model low, high, firmware) of all servos that answer a broadcast ping, by id; takes 0.8 s."""
         found: dict[int, bytes] = {}
         reader = StatusReader()
         self.send(port, encode_instruction(packet.BROADCAST_ID, Instruction.PING))
@@ -154,48 +184,38 @@ class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protoco
             port.is_using = False
         return found
 
-    def read_asked(self, port: Any, ids: tuple[int, ...], address: int, size: int, manner: str) -> Got:
-        """One ``"sync"`` read, or a ``"fast"`` one, keeping every reply that arrived (S7, S10, S14)."""
-        group = group_read((Run(ids, address, size),), manner == "fast")
-        got = self.read_rows(port, group)
-        return got if isinstance(got, Exchange) else Exchange(_replies(group.runs, got), (), False)
+    def _read_asked(self, port: Any, ids: tuple[int, ...], address: int, size: int, manner: str) -> Got:
+        return self.read_prepared(port, group_read((Run(ids, address, size),), manner == "fast"))
 
-    def read_rows(self, port: Port, group: GroupRead, sweep: Quick | None = None) -> list[Rows] | Got:
-        """Ask a group that was made before. None of it may be in ``port.suspects``.
+    def read_prepared(self, port: Port, group: GroupRead, compiled: CompiledRead | None = None) -> Got:
+        """Send a group read and collect the replies. None of its servos may be in ``port.suspects``.
 
-        Parameters
-        ----------
-        sweep : takes what it can by itself.
-
-        Returns
-        -------
-        list of Rows : what every servo said, run by run, when all is as it should be (nothing more where `sweep`
-            has taken it); otherwise an Exchange with whatever arrived.
+        Replies that `compiled` takes, because they are as expected, are not returned.
         """
         port.suspects.update(group.wanted)  # until they have answered, so also when this is interrupted
         self.send(port, group.frame)
         try:
             port.expect(group.size)
-            if sweep is not None:
-                sweep.prepare()
-            data = self.fill(port, group.size)
-            taken = sweep is not None and sweep.take(data, port.clock())
-            rows = [] if taken else group.decode(data)
-            if rows is not None:
+            if compiled is not None:
+                compiled.prepare()
+            data = self._fill(port, group.size)
+            taken = compiled is not None and compiled.take(data, port.clock())
+            replies = {} if taken else group.decode(data)
+            if replies is not None:
                 port.suspects.difference_update(group.wanted)
-                return rows
+                return Exchange(replies, (), False)
             if not group.fast:
-                return self.sort(port, group.wanted, data)
-            got = self._salvage(port, group, data)
+                return self._sort(port, group.wanted, data)
+            got = self._decode_joint(port, group, data)
         finally:
             port.is_using = False
         return self._read_behind(port, group, got)
 
-    def fill(self, port: Any, size: int) -> bytes:
+    def _fill(self, port: Any, size: int) -> bytes:
         """Received bytes, at least ``size`` of them unless the deadline passes.
 
-        Once the first have come, the others are known to take their time on the wire: sleeping through it costs
-        one awakening instead of one for every few bytes.
+        After the first bytes it sleeps for the time that the others take on the wire: one wake-up, not one for every
+        few bytes.
         """
         data: bytes = port.link.read(port.deadline_s)
         more = data
@@ -204,8 +224,8 @@ class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protoco
             data += more
         return data
 
-    def _salvage(self, port: Port, group: GroupRead, data: bytes) -> Got:
-        """What can be read of a joint reply that is cut short, damaged, or has something before it."""
+    def _decode_joint(self, port: Port, group: GroupRead, data: bytes) -> Got:
+        """The replies that can be decoded in a joint reply that is cut short, damaged, or has noise before it."""
         devices, raw = list(group.wanted.items()), bytearray(data)
         replies = packet.decode_fast(bytes(raw), devices)
         while data and len(replies) < len(devices) and len(raw) < _LATE_CHUNKS * packet.MAX_LENGTH:
@@ -216,18 +236,16 @@ class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protoco
         return settled(port, group.wanted, {reply.id: reply for reply in replies}, len(raw) >= group.size)
 
     def _read_behind(self, port: Port, group: GroupRead, got: Got) -> Got:
-        """Ask those behind the first silent servo plainly: it cut them off from the joint reply (S14).
+        """Read servos behind the first silent one again, plainly: it cut them off from the joint reply (S14).
 
-        What they might still send of that is no packet, so it cannot be taken for an answer.
+        Late bytes of that reply are no packet, so they cannot be taken for one.
         """
-        behind = set(got.missing[1:])
-        runs = tuple(run for run in (run.among(behind) for run in group.runs) if run.ids)
+        asked = [(tuple(i for i in run.ids if i in got.missing[1:]), run) for run in group.runs]
+        runs = tuple(run._replace(ids=ids) for ids, run in asked if ids)
         lost = not got.replies
         if not runs:
             return got._replace(joint_lost=lost)
-        more = self.read_rows(port, group_read(runs, False))
-        if not isinstance(more, Exchange):
-            more = Exchange(_replies(runs, more), (), False)
+        more = self.read_prepared(port, group_read(runs, False))
         return Exchange(got.replies | more.replies, got.missing[:1] + more.missing, got.corrupt or more.corrupt, lost)
 
 
@@ -235,36 +253,6 @@ class Packets(exchange.Exchanges[StatusPacket], protocol2_packet_handler.Protoco
 def group_read(runs: tuple[Run, ...], fast: bool) -> GroupRead:
     """A group read, made once for the same servos and registers."""
     return GroupRead(runs, fast)
-
-
-def _replies(runs: Sequence[Run], rows: Sequence[Rows]) -> dict[int, StatusPacket]:
-    """The replies of all runs by servo id."""
-    return {
-        servo: StatusPacket(servo, error, data.tobytes())
-        for run, (errors, block) in zip(runs, rows, strict=True)
-        for servo, error, data in zip(run.ids, errors.tolist(), block, strict=True)
-    }
-
-
-def _params(txpacket: Sequence[int]) -> bytes:
-    """Parameters of an instruction packet of the SDK; too little data leaves its list too short (S11)."""
-    length = txpacket[5] | txpacket[6] << 8
-    if len(txpacket) != 7 + length:
-        raise ValueError(f"packet of {7 + length} bytes was given {len(txpacket)}: its parameters are cut short")
-    return bytes(txpacket[8 : 5 + length])
-
-
-def _reply_length(instruction: int, params: bytes) -> int:
-    if instruction == Instruction.READ:
-        return params[2] | params[3] << 8
-    return PING_DATA if instruction == Instruction.PING else 0
-
-
-def _frame(reply: StatusPacket) -> bytes:
-    """A status packet as the SDK hands it on: unstuffed, with the length of the unstuffed parameters."""
-    length = len(reply.params) + 4
-    head = packet.HEADER + bytes((0, reply.id, length & 0xFF, length >> 8, Instruction.STATUS, reply.error))
-    return head + reply.params + b"\0\0"
 
 
 def _restuffed(packet_in: list[int], change: Any) -> list[int]:

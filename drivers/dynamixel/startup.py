@@ -1,7 +1,4 @@
-"""Bringing servos with Protocol 2.0 up without a movement: what start-up has of its own here.
-
-They can be rebooted, latch hardware errors, and have a bus watchdog, which is armed before torque comes on.
-"""
+"""Start-up of servos with Protocol 2.0: reboot after hardware errors, permanent settings, limits, bus watchdog."""
 
 from __future__ import annotations
 
@@ -11,11 +8,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, CorruptReply, NoReply, ServoRefused, together
+from drivers.base.errors import CorruptReply, NoReply, ServoRefused
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.registers import Registers
+from drivers.packets.packet import StatusPacket
 from drivers.servos import startup
-from drivers.tables.tables import load_table, model_number
+from drivers.tables.tables import ControlTable
 
 WATCHDOG_STEP_S = 0.02
 INPUT_VOLTAGE = 0x01
@@ -27,12 +25,7 @@ EEPROM_TRIES = 10
 
 @dataclass(frozen=True)
 class Policy(startup.Policy):
-    """What start-up may do.
-
-    Attributes
-    ----------
-    watchdog_ms : a servo stops by itself when it hears nothing for so long; 0 switches that off.
-    """
+    """What start-up may do. A servo that receives nothing for `watchdog_ms` stops by itself; 0 switches that off."""
 
     watchdog_ms: int = 200
 
@@ -42,8 +35,8 @@ class Policy(startup.Policy):
         return min(math.ceil(self.watchdog_ms / 1000.0 / WATCHDOG_STEP_S), 127)
 
 
-class Startup(startup.Startup):
-    """Start-up and stop; parameters as for :class:`~drivers.servos.startup.Startup`."""
+class Startup(startup.Startup[StatusPacket]):
+    """Start-up and stop sequence; `indirect` maps registers side by side where the models have indirect addressing."""
 
     out_of_turn_hint = "clear its homing offset and turn count: switch its power off and on"
     not_on_hint = "switch their power off and on, or start with reboot_faulted=true"
@@ -52,74 +45,37 @@ class Startup(startup.Startup):
     registers: Registers
     policy: Policy
 
-    def release(self, servo: int) -> None:
-        """Switch one servo off and be sure of it."""
+    def __init__(self, registers: Registers, policy: Policy, indirect: bool) -> None:
+        super().__init__(registers, policy)
+        self._indirect = indirect
+
+    def _identity(self, reply: StatusPacket, expected: ControlTable) -> tuple[int, int]:
+        return reply.params[0] | reply.params[1] << 8, reply.params[2]
+
+    def _release(self, servo: int) -> None:
         self.registers.put(servo, "torque", 0)
 
-    def slack(self, turn: int) -> float:
-        """Steps that a position may lie outside of a turn."""
+    def _slack(self, turn: int) -> float:
         return OUT_OF_TURN_TICKS
 
-    def why_limp(self, ids: Sequence[int]) -> Mapping[int, str]:
-        """Hardware errors of servos whose motor did not come on."""
+    def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
         latched = self.registers.get_all(ids, "hardware")
         return {servo: f"hardware error 0x{latched.get(servo, 0):02X}" for servo in ids}
 
-    def identify(self, servos: Sequence[ServoSpec]) -> None:
-        """Ping every servo, compare its model and load its control table. Writes nothing.
-
-        Raises
-        ------
-        NoReply, CorruptReply : some did not answer.
-        WrongModel : one is not the configured model.
-        """
-        replies = self.registers.each([servo.id for servo in servos], self.registers.hello)
-        wrong: dict[int, BusError] = {}
-        for servo in servos:
-            low, high, firmware = replies[servo.id].params
-            number = low | high << 8
-            if number == model_number(servo.model):
-                self.registers.tables[servo.id] = load_table(number, firmware)
-            else:
-                wrong[servo.id] = self.wrong_model(servo, number)
-        if wrong:
-            raise together(wrong)
-
-    def bring_up(self, servos: Sequence[ServoSpec], *, indirect: bool = False) -> startup.Started:
-        """Start identified servos where they stand.
-
-        Parameters
-        ----------
-        servos : who is on the wire.
-        indirect : map registers side by side where the models have indirect addressing.
-
-        Raises
-        ------
-        BusError : something is not as it must be; torque was switched off again where it had been switched on.
-        """
-        registers, ids = self.registers, [servo.id for servo in servos]
-        registers.put_all(dict.fromkeys(ids, 2), "status_level")
-        held = self.take_over(ids)
-        self.wait_for_voltage(ids, registers.get_all(ids, "min_voltage"))
-        rebooted = self._clear_faults(ids)
-        for servo in ids:
-            self._settings(servo, servo in held and servo not in rebooted)
-        self.read_limits(ids)
-        if indirect:
-            self.started.mapped = set_up(registers, ids)
-        self._prepare(servos)
-        try:
-            self.torque_on(ids)
-        except BaseException:
-            self.switch_off(ids)
-            raise
-        return self.started
+    def bring_up(self, servos: Sequence[ServoSpec]) -> startup.Started:
+        """Make identified servos answer writes, then start them where they are."""
+        self.registers.put_all(dict.fromkeys([servo.id for servo in servos], 2), "status_level")
+        return super().bring_up(servos)
 
     def _clear_faults(self, ids: Sequence[int]) -> list[int]:
-        """Reboot servos with a latched error where that is allowed; input voltage alone is let pass."""
+        """Reboot servos with a latched error where that is allowed; input voltage alone may be ignored."""
         registers = self.registers
         latched = registers.get_all(ids, "hardware")
-        bad = {servo: bits for servo, bits in latched.items() if bits and not self._passable(servo, bits)}
+        bad = {
+            servo: bits
+            for servo, bits in latched.items()
+            if bits and (bits != INPUT_VOLTAGE or registers.get(servo, "shutdown") & INPUT_VOLTAGE)
+        }
         if not bad:
             return []
         if not self.policy.reboot_faulted:
@@ -135,12 +91,8 @@ class Startup(startup.Startup):
             raise self.fault("latched", still)
         return list(bad)
 
-    def _passable(self, servo: int, bits: int) -> bool:
-        """Input voltage alone, where it does not switch the motor off."""
-        return bits == INPUT_VOLTAGE and not self.registers.get(servo, "shutdown") & INPUT_VOLTAGE
-
-    def _settings(self, servo: int, held: bool) -> None:
-        """Permanent registers this driver relies on: read, and written only where they differ."""
+    def _write_settings(self, servo: int, held: bool) -> None:
+        """Operating mode, drive mode and return delay: read, and written only where they differ."""
         registers, table = self.registers, self.registers.tables[servo]
         wanted: dict[str, int] = {"mode": 2 if table.model == "xl320" else 3}
         keep = {"drive_mode": ~(REVERSE | TIME_PROFILE | TORQUE_BY_GOAL)}
@@ -162,14 +114,17 @@ class Startup(startup.Startup):
     def _write_eeprom(self, servo: int, name: str, old: int, new: int) -> None:
         registers = self.registers
         registers.put(servo, "torque", 0)
-        registers.put(servo, name, new, tries=EEPROM_TRIES)  # it is deaf for a while after
+        registers.put(servo, name, new, tries=EEPROM_TRIES)  # it does not answer for a while after
         if registers.get(servo, name, tries=EEPROM_TRIES) != new:
-            message = f"servo {registers.label(servo)} did not keep {registers.called(servo, name)} = {new}"
-            raise self.error(ServoRefused, message, "", servo)
+            message = f"servo {registers.label(servo)} did not keep {registers.register_name(servo, name)} = {new}"
+            raise self.registers.error(ServoRefused, message, "", servo)
         self.note(servo, name, old, new)
 
     def _prepare(self, servos: Sequence[ServoSpec]) -> None:
-        """Speed and acceleration limits, and the bus watchdog: cleared, then armed, before torque."""
+        """Indirect addresses, limits of speed and acceleration, and the bus watchdog: cleared, then armed."""
+        ids = [servo.id for servo in servos]
+        if self._indirect:
+            self.started.mapped = set_up(self.registers, ids)
         for name, limit in (("speed_limit", "max_speed_rad_s"), ("accel_limit", "max_accel_rad_s2")):
             values = {}
             for servo in servos:
@@ -178,15 +133,11 @@ class Startup(startup.Startup):
                     steps = math.ceil(getattr(servo, limit) / item.scale)
                     values[servo.id] = min(max(steps, 1), 1023 if item.size == 2 else 32767)
             self.registers.set_all(values, name)
-        self._arm_watchdog([servo.id for servo in servos])
+        watched = self.registers.having(ids, "watchdog")
+        self.registers.put_all(dict.fromkeys(watched, 0), "watchdog")
+        self.registers.set_all(dict.fromkeys(watched, self.policy.watchdog_steps), "watchdog")
 
-    def _arm_watchdog(self, ids: Sequence[int]) -> None:
-        """Clear a watchdog that may have tripped, and set its time."""
-        ids = self.registers.having(ids, "watchdog")
-        self.registers.put_all(dict.fromkeys(ids, 0), "watchdog")
-        self.registers.set_all(dict.fromkeys(ids, self.policy.watchdog_steps), "watchdog")
-
-    def disarm(self, ids: Sequence[int]) -> None:
-        """Switch the watchdogs of servos that are off to off; not worth an error."""
+    def _disarm(self, ids: Sequence[int]) -> None:
+        """Switch the watchdogs of servos off; a failure is ignored."""
         with suppress(NoReply, CorruptReply, ServoRefused):
             self.registers.set_all(dict.fromkeys(self.registers.having(ids, "watchdog"), 0), "watchdog")

@@ -1,4 +1,4 @@
-"""The family of Feetech servos."""
+"""Definition of the family of Feetech servos: options, driver and simulator."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.core.families import SERVO_BAUD, Family, ServoSettings
 
 @dataclass(frozen=True, kw_only=True)
 class FeetechSettings(ServoSettings):
-    """What the driver of Feetech servos can be told."""
+    """Options of the driver of Feetech servos."""
 
     torque_limit: float | None = option("Part of their torque that servos may use.", above=0, at_most=1)
 
@@ -21,7 +21,7 @@ FAMILY = Family(
     title="Feetech STS, SMS and SCS servos",
     driver="drivers.feetech.bus:FeetechBus",
     settings=FeetechSettings,
-    check_model="drivers.tables.models:check_feetech",
+    check_model="drivers.tables.tables:check_feetech",
     simulator="drivers.sim.servos.simulators:FEETECH",
     baud=SERVO_BAUD,
     install="dynamixel-sdk pyserial",

@@ -1,4 +1,4 @@
-"""Bytes of servo protocols: packets of Dynamixel Protocol 2.0 and 1.0, made and found in a stream.
+"""Packets of Dynamixel Protocol 2.0 and 1.0: encoding, checksums, and readers that find packets in a byte stream.
 
-In: bytes. Out: packets, and what was no packet. Imports base.
+In: bytes. Out: packets, and counts of bytes that belong to no valid packet. Imports base.
 """

@@ -1,16 +1,15 @@
-"""A byte stream cut into frames, whatever the protocol: what is kept, what is thrown away, and when one gives up.
-
-What begins a frame, how long it is and whether it is whole, says the protocol (``dynamixel/packet`` and ``packet1``).
-"""
+"""Base class of stream readers that cut received bytes into frames and resynchronise after noise or damage."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import ClassVar, Generic, TypeVar
+
+P = TypeVar("P")
 
 
-class FrameReader(ABC):
-    """Cuts a byte stream into frames whose length and checksum are right, whatever lies between them.
+class FrameReader(ABC, Generic[P]):
+    """Finds frames whose length and checksum are right in a byte stream, and decodes them to packets.
 
     Attributes
     ----------
@@ -28,28 +27,36 @@ class FrameReader(ABC):
 
     @abstractmethod
     def _next(self) -> bytes | None:
-        """Take the next whole frame out of the buffer, and drop what cannot begin one; None when there is none yet."""
+        """Remove and return the next whole frame of the buffer, and drop what cannot begin one; None: none yet."""
+
+    @abstractmethod
+    def _decode(self, frames: list[bytes]) -> list[P]:
+        """The packets in whole frames."""
 
     @property
     def pending(self) -> int:
         """Bytes held back because the frame they begin is not complete."""
         return len(self._buffer)
 
-    def feed_frames(self, data: bytes) -> list[bytes]:
-        """Add received bytes; return the frames completed by them as they came."""
-        self._buffer += data
-        frames = []
-        while (frame := self._next()) is not None:
-            frames.append(frame)
-        return frames
+    def feed(self, data: bytes) -> list[P]:
+        """Add received bytes; return the packets completed by them."""
+        return self._decode(self.feed_frames(data))
 
-    def flush_frames(self) -> list[bytes]:
-        """Give up on the incomplete frame (the sender paused); return valid frames found behind its beginning."""
+    def flush(self) -> list[P]:
+        """Give up on the incomplete frame (the sender paused); return valid packets found behind its beginning."""
         frames = []
         while self._buffer:
             self.broken_frames += self._buffer.startswith(self.MARK)
             self._drop(1)
             frames += self.feed_frames(b"")
+        return self._decode(frames)
+
+    def feed_frames(self, data: bytes) -> list[bytes]:
+        """Add received bytes; return the raw frames completed by them."""
+        self._buffer += data
+        frames = []
+        while (frame := self._next()) is not None:
+            frames.append(frame)
         return frames
 
     def take_pending(self) -> bytes:

@@ -1,6 +1,6 @@
-"""Dynamixel Protocol 2.0 packets as pure functions: checksum, byte stuffing, encoding, stream readers.
+"""Dynamixel Protocol 2.0 packets: CRC-16, byte stuffing, encoding and decoding, stream readers.
 
-Nothing here opens a port; driver and simulated bus share it. Layout (ROBOTIS e-Manual, Protocol 2.0)::
+Drivers and simulated servos share it. Layout (ROBOTIS e-Manual, Protocol 2.0)::
 
     FF FF FD 00 | ID | LEN_L LEN_H | INST [ERR] PARAMETERS | CRC_L CRC_H
 
@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Iterable, Sequence
-from enum import IntEnum, IntFlag
+from collections.abc import Sequence
+from enum import IntEnum
 from functools import lru_cache
 from typing import NamedTuple
 
-from drivers.packets.framing import FrameReader
+import numpy as np
+
+from drivers.packets.framing import FrameReader, P
 
 HEADER = b"\xff\xff\xfd"
 STUFFED = b"\xff\xff\xfd\xfd"
@@ -29,7 +31,7 @@ MAX_LENGTH = 2048
 
 _PREFIX = HEADER + b"\x00"
 _HEAD_SIZE = 7
-_MAX_EXPLANATIONS = 3  # each one followed makes a chance match of a CRC likelier
+_MAX_STATES = 3  # every further CRC state followed makes an accidental match likelier
 
 
 class Instruction(IntEnum):
@@ -43,7 +45,6 @@ class Instruction(IntEnum):
     FACTORY_RESET = 0x06
     REBOOT = 0x08
     CLEAR = 0x10
-    BACKUP = 0x20
     STATUS = 0x55
     SYNC_READ = 0x82
     SYNC_WRITE = 0x83
@@ -64,16 +65,6 @@ class ErrorNumber(IntEnum):
     DATA_LENGTH = 5
     DATA_LIMIT = 6
     ACCESS = 7
-
-
-class HardwareError(IntFlag):
-    """Hardware Error Status (70) and Shutdown (63) of X-series servos. XL-320 orders its bits differently."""
-
-    INPUT_VOLTAGE = 0x01
-    OVERHEATING = 0x04
-    MOTOR_ENCODER = 0x08
-    ELECTRICAL_SHOCK = 0x10
-    OVERLOAD = 0x20
 
 
 class InstructionPacket(NamedTuple):
@@ -102,32 +93,18 @@ class StatusPacket(NamedTuple):
         return self.error & 0x7F
 
 
-def _byte_table() -> list[int]:
-    """CRC of each single byte: polynomial 0x8005, most significant bit first. Shape (256,)."""
-    table = []
-    for byte in range(256):
-        crc = byte << 8
-        for _ in range(8):
-            crc = ((crc << 1) ^ 0x8005 if crc & 0x8000 else crc << 1) & 0xFFFF
-        table.append(crc)
-    return table
+def _crc_table(shifts: int) -> array[int]:
+    """CRC of every 16-bit state after so many zero bits: polynomial 0x8005, most significant bit first. (65536,).
 
-
-def _word_table(table: list[int]) -> array[int]:
-    """CRC of each pair of bytes, shape (65536,): a 16-bit state is used up by one look-up per pair.
-
-    An array and not a list: 128 KiB stay in the processor's cache, two megabytes of integers do not.
+    An array and not a list: 128 KiB stay in the processor's cache.
     """
-    words = array("H")
-    for high in table:
-        shifted, first = (high << 8) & 0xFFFF, high >> 8
-        words.extend(shifted ^ table[first ^ low] for low in range(256))
-    return words
+    crc = np.arange(0x10000)
+    for _ in range(shifts):
+        crc = (crc << 1 ^ 0x8005 * (crc >> 15)) & 0xFFFF
+    return array("H", crc.astype(np.uint16).tobytes())
 
 
-_BYTES = _byte_table()
-_WORDS = _word_table(_BYTES)
-_UNPACKERS = [struct.Struct(f">{n}H") for n in range(64)]
+_BYTES, _WORDS = _crc_table(8), _crc_table(16)
 
 
 def crc16(data: bytes | bytearray | memoryview, crc: int = 0) -> int:
@@ -137,11 +114,10 @@ def crc16(data: bytes | bytearray | memoryview, crc: int = 0) -> int:
     """
     words = _WORDS
     pairs, odd = divmod(len(data), 2)
-    unpack = _UNPACKERS[pairs] if pairs < 64 else struct.Struct(f">{pairs}H")
-    for word in unpack.unpack_from(data):
+    for word in struct.unpack_from(f">{pairs}H", data):
         crc = words[crc ^ word]
     if odd:
-        crc = ((crc << 8) & 0xFFFF) ^ _BYTES[(crc >> 8) ^ data[-1]]
+        crc = _BYTES[crc ^ data[-1] << 8]
     return crc
 
 
@@ -163,25 +139,18 @@ def _head(device_id: int, length: int, instruction: int) -> tuple[bytes, int]:
 
 
 def _encode(device_id: int, instruction: int, params: bytes) -> bytes:
-    if HEADER in params:
-        params = params.replace(HEADER, STUFFED)
+    params = stuff(params)
     head, crc = _head(device_id, len(params) + 3, instruction)
     crc = crc16(params, crc)
     return head + params + bytes((crc & 0xFF, crc >> 8))
 
 
 def encode_instruction(device_id: int, instruction: int, params: bytes = b"") -> bytes:
-    """One instruction packet, stuffed and with its CRC.
-
-    Parameters
-    ----------
-    device_id : 0 to 252, or `BROADCAST_ID`.
-    instruction : an `Instruction`.
-    params : bytes after INST, not stuffed.
+    """One instruction packet, stuffed and with its CRC; `params` are the bytes after INST, not stuffed.
 
     Raises
     ------
-    ValueError : an id no packet can carry.
+    ValueError : an id other than 0 to 252 and `BROADCAST_ID`.
     """
     if not 0 <= device_id <= BROADCAST_ID or device_id == 0xFD:
         raise ValueError(f"device_id {device_id}: a packet carries 0-252, or 254 for all")
@@ -193,23 +162,16 @@ def encode_status(device_id: int, error: int = 0, params: bytes = b"") -> bytes:
     return _encode(device_id, Instruction.STATUS, bytes((error,)) + params)
 
 
-def fast_reply_size(lengths: Iterable[int]) -> int:
-    """Bytes of a fast read's joint reply to reads of `lengths` bytes: 8 + sum(4 + L)."""
-    return 8 + sum(4 + length for length in lengths)
-
-
 def encode_fast_head(lengths: Sequence[int]) -> bytes:
-    """First bytes of a fast read's joint reply, up to INST. Its LEN is that of the full, unstuffed reply."""
+    """First bytes of a fast read's joint reply to reads of `lengths` bytes, up to INST; LEN counts the full reply."""
     length = 1 + sum(4 + length for length in lengths)
     return _PREFIX + bytes((BROADCAST_ID, length & 0xFF, length >> 8, Instruction.STATUS))
 
 
 def encode_fast_part(device_id: int, error: int, data: bytes, crc: int) -> tuple[bytes, int]:
-    """One device's part of a joint reply, unstuffed, and the CRC to carry on from.
+    """One device's part of a joint reply, unstuffed, and the CRC of the reply up to its end.
 
-    Parameters
-    ----------
-    crc : CRC of all bytes of the reply before this part, earlier devices' CRCs included.
+    `crc` is that of all bytes of the reply before this part, earlier devices' CRCs included.
     """
     part = bytes((error, device_id)) + data
     crc = crc16(part, crc)
@@ -220,18 +182,14 @@ def encode_fast_part(device_id: int, error: int, data: bytes, crc: int) -> tuple
 def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusPacket]:
     """Replies in a joint packet, decoded by position. It may be cut short or damaged in places.
 
-    A device's CRC covers everything before it, so one damaged byte would fail all later devices. After a
-    mismatch each explanation is followed (data damaged, CRC damaged at the device, CRC damaged on the way):
-    later devices stay readable and only the damaged one is left out.
+    A device's CRC covers everything before it, so one damaged byte would fail all later devices. After a mismatch
+    the decoder goes on from every CRC state that damage can explain (in the data, in the CRC at the device, or in
+    the CRC on the wire), so only the damaged device is left out.
 
     Parameters
     ----------
     data : received bytes; anything before the joint packet's header is skipped.
-    devices : (id, bytes read) in request order.
-
-    Returns
-    -------
-    list of StatusPacket : the devices whose id and CRC are right, in request order.
+    devices : (id, bytes read) in request order; so are the replies, of devices whose id and CRC are right.
     """
     head = encode_fast_head([length for _, length in devices])
     start = data.find(head)
@@ -249,26 +207,17 @@ def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusP
             if part[1] == device_id:
                 replies.append(StatusPacket(device_id, part[0], part[2:]))
         else:
-            sums = sums if len(sums) <= _MAX_EXPLANATIONS else set()
+            sums = sums if len(sums) <= _MAX_STATES else set()
         states = {crc16(tail, total) for total in sums | {claimed}}
         states |= {crc16(bytes((total & 0xFF, total >> 8)), total) for total in sums}
         at = end + 2
     return replies
 
 
-class PacketReader(FrameReader):
-    """Frames of Protocol 2.0, header to CRC, still stuffed.
-
-    Parameters
-    ----------
-    max_length : largest LEN that is believed.
-    """
+class PacketReader(FrameReader[P]):
+    """Finds frames of Protocol 2.0, header to CRC, still stuffed."""
 
     MARK = _PREFIX
-
-    def __init__(self, max_length: int = MAX_LENGTH) -> None:
-        super().__init__()
-        self._max_length = max_length
 
     def _seek_header(self) -> bool:
         """Drop what cannot begin a frame; True when a whole frame head lies at the start of the buffer."""
@@ -278,21 +227,16 @@ class PacketReader(FrameReader):
             if at < 0:
                 self._drop(len(buffer) - _header_tail(buffer))
                 return False
-            if at:
-                self._drop(at)
+            self._drop(at)
             if len(buffer) > 3 and buffer[3]:
                 self._drop(3)
                 continue
             if len(buffer) < _HEAD_SIZE:
                 return False
-            if self._plausible():
+            if 3 <= buffer[5] | buffer[6] << 8 <= MAX_LENGTH and buffer[4] not in (0xFD, 0xFF):
                 return True
             self.broken_frames += 1
             self._drop(3)
-
-    def _plausible(self) -> bool:
-        buffer = self._buffer
-        return 3 <= buffer[5] | buffer[6] << 8 <= self._max_length and buffer[4] not in (0xFD, 0xFF)
 
     def _next(self) -> bytes | None:
         buffer = self._buffer
@@ -336,50 +280,31 @@ def _checks(frame: bytes | bytearray) -> bool:
     return crc16(frame[:-2]) == frame[-2] | frame[-1] << 8
 
 
-class InstructionReader(PacketReader):
-    """Yields the instructions in a byte stream; status packets (a wire's echo) are passed over."""
+class InstructionReader(PacketReader[InstructionPacket]):
+    """Finds the instructions in a byte stream; status packets are skipped."""
 
-    def feed(self, data: bytes) -> list[InstructionPacket]:
-        """Add received bytes; return the instructions completed by them."""
-        return _instructions(self.feed_frames(data))
+    def _decode(self, frames: list[bytes]) -> list[InstructionPacket]:
+        return [
+            InstructionPacket(frame[4], frame[7], unstuff(frame[8:-2]))
+            for frame in frames
+            if frame[7] != Instruction.STATUS
+        ]
 
-    def flush(self) -> list[InstructionPacket]:
-        """Give up on an incomplete packet; return the instructions found behind its header."""
-        return _instructions(self.flush_frames())
 
+class StatusReader(PacketReader[StatusPacket]):
+    """Finds the status packets in a byte stream; instruction packets (echoed by an adapter) are skipped.
 
-class StatusReader(PacketReader):
-    """Yields the status packets in a byte stream; instruction packets (a wire's echo) are passed over.
-
-    A joint reply of a fast read comes as one packet of id `BROADCAST_ID`, error 0, whose `params` are
-    everything behind INST but the last CRC, not unstuffed. To keep what a damaged or cut one holds, collect
-    the raw bytes and use `decode_fast` instead.
+    A joint reply of a fast read comes as one packet of id `BROADCAST_ID`, error 0, whose `params` are everything
+    behind INST but the last CRC, not unstuffed. `decode_fast` also reads one that is damaged or cut short.
     """
 
-    def feed(self, data: bytes) -> list[StatusPacket]:
-        """Add received bytes; return the status packets completed by them."""
-        return _statuses(self.feed_frames(data))
-
-    def flush(self) -> list[StatusPacket]:
-        """Give up on an incomplete packet; return the status packets found behind its header."""
-        return _statuses(self.flush_frames())
-
-
-def _instructions(frames: list[bytes]) -> list[InstructionPacket]:
-    return [
-        InstructionPacket(frame[4], frame[7], unstuff(frame[8:-2]))
-        for frame in frames
-        if frame[7] != Instruction.STATUS
-    ]
-
-
-def _statuses(frames: list[bytes]) -> list[StatusPacket]:
-    replies = []
-    for frame in frames:
-        if frame[7] != Instruction.STATUS or len(frame) < 11:
-            continue
-        if frame[4] == BROADCAST_ID:
-            replies.append(StatusPacket(BROADCAST_ID, 0, frame[8:-2]))
-        else:
-            replies.append(StatusPacket(frame[4], frame[8], unstuff(frame[9:-2])))
-    return replies
+    def _decode(self, frames: list[bytes]) -> list[StatusPacket]:
+        replies = []
+        for frame in frames:
+            if frame[7] != Instruction.STATUS or len(frame) < 11:
+                continue
+            if frame[4] == BROADCAST_ID:
+                replies.append(StatusPacket(BROADCAST_ID, 0, frame[8:-2]))
+            else:
+                replies.append(StatusPacket(frame[4], frame[8], unstuff(frame[9:-2])))
+        return replies

@@ -1,4 +1,4 @@
-"""Dynamixel Protocol 1.0 packets (AX, MX; Feetech uses them too) as pure functions.
+"""Dynamixel Protocol 1.0 packets, which Feetech servos use too: encoding, checksum and a stream reader.
 
 Layout (ROBOTIS e-Manual, Protocol 1.0)::
 
@@ -50,12 +50,17 @@ class Error1(IntFlag):
 class Packet1(NamedTuple):
     """One packet: `id`, `code` (the instruction, or the error byte of a status packet), `params`.
 
-    Both directions look alike: which one it is follows from who sent it.
+    Both directions have one format: only the sender tells which one it is.
     """
 
     id: int
     code: int
     params: bytes
+
+    @property
+    def error(self) -> int:
+        """The error byte of a status packet."""
+        return self.code
 
 
 def checksum(body: bytes) -> int:
@@ -64,17 +69,11 @@ def checksum(body: bytes) -> int:
 
 
 def encode(device_id: int, code: int, params: bytes = b"") -> bytes:
-    """One packet of either direction.
-
-    Parameters
-    ----------
-    device_id : 0 to 253, or `BROADCAST_ID`.
-    code : an `Instruction1`, or the error byte of a status packet.
-    params : up to 253 bytes.
+    """One packet of either direction; `code` is an `Instruction1`, or the error byte of a status packet.
 
     Raises
     ------
-    ValueError : an id or a length that no packet can carry.
+    ValueError : an id other than 0 to 253 and `BROADCAST_ID`, or more than 253 bytes of parameters.
     """
     if not 0 <= device_id <= BROADCAST_ID:
         raise ValueError(f"device_id {device_id}: a packet carries 0-253, or 254 for all")
@@ -84,18 +83,13 @@ def encode(device_id: int, code: int, params: bytes = b"") -> bytes:
     return HEADER + body + bytes((checksum(body),))
 
 
-class Reader1(FrameReader):
-    """Yields the packets in a byte stream."""
+class Reader1(FrameReader[Packet1]):
+    """Finds the packets of either direction in a byte stream."""
 
     MARK = HEADER
 
-    def feed(self, data: bytes) -> list[Packet1]:
-        """Add received bytes; return the packets completed by them."""
-        return _packets(self.feed_frames(data))
-
-    def flush(self) -> list[Packet1]:
-        """Give up on the incomplete packet (the sender paused); return valid ones found behind its header."""
-        return _packets(self.flush_frames())
+    def _decode(self, frames: list[bytes]) -> list[Packet1]:
+        return [Packet1(frame[2], frame[4], frame[5:-1]) for frame in frames]
 
     def _next(self) -> bytes | None:
         buffer = self._buffer
@@ -120,7 +114,3 @@ class Reader1(FrameReader):
                 return frame
             self.broken_frames += 1
             self._drop(1)
-
-
-def _packets(frames: list[bytes]) -> list[Packet1]:
-    return [Packet1(frame[2], frame[4], frame[5:-1]) for frame in frames]

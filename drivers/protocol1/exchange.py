@@ -1,17 +1,14 @@
-"""Questions and answers on a wire with Protocol 1.0 framing, every answer checked for sender and length."""
+"""Request-reply transactions of Protocol 1.0 framing: every reply is checked for sender and length."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
 
-from drivers.packets.packet1 import BROADCAST_ID, HEADER, Error1, Instruction1, Packet1, Reader1, checksum, encode
+from drivers.packets.packet1 import BROADCAST_ID, Instruction1, Packet1, Reader1, encode
 from drivers.protocol1 import HELLO
 from drivers.servos import exchange
 from drivers.servos.exchange import Exchange
 from drivers.servos.port import Port
-
-STATUS_SIZE = 6
 
 
 class Exchanges(exchange.Exchanges[Packet1]):
@@ -20,36 +17,26 @@ class Exchanges(exchange.Exchanges[Packet1]):
     Attributes
     ----------
     longest : longest packet, in bytes, that its servos take.
-    refusals : flags of the error byte that say why an instruction was refused; the others are about the servo.
+    refusals : flags of the error byte that refuse an instruction; the others are about the servo's state.
     """
 
-    status_size = STATUS_SIZE
+    status_size = 6
+    number_size = 1
+    refusals = 0
+    reader = Reader1
     longest = 250
-    refusals = Error1.NONE
 
     def encode(self, servo: int, code: int, params: bytes = b"") -> bytes:
         """The packet of an instruction."""
         return encode(servo, code, params)
 
-    def number(self, value: int) -> bytes:
-        """An address or a length: one byte."""
-        return bytes((value,))
-
-    def make_reader(self) -> Reader1:
-        """Finds replies in what arrives."""
-        return Reader1()
-
-    def is_refusal(self, reply: Packet1) -> bool:
-        """Whether a reply says no, so that it may be without the data asked for."""
-        return bool(reply.code & self.refusals)
-
-    def tell(self, port: Port, frame: bytes) -> None:
-        """Clear the input and send one packet whose answer nobody waits for."""
+    def send_only(self, port: Port, frame: bytes) -> None:
+        """Clear the input and send one packet without waiting for a reply."""
         self.send(port, frame)
         port.is_using = False
 
     def hello(self, port: Port, servo: int) -> Exchange[Packet1]:
-        """Ask a servo for the first ``HELLO`` bytes of its registers."""
+        """Read the first ``HELLO`` bytes of a servo's registers."""
         return self.exchange(port, _read_frame(servo, 0, HELLO), {servo: HELLO})
 
     def pings(self, port: Port, servo: int) -> bool:
@@ -61,8 +48,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
         got = self.exchange(port, frame, {servo: 0}).replies.get(servo)
         return got is not None and got.code != Instruction1.PING
 
-    def read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[Packet1]:
-        """Read by ``"sync"`` (Feetech STS), ``"bulk"`` (Dynamixel MX), or ``""``: one question each."""
+    def _read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[Packet1]:
         if manner:
             return self.exchange(port, _group_frame(ids, address, size, manner), dict.fromkeys(ids, size))
         replies: dict[int, Packet1] = {}
@@ -73,34 +59,8 @@ class Exchanges(exchange.Exchanges[Packet1]):
             corrupt |= got.corrupt
         return Exchange(replies, tuple(servo for servo in ids if servo not in replies), corrupt)
 
-    def rows_at_most(self, width: int) -> int:
-        """Rows of so many bytes that one sync write carries."""
+    def _rows_at_most(self, width: int) -> int:
         return (self.longest - 8) // width
-
-    def sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[Packet1]:
-        """The usual case quickly; anything else carefully."""
-        replies = _in_order(data, wanted)
-        if replies is None:
-            return super().sort(port, wanted, data)
-        port.suspects.difference_update(replies)
-        return Exchange(replies, (), False)
-
-
-def _in_order(data: bytes, wanted: Mapping[int, int]) -> dict[int, Packet1] | None:
-    """The usual case, quickly: exactly the replies asked for, in order. None when it is not that."""
-    at, replies = 0, {}
-    if len(data) != len(wanted) * STATUS_SIZE + sum(wanted.values()):
-        return None
-    for servo, length in wanted.items():
-        end = at + STATUS_SIZE + length
-        body = data[at + 2 : end - 1]
-        if data[at : at + 2] != HEADER or body[0] != servo or body[1] != length + 2:
-            return None
-        if checksum(body) != data[end - 1]:
-            return None
-        replies[servo] = Packet1(servo, body[2], body[3:])
-        at = end
-    return replies
 
 
 @lru_cache(maxsize=1024)

@@ -1,4 +1,4 @@
-"""Named registers of servos with Protocol 1.0 framing on one port."""
+"""Registers of servos with Protocol 1.0 framing by name: read windows, error flags and reasons of refusal."""
 
 from __future__ import annotations
 
@@ -14,12 +14,7 @@ from drivers.tables.tables import ControlTable, Item
 
 
 class Registers(registers.Registers[Packet1]):
-    """Registers by servo id and short name; parameters as for :class:`~drivers.servos.registers.Registers`.
-
-    Attributes
-    ----------
-    flags : error byte of the last reply by id.
-    """
+    """Registers by servo id and short name; `flags` holds the error byte of the last reply by id."""
 
     greeting = "a greeting"
     packets: Exchanges
@@ -32,6 +27,10 @@ class Registers(registers.Registers[Packet1]):
         """Those of a reply's error flags that are about the servo's state: supply, heat, load."""
         return flags & sum(self.tables[servo].hardware_error.values())
 
+    def hardware_error(self, servo: int) -> int:
+        """Error flags of the last reply that are about the servo's state."""
+        return self.causes(servo, self.flags[servo])
+
     def refusal(self, reply: Packet1) -> str:
         """Why a servo refused what it was asked; empty where it did not."""
         if reply.params:  # flags about an earlier instruction come with data that is good
@@ -40,11 +39,11 @@ class Registers(registers.Registers[Packet1]):
         return ", ".join(flag.name.lower().replace("_", " ") for flag in refusal if flag.name)
 
     def span(self, table: ControlTable, item: Item) -> tuple[int, int, str]:
-        """(address, size, manner) of the read that learns a register."""
+        """(address, size, manner) of the read that contains a register."""
         return (*window(table, item), table.group_read)
 
     def is_damaged(self, reply: Packet1) -> bool:
-        """Whether a servo says that the question's checksum was wrong."""
+        """Whether a servo reports that the checksum of the request was wrong."""
         return bool(reply.code & self.packets.refusals & Error1.CHECKSUM)
 
     def note(self, servo: int, reply: Packet1) -> None:
@@ -53,7 +52,7 @@ class Registers(registers.Registers[Packet1]):
 
 
 def window(table: ControlTable, item: Item) -> tuple[int, int]:
-    """(address, size) of the read that learns a register without looking like the question (see the package)."""
+    """(address, size) of the read that contains a register, with a reply unlike the request (see the package)."""
     if item.size == 1:
         return item.address, 1
     return min(item.address, table.size - WINDOW), WINDOW

@@ -1,6 +1,6 @@
-"""Bringing servos with Protocol 1.0 framing up without a movement: what start-up has of its own here.
+"""Start-up of servos with Protocol 1.0 framing: identification, permanent settings, limits, and shutdown errors.
 
-These servos have no bus watchdog: nothing but this program (or the power switch) ever tells them to let go.
+These servos have no bus watchdog: only this program (or the power switch) ever switches them off.
 """
 
 from __future__ import annotations
@@ -10,30 +10,27 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, NoReply, together
+from drivers.base.errors import NoReply, ServoRefused
 from drivers.packets.packet1 import Error1, Packet1
 from drivers.protocol1.registers import Registers
-from drivers.protocol1.settings import EEPROM_TRIES, apply_settings, write_surely
 from drivers.servos import startup
 from drivers.servos.registers import TRIES
-from drivers.tables.tables import ControlTable, known_models, load_table
+from drivers.tables.tables import ControlTable, known_models
 
+EEPROM_TRIES = 10
+MULTI_TURN = 0x10
+"""Feetech's Phase: present positions leave the turn."""
 OUT_OF_TURN = 1 / 64
 """Share of a turn that a position may lie outside of it."""
 RELAPSE_S = 0.25
-"""Time in which a servo that was in trouble shows whether it still is."""
+"""Time in which a servo that had shut down shuts down again if the cause persists."""
 UNNUMBERED = 0x10000
 """Model numbers from here on stand for models whose real number no source gives."""
 
 
 @dataclass(frozen=True)
 class Policy(startup.Policy):
-    """What start-up may do.
-
-    Attributes
-    ----------
-    torque_limit : share of the stall torque that motors may give, above 0 to 1; None leaves it as it is.
-    """
+    """What start-up may do. `torque_limit` is the share of the stall torque, above 0 to 1; None leaves it as it is."""
 
     torque_limit: float | None = None
 
@@ -56,12 +53,6 @@ def identity(reply: Packet1, tables: Iterable[ControlTable]) -> tuple[int, int]:
     return next((reading for reading in readings if reading[0] in known_models()), readings[0])
 
 
-def _accepts(expected: ControlTable, number: int) -> bool:
-    """Whether a number is the configured model's. One that no source gives may be any that no other model has."""
-    unknown = expected.number >= UNNUMBERED and number not in known_models()
-    return number == expected.number or unknown
-
-
 def speed_steps(servo: ServoSpec, registers: Registers) -> int:
     """A servo's top speed in steps of its speed register; never 0, which would mean no limit."""
     table, item = registers.tables[servo.id], registers.item(servo.id, "speed")
@@ -69,8 +60,8 @@ def speed_steps(servo: ServoSpec, registers: Registers) -> int:
     return min(max(math.ceil(servo.max_speed_rad_s / scale), 1), top)
 
 
-class Startup(startup.Startup):
-    """Start-up and stop; parameters as for :class:`~drivers.servos.startup.Startup`."""
+class Startup(startup.Startup[Packet1]):
+    """Start-up and stop sequence; parameters as for :class:`~drivers.servos.startup.Startup`."""
 
     out_of_turn_hint = "clear its offset and turn count: switch its power off and on"
     not_on_hint = "switch their power off and on"
@@ -79,46 +70,16 @@ class Startup(startup.Startup):
     registers: Registers
     policy: Policy
 
-    def release(self, servo: int) -> None:
-        """Switch one servo off and be sure of it."""
-        write_surely(self.registers, servo, "torque", 0, TRIES)
+    def _identity(self, reply: Packet1, expected: ControlTable) -> tuple[int, int]:
+        return identity(reply, [expected])
 
-    def slack(self, turn: int) -> float:
-        """Steps that a position may lie outside of a turn."""
-        return OUT_OF_TURN * turn
-
-    def is_on(self, torque: int) -> bool:
-        """Whether the torque register says that the motor is on; Feetech's has other values, too."""
-        return torque == 1
-
-    def why_limp(self, ids: Sequence[int]) -> Mapping[int, str]:
-        """Error flags of servos whose motor did not come on."""
-        return {servo: f"error flags 0x{self.registers.flags.get(servo, 0):02X}" for servo in ids}
-
-    def identify(self, servos: Sequence[ServoSpec]) -> None:
-        """Greet every servo and compare its model. Writes only to those that keep quiet because they were told to.
-
-        Raises
-        ------
-        NoReply, CorruptReply : some did not answer.
-        WrongModel : one is not the configured model.
-        """
-        tables = {servo.id: load_table(servo.model) for servo in servos}
-        self.registers.tables |= tables
-        replies = self.registers.each([servo.id for servo in servos], self._greet)
-        wrong: dict[int, BusError] = {}
-        for servo in servos:
-            expected = tables[servo.id]
-            number, firmware = identity(replies[servo.id], [expected])
-            if _accepts(expected, number):
-                self.registers.tables[servo.id] = load_table(expected.number, firmware)
-            else:
-                wrong[servo.id] = self.wrong_model(servo, number)
-        if wrong:
-            raise together(wrong)
+    def _accepts(self, expected: ControlTable, number: int) -> bool:
+        """Whether a number is the configured model's. One that no source gives may be any that no other model has."""
+        unknown = expected.number >= UNNUMBERED and number not in known_models()
+        return number == expected.number or unknown
 
     def _greet(self, servo: int) -> Packet1:
-        """A servo's first registers; one that answers pings only is told to answer everything."""
+        """A servo's first registers; one that answers only pings is set to answer everything."""
         registers = self.registers
         try:
             return registers.hello(servo)
@@ -126,54 +87,51 @@ class Startup(startup.Startup):
             quiet = "Status Return Level" in registers.tables[servo]
             if not quiet or not registers.packets.pings(registers.port, servo):
                 raise
-        registers.tell(servo, "status_level", 2)
+        registers.put_unanswered(servo, "status_level", 2)
         reply = registers.hello(servo, tries=EEPROM_TRIES)
         self.note(servo, "status_level", 0, 2)
         return reply
 
-    def bring_up(self, servos: Sequence[ServoSpec]) -> startup.Started:
-        """Start identified servos where they stand.
+    def _release(self, servo: int) -> None:
+        self._write_surely(servo, "torque", 0, TRIES)
 
-        Raises
-        ------
-        BusError : something is not as it must be; torque was switched off again where it had been switched on.
-        """
-        registers, ids = self.registers, [servo.id for servo in servos]
-        held = self.take_over(ids)
-        need = registers.get_all(ids, "min_voltage") if self.policy.min_voltage_v is None else {}
-        self.wait_for_voltage(ids, need)
-        faulted = self._faults(ids)
-        if faulted and not self.policy.reboot_faulted:
+    def _slack(self, turn: int) -> float:
+        return OUT_OF_TURN * turn
+
+    def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
+        return {servo: f"error flags 0x{self.registers.flags.get(servo, 0):02X}" for servo in ids}
+
+    def _least_voltage(self, ids: Sequence[int]) -> Mapping[int, int]:
+        """Least voltage that servos need by id, 0.1 V; not read where the policy has it."""
+        return super()._least_voltage(ids) if self.policy.min_voltage_v is None else {}
+
+    def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
+        """Look at hardware errors; torque brings servos back that shut down, where that is allowed."""
+        self._faulted = self._faults(ids)
+        if self._faulted and not self.policy.reboot_faulted:
+            raise self.fault("report", self._faulted)
+        return ()
+
+    def torque_on(self, ids: Sequence[int]) -> None:
+        """Switch torque on, and see whether servos that had shut down stay on."""
+        super().torque_on(ids)
+        if self._faulted:
+            self.registers.port.sleep(RELAPSE_S)  # a cause that persists shuts it down again
+            self.registers.get_all(ids, "voltage")
+        if faulted := self._faults(ids):
             raise self.fault("report", faulted)
-        for servo in ids:
-            apply_settings(self, servo, servo in held)
-        self.read_limits(ids)
-        self._prepare(servos)
-        try:
-            self.torque_on(ids)
-            if faulted:
-                registers.port.sleep(RELAPSE_S)  # a cause that is still there shuts it down again
-                registers.get_all(ids, "voltage")
-            if faulted := self._faults(ids):
-                raise self.fault("report", faulted)
-        except BaseException:
-            self.switch_off(ids)
-            raise
-        return self.started
 
     def _faults(self, ids: Sequence[int]) -> dict[int, int]:
-        """Hardware errors in the replies just had; input voltage alone is let pass where it switches nothing off."""
+        """Hardware errors in the last replies; input voltage alone is ignored where it switches nothing off."""
         registers, bad = self.registers, {}
         for servo in ids:
             bits = registers.causes(servo, registers.flags.get(servo, 0))
-            if bits == Error1.INPUT_VOLTAGE and not registers.get(servo, "shutdown") & bits:
-                continue
-            if bits:
+            if bits and (bits != Error1.INPUT_VOLTAGE or registers.get(servo, "shutdown") & bits):
                 bad[servo] = bits
         return bad
 
     def _prepare(self, servos: Sequence[ServoSpec]) -> None:
-        """Limits of speed, acceleration and torque."""
+        """Write limits of speed, acceleration and torque."""
         registers, ids = self.registers, [servo.id for servo in servos]
         registers.set_all({servo.id: speed_steps(servo, registers) for servo in servos}, "speed")
         registers.set_all(dict.fromkeys(registers.having(ids, "time"), 0), "time")
@@ -182,7 +140,7 @@ class Startup(startup.Startup):
             item = registers.item(servo.id, "accel")
             if item is not None:
                 steps = max(math.ceil(servo.max_accel_rad_s2 / item.scale), 1)
-                accelerations[servo.id] = steps if steps <= (item.maximum or 0) else 0  # 0: as quick as it can
+                accelerations[servo.id] = steps if steps <= (item.maximum or 0) else 0  # 0: unlimited
         registers.set_all(accelerations, "accel")
         registers.set_all(self._torque_limits(ids), "torque_limit")
 
@@ -195,3 +153,62 @@ class Startup(startup.Startup):
             full = (item.maximum if item else None) or 0
             limits[servo] = (value or full) if share is None else max(round(share * full), 1)
         return limits
+
+    # ------------------------------------------------------------------ permanent registers
+
+    def _write_settings(self, servo: int, held: bool) -> None:
+        """Permanent registers this driver depends on: read, and written only where they differ, with torque off."""
+        registers = self.registers
+        wanted = self._wanted(servo)
+        if not held:  # a delayed reply only costs time, so a servo that holds is left alone
+            wanted["return_delay"] = 0
+        present = {name: registers.get(servo, name) for name in wanted}
+        differing = {name: value for name, value in wanted.items() if present[name] != value}
+        feetech = "Response Level" in registers.tables[servo]
+        if differing:
+            name, value = next(iter(differing.items()))
+            if held:
+                raise self.locked(servo, name, present[name], value)
+            self._write_surely(servo, "torque", 0, TRIES)
+        try:
+            for name, value in differing.items():
+                if feetech:
+                    self._write_surely(servo, "lock", 0, TRIES)
+                self._write_surely(servo, name, value, EEPROM_TRIES)
+                self.note(servo, name, present[name], value)
+        finally:
+            if feetech:  # unlocked, its id and limits could be changed by a bad packet
+                registers.put_unanswered(servo, "lock", 1)
+        if feetech and registers.get(servo, "lock") != 1:
+            self._write_surely(servo, "lock", 1, TRIES)
+
+    def _wanted(self, servo: int) -> dict[str, int]:
+        """Values of permanent registers by short name."""
+        registers, table = self.registers, self.registers.tables[servo]
+        last = table.ticks_per_turn - 1
+        feetech = "Response Level" in table
+        wanted = {"status_level": 1 if feetech else 2}
+        low, high = registers.get(servo, "min_ticks"), registers.get(servo, "max_ticks")
+        if low == high == 0:
+            wanted["max_ticks"] = last  # it would turn without end
+        elif low == high == last:
+            wanted["min_ticks"] = 0  # MX: several turns
+        if registers.item(servo, "mode"):
+            wanted["mode"] = 0
+        if feetech and registers.get(servo, "phase") & MULTI_TURN and table.group_read:
+            wanted["phase"] = registers.get(servo, "phase") & ~MULTI_TURN
+        return wanted
+
+    def _write_surely(self, servo: int, name: str, value: int, tries: int) -> None:
+        """Write until it reads back, without depending on replies to writes, which a servo may not send.
+
+        Raises ServoRefused where it keeps another value.
+        """
+        registers = self.registers
+        for _ in range(tries):
+            registers.put_unanswered(servo, name, value)
+            if registers.get(servo, name, tries) == value:  # it does not answer for a while after a permanent write
+                return
+        message = f"servo {registers.label(servo)} did not take {registers.register_name(servo, name)} = {value}"
+        hint = "switch its power off and on: a locked servo opens only then"
+        raise registers.error(ServoRefused, message, hint, servo)

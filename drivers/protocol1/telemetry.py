@@ -1,37 +1,67 @@
-"""What a bus with Protocol 1.0 framing knows of its servos: read in groups or in turn, silent ones left out."""
+"""Telemetry of servos with Protocol 1.0 framing: read in groups, or a few in turn where they cannot be."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.base.bus import BusReport
-from drivers.core.scale import Ticks
+from drivers.base.bus import BusReport, BusState, Flags
+from drivers.core.scale import Scale, Ticks
 from drivers.packets.packet import ALERT
-from drivers.packets.packet1 import Packet1
-from drivers.protocol1.layout import Group, layout_of, values_of
 from drivers.protocol1.registers import Registers
 from drivers.servos import telemetry
-from drivers.servos.layout import Block
+from drivers.servos.layout import Group, Layout, ReadRequest, block_of, format_of, item_of
+from drivers.servos.telemetry import Octets, Values
+from drivers.tables.tables import ControlTable
 
-Turn = tuple[Group, Block, tuple[int, ...]]
+FULL = ("position", "velocity", "load", "voltage", "temperature", "hardware", "moving", "current")
+
+
+def layout_of(table: ControlTable, feedback: str = "full") -> Layout:
+    """Layout of a control table; `feedback` ``"full"`` reads all measurements, ``"position"`` position and speed.
+
+    The goal's block has time and speed too, where they lie beside it.
+    """
+    feetech = item_of(table, "hardware") is not None  # Dynamixel reports errors in the error byte
+    full: tuple[str, ...] = FULL if feetech else FULL[:5]
+    slow: list[tuple[str, ...]] = [("torque", "torque_limit")]
+    if feedback != "full":
+        slow.append(full[2:7])
+        full = full[:2]
+    blocks = tuple(block_of(table, *names) for names in slow)
+    return Layout(block_of(table, "goal", "time", "speed"), block_of(table, *full), blocks, table.group_read)
+
+
+class GoalRows:
+    """Rows of the sync write that sends goals to a group, each with the speed (k,) to approach it, in steps."""
+
+    def __init__(self, group: Group, speeds: Sequence[int]) -> None:
+        self.block, self._index = group.layout.goal, group.index
+        fields = [("id", "u1"), *((name, format_of(item)) for name, item in self.block.items.items())]
+        self._rows = np.zeros(len(group.ids), dtype=fields)
+        self._rows["id"] = group.ids
+        self._rows["speed"] = speeds
+
+    def encode(self, ticks: Ticks, driven: Flags) -> bytes:
+        """Rows of the servos that are driven; ``(n,)`` both, of the whole bus."""
+        self._rows["goal"] = ticks[self._index]
+        chosen = driven[self._index]
+        return (self._rows if chosen.all() else self._rows[chosen]).tobytes()
 
 
 class Telemetry(telemetry.Telemetry):
-    """Reads the servos of a bus and remembers what they said.
+    """Reads the servos of a bus and stores what they measured.
 
     Parameters
     ----------
-    registers, ids, report : see :class:`~drivers.servos.telemetry.Telemetry`.
-    feedback, singles, slow_group : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
+    feedback, singles : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
 
     Attributes
     ----------
     load : (n,) share of the stall torque, positive where it pushes towards greater angles; NaN before the first.
-    moving : (n,) the servo said that it moves.
+    moving : (n,) the servo reported that it moves.
     """
 
     _registers: Registers
@@ -39,143 +69,53 @@ class Telemetry(telemetry.Telemetry):
     def __init__(
         self, registers: Registers, ids: Sequence[int], report: BusReport, feedback: str, singles: int, slow_group: int
     ) -> None:
-        super().__init__(registers, ids, report)
-        self._options = (feedback, max(singles, 1), max(slow_group, 0))
-        self.load = np.full(len(self.ids), np.nan)
+        super().__init__(registers, ids, report, slow_group)
+        self._feedback, self._singles = feedback, max(singles, 1)
+        self.load = self._stores["load"] = np.full(len(self.ids), np.nan)
         self.moving = np.zeros(len(self.ids), bool)
 
     def rebuild(self, speeds: Mapping[int, int]) -> None:
-        """Group the servos anew after their tables were loaded; nobody is silent yet.
-
-        Parameters
-        ----------
-        speeds : by id, steps of the speed register that goals are approached with.
-        """
-        tables = self._registers.tables
-        members: dict[tuple[object, ...], list[int]] = {}
-        for servo in self.ids:
-            members.setdefault(layout_of(tables[servo], self._options[0]).key, []).append(servo)
-        self._groups = [
-            Group(
-                ids,
-                [self._place[servo] for servo in ids],
-                [tables[servo] for servo in ids],
-                layout_of(tables[ids[0]], self._options[0]),
-                [speeds[servo] for servo in ids],
-            )
-            for ids in members.values()
-        ]
-        self._forget()
-        self._urgent: deque[Turn] = deque()
-        self._rota = self._turns()
-        self._next = dict.fromkeys(range(len(self._groups)), 0)
+        """Group the servos by their control tables, and forget their positions; `speeds` of goals in steps by id."""
+        self._regroup([layout_of(self._registers.tables[servo], self._feedback) for servo in self.ids])
+        self._goals = [GoalRows(group, [speeds[servo] for servo in group.ids]) for group in self._groups]
+        self._next_single = dict.fromkeys(self._groups, 0)
 
     def send_goals(self, ticks: Ticks) -> None:
-        """One sync write per group, ``(n,)`` steps. A servo that let go gets none: a goal could switch it on."""
-        for group in self._groups:
-            rows = group.rows(ticks, self._torque)
-            if rows:
-                goal = group.layout.goal
-                self._packets.write_group(self._port, goal.address, goal.size, rows)
+        """One sync write per group, ``(n,)`` steps; none to servos whose torque is off: it could switch them on."""
+        for goals in self._goals:
+            if rows := goals.encode(ticks, self._torque):
+                self._packets.write_group(self._port, goals.block.address, goals.block.size, rows)
 
-    def cycle(self, clock: Callable[[], float], running: bool) -> None:
-        """Bring back who can be brought back, read everybody whose turn it is, and ask some for a slow value."""
-        self._fresh[:] = False
-        if self._port.suspects or self._silent:
-            self._revive(clock())
-        for number, group in enumerate(self._groups):
-            self._read(group, self._chosen(number, group), clock)
-        turn = self._urgent.popleft() if self._urgent else next(self._rota, None)
-        if turn is not None:
-            self._ask(*turn, running)
+    def _read_feedback(self, clock: Callable[[], float], running: bool, scale: Scale) -> BusState | None:
+        requests = [ReadRequest(group, group.layout.feedback, self._chosen(group)) for group in self._groups]
+        self._ask(requests, clock, running)
+        return None
 
-    # ------------------------------------------------------------------ whose turn it is
-
-    def _chosen(self, number: int, group: Group) -> Sequence[int]:
-        """Who is read this cycle: all of a group that answers together, else the next few that are not silent."""
+    def _chosen(self, group: Group) -> tuple[int, ...]:
+        """Servos that are read this cycle: all of a group that answers together, else the next few that answer."""
         if group.layout.manner:
             return group.ids
-        ids, count = group.ids, self._options[1]
-        first = self._next[number]
-        turn = [servo for servo in ids[first:] + ids[:first] if servo not in self._port.suspects][:count]
-        if turn:
-            self._next[number] = (ids.index(turn[-1]) + 1) % len(ids)
-        return turn
+        first = self._next_single[group]
+        in_turn = group.ids[first:] + group.ids[:first]
+        chosen = tuple(servo for servo in in_turn if servo not in self._port.suspects)[: self._singles]
+        if chosen:
+            self._next_single[group] = (group.ids.index(chosen[-1]) + 1) % len(group.ids)
+        return chosen
 
-    def _look_at(self, servo: int) -> None:
-        """Ask a servo whether it holds next, before the turn of the others."""
-        group = next(group for group in self._groups if servo in group.place)
-        self._urgent.append((group, group.layout.slow[0], (servo,)))
+    def _ask(self, requests: list[ReadRequest], clock: Callable[[], float], running: bool) -> None:
+        for request in requests:
+            if request.ids:
+                block, manner = request.block, request.group.layout.manner
+                got = self._packets.read_group(self._port, request.ids, block.address, block.size, manner)
+                self._accept([request], got, clock(), running)
 
-    # ------------------------------------------------------------------ what they say
-
-    def _read(self, group: Group, ids: Sequence[int], clock: Callable[[], float]) -> None:
-        good = self._ask(group, group.layout.feedback, ids)
-        if good:
-            where = [group.place[servo] for servo in good]
-            self._fresh[where] = True
-            self._seen_s[where] = clock()
-
-    def _ask(self, group: Group, block: Block, ids: Sequence[int], running: bool = False) -> list[int]:
-        """Read a block and take its values over; returns who answered."""
-        if not ids:
-            return []
-        got = self._packets.read_group(self._port, ids, block.address, block.size, group.layout.manner)
-        if got.missing:
-            self._note_missing(got.missing, got.corrupt)
-        replies = {servo: reply for servo, reply in got.replies.items() if len(reply.params) == block.size}
-        for servo in got.replies.keys() - replies.keys():
-            self.report.count("refused", servo)
-        good = list(replies)
-        if good:
-            where = np.array([group.place[servo] for servo in good])
-            self._note_flags(replies, where)
-            values = values_of(block, [reply.params for reply in replies.values()])
-            self._take(group, good, where, values)
-            if "torque" in values:
-                on = values["torque"] == 1
-                if "torque_limit" in values:  # a servo that shut down has 0 there
-                    on &= values["torque_limit"] != 0
-                self._note_torque(good, where, on, running)
-        return good
-
-    def _take(
-        self, group: Group, ids: Sequence[int], where: NDArray[np.intp], values: Mapping[str, NDArray[np.int64]]
-    ) -> None:
-        stores = {
-            "velocity": self._speed,
-            "current": self._current,
-            "load": self.load,
-            "voltage": self._volts,
-            "temperature": self._celsius,
-        }
-        for name, store in stores.items():
-            if name in values:
-                store[where] = group.si(name, ids, values[name])
-        if "position" in values:
-            self._ticks[where] = values["position"]
-        if "hardware" in values:
-            self._hardware[where] = values["hardware"]
+    def _store(self, request: ReadRequest, values: Values, errors: Octets, now: float, running: bool) -> None:
+        super()._store(request, values, errors, now, running)
         if "moving" in values:
-            self.moving[where] = values["moving"] != 0
+            self.moving[request.group.index[request.group.slots(request.ids)]] = values["moving"] != 0
 
-    def _note_flags(self, replies: Mapping[int, Packet1], where: NDArray[np.intp]) -> None:
-        """Error flags of replies: those about the servo's state raise an alert."""
-        causes = [self._registers.causes(servo, reply.code) for servo, reply in replies.items()]
-        errors = np.where(causes, ALERT, 0).astype(np.uint8)
+    def _note_errors(self, ids: Sequence[int], where: NDArray[np.intp], errors: Octets) -> None:
+        """Those error flags that are about a servo's state raise an alert."""
+        causes = [self._registers.causes(servo, flags) for servo, flags in zip(ids, errors.tolist(), strict=True)]
         self._hardware[where] = causes
-        self._note_errors(list(replies), where, errors)
-
-    def _turns(self) -> Iterator[Turn]:
-        """Slow values in turn, some servos at a time (one where they are asked one by one), for ever."""
-        size = self._options[2]
-        turns = [
-            (group, block, group.ids[at : at + step])
-            for group in self._groups
-            for step in (size if group.layout.manner else min(size, 1),)
-            if step
-            for block in group.layout.slow
-            for at in range(0, len(group.ids), step)
-        ]
-        while turns:
-            yield from turns
+        super()._note_errors(ids, where, np.where(causes, ALERT, 0).astype(np.uint8))

@@ -1,5 +1,4 @@
-"""What drivers of servos with registers share, whatever their protocol; a family says only what differs.
+"""Shared core of drivers of servos with registers, for every protocol: transactions, start-up and telemetry.
 
-In: goals in rad, a family's packets. Out: registers by short name, servos brought up where they stand, states, and
-who keeps silent. Imports base to core.
+In: goals in rad, a family's packets. Out: registers by short name, start-up and stop, states. Imports base to core.
 """

@@ -1,11 +1,12 @@
-"""Questions and answers on a wire with servos, every answer checked for sender and length, in any protocol."""
+"""Request-reply transactions with servos: every reply is checked for sender and length, in any protocol."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar, Generic, NamedTuple, Protocol, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
+from drivers.packets.framing import FrameReader
 from drivers.packets.packet import BROADCAST_ID, Instruction
 from drivers.servos.port import Port
 
@@ -13,43 +14,30 @@ _LATE_CHUNKS = 16
 
 
 class Reply(Protocol):
-    """What a servo sent: its `id`, and the data in `params`."""
+    """A status packet: the servo's `id`, its `error` byte, and the data in `params`."""
 
     @property
-    def id(self) -> int:
-        """Who sent it."""
+    def id(self) -> int: ...
 
     @property
-    def params(self) -> bytes:
-        """Its data."""
+    def error(self) -> int: ...
+
+    @property
+    def params(self) -> bytes: ...
 
 
 R = TypeVar("R", bound=Reply)
-R_co = TypeVar("R_co", bound=Reply, covariant=True)
-
-
-class Reader(Protocol[R_co]):
-    """Finds the replies in a byte stream, and counts what was none."""
-
-    broken_frames: int
-    noise_bytes: int
-
-    def feed(self, data: bytes) -> Sequence[R_co]:
-        """Add received bytes; return the replies completed by them."""
-
-    def flush(self) -> Sequence[R_co]:
-        """Give up on an incomplete reply; return those found behind its header."""
 
 
 class Exchange(NamedTuple, Generic[R]):
-    """What came back for one question.
+    """The replies to one request.
 
     Attributes
     ----------
     replies : by servo id; only those with the right sender, length and checksum.
     missing : ids that were asked and are not in ``replies``.
     corrupt : True when damaged bytes arrived too, so that a missing reply may have been one of them.
-    joint_lost : True when nobody answered a fast read, whoever answered the plain one after it.
+    joint_lost : True when no servo answered a fast read, whatever the plain read after it brought.
     """
 
     replies: dict[int, R]
@@ -59,15 +47,21 @@ class Exchange(NamedTuple, Generic[R]):
 
 
 class Exchanges(ABC, Generic[R]):
-    """Transactions of a driver. The hooks of a protocol are the abstract methods below.
+    """Transactions of a driver; a protocol sets the attributes and implements the abstract methods.
 
     Attributes
     ----------
     status_size : bytes of a reply without data.
+    number_size : bytes of an address or a length in a packet.
+    refusals : bits of the error byte that refuse the request, so that the reply may be without the data asked for.
+    reader : finds replies in received bytes.
     greeting : instruction that a servo in ``port.suspects`` may be sent at once, where it is not a plain read.
     """
 
     status_size: ClassVar[int]
+    number_size: ClassVar[int]
+    refusals: ClassVar[int]
+    reader: ClassVar[type[FrameReader[Any]]]
     greeting: ClassVar[int] = -1
 
     # ------------------------------------------------------------------ hooks
@@ -77,26 +71,18 @@ class Exchanges(ABC, Generic[R]):
         """The packet of an instruction."""
 
     @abstractmethod
-    def number(self, value: int) -> bytes:
-        """An address or a length, as packets carry it."""
-
-    @abstractmethod
-    def make_reader(self) -> Reader[R]:
-        """Finds replies in what arrives."""
-
-    @abstractmethod
-    def is_refusal(self, reply: R) -> bool:
-        """Whether a reply says no, so that it may be without the data asked for."""
-
-    @abstractmethod
     def hello(self, port: Port, servo: int) -> Exchange[R]:
-        """Greet a servo by a question whose answer is like no other. It may be in ``port.suspects``."""
+        """Send the greeting, a request whose reply has a length of its own. The servo may be in ``port.suspects``."""
 
     @abstractmethod
-    def read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[R]:
-        """Read the same registers of servos that are in step; parameters as for :meth:`read_group`."""
+    def _read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[R]:
+        """Read the same registers of servos that owe no reply; parameters as for :meth:`read_group`."""
 
     # ------------------------------------------------------------------ one servo
+
+    def number(self, value: int) -> bytes:
+        """An address or a length, as packets carry it."""
+        return value.to_bytes(self.number_size, "little")
 
     def send(self, port: Port, frame: bytes) -> None:
         """Clear the input and send one packet; the port stays in use until the reply was taken."""
@@ -108,8 +94,8 @@ class Exchanges(ABC, Generic[R]):
             port.is_using = False
             raise
 
-    def tell(self, port: Port, frame: bytes) -> None:
-        """Send a packet, or several, that nobody answers."""
+    def send_only(self, port: Port, frame: bytes) -> None:
+        """Send a packet, or several, that no servo answers."""
         port.is_using = True
         try:
             port.transmit(frame)
@@ -119,8 +105,8 @@ class Exchanges(ABC, Generic[R]):
     def ask(self, port: Port, servo: int, code: int, params: bytes, length: int) -> Exchange[R]:
         """One instruction to one servo and its reply of ``length`` data bytes.
 
-        A servo that missed its time before must first answer a greeting: its replies come in order, so whatever it
-        still owed has arrived by then. Never ask for as many bytes as the answer to a greeting has.
+        A servo that missed a deadline must first answer a greeting: its replies come in order, so a late one has
+        arrived by then. Never ask for as many bytes as the reply to a greeting has.
         """
         if servo in port.suspects and code != self.greeting and not self.revive(port, servo):
             return Exchange({}, (servo,), False)
@@ -131,11 +117,11 @@ class Exchanges(ABC, Generic[R]):
         return self.ask(port, servo, Instruction.READ, self.number(address) + self.number(size), size)
 
     def write(self, port: Port, servo: int, address: int, data: bytes) -> Exchange[R]:
-        """Write registers of one servo and wait until it agrees."""
+        """Write registers of one servo and wait for its status."""
         return self.ask(port, servo, Instruction.WRITE, self.number(address) + data, 0)
 
     def revive(self, port: Port, servo: int) -> bool:
-        """Greet a servo that missed its time; True when it is in step again."""
+        """Greet a servo that missed a deadline; True when it answers again."""
         return not self.hello(port, servo).missing
 
     # ------------------------------------------------------------------ many servos
@@ -143,66 +129,51 @@ class Exchanges(ABC, Generic[R]):
     def read_group(self, port: Port, ids: Sequence[int], address: int, size: int, manner: str = "sync") -> Exchange[R]:
         """Read the same registers of many servos, keeping every reply that arrived.
 
-        Servos in ``port.suspects`` are not asked and count as missing until :meth:`revive` brought them back.
-
-        Parameters
-        ----------
-        manner : how, as the protocol knows it, such as ``"sync"``.
+        Servos in ``port.suspects`` are not asked and count as missing until they answered :meth:`revive`. `manner` is
+        the protocol's name of the kind of read, such as ``"sync"``.
         """
         left_out = tuple(servo for servo in ids if servo in port.suspects)
         asked = tuple(servo for servo in ids if servo not in left_out)
         if not asked:
             return Exchange({}, left_out, False)
-        got = self.read_asked(port, asked, address, size, manner)
+        got = self._read_asked(port, asked, address, size, manner)
         return got._replace(missing=got.missing + left_out)
 
     def write_group(self, port: Port, address: int, size: int, rows: bytes) -> None:
-        """Sync writes, as many as the rows need, that nobody answers; parameters as for :meth:`group_frames`."""
+        """Send the sync writes of :meth:`group_frames`, which no servo answers."""
         for frame in self.group_frames(address, size, rows):
-            self.tell(port, frame)
+            self.send_only(port, frame)
 
     def group_frames(self, address: int, size: int, rows: bytes) -> list[bytes]:
-        """Sync writes of some registers of many servos.
+        """Sync writes of `size` bytes from `address` of many servos.
 
-        Parameters
-        ----------
-        address, size : the registers.
-        rows : for each servo its id and `size` bytes, one behind the other.
-
-        Raises
-        ------
-        ValueError : `rows` does not hold whole rows.
+        `rows` holds for each servo its id and its bytes; raises ValueError where they are not whole rows.
         """
         width = size + 1
         if not rows or len(rows) % width:
             raise ValueError(f"rows: {len(rows)} bytes are not whole rows of 1 + {size}")
-        head, step = self.number(address) + self.number(size), self.rows_at_most(width) * width
+        head, step = self.number(address) + self.number(size), self._rows_at_most(width) * width
         parts = (rows[at : at + step] for at in range(0, len(rows), step))
         return [self.encode(BROADCAST_ID, Instruction.SYNC_WRITE, head + part) for part in parts]
 
-    def rows_at_most(self, width: int) -> int:
+    def _rows_at_most(self, width: int) -> int:
         """Rows of so many bytes that one sync write carries; by default as many as there can be servos."""
         return BROADCAST_ID
 
     # ------------------------------------------------------------------ on the wire
 
     def exchange(self, port: Port, frame: bytes, wanted: Mapping[int, int]) -> Exchange[R]:
-        """Send a packet and collect the replies to it.
-
-        Parameters
-        ----------
-        wanted : data bytes expected, by servo id, in the order of the replies.
-        """
+        """Send a packet and collect the replies; `wanted`: data bytes expected by servo id, in the replies' order."""
         size = len(wanted) * self.status_size + sum(wanted.values())
         port.suspects.update(wanted)  # until they have answered, so also when this is interrupted
         self.send(port, frame)
         try:
             port.expect(size)
-            return self.sort(port, wanted, self.fill(port, size))
+            return self._sort(port, wanted, self._fill(port, size))
         finally:
             port.is_using = False
 
-    def fill(self, port: Port, size: int) -> bytes:
+    def _fill(self, port: Port, size: int) -> bytes:
         """Received bytes, at least ``size`` of them unless the deadline passes."""
         data = more = port.link.read(port.deadline_s)
         while more and len(data) < size:
@@ -210,9 +181,9 @@ class Exchanges(ABC, Generic[R]):
             data += more
         return data
 
-    def sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[R]:
-        """The replies in ``data`` and in what still comes, whatever lies between them."""
-        reader, box, late = self.make_reader(), _Sorter(wanted, self.is_refusal), 0
+    def _sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[R]:
+        """The replies in ``data`` and in what still arrives, whatever lies between them."""
+        reader, box, late = self.reader(), _Sorter[R](wanted, self.refusals), 0
         box.take(reader.feed(data))
         while len(box.replies) < len(wanted) and late < _LATE_CHUNKS:
             data = port.link.read(port.deadline_s)
@@ -226,16 +197,13 @@ class Exchanges(ABC, Generic[R]):
 
 
 class _Sorter(Generic[R]):
-    """Sorts replies into those asked for and strays; two under one id are both worth nothing.
+    """Sorts replies into those asked for and strays; two under one id are both discarded.
 
-    Parameters
-    ----------
-    wanted : data bytes expected, by servo id.
-    is_refusal : whether a reply may be without them.
+    `wanted` holds the data bytes expected by servo id, `refusals` the error bits with which a reply may lack them.
     """
 
-    def __init__(self, wanted: Mapping[int, int], is_refusal: Callable[[R], bool]) -> None:
-        self._wanted, self._is_refusal = wanted, is_refusal
+    def __init__(self, wanted: Mapping[int, int], refusals: int) -> None:
+        self._wanted, self._refusals = wanted, refusals
         self.replies: dict[int, R] = {}
         self.twice: set[int] = set()
         self.stray = 0
@@ -244,7 +212,7 @@ class _Sorter(Generic[R]):
         """Sort some more."""
         for reply in arrived:
             length = self._wanted.get(reply.id)
-            refused = self._is_refusal(reply) and not reply.params
+            refused = reply.error & self._refusals and not reply.params
             if length is None or (len(reply.params) != length and not refused):
                 self.stray += 1
             elif self.replies.setdefault(reply.id, reply) is not reply:
@@ -257,7 +225,7 @@ class _Sorter(Generic[R]):
 
 
 def settled(port: Port, wanted: Mapping[int, int], replies: dict[int, R], corrupt: bool) -> Exchange[R]:
-    """Who answered is in step; the others stay suspects."""
+    """The exchange of these replies; servos without one stay suspects."""
     missing = tuple(servo for servo in wanted if servo not in replies)
     port.suspects.difference_update(replies)
     return Exchange(replies, missing, corrupt and bool(missing))

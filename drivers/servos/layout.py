@@ -1,10 +1,11 @@
-"""Registers by short names that hold for every family, and those that lie together as one block of bytes."""
+"""Register layout of servos: registers by short name, blocks read in one go, and groups of servos read together."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,9 @@ NAMES = {
     "shutdown": ("Shutdown",),
     "lock": ("Lock",),
 }
-"""Short names -> the makers' names of a register, which differ by family."""
+"""Short name -> the makers' names of a register, which differ by family."""
+SCALED = {"velocity": "rad/s", "current": "A", "load": "1", "voltage": "V", "temperature": "C"}
+"""Short names of registers that are converted, and the units they are converted to."""
 
 
 def item_of(table: ControlTable, name: str) -> Item | None:
@@ -51,12 +54,7 @@ def item_of(table: ControlTable, name: str) -> Item | None:
 
 @dataclass(frozen=True)
 class Block:
-    """Registers that lie together and are read in one go.
-
-    Parameters
-    ----------
-    items : by short name (``"position"``, ``"velocity"``, ...).
-    """
+    """Adjacent registers that are read in one go: `items` by short name (``"position"``, ``"velocity"``, ...)."""
 
     items: Mapping[str, Item]
 
@@ -67,8 +65,13 @@ class Block:
 
     @cached_property
     def size(self) -> int:
-        """Bytes to read. Never as many as the answer to a greeting has, see ``Exchanges.hello``."""
+        """Bytes to read. Never as many as the reply to a greeting has, see ``Exchanges.hello``."""
         return max(item.end for item in self.items.values()) - self.address
+
+    @cached_property
+    def key(self) -> tuple[object, ...]:
+        """Equal for blocks that hold the same registers at the same addresses."""
+        return self.address, self.size, tuple((name, item.big_endian) for name, item in self.items.items())
 
     @cached_property
     def dtype(self) -> np.dtype[np.void]:
@@ -82,16 +85,102 @@ class Block:
             }
         )
 
-    def decode(self, data: NDArray[np.uint8]) -> NDArray[np.void]:
-        """Raw values of k servos from their replies ``(k, size)`` uint8; fields by name, shape ``(k,)``."""
-        return np.ascontiguousarray(data).view(self.dtype)[:, 0]
+    def decode(self, data: NDArray[np.uint8]) -> dict[str, NDArray[np.int64]]:
+        """Signed values of k servos by short name, ``(k,)`` each, from their replies ``(k, size)`` uint8."""
+        raw = np.ascontiguousarray(data).view(self.dtype)[:, 0]
+        return {name: _signed(raw[name].astype(np.int64), item.sign_bit) for name, item in self.items.items()}
+
+
+def _signed(raw: NDArray[np.int64], sign_bit: int | None) -> NDArray[np.int64]:
+    """Values of magnitudes that have their sign in a bit."""
+    if sign_bit is None:
+        return raw
+    magnitude = raw & ((1 << sign_bit) - 1)
+    return np.where(raw >> sign_bit & 1, -magnitude, magnitude)
 
 
 def format_of(item: Item) -> str:
-    """How numpy calls a register's bytes; a sign that is kept in a bit of its own is left there."""
+    """numpy's type code of a register's bytes; a sign in a bit of its own is not decoded by it."""
     return f"{'>' if item.big_endian else '<'}{'i' if item.signed else 'u'}{item.size}"
 
 
 def block_of(table: ControlTable, *names: str) -> Block:
     """The registers of these short names that a model has; empty where it has none."""
     return Block({name: item for name in names if (item := item_of(table, name)) is not None})
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Blocks of one control table that a bus reads and writes; servos whose layouts have equal keys share reads.
+
+    Attributes
+    ----------
+    goal : registers written every cycle.
+    feedback : block read every cycle (or in turn, where servos are read one by one).
+    slow : blocks read in turn: what is not in ``feedback``.
+    manner : how a group is read, see ``Exchanges.read_group``; empty: one servo after the other.
+    indirect : ``feedback`` is read through pointers, which a servo forgets when it reboots.
+    """
+
+    goal: Block
+    feedback: Block
+    slow: tuple[Block, ...]
+    manner: str = "sync"
+    indirect: bool = False
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal for layouts whose servos can share one transaction."""
+        return self.manner, *(block.key for block in (self.goal, self.feedback, *self.slow))
+
+
+class Group:
+    """Servos that share one transaction because their registers lie at the same addresses.
+
+    Parameters
+    ----------
+    ids : k servo ids.
+    index : (k,) their places in the bus's arrays.
+    tables, layout : k control tables, and the layout that they share.
+
+    Attributes
+    ----------
+    scales : value of one step by short name, (k,) in the units of `SCALED`; NaN where a model has no such value.
+    """
+
+    def __init__(self, ids: Sequence[int], index: Sequence[int], tables: Sequence[ControlTable], layout: Layout):
+        self.ids, self.index, self.layout = tuple(ids), np.array(index, np.int64), layout
+        self.scales = {name: np.array([_scale(table, name) for table in tables]) for name in SCALED}
+        self._slot = {servo: slot for slot, servo in enumerate(self.ids)}
+
+    def slots(self, ids: Sequence[int]) -> slice | list[int]:
+        """Places of ids within the group; all of it as a slice, which is faster."""
+        return slice(None) if tuple(ids) == self.ids else [self._slot[servo] for servo in ids]
+
+
+def _scale(table: ControlTable, name: str) -> float:
+    item = item_of(table, name)
+    return item.scale if item is not None and item.unit == SCALED[name] else np.nan
+
+
+class ReadRequest(NamedTuple):
+    """A block to read from some servos of a group."""
+
+    group: Group
+    block: Block
+    ids: tuple[int, ...]
+
+    def without(self, left_out: Collection[int]) -> ReadRequest:
+        """The same request to fewer servos."""
+        return self._replace(ids=tuple(servo for servo in self.ids if servo not in left_out))
+
+
+def slow_requests(groups: Sequence[Group], size: int) -> list[ReadRequest]:
+    """All slow values, `size` servos at a time, or one where they are read one by one; none where `size` is 0."""
+    return [
+        ReadRequest(group, block, group.ids[at : at + step])
+        for group in groups
+        for step in (size if group.layout.manner else min(size, 1),)
+        for block in group.layout.slow
+        for at in range(0, len(group.ids) if step else 0, max(step, 1))
+    ]

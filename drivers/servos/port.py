@@ -1,17 +1,32 @@
-"""A serial port with the state of a conversation: who owes an answer, when the wire is free, who is talking."""
+"""Serial port for request-reply transactions: dynamixel-sdk's port handler with its known faults overridden.
+
+It is exclusive and blocking, keeps monotonic reply deadlines that fit the wire, and knows the servos that owe a reply.
+See drivers/dynamixel/sdk.py for the list of faults that the numbers S3 to S12 refer to.
+"""
 
 from __future__ import annotations
 
 import threading
 
+from dynamixel_sdk import port_handler
+
 from drivers.base.errors import DriverError
 from drivers.port.serialport import SerialPort, link_to, reply_margin_s
 
 BITS_PER_BYTE = 10
+LEAST_SLEEP_S = 0.0005
+"""A shorter sleep costs more than it saves."""
+WAKE_EARLY_S = 0.0006
+"""How long before the last byte is due a sleep ends."""
+POLL_S = 0.00002
+"""Length of the sleeps from then on: a processor that is not switched off keeps its caches, and processing the reply
+takes a third of the time."""
+POLL_LATE_S = 0.0005
+"""How long after the last byte was due polling goes on."""
 
 
-class Port:
-    """An exclusive, blocking :class:`~drivers.port.serialport.SerialPort` for questions and answers.
+class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
+    """An exclusive, blocking :class:`~drivers.port.serialport.SerialPort` for requests and replies (S5 to S9).
 
     Methods have the names that dynamixel-sdk gives them.
 
@@ -23,29 +38,31 @@ class Port:
 
     Attributes
     ----------
-    clock, sleep : monotonic seconds, and the way to let them pass.
+    clock, sleep : monotonic seconds, and the function that waits.
     port_name : device path.
-    suspects : ids that did not answer when they should have; see :class:`~drivers.servos.exchange.Exchanges`.
+    suspects : ids that missed a deadline and may still reply late; see :class:`~drivers.servos.exchange.Exchanges`.
     stray : replies thrown away.
     """
 
     def __init__(self, path: str | SerialPort, baud: int = 1_000_000, margin_s: float | None = None) -> None:
+        self._busy = threading.Lock()
         self.link = link_to(path, baud)
         self.clock, self.sleep = self.link.clock, self.link.sleep
-        self.port_name, self.baudrate = self.link.path, baud
+        super().__init__(self.link.path)
+        self.baudrate = baud
         self.suspects: set[int] = set()
         self.stray = 0
         self.deadline_s = self._free_s = 0.0
+        self._held = bytearray()
         self._margin_s = margin_s
-        self._busy = threading.Lock()
         self._tune()
 
     def _tune(self) -> None:
         self.margin_s = reply_margin_s(self.link.path) if self._margin_s is None else self._margin_s
+        self._byte_s = BITS_PER_BYTE / self.baudrate
+        self.tx_time_per_byte = 1000.0 * self._byte_s  # milliseconds, the SDK's unit
 
-    @property
-    def _byte_s(self) -> float:
-        return BITS_PER_BYTE / self.baudrate
+    # ------------------------------------------------------------------ opening and closing
 
     def setPortName(self, port_name: str) -> None:
         """Another device path for the next opening."""
@@ -53,29 +70,97 @@ class Port:
 
     def openPort(self) -> bool:
         """Open exclusively; raises PortMissing, PortBusy or PortPermission instead of returning False."""
+        return self.setupPort(self.baudrate)
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """As ``openPort``, at a rate."""
+        self.link.baud = self.baudrate = cflag_baud
         self.link.open()
         self.suspects.clear()
         self.is_using = False
         self._tune()
+        self.is_open, self.ser = True, self.link.serial
+        self._held.clear()
         return True
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Any rate, not only those of the SDK's list (4.5 Mbaud is real)."""
+        return self.setupPort(baudrate)
 
     def closePort(self) -> None:
         """Close; never raises."""
         self.link.close()
-        self.is_using = False
+        self.is_using = self.is_open = False
+
+    # ------------------------------------------------------------------ bytes
 
     def clearPort(self) -> None:
-        """Throw away all input."""
+        """Throw away all input (S3)."""
+        self._held.clear()
         self.link.drain()
 
+    def getBytesAvailable(self) -> int:
+        """Bytes that can be read without waiting."""
+        self._held += self.link.read(0.0)
+        return len(self._held)
+
+    def readPort(self, length: int) -> bytes:
+        """At most ``length`` bytes, waiting for the first until the packet timeout (S12)."""
+        if not self._held:
+            self._held += self.link.read(self.deadline_s)
+        data = bytes(self._held[:length])
+        del self._held[:length]
+        return data
+
+    def writePort(self, packet: bytes) -> int:
+        """Send; returns the count sent."""
+        self.transmit(bytes(packet))
+        return len(packet)
+
     def transmit(self, packet: bytes) -> None:
-        """Hand bytes to the system, and keep count of when the last of them will have left."""
+        """Hand bytes to the system, and note when the last of them will have left."""
         self._free_s = max(self.clock(), self._free_s) + len(packet) * self._byte_s
         self.link.write(packet)
+
+    def more(self, missing: int) -> bytes:
+        """The next bytes of a reply that lacks so many, empty when none came until the deadline.
+
+        It sleeps while the wire carries them, and polls at the end.
+        """
+        due_s = min(self.clock() + missing * self._byte_s, self.deadline_s)
+        pause = due_s - WAKE_EARLY_S - self.clock()
+        if pause > LEAST_SLEEP_S:
+            self.sleep(pause)
+        end_s = min(due_s + POLL_LATE_S, self.deadline_s)
+        while (now := self.clock()) < end_s:
+            if data := self.link.read(min(now + POLL_S, end_s)):
+                return data
+        return self.link.read(self.deadline_s)
+
+    # ------------------------------------------------------------------ deadlines
 
     def expect(self, size: int) -> None:
         """Deadline for ``size`` bytes of reply to what was sent: time on the wire, both ways, plus the margin."""
         self.deadline_s = max(self.clock(), self._free_s) + size * self._byte_s + self.margin_s
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Deadline for a reply of ``packet_length`` bytes: wire time plus margin (S7)."""
+        self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + self.margin_s * 1000.0)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Deadline so many milliseconds from now."""
+        super().setPacketTimeoutMillis(msec)
+        self.deadline_s = self.clock() + msec / 1000.0
+
+    def isPacketTimeout(self) -> bool:
+        """True behind the deadline."""
+        return self.clock() > self.deadline_s
+
+    def getCurrentTime(self) -> float:
+        """Milliseconds on the monotonic clock (S8)."""
+        return self.clock() * 1000.0
+
+    # ------------------------------------------------------------------ transactions
 
     @property
     def is_using(self) -> bool:
@@ -83,7 +168,7 @@ class Port:
 
         Raises
         ------
-        DriverError : another thread is in the middle of a transaction.
+        DriverError : another thread is in the middle of a transaction (S9).
         """
         return self._busy.locked()
 

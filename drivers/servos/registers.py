@@ -1,4 +1,4 @@
-"""Named registers of the servos on one port, read and written with every answer checked, in any protocol."""
+"""Reading and writing registers of servos by name, with retries and every reply checked, in any protocol."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import ClassVar, Generic, TypeVar
 
-from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, CorruptReply, DriverError, NoReply, ServoRefused, together
+from drivers.base.bus import ServoInfo, ServoSpec
+from drivers.base.errors import BusError, CorruptReply, DriverError, NoReply, PortLost, ServoRefused, together
 from drivers.servos.exchange import Exchange, Exchanges, R
 from drivers.servos.layout import NAMES, item_of
 from drivers.servos.port import Port
-from drivers.tables.tables import ControlTable, Item
+from drivers.tables.tables import ControlTable, Item, model_name
 
 TRIES = 4
 T = TypeVar("T")
@@ -20,17 +20,13 @@ E = TypeVar("E", bound=DriverError)
 
 
 class Registers(ABC, Generic[R]):
-    """Registers by servo id and short name (see ``layout.NAMES``). The hooks of a protocol are listed first.
-
-    Parameters
-    ----------
-    packets, port : the wire.
-    servos : by id, for messages.
+    """Registers by servo id and short name (see ``layout.NAMES``); a protocol implements the hooks.
 
     Attributes
     ----------
     tables : control table by id.
-    greeting : how messages call the question of :meth:`hello`.
+    names : names of servos by id, for messages.
+    greeting : what error messages call the request of :meth:`hello`.
     """
 
     greeting: ClassVar[str]
@@ -47,25 +43,28 @@ class Registers(ABC, Generic[R]):
         """Why a servo refused what it was asked; empty where it did not."""
 
     def span(self, table: ControlTable, item: Item) -> tuple[int, int, str]:
-        """(address, size, manner) of the read that learns a register, see ``Exchanges.read_group``; no manner: one
-        servo after the other."""
+        """(address, size, manner) of the read that contains a register, see ``Exchanges.read_group``."""
         return item.address, item.size, "sync"
 
     def title(self, item: Item, name: str) -> str:
-        """How messages call a register."""
+        """The name of a register in messages."""
         return item.name
 
     def is_damaged(self, reply: R) -> bool:
-        """Whether a servo says that the question reached it damaged, so that it must be asked again."""
+        """Whether a servo reports that the request reached it damaged, so that it must be sent again."""
         return False
 
+    @abstractmethod
+    def hardware_error(self, servo: int) -> int:
+        """Hardware error bits of a servo that was just read from."""
+
     def note(self, servo: int, reply: R) -> None:
-        """Keep what a reply says beside its data."""
+        """Keep what a reply holds beside its data."""
 
     # ------------------------------------------------------------------ what a servo has
 
     def label(self, servo: int) -> str:
-        """How messages call a servo: ``"jaw" (id 3)``."""
+        """The name of a servo in messages: ``"jaw" (id 3)``."""
         return f'"{self.names[servo]}" (id {servo})' if servo in self.names else f"id {servo}"
 
     def item(self, servo: int, name: str) -> Item | None:
@@ -76,49 +75,49 @@ class Registers(ABC, Generic[R]):
         """Those of the ids whose model has a register."""
         return [servo for servo in ids if self.item(servo, name) is not None]
 
-    def called(self, servo: int, name: str) -> str:
-        """How messages call a register of a servo."""
+    def register_name(self, servo: int, name: str) -> str:
+        """The name of a servo's register in messages."""
         return self.title(self._known(servo, name), name)
 
     # ------------------------------------------------------------------ one servo
 
     def hello(self, servo: int, tries: int = TRIES) -> R:
-        """A servo's answer to a greeting.
-
-        Raises
-        ------
-        NoReply, CorruptReply
-        """
-        return self._insist(servo, self.greeting, partial(self.packets.hello, self.port, servo), tries)
+        """A servo's reply to a greeting; raises NoReply or CorruptReply."""
+        return self._with_retries(servo, self.greeting, partial(self.packets.hello, self.port, servo), tries)
 
     def get(self, servo: int, name: str, tries: int = TRIES) -> int:
-        """One register.
-
-        Raises
-        ------
-        NoReply, CorruptReply, ServoRefused
-        """
+        """One register; raises NoReply, CorruptReply or ServoRefused."""
         item = self._known(servo, name)
         at, size, _ = self.span(self.tables[servo], item)
         ask = partial(self.packets.read, self.port, servo, at, size)
-        reply = self._insist(servo, f"reading {self.title(item, name)}", ask, tries)
+        reply = self._with_retries(servo, f"reading {self.title(item, name)}", ask, tries)
         return item.decode(reply.params[item.address - at :])
 
     def put(self, servo: int, name: str, value: int, tries: int = TRIES) -> None:
-        """Write one register and wait for the servo to agree.
-
-        Raises
-        ------
-        NoReply, CorruptReply, ServoRefused
-        """
+        """Write one register and wait for the servo's status; raises as :meth:`get` does."""
         item = self._known(servo, name)
         ask = partial(self.packets.write, self.port, servo, item.address, item.encode(value))
-        self._insist(servo, f"writing {self.title(item, name)} = {value}", ask, tries)
+        self._with_retries(servo, f"writing {self.title(item, name)} = {value}", ask, tries)
 
-    def tell(self, servo: int, name: str, value: int) -> None:
-        """Write one register by a sync write of one, which is never answered: an answer that nobody waited for
-        would collide with the next question."""
+    def put_unanswered(self, servo: int, name: str, value: int) -> None:
+        """Write one register by a sync write of one, which is never answered: an unread reply would collide with the
+        next request."""
         self.put_all({servo: value}, name)
+
+    def info(self, servo: int, number: int, firmware: int, find_table: Callable[[], ControlTable]) -> ServoInfo:
+        """Description of a servo; without measurements where its model is unknown or it stops answering.
+
+        `find_table` returns its control table or raises DriverError. Raises PortLost.
+        """
+        try:
+            table = self.tables[servo] = find_table()
+            volts, celsius = self.get(servo, "voltage"), self.get(servo, "temperature")
+            hardware, torque = self.hardware_error(servo), self.get(servo, "torque") == 1
+        except PortLost:
+            raise
+        except DriverError:
+            return ServoInfo(servo, number, model_name(number), firmware)
+        return ServoInfo(servo, number, table.model, firmware, volts / 10.0, float(celsius), hardware, torque)
 
     # ------------------------------------------------------------------ many servos
 
@@ -145,9 +144,9 @@ class Registers(ABC, Generic[R]):
         return values | self.each(missing, lambda servo: self.get(servo, name))
 
     def put_all(self, values: Mapping[int, int], name: str) -> None:
-        """Write one register of many servos with one packet per address; nobody answers."""
+        """Write one register of many servos with one packet per address, which no servo answers."""
         for frame in self.frames(values, name):
-            self.packets.tell(self.port, frame)
+            self.packets.send_only(self.port, frame)
 
     def frames(self, values: Mapping[int, int], name: str) -> list[bytes]:
         """The sync writes of :meth:`put_all`."""
@@ -159,12 +158,7 @@ class Registers(ABC, Generic[R]):
         return [frame for key, rows in groups.items() for frame in self.packets.group_frames(*key, rows)]
 
     def set_all(self, values: Mapping[int, int], name: str) -> None:
-        """Write one register of many servos and make sure that each has it.
-
-        Raises
-        ------
-        NoReply, CorruptReply, ServoRefused
-        """
+        """Write one register of many servos and make sure that each has it; raises as :meth:`get` does."""
         self.put_all(values, name)
         has = self.get_all(list(values), name)
         self.each(
@@ -173,7 +167,7 @@ class Registers(ABC, Generic[R]):
         )
 
     def each(self, ids: Iterable[int], do: Callable[[int], T]) -> dict[int, T]:
-        """Do something with every servo, each by itself, and tell about all that failed.
+        """Do something with every servo, each by itself, and raise one error about all that failed.
 
         Raises
         ------
@@ -210,25 +204,25 @@ class Registers(ABC, Generic[R]):
             raise ServoRefused(f"{self.tables[servo].model} has no {NAMES[name][0]}", servo_ids=(servo,))
         return item
 
-    def _insist(self, servo: int, doing: str, ask: Callable[[], Exchange[R]], tries: int) -> R:
+    def _with_retries(self, servo: int, doing: str, ask: Callable[[], Exchange[R]], tries: int) -> R:
         corrupt = False
         for _ in range(tries):
             got = ask()
             reply = got.replies.get(servo)
             if reply is not None and not self.is_damaged(reply):
                 self.note(servo, reply)
-                return self._agreed(servo, doing, reply)
+                return self._unless_refused(servo, doing, reply)
             corrupt |= got.corrupt or reply is not None
-        raise self._silent(servo, doing, corrupt)
+        raise self._no_reply(servo, doing, corrupt)
 
-    def _agreed(self, servo: int, doing: str, reply: R) -> R:
+    def _unless_refused(self, servo: int, doing: str, reply: R) -> R:
         reason = self.refusal(reply)
         if not reason:
             return reply
         message = f"servo {self.label(servo)} on {self.port.port_name} refused {doing}: {reason}"
         raise self.error(ServoRefused, message, "`omote scan` shows its state", servo)
 
-    def _silent(self, servo: int, doing: str, corrupt: bool) -> BusError:
+    def _no_reply(self, servo: int, doing: str, corrupt: bool) -> BusError:
         where = f"servo {self.label(servo)} on {self.port.port_name} at {self.port.baudrate} baud"
         if corrupt:
             hint = "two servos may have this id, or the baud rate is wrong: connect one alone, try `omote scan`"

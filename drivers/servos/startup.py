@@ -1,8 +1,8 @@
-"""Bringing servos up without a movement, and switching them off so that no reachable one stays on.
+"""Start-up of servos without movement, and switching them off so that no reachable one keeps its torque.
 
-Nothing is written before every servo has answered and is the configured model, torque goes on last, with each
-goal at the position just read, and is read back. Going down, one packet reaches everybody first; then each servo is
-switched off and read back by itself, the silent ones last, so that one dead servo cannot cost the others theirs.
+Nothing is written before every servo has answered and is the configured model. Torque is switched on last, with each
+goal at the position just read, and is read back. To stop, one packet switches all servos off; then each is switched
+off and read back by itself, again later where it does not answer, so that a dead servo does not keep others on.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar, Generic
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel
+from drivers.base.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel, together
+from drivers.servos.exchange import R
 from drivers.servos.layout import Block
-from drivers.servos.registers import E, Registers
-from drivers.tables.tables import model_name
+from drivers.servos.registers import Registers
+from drivers.tables.tables import ControlTable, load_table, model_name
 
 log = logging.getLogger(__name__)
 
@@ -26,13 +27,13 @@ OFF_RETRIES = 5
 
 @dataclass(frozen=True)
 class Policy:
-    """What start-up may do, whatever the family.
+    """What start-up may do, in every family.
 
     Attributes
     ----------
-    takeover : servos found holding with torque are kept holding (``"adopt"``), switched off first
-        (``"release"``: they may fall), or make start-up fail (``"refuse"``).
-    reboot_faulted : bring servos back that had shut down for a hardware error; they let go while they reboot.
+    takeover : servos whose torque is on already are kept holding (``"adopt"``), switched off first (``"release"``:
+        what they carry may fall), or make start-up fail (``"refuse"``).
+    reboot_faulted : bring servos back that had shut down for a hardware error; they lose torque while they reboot.
     min_voltage_v : wait until every servo has at least this supply; None takes each servo's own limit.
     voltage_wait_s : how long to wait for it.
     """
@@ -65,64 +66,117 @@ class Started:
     eeprom: list[str] = field(default_factory=list)
 
 
-class Startup(ABC):
-    """The steps of start-up and stop; a family puts them in its order. Its hooks are the abstract methods.
-
-    Parameters
-    ----------
-    registers : the wire, and who is on it.
-    policy : what may be done.
-    started : what was found and done, to add to.
+class Startup(ABC, Generic[R]):
+    """The steps of start-up and stop; a protocol implements the hooks.
 
     Attributes
     ----------
-    out_of_turn_hint, not_on_hint, not_off_hint : what a user can do where a position is not within one turn, a motor
-        does not come on, or does not go off.
+    started : what was found and done.
+    out_of_turn_hint, not_on_hint, not_off_hint : what a user can do where a position is not within one turn, or a
+        motor does not switch on, or off.
     """
 
     out_of_turn_hint: ClassVar[str]
     not_on_hint: ClassVar[str]
     not_off_hint: ClassVar[str]
 
-    def __init__(self, registers: Registers[Any], policy: Policy, started: Started | None = None) -> None:
+    def __init__(self, registers: Registers[R], policy: Policy) -> None:
         self.registers, self.policy = registers, policy
-        self.started = Started() if started is None else started
+        self.started = Started()
 
     # ------------------------------------------------------------------ hooks
 
     @abstractmethod
-    def release(self, servo: int) -> None:
-        """Switch one servo off and be sure of it."""
+    def _identity(self, reply: R, expected: ControlTable) -> tuple[int, int]:
+        """Model number and firmware in a servo's reply to the greeting."""
+
+    def _accepts(self, expected: ControlTable, number: int) -> bool:
+        """Whether a model number is the configured model's."""
+        return number == expected.number
+
+    def _greet(self, servo: int) -> R:
+        """A servo's reply to the greeting."""
+        return self.registers.hello(servo)
 
     @abstractmethod
-    def slack(self, turn: int) -> float:
+    def _release(self, servo: int) -> None:
+        """Switch one servo off and verify it."""
+
+    def _least_voltage(self, ids: Sequence[int]) -> Mapping[int, int]:
+        """Least voltage that servos need by id, 0.1 V."""
+        return self.registers.get_all(ids, "min_voltage")
+
+    @abstractmethod
+    def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
+        """Look at hardware errors; returns servos that were rebooted.
+
+        Raises ServoFault where a servo has an error and the policy does not allow to bring it back.
+        """
+
+    @abstractmethod
+    def _write_settings(self, servo: int, held: bool) -> None:
+        """Permanent registers this driver depends on: read, and written only where they differ, with torque off."""
+
+    @abstractmethod
+    def _prepare(self, servos: Sequence[ServoSpec]) -> None:
+        """Write the registers that must be right before torque comes on."""
+
+    @abstractmethod
+    def _slack(self, turn: int) -> float:
         """Steps that a position may lie outside of a turn of so many."""
 
     @abstractmethod
-    def why_limp(self, ids: Sequence[int]) -> Mapping[int, str]:
-        """What servos say whose motor did not come on, by id."""
+    def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
+        """Why motors did not switch on, by id."""
 
-    def is_on(self, torque: int) -> bool:
-        """Whether the torque register says that the motor is on."""
-        return bool(torque)
-
-    def disarm(self, ids: Sequence[int]) -> None:  # noqa: B027  most have nothing to disarm
-        """Look after servos that were switched off."""
+    def _disarm(self, ids: Sequence[int]) -> None:
+        """Switch off what watches servos whose motors are off."""
 
     # ------------------------------------------------------------------ up
 
-    def error(self, kind: type[E], message: str, hint: str, *ids: int) -> E:
-        """An error about servos on this port."""
-        return self.registers.error(kind, message, hint, *ids)
+    def identify(self, servos: Sequence[ServoSpec]) -> None:
+        """Greet every servo, compare its model and load its control table.
 
-    def wrong_model(self, servo: ServoSpec, number: int) -> BusError:
-        """The error of a servo that is another model than the configured one."""
-        message = f"servo {self.registers.label(servo.id)} is {model_name(number)}, configured is {servo.model}"
-        hint = "correct the configuration, or the servo's id with `omote scan PORT`"
-        return self.error(WrongModel, message, hint, servo.id)
+        Raises WrongModel where one is not the configured model; NoReply or CorruptReply where some did not answer.
+        """
+        replies = self.registers.each([servo.id for servo in servos], self._greet)
+        wrong: dict[int, BusError] = {}
+        for servo in servos:
+            expected = load_table(servo.model)
+            number, firmware = self._identity(replies[servo.id], expected)
+            if self._accepts(expected, number):
+                self.registers.tables[servo.id] = load_table(expected.number, firmware)
+                continue
+            label = self.registers.label(servo.id)
+            message = f"servo {label} is {model_name(number)}, configured is {servo.model}"
+            hint = "correct the configuration, or the servo's id with `omote scan PORT`"
+            wrong[servo.id] = self.registers.error(WrongModel, message, hint, servo.id)
+        if wrong:
+            raise together(wrong)
+
+    def bring_up(self, servos: Sequence[ServoSpec]) -> Started:
+        """Start identified servos where they are.
+
+        Raises BusError where that is not safe; torque was switched off again where it had been switched on.
+        """
+        ids = [servo.id for servo in servos]
+        held = self.take_over(ids)
+        self.wait_for_voltage(ids)
+        rebooted = self._clear_faults(ids)
+        for servo in ids:
+            self._write_settings(servo, servo in held and servo not in rebooted)
+        low, high = self.registers.get_all(ids, "min_ticks"), self.registers.get_all(ids, "max_ticks")
+        self.started.limits = {servo: (low[servo], high[servo]) for servo in low}
+        self._prepare(servos)
+        try:
+            self.torque_on(ids)
+        except BaseException:
+            self.switch_off(ids)
+            raise
+        return self.started
 
     def take_over(self, ids: Sequence[int]) -> list[int]:
-        """Servos that hold with torque and go on holding.
+        """Servos whose torque is on and stays on.
 
         Raises
         ------
@@ -132,24 +186,19 @@ class Startup(ABC):
         if not held or self.policy.takeover == "adopt":
             return held
         if self.policy.takeover == "release":
-            self.registers.each(held, self.release)
+            self.registers.each(held, self._release)
             return []
         message = f"servos hold with torque already: {', '.join(map(self.registers.label, held))}"
         hint = 'stop the program that drives them, or start with takeover="adopt" or "release"'
-        raise self.error(ServoRefused, message, hint, *held)
+        raise self.registers.error(ServoRefused, message, hint, *held)
 
-    def wait_for_voltage(self, ids: Sequence[int], need: Mapping[int, int]) -> None:
+    def wait_for_voltage(self, ids: Sequence[int]) -> None:
         """Wait for the supply: switching torque on while it ramps up latches input-voltage errors.
 
-        Parameters
-        ----------
-        need : least voltage by id, 0.1 V; what the policy asks for goes before it.
-
-        Raises
-        ------
-        ServoFault : it does not come.
+        Raises ServoFault where it stays too low.
         """
         registers, least_v = self.registers, self.policy.min_voltage_v
+        need = self._least_voltage(ids)
         if least_v is not None:
             need = dict.fromkeys(ids, round(least_v * 10))
         port = registers.port
@@ -167,33 +216,30 @@ class Startup(ABC):
             f"{len(low)} servos have too little supply voltage: {registers.label(worst)} reads "
             f"{low[worst] / 10:.1f} V, needs {need[worst] / 10:.1f} V"
         )
-        raise self.error(ServoFault, message, "check the power supply and its cable", *sorted(low))
+        raise self.registers.error(ServoFault, message, "check the power supply and its cable", *sorted(low))
 
     def fault(self, what: str, bad: Mapping[int, int]) -> BusError:
         """The error of servos with a hardware error; their bits by id."""
         which = ", ".join(f"{self.registers.label(servo)} 0x{bits:02X}" for servo, bits in bad.items())
         hint = "support the head, then start with reboot_faulted=true, or switch the power off and on"
-        return self.error(ServoFault, f"servos {what} a hardware error: {which}", hint, *sorted(bad))
+        return self.registers.error(ServoFault, f"servos {what} a hardware error: {which}", hint, *sorted(bad))
 
     def locked(self, servo: int, name: str, old: int, new: int) -> BusError:
         """The error of a permanent register that must change while the servo holds."""
-        what = f"{self.registers.called(servo, name)} must change from {old} to {new}"
+        what = f"{self.registers.register_name(servo, name)} must change from {old} to {new}"
         message = f"servo {self.registers.label(servo)} holds with torque, and {what}"
-        return self.error(ServoRefused, message, 'support the head, then start with takeover="release"', servo)
+        return self.registers.error(
+            ServoRefused, message, 'support the head, then start with takeover="release"', servo
+        )
 
     def note(self, servo: int, name: str, old: int, new: int) -> None:
-        """Tell that a permanent register was written."""
-        line = f"servo {self.registers.label(servo)}: {self.registers.called(servo, name)} {old} -> {new}"
+        """Log that a permanent register was written."""
+        line = f"servo {self.registers.label(servo)}: {self.registers.register_name(servo, name)} {old} -> {new}"
         self.started.eeprom.append(line)
         log.info("permanent setting written: %s", line)
 
-    def read_limits(self, ids: Sequence[int]) -> None:
-        """Keep the limits that the servos' own registers hold."""
-        low, high = self.registers.get_all(ids, "min_ticks"), self.registers.get_all(ids, "max_ticks")
-        self.started.limits = {servo: (low[servo], high[servo]) for servo in ids if servo in low and servo in high}
-
     def torque_on(self, ids: Sequence[int]) -> None:
-        """Goals to where the servos are, as close before torque as can be, then torque, then read back.
+        """Write goals at the present positions, right before torque; then switch torque on and read it back.
 
         Raises
         ------
@@ -202,11 +248,13 @@ class Startup(ABC):
         registers = self.registers
         registers.set_all(self.goals_at_present(ids), "goal")
         registers.put_all(dict.fromkeys(ids, 1), "torque")
-        limp = [servo for servo, torque in registers.get_all(ids, "torque").items() if not self.is_on(torque)]
-        if limp:
-            why = self.why_limp(limp)
-            which = ", ".join(f"{registers.label(servo)} ({why[servo]})" for servo in limp)
-            raise self.error(ServoFault, f"servos did not switch their motor on: {which}", self.not_on_hint, *limp)
+        off = [servo for servo, torque in registers.get_all(ids, "torque").items() if torque != 1]
+        if off:
+            why = self._why_off(off)
+            which = ", ".join(f"{registers.label(servo)} ({why[servo]})" for servo in off)
+            raise self.registers.error(
+                ServoFault, f"servos did not switch their motor on: {which}", self.not_on_hint, *off
+            )
         self.started.ticks = registers.get_all(ids, "position")
 
     def goals_at_present(self, ids: Sequence[int]) -> dict[int, int]:
@@ -219,11 +267,11 @@ class Startup(ABC):
         goals = {}
         for servo, value in self.registers.get_all(ids, "position").items():
             turn = self.registers.tables[servo].ticks_per_turn
-            slack = self.slack(turn)
+            slack = self._slack(turn)
             if not -slack <= value < turn + slack:
                 where = f"outside one turn of {turn} steps"
                 message = f"servo {self.registers.label(servo)} reads position {value}, {where}"
-                raise self.error(ServoFault, message, self.out_of_turn_hint, servo)
+                raise self.registers.error(ServoFault, message, self.out_of_turn_hint, servo)
             low, high = self.started.limits.get(servo, (0, turn - 1))
             goals[servo] = min(max(value, low), high)
         return goals
@@ -231,7 +279,7 @@ class Startup(ABC):
     # ------------------------------------------------------------------ down
 
     def switch_off(self, ids: Sequence[int]) -> None:
-        """Torque off for every servo that can be reached, each tried by itself.
+        """Switch torque off for every servo that can be reached, each by itself.
 
         Raises
         ------
@@ -246,18 +294,20 @@ class Startup(ABC):
                 open_ids = [servo for servo in open_ids if not self._confirmed_off(servo)]
                 if not open_ids:
                     break
-            self.disarm([servo for servo in known if servo not in open_ids])
+            self._disarm([servo for servo in known if servo not in open_ids])
         except PortLost as error:
             lost = error
         if not open_ids:
             return
         which = ", ".join(map(registers.label, open_ids)) + (f" ({lost})" if lost else "")
         message = f"not confirmed off on {registers.port.port_name}: {which}"
-        raise self.error(NoReply if lost is None else PortLost, message, self.not_off_hint, *open_ids) from lost
+        raise self.registers.error(
+            NoReply if lost is None else PortLost, message, self.not_off_hint, *open_ids
+        ) from lost
 
     def _confirmed_off(self, servo: int) -> bool:
         try:
-            self.registers.tell(servo, "torque", 0)
+            self.registers.put_unanswered(servo, "torque", 0)
             return self.registers.get(servo, "torque", tries=1) == 0
         except BusError:
             return False

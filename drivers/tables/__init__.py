@@ -1,4 +1,4 @@
-"""Control tables: which servo model keeps which register where, as the makers' pages say.
+"""Control tables: registers, units, limits and identity numbers of every supported servo model.
 
-In: a model's name or number. Out: its registers, units and limits. Imports base.
+In: a model's name or number. Out: its control table. Imports base.
 """

@@ -1,8 +1,8 @@
-"""Control tables of Dynamixel and Feetech servos by model, as data.
+"""Control tables of Dynamixel and Feetech servos: the registers of each model with addresses, units and limits.
 
-Addresses and sizes come from the table files that ship with dynamixel-sdk; `tables.toml` beside this module
-adds what they lack (initial values, access, ranges, signs, units) and corrects what is wrong in them. Nothing
-is read before a table is asked for, and each table is built once.
+Addresses and sizes of Protocol 2.0 models come from the table files that ship with dynamixel-sdk; `tables.toml` adds
+what they lack (initial values, access, ranges, signs, units) and corrects their mistakes; `legacy.toml` holds the
+models with Protocol 1.0 framing. Each table is built when it is first asked for.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib.util
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -20,7 +20,9 @@ from drivers.base.errors import DriverError
 MAGNITUDE_BIT = 1024
 """XL-320: bit 10 of speed and load is the direction, the rest the magnitude."""
 TRIPPED = 0xFF
-"""What the watchdog's register says when it has stopped the servo."""
+"""Value of the bus watchdog's register after it has stopped the servo."""
+FEETECH = ("sts", "sm", "scs")
+"""What the names of Feetech's models begin with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,7 @@ class Item:
     Attributes
     ----------
     name : vendor's name, for example ``"Goal Position"``.
-    address, size : where it lies and its bytes (1, 2 or 4, little-endian).
+    address, size : first address and bytes (1, 2 or 4, little-endian).
     signed : two's complement.
     writable : whether a host may write it.
     initial : value after a factory reset (for RAM items: after power-up).
@@ -97,7 +99,7 @@ class ControlTable(Mapping[str, Item]):
     Attributes
     ----------
     model, number, firmware : ``"xl330-m288"``, 1200, 52.
-    protocol : 1 or 2: the framing it speaks.
+    protocol : 1 or 2: its framing.
     group_read : how many servos are read at once with Protocol 1.0 framing: ``"sync"``, ``"bulk"``, or ``""`` for
         one by one.
     lock : what closes the EEPROM to writes: ``"torque"``, or ``"Lock"`` for the register of that name.
@@ -160,16 +162,15 @@ class ControlTable(Mapping[str, Item]):
 
 def _bit_rates(spec: dict[str, Any]) -> tuple[int, ...]:
     """Bits per second by value of Baud Rate."""
-    divider = spec.get("baud_divider")
-    if divider is None:
+    if "baud_divider" not in spec:
         return tuple(spec["baud"])
     extra = spec.get("baud_extra", {})
-    return tuple(extra.get(str(value), round(divider / (value + 1))) for value in range(255))
+    return tuple(extra.get(str(value), round(spec["baud_divider"] / (value + 1))) for value in range(255))
 
 
 @lru_cache(maxsize=1)
 def _data() -> dict[str, Any]:
-    """The data of both files; their families and numbers are kept apart by name."""
+    """The sections of both files, merged."""
     data: dict[str, Any] = {}
     for name in ("tables.toml", "legacy.toml"):
         part = tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
@@ -210,9 +211,7 @@ def model_name(number: int) -> str:
 def model_number(model: str | int) -> int:
     """Number of a model name in any case, with ``_`` or ``-`` and with or without the connector letter.
 
-    Raises
-    ------
-    DriverError : there is no such model; the hint lists names that look like it.
+    Raises DriverError where there is no such model; the hint lists names that look like it.
     """
     numbers = {name: number for number, name in known_models().items()}
     if isinstance(model, int):
@@ -231,6 +230,27 @@ def _some_models(numbers: dict[str, int], name: str) -> str:
     return "use one of " + ", ".join(sorted(near))
 
 
+def check_dynamixel(model: str) -> None:
+    """Check that a name is a Dynamixel model of either protocol; raises DriverError for any other."""
+    if load_table(model).model.startswith(FEETECH):
+        raise DriverError(
+            f"servo model {model!r} is no Dynamixel",
+            hint='set the kind of its bus to the family it is of, as "feetech"; docs/drivers.md lists them',
+        )
+
+
+def check_feetech(model: str) -> None:
+    """Check that a name is a Feetech model; raises DriverError for any other."""
+    known = known_models()
+    try:
+        name = known[model_number(model)]
+    except DriverError:
+        name = ""
+    if not name.startswith(FEETECH):
+        hint = f"use one of {', '.join(sorted(name for name in known.values() if name.startswith(FEETECH)))}"
+        raise DriverError(f"servo model {model!r} is no Feetech known here", hint=hint)
+
+
 def load_table(model: str | int, firmware: int | None = None) -> ControlTable:
     """Control table of a model (name or number), for a firmware version (None: a current one).
 
@@ -246,17 +266,15 @@ def _load(number: int, firmware: int | None) -> ControlTable:
     model = known_models()[number]
     spec = _specification(model)
     version = spec["firmware"] if firmware is None else firmware
-    suffix = ""
     for since, changes in spec.get("since", {}).items():
         if version >= int(since):
-            suffix = changes.get("file", suffix)
             spec.update(changes)
     text = ""
     if spec.get("protocol", 2) == 2:
-        path = _folder() / f"{model.replace('-', '_')}{suffix}.model"
+        path = _folder() / f"{model.replace('-', '_')}{spec.get('file', '')}.model"
         text = path.read_text(encoding="utf-8")
-    items = _items(_layout(text, spec), spec) + _indirect_items(spec)
-    items = [_with_identity(item, number, version) for item in items]
+    identity = {"Model Number": number, "Firmware Version": version}
+    items = _items(_layout(text, spec), spec, identity) + _indirect_items(spec)
     return ControlTable(model, number, version, spec, items)
 
 
@@ -294,40 +312,35 @@ def _layout(text: str, spec: dict[str, Any]) -> dict[str, tuple[int, int]]:
     return layout
 
 
-def _items(layout: dict[str, tuple[int, int]], spec: dict[str, Any]) -> list[Item]:
-    entries, big_endian = spec["items"], spec.get("order") == "big"
-    return [
-        _item(name, address, size, {"big_endian": big_endian, **entries.get(name, {})})
-        for name, (address, size) in layout.items()
-        if not name.startswith("Indirect ")
-    ]
-
-
-def _item(name: str, address: int, size: int, entry: dict[str, Any]) -> Item:
-    low, high = entry.get("range", (None, None))
-    lower, upper = entry.get("between", (None, entry.get("limit")))
-    values = entry.get("values")
-    return Item(
-        entry.get("name", name),
-        address,
-        size,
-        signed=entry.get("signed", False),
-        writable=entry.get("access", "rw") == "rw",
-        initial=entry.get("initial", 0),
-        minimum=low,
-        maximum=high,
-        values=None if values is None else tuple(values),
-        lower=lower,
-        upper=upper,
-        scale=entry.get("scale", 1.0),
-        unit=entry.get("unit", ""),
-        sign_bit=entry.get("sign_bit"),
-        big_endian=entry["big_endian"],
-    )
+def _items(layout: dict[str, tuple[int, int]], spec: dict[str, Any], identity: dict[str, int]) -> list[Item]:
+    """Items of all registers but the indirect ones; `identity` is the initial value by name of those it has."""
+    items = []
+    for name, (address, size) in layout.items():
+        if name.startswith("Indirect "):
+            continue
+        entry = spec["items"].get(name, {})
+        low, high = entry.get("range", (None, None))
+        lower, upper = entry.get("between", (None, entry.get("limit")))
+        item = Item(
+            entry.get("name", name),
+            address,
+            size,
+            writable=entry.get("access", "rw") == "rw",
+            initial=identity.get(name, entry.get("initial", 0)),
+            minimum=low,
+            maximum=high,
+            values=tuple(entry["values"]) if "values" in entry else None,
+            lower=lower,
+            upper=upper,
+            big_endian=spec.get("order") == "big",
+            **{key: entry[key] for key in ("signed", "scale", "unit", "sign_bit") if key in entry},
+        )
+        items.append(item)
+    return items
 
 
 def _indirect_items(spec: dict[str, Any]) -> list[Item]:
-    """Pointers and data of indirect areas, numbered on from area to area; a pointer starts at its slot."""
+    """Pointers and data of indirect areas, numbered on from area to area; a pointer's initial target is its data."""
     items = []
     low, high = spec.get("indirect_range", (0, 0))
     slot = 1
@@ -337,10 +350,3 @@ def _indirect_items(spec: dict[str, Any]) -> list[Item]:
             items.append(Item(f"Indirect Data {slot}", data + k, 1))
             slot += 1
     return items
-
-
-def _with_identity(item: Item, number: int, firmware: int) -> Item:
-    known = {"Model Number": number, "Firmware Version": firmware}
-    if item.name not in known:
-        return item
-    return replace(item, initial=known[item.name])

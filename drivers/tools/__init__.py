@@ -1,4 +1,4 @@
-"""What looks at servos from outside a run: probing, giving ids.
+"""Tools that look at servos on a port without driving them: scanning, and changing an id.
 
 In: a port. Out: findings. Imports any room left of it.
 """

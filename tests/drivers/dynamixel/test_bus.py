@@ -221,6 +221,9 @@ def test_a_tripped_watchdog_is_cleared_without_a_jump(wire: SimulatedBus) -> Non
         assert np.abs(sent - here).max() < 8.0 * 0.2
         assert bus.report().errors == {"watchdog": 3}
         assert [wire.servo(i).register("Bus Watchdog") for i in IDS] == [100] * 3
+        wire.servo(1).put("Bus Watchdog", 99)
+        bus.read()
+        assert wire.servo(1).register("Bus Watchdog") == 99, "cleared once and then left alone"
         settle(bus, [0.2, 0.2, 0.2])
 
 

@@ -11,7 +11,7 @@ import drivers.core.kernels  # noqa: F401  compiled code is loaded here and not 
 from drivers.base.bus import ServoSpec
 from drivers.core.scale import Scale
 from drivers.dynamixel.layout import item_of, layout_of
-from drivers.servos.layout import Block
+from drivers.servos.layout import Block, Group
 from drivers.tables.tables import load_table
 
 MODELS = ("xl330-m288", "xm430-w350", "xl430-w250", "xl320", "mx-28")
@@ -105,17 +105,23 @@ def test_a_block_decodes_as_its_registers_do(current: int, velocity: int, positi
     block: Block = layout_of(table).feedback
     items = [item_of(table, name) for name in ("current", "velocity", "position")]
     data = b"".join(item.encode(v) for item, v in zip(items, (current, velocity, position), strict=True) if item)
-    row = block.decode(np.frombuffer(data + data, np.uint8).reshape(2, -1))[1]
-    assert (row["current"], row["velocity"], row["position"]) == (current, velocity, position)
+    values = block.decode(np.frombuffer(data + data, np.uint8).reshape(2, -1))
+    assert [values[name].tolist() for name in ("current", "velocity", "position")] == [
+        [current] * 2,
+        [velocity] * 2,
+        [position] * 2,
+    ]
 
 
 def test_speeds_with_a_direction_bit() -> None:
-    np.testing.assert_array_equal(
-        layout_of(load_table("xl320")).speeds(np.array([0, 100, 1024 + 100], np.uint16)), [0, 100, -100]
-    )
-    np.testing.assert_array_equal(layout_of(load_table("xm430-w350")).speeds(np.array([-5])), [-5])
+    feedback = layout_of(load_table("xl320")).feedback
+    words = np.array([[9, 0, 7], [9, 100, 7], [9, 1024 + 100, 7]], "<u2")
+    values = feedback.decode(words.view(np.uint8).reshape(3, 6))
+    assert values["velocity"].tolist() == [0, 100, -100]
+    assert values["position"].tolist() == [9, 9, 9]
 
 
 def test_a_load_in_per_cent_is_no_current() -> None:
-    assert np.isnan(layout_of(load_table("xl430-w250")).scales["current"])
-    assert layout_of(load_table("xl330-m288")).scales["current"] == 0.001
+    tables = [load_table("xl430-w250"), load_table("xl330-m288")]
+    scales = Group([1, 2], [0, 1], tables, layout_of(tables[0])).scales["current"]
+    np.testing.assert_array_equal(scales, [np.nan, 0.001])

@@ -11,9 +11,6 @@ import pytest
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import NoReply, ServoFault, WrongModel
-from drivers.dynamixel.bus import DynamixelBus
-from drivers.dynamixel.legacy import LegacyBus
-from drivers.dynamixel.mixed import MixedBus
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import read_until, settle
 
@@ -44,11 +41,6 @@ def bus(wire: VirtualBus) -> Iterator[Bus]:
 
 def torques(wire: VirtualBus) -> list[bool]:
     return [wire.servo(servo.id).torque for servo in SERVOS]
-
-
-def test_the_models_choose_the_driver(wire: VirtualBus) -> None:
-    new, old = SERVOS[:1], SERVOS[1:2]
-    assert [type(make(wire, servos)) for servos in (new, old, new + old)] == [DynamixelBus, LegacyBus, MixedBus]
 
 
 def test_every_servo_is_driven_in_its_own_place(wire: VirtualBus, bus: Bus) -> None:

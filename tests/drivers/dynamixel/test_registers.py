@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import pytest
 
 from drivers.base.errors import CorruptReply, NoReply, ServoRefused, together
-from drivers.dynamixel.port import Port
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
+from drivers.servos.port import Port
 from drivers.sim import SimulatedBus
 from drivers.tables.tables import load_table
 from tests.drivers.contract import SERVOS

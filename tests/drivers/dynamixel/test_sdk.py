@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 import dynamixel_sdk as bare
 import pytest
 
-from drivers.dynamixel.port import Port
 from drivers.dynamixel.sdk import Packets
 from drivers.packets.packet import (
     ALERT,
@@ -29,6 +28,7 @@ from drivers.packets.packet import (
     stuff,
     unstuff,
 )
+from drivers.servos.port import Port
 from tests.drivers.wire import Wire
 
 GOAL, POSITION, CURRENT = 116, 132, 126

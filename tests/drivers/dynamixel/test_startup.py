@@ -13,6 +13,7 @@ from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import BusError, CorruptReply, NoReply, ServoFault, ServoRefused, WrongModel
 from drivers.dynamixel import startup
 from drivers.dynamixel.startup import Policy
+from drivers.servos import startup as shared_startup
 from drivers.sim.serving.virtual import VirtualBus
 from drivers.tables.tables import load_table
 from tests.drivers.contract import SERVOS, settle
@@ -343,7 +344,7 @@ def test_old_firmware_is_not_asked_for_what_it_lacks(wire: VirtualBus, monkeypat
     )
     for firmware, expected in ((45, False), (52, True)):
         del asked[:]
-        monkeypatch.setattr(startup, "load_table", lambda number, _, f=firmware: load_table(number, f))
+        monkeypatch.setattr(shared_startup, "load_table", lambda model, _=None, f=firmware: load_table(model, f))
         with bus_on(wire) as bus:
             bus.start()
         assert ("startup" in asked) is expected

@@ -12,8 +12,8 @@ from drivers.base.errors import DriverError
 from drivers.packets.packet1 import Error1, Instruction1, Packet1, Reader1, encode
 from drivers.protocol1 import HELLO, WINDOW
 from drivers.protocol1.exchange import Exchanges
-from drivers.protocol1.layout import layout_of
 from drivers.protocol1.registers import window
+from drivers.protocol1.telemetry import layout_of
 from drivers.servos.layout import NAMES, item_of
 from drivers.servos.port import Port
 from drivers.sim.serving.virtual import VirtualClock
@@ -26,6 +26,8 @@ Answer = Callable[[Packet1], list["bytes | tuple[float, bytes]"]]
 
 class FarEnd:
     """A port in virtual time, behind which ``answer`` says what comes back for every packet, one after the other."""
+
+    serial = None
 
     def __init__(self) -> None:
         self.answer: Answer = lambda packet: []
@@ -245,7 +247,7 @@ def test_a_refusal_is_an_answer_where_the_family_has_them(wire: FarEnd, port: Po
 
 
 def test_the_deadline_counts_what_is_still_leaving(wire: FarEnd, port: Port) -> None:
-    port.baudrate = 9600
+    port.setBaudRate(9600)
     before = wire.clock()
     port.transmit(encode(1, Instruction1.WRITE, bytes(90)))
     port.expect(10)

@@ -284,8 +284,11 @@ def test_a_servo_told_to_keep_quiet_is_told_to_speak(head: Head, level: int) -> 
     head.wire.servo(2).put(name, level)
     with head.bus() as bus:
         bus.start()
-        assert head.registers(name) == [1 if head.model == "sts3215" else 2] * 3
+        wanted = 1 if head.model == "sts3215" else 2
+        assert head.registers(name) == [wanted] * 3
         assert bus.read().fresh.all()
+        written = [line for line in bus.report().eeprom_writes if "(id 2)" in line and name in line]
+        assert [line.partition(": ")[2] for line in written] == [f"{name} {level} -> {wanted}"] * (level != wanted)
 
 
 # ---------------------------------------------------------------------------- 17: out of the turn

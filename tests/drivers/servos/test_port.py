@@ -1,13 +1,210 @@
-"""drivers.servos.port: a port knows when the wire is free, who owes an answer, and who is talking."""
+"""drivers.servos.port: what is wrong with the bare SDK's port handler, and is not here.
+
+Numbers S5 to S12 as in drivers/dynamixel/sdk.py. Everything runs over real pseudo-terminals.
+"""
 
 from __future__ import annotations
 
-import pytest
+import math
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
 
-from drivers.base.errors import DriverError
-from drivers.servos.port import Port
+import dynamixel_sdk as bare
+import pytest
+import serial
+
+from drivers.base.errors import DriverError, PortLost
+from drivers.dynamixel.sdk import Packets
+from drivers.packets.packet import Instruction, InstructionPacket, encode_status
+from drivers.servos.port import POLL_LATE_S, POLL_S, WAKE_EARLY_S, Port
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import SERVOS
+from tests.drivers.wire import Wire
+
+POSITION = 132
+Client = tuple[bare.PortHandler, bare.Protocol2PacketHandler]
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    with Wire() as far_end:
+        yield far_end
+
+
+@pytest.fixture
+def ours(wire: Wire) -> Iterator[tuple[Port, Packets]]:
+    port = Port(wire.path, margin_s=0.3)
+    port.openPort()
+    yield port, Packets()
+    port.closePort()
+
+
+@pytest.fixture
+def theirs(wire: Wire) -> Iterator[Client]:
+    port = bare.PortHandler(wire.path)
+    port.openPort()
+    yield port, bare.Protocol2PacketHandler()
+    port.ser.close()
+
+
+def four(value: int) -> bytes:
+    return struct.pack("<i", value)
+
+
+def says(value: int) -> Callable[[InstructionPacket], list[bytes]]:
+    """A servo that answers every read with one value."""
+    ping = Instruction.PING
+    return lambda p: [encode_status(p.id, 0, b"\xb0\x04\x34" if p.instruction == ping else four(value))]
+
+
+def test_s5_an_interrupt_in_a_transaction_leaves_the_port_usable(
+    wire: Wire, ours: tuple, theirs: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wire.answer = says(7)
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    port, packets = theirs
+    with monkeypatch.context() as patch:
+        patch.setattr(port, "readPort", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            packets.read4ByteTxRx(port, 1, POSITION)
+    assert packets.read4ByteTxRx(port, 1, POSITION)[1] == bare.COMM_PORT_BUSY
+    port.ser.close()
+
+    port, packets = ours
+    for broken in ("read", "write", "drain"):
+        with monkeypatch.context() as patch:
+            patch.setattr(port.link, broken, interrupt)
+            with pytest.raises(KeyboardInterrupt):
+                packets.read4ByteTxRx(port, 1, POSITION)
+        assert not port.is_using
+        assert packets.read4ByteTxRx(port, 1, POSITION)[:2] == (7, bare.COMM_SUCCESS)
+
+
+def test_s6_an_unplugged_port_is_one_error(wire: Wire, ours: tuple, theirs: Client) -> None:
+    (their_port, their_packets), (port, packets) = theirs, ours
+    wire.unplug()
+    with pytest.raises(Exception) as caught:
+        their_packets.read4ByteTxRx(their_port, 1, POSITION)
+    assert not isinstance(caught.value, (OSError, serial.SerialException)), "termios.error"
+    for use in (packets.read4ByteTxRx, packets.hello):
+        with pytest.raises(PortLost):
+            use(port, 1, POSITION) if use == packets.read4ByteTxRx else use(port, 1)
+        assert not port.is_using
+
+
+def test_s7_a_silent_servo_costs_the_margin_and_not_34_ms(wire: Wire) -> None:
+    theirs, port = bare.PortHandler("unused"), Port("/dev/ttyACM0")
+    theirs.tx_time_per_byte = 0.01
+    theirs.setPacketTimeout(15)
+    assert theirs.packet_timeout > 34.0
+    port.setPacketTimeout(15)
+    assert port.packet_timeout == pytest.approx(0.15 + port.margin_s * 1000)
+    assert port.margin_s < 0.02
+    assert Port(wire.path).margin_s == 0.05, "a program behind a pseudo-terminal may be busy"
+
+
+def test_s7_the_latency_timer_sets_the_margin(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.port.serialport.latency_s", lambda path: 0.016)
+    slow = Port("/dev/ttyUSB0").margin_s
+    monkeypatch.setattr("drivers.port.serialport.latency_s", lambda path: 0.001)
+    assert slow - Port("/dev/ttyUSB0").margin_s == pytest.approx(0.030)
+
+
+def test_s8_a_step_of_the_wall_clock_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs, port = bare.PortHandler("unused"), Port("unused")
+    theirs.setPacketTimeoutMillis(1000)
+    port.setPacketTimeoutMillis(1000)
+    future = time.time() + 3600
+    monkeypatch.setattr(time, "time", lambda: future)
+    assert theirs.isPacketTimeout()
+    assert not port.isPacketTimeout()
+    assert port.getTimeSinceStart() < 900
+
+
+def test_s9_a_second_thread_is_told(wire: Wire, ours: tuple, theirs: Client) -> None:
+    wire.answer = lambda packet: [(0.3, encode_status(packet.id, 0, four(1)))]
+    results: list[object] = []
+
+    def use(port: bare.PortHandler, packets: bare.Protocol2PacketHandler) -> None:
+        results.append(packets.read4ByteTxRx(port, 1, POSITION)[1])
+
+    port, packets = ours
+    port.margin_s = 2.0
+    thread = threading.Thread(target=use, args=(port, packets))
+    thread.start()
+    while not port.is_using:
+        time.sleep(0.001)
+    with pytest.raises(DriverError, match="two threads"):
+        packets.hello(port, 1)
+    thread.join()
+    assert results == [bare.COMM_SUCCESS]
+    assert not port.is_using
+
+
+def reads_while_waiting(port: object, name: str, client: Client, monkeypatch: pytest.MonkeyPatch) -> int:
+    """How often a client asks for bytes while it waits for one reply that never comes."""
+    count, original = 0, getattr(port, name)
+
+    def counted(*args: object) -> bytes:
+        nonlocal count
+        count += 1
+        return original(*args)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(port, name, counted)
+        assert client[1].read4ByteTxRx(client[0], 1, POSITION)[1] == bare.COMM_RX_TIMEOUT
+    return count
+
+
+def test_s12_waiting_does_not_spin(wire: Wire, ours: tuple, theirs: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    spins = reads_while_waiting(theirs[0], "readPort", theirs, monkeypatch)
+    assert spins > 20, "the bare SDK waits without spinning by now"
+    theirs[0].ser.close()
+    assert reads_while_waiting(ours[0].link, "read", ours, monkeypatch) <= 3
+
+
+def test_a_reply_is_slept_through_and_its_end_awaited_lightly(monkeypatch: pytest.MonkeyPatch) -> None:
+    port = Port("unused", margin_s=0.05)
+    now, naps, asked = 0.0, [], []
+
+    def sleep(seconds: float) -> None:
+        nonlocal now
+        naps.append(seconds)
+        now += seconds
+
+    def read(deadline_s: float) -> bytes:
+        nonlocal now
+        asked.append(deadline_s)
+        now = max(now, min(deadline_s, last_s))
+        return b"x" if now >= last_s else b""
+
+    port.clock, port.sleep = lambda: now, sleep
+    monkeypatch.setattr(port.link, "read", read)
+    port.deadline_s, last_s = 0.055, 0.005
+    assert port.more(500) == b"x"
+    assert naps == [pytest.approx(0.005 - WAKE_EARLY_S)]
+    assert max(asked) <= last_s + POLL_S, "so the processor is awake when it comes"
+    now, last_s, port.deadline_s = 0.0, math.inf, 0.055
+    asked.clear()
+    assert port.more(20) == b""
+    assert len(naps) == 1, "a sleep as short as this is none"
+    assert now == port.deadline_s
+    assert len(asked) <= (0.0002 + POLL_LATE_S) / POLL_S + 3, "then it is awaited in one go"
+
+
+@pytest.mark.parametrize("baud", [123_456, 250_000, 4_500_000])
+def test_any_baud_rate_opens(wire: Wire, baud: int) -> None:
+    assert not bare.PortHandler(wire.path).setBaudRate(baud)
+    port = Port(wire.path)
+    assert port.setBaudRate(baud)
+    assert port.getBaudRate() == baud
+    assert port.tx_time_per_byte == pytest.approx(10_000 / baud)
+    port.closePort()
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""drivers.dynamixel.sweep: the quick way through a cycle says what the careful one says, and leaves the rest to it."""
+"""drivers.dynamixel.compiled_read: the compiled way gives what the general one gives, and leaves the rest to it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import Bus, BusState, ServoSpec
-from drivers.dynamixel.sweep import Sweep
+from drivers.dynamixel.compiled_read import CompiledRead
 from drivers.dynamixel.telemetry import Telemetry
 from drivers.sim.serving.virtual import VirtualBus
 
@@ -35,7 +35,7 @@ def drive(models: tuple[str, ...], options: dict[str, Any], careful: bool) -> It
     wire = VirtualBus(specs(models), seed=3)
     with wire.bus(margin_s=0.05, watchdog_ms=100, **options) as bus:
         if careful:
-            bus._telemetry._sweep_of = lambda scale: None
+            bus._telemetry._compiled_read = lambda scale: None
         bus.start()
         for fault in ("", *FAULTS, "reboot", "pause"):
             if fault == "reboot":
@@ -80,7 +80,7 @@ def test_an_undisturbed_cycle_is_taken_and_gives_what_nobody_can_change(
 ) -> None:
     bus.read()
     with monkeypatch.context() as patch:
-        patch.setattr(Telemetry, "_take", None)  # a careful look would fail
+        patch.setattr(Telemetry, "_store", None)  # the general way would fail
         bus.write([0.1, 0.1, 0.1])
         first = bus.read()
         kept = first.position_rad.copy()
@@ -97,11 +97,11 @@ def test_an_undisturbed_cycle_is_taken_and_gives_what_nobody_can_change(
 
 def test_what_is_not_expected_changes_nothing(bus: Bus) -> None:
     bus.read()
-    sweep: Sweep = bus._telemetry._sweep
-    known, octets = sweep._known.copy(), sweep._octets.copy()
-    sweep.prepare()
-    for data in (b"", bytes(sweep.read.size), bytes(sweep.read.size + 1)):
-        assert not sweep.take(data, 9.0)
-        assert sweep.state is None
-    np.testing.assert_array_equal(sweep._known, known)
-    np.testing.assert_array_equal(sweep._octets, octets)
+    read: CompiledRead = bus._telemetry._compiled
+    known, octets = read._known.copy(), read._octets.copy()
+    read.prepare()
+    for data in (b"", bytes(read.read.size), bytes(read.read.size + 1)):
+        assert not read.take(data, 9.0)
+        assert read.state is None
+    np.testing.assert_array_equal(read._known, known)
+    np.testing.assert_array_equal(read._octets, octets)

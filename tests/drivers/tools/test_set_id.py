@@ -1,4 +1,4 @@
-"""drivers.tools.rename over simulated servos: the id changes, or nothing does."""
+"""drivers.tools.set_id over simulated servos: the id changes, or nothing does."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 from drivers.base.errors import CorruptReply, NoReply, ServoRefused
 from drivers.sim import SimulatedBus
-from drivers.tools.rename import set_id
+from drivers.tools.set_id import set_id
 
 FAMILIES = [("xl330-m288", 2), ("xl320", 2), ("ax-12a", 1), ("sts3215", 1), ("scs0009", 1)]
 
@@ -63,7 +63,7 @@ def _switch_on(bus: SimulatedBus, model: str) -> None:
 
 @pytest.mark.parametrize("protocol", [1, 2])
 def test_nobody_there_is_told_with_the_next_step(protocol: int) -> None:
-    with SimulatedBus([1]) as bus, pytest.raises(NoReply, match="nobody has the id 9") as caught:
+    with SimulatedBus([1]) as bus, pytest.raises(NoReply, match="no servo has the id 9") as caught:
         set_id(bus.path, 1_000_000, protocol, 9, 2)
     assert "omote scan" in caught.value.hint
 

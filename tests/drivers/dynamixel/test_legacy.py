@@ -1,4 +1,4 @@
-"""drivers.dynamixel.legacy_sdk: known faults of dynamixel-sdk's Protocol 1.0, shown on the bare SDK and gone here."""
+"""drivers.dynamixel.legacy: known faults of dynamixel-sdk's Protocol 1.0, shown on the bare SDK and gone here."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import dynamixel_sdk as bare
 import pytest
 
-from drivers.dynamixel.legacy_sdk import Packets1
-from drivers.dynamixel.port import Port
+from drivers.dynamixel.legacy import Packets1
 from drivers.packets.packet1 import Error1
+from drivers.servos.port import Port
 from drivers.sim import SimulatedBus
 
 POSITION = 36

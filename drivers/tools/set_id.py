@@ -1,0 +1,118 @@
+"""Set the id of a servo of either protocol.
+
+Nothing is written before the servo has answered, the new id has proved free and the motor is off.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from drivers.base.bus import ServoInfo
+from drivers.base.errors import BusError, NoReply, ServoRefused
+from drivers.dynamixel.registers import Registers as Registers2
+from drivers.dynamixel.sdk import Packets
+from drivers.packets.packet import MAX_ID, Instruction
+from drivers.protocol1.registers import Registers as Registers1
+from drivers.servos.port import Port
+from drivers.servos.registers import Registers
+from drivers.tables.tables import FEETECH, load_table
+from drivers.tools.scan_protocol1 import identity, registers_on
+
+SETTLE_S = 1.0
+"""How long a servo may not answer while it writes its permanent memory."""
+REPLY_S = 0.02
+"""Time for the reply to a write, which is not read: it may come from the new id."""
+
+
+@contextmanager
+def _registers(port: str, baud: int, protocol: int) -> Iterator[Registers[Any]]:
+    registers = Registers2(Packets(), Port(port, baud), ()) if protocol == 2 else registers_on(port, baud)
+    registers.port.openPort()
+    try:
+        yield registers
+    finally:
+        registers.port.closePort()
+
+
+def _find(registers: Registers[Any], servo: int) -> ServoInfo | None:
+    """What a servo is, with its torque; None where no servo answers. Raises CorruptReply where two answer at once."""
+    found: tuple[int, int] | None
+    if isinstance(registers, Registers1):
+        found = identity(registers, servo)
+    else:
+        try:
+            low, high, firmware = registers.hello(servo).params
+            found = low | high << 8, firmware
+        except NoReply:
+            found = None
+    if found is None:
+        return None
+    table = registers.tables[servo] = load_table(*found)
+    registers.get(servo, "position")  # two servos that are alike in all else differ in this: the reply is damaged
+    return ServoInfo(servo, table.number, table.model, found[1], torque=registers.get(servo, "torque") == 1)
+
+
+def _write(registers: Registers[Any], servo: int, name: str, value: int) -> None:
+    """Write a register by the maker's name without reading the reply."""
+    item, packets = registers.tables[servo][name], registers.packets
+    params = packets.number(item.address) + item.encode(value)
+    packets.send_only(registers.port, packets.encode(servo, Instruction.WRITE, params))
+    registers.port.sleep(REPLY_S)
+
+
+def set_id(port: str, baud: int, protocol: int, old: int, new: int, *, release: bool = False) -> ServoInfo:
+    """Give the servo ``old`` the id ``new``; returns it under its new id.
+
+    Parameters
+    ----------
+    port, baud, protocol : where it is; Protocol 2 or 1 (AX, MX, Feetech).
+    release : switch its motor off where it is on.
+
+    Raises
+    ------
+    ValueError : an id that no servo may have.
+    NoReply, CorruptReply : no servo, or more than one, has the old id.
+    ServoRefused : the new id is taken, the motor is on, or the servo kept its id. Nothing was changed.
+    """
+    for name, servo in (("old", old), ("new", new)):
+        if not 0 <= servo <= MAX_ID:
+            raise ValueError(f"{name}: an id is 0 to {MAX_ID}, got {servo}")
+    with _registers(port, baud, protocol) as registers:
+        info = _find(registers, old)
+        if info is None:
+            message = f"no servo has the id {old} on {port} at {baud} baud"
+            raise NoReply(message, hint=f"omote scan {port}", port=port, servo_ids=(old,))
+        taken = _find(registers, new) if new != old else None
+        if taken is not None:
+            raise _error(f"the id {new} on {port} is taken by another {taken.model}", "choose a free id", port, new)
+        if info.torque:
+            if not release:
+                message = f"servo {old} on {port} holds with torque, and an id changes only while the motor is off"
+                raise _error(message, "support what it carries, then add --release", port, old)
+            _write(registers, old, "Torque Enable", 0)
+        locks = registers.tables[old].lock == "Lock"
+        if locks:
+            _write(registers, old, "Lock", 0)
+        _write(registers, old, "ID", new)
+        changed = _await(registers, new)
+        if changed is None or changed.model_number != info.model_number:
+            message = f"servo {old} on {port} did not take the id {new}"
+            raise _error(message, "`omote scan` lists the servos", port, old)
+        if locks and changed.model.startswith(FEETECH):  # an AX opens only without power
+            _write(registers, new, "Lock", 1)
+        return changed
+
+
+def _await(registers: Registers[Any], servo: int) -> ServoInfo | None:
+    """The servo as soon as it answers again."""
+    found, end_s = None, time.monotonic() + SETTLE_S
+    while found is None and time.monotonic() < end_s:
+        found = _find(registers, servo)
+    return found
+
+
+def _error(message: str, hint: str, port: str, servo: int) -> BusError:
+    return ServoRefused(message, hint=hint, port=port, servo_ids=(servo,))
