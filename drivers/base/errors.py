@@ -90,7 +90,7 @@ class ServoFault(BusError):
     """A servo latched a hardware error and needs a reboot."""
 
 
-def together(failed: Mapping[int, BusError]) -> BusError:
+def merge_errors(failed: Mapping[int, BusError]) -> BusError:
     """One error for many servos: the first one's kind and hint, every servo's id, and how many there are."""
     first, *others = failed.values()
     if not others:

@@ -9,7 +9,7 @@ import platform
 import struct
 import sys
 
-ORDINARY = "OMOTE_ORDINARY_PRIORITY"
+NO_REALTIME = "OMOTE_ORDINARY_PRIORITY"
 """Environment variable: set to anything, nobody asks for real-time scheduling."""
 _REALTIME_PRIORITY = 10
 _PR_SET_TIMERSLACK = 29
@@ -21,19 +21,19 @@ _SCHED_SETATTR = {"x86_64": 314, "aarch64": 274, "riscv64": 274, "armv7l": 380, 
 """Its number as a system call, by machine; the C library has no function for it."""
 
 
-def yield_to_servos() -> None:
+def lower_process_priority() -> None:
     """Let this process give way: a late frame is seen less than a late servo target."""
     if hasattr(os, "nice"):
         os.nice(5)
 
 
-def wake_promptly() -> None:
+def reduce_timer_slack() -> None:
     """Let waits of the calling thread end when they should; Linux adds 50 us by default, to save power."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(1))
 
 
-def take_turns_quickly() -> None:
+def shorten_thread_switches() -> None:
     """Let threads of this process wait for each other, and for the collection of garbage, as short as can be.
 
     Python lets one thread run for 5 ms before another gets its turn, and a full collection looks at all that was
@@ -44,24 +44,24 @@ def take_turns_quickly() -> None:
     gc.freeze()
 
 
-def take_priority() -> bool:
+def request_realtime() -> bool:
     """Ask for real-time scheduling and exact waits of the calling thread; False where the first is not allowed.
 
     Where it is not the thread asks for short turns instead, as everybody may.
     """
-    wake_promptly()
-    if hasattr(os, "sched_setscheduler") and not os.environ.get(ORDINARY):
+    reduce_timer_slack()
+    if hasattr(os, "sched_setscheduler") and not os.environ.get(NO_REALTIME):
         try:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_REALTIME_PRIORITY))
         except OSError:
             pass
         else:
             return True
-    take_short_turns()
+    request_short_time_slice()
     return False
 
 
-def take_short_turns() -> bool:
+def request_short_time_slice() -> bool:
     """Let the calling thread run often and briefly, not seldom and long; False where the system has no such request.
 
     Linux 6.12 and later serves a thread that wakes up ahead of one in the middle of a longer turn (EEVDF, a slice asked
@@ -75,7 +75,7 @@ def take_short_turns() -> bool:
     return bool(ctypes.CDLL(None).syscall(number, 0, request, 0) == 0)
 
 
-def give_priority_back() -> None:
+def restore_priority() -> None:
     """Ordinary scheduling of the calling thread again."""
     if hasattr(os, "sched_setscheduler"):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -181,7 +181,7 @@ class Closers(ExitStack):
         super().close()
         failed, self._failed = self._failed, []
         if failed:
-            raise together(failed)
+            raise combine_errors(failed)
 
     def _try(self, callback: Callable[..., object], *args: Any, **kwds: Any) -> None:
         try:
@@ -191,7 +191,7 @@ class Closers(ExitStack):
             self._failed.append(error)
 
 
-def together(failed: Sequence[Exception]) -> Exception:
+def combine_errors(failed: Sequence[Exception]) -> Exception:
     """One error that tells several: their messages in order, each hint once, all servos."""
     if len(failed) == 1:
         return failed[0]
@@ -201,7 +201,7 @@ def together(failed: Sequence[Exception]) -> Exception:
     return DriverError(message, hint="; ".join(hints), servo_ids=tuple(servos))
 
 
-def with_those_before(error: Exception) -> Exception:
+def combine_with_context(error: Exception) -> Exception:
     """The error together with those that were under way when it was raised, which it would hide; oldest first.
 
     One that it was raised from is in its message already, and is left out, as are those that are not for people.
@@ -212,4 +212,4 @@ def with_those_before(error: Exception) -> Exception:
         step, told = step.__context__, step.__context__ is step.__cause__
         if isinstance(step, Exception) and hasattr(step, "hint") and not told:
             found.append(step)
-    return together(found[::-1])
+    return combine_errors(found[::-1])

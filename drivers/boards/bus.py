@@ -18,7 +18,7 @@ from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec, frozen
 from drivers.base.errors import BusError, NoReply, PortLost
 from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.core.wirebus import WireBus
-from drivers.port.serialport import SerialPort, link_to, reply_margin_s
+from drivers.port.serialport import SerialPort, as_serial_port, reply_margin_s
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,7 @@ class BoardBus(WireBus):
     ) -> None:
         super().__init__(servos, clock=clock)
         n = len(self.servos)
-        self._port = link_to(port, baud)
+        self._port = as_serial_port(port, baud)
         self._margin_s, self._margin_set = margin_s or 0.0, margin_s is not None
         self._stagger_s = stagger_s
         self._position, self._position_s = np.full(n, math.nan), np.full(n, -math.inf)

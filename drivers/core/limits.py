@@ -33,12 +33,12 @@ class TargetLimits:
 
         self._limit = limit_targets
 
-    def begin(self, position_rad: Floats, now_s: float) -> None:
+    def reset(self, position_rad: Floats, now_s: float) -> None:
         """Begin from where the servos (n,) are."""
         self.target = np.array(position_rad, dtype=np.float64)
         self._guard.reset(self.target, now_s)
 
-    def begin_one(self, index: int, position_rad: float) -> None:
+    def reset_one(self, index: int, position_rad: float) -> None:
         """One servo begins again from a position."""
         self.target[index] = position_rad
         self._guard.reset_one(index, position_rad)

@@ -106,10 +106,10 @@ def _simulated(kind: str, servos: Sequence[ServoSpec]) -> Any:
     """The driver of a family over a simulated far end; PluginError where the family has none."""
     family = FAMILIES.get(kind)
     if not family.simulator:
-        raise no_simulator(kind)
+        raise no_simulator_error(kind)
     return FAMILIES.load(family, "drivers.sim.serving.simulated_wire:simulated")(driver_of(kind, servos), kind)
 
 
-def no_simulator(kind: str) -> PluginError:
+def no_simulator_error(kind: str) -> PluginError:
     """What is said of a family that nothing stands in for."""
     return PluginError(f"bus kind {kind!r} has no simulator", hint=f'use a real one: kind = "{kind}", and its port')

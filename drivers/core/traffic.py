@@ -23,7 +23,7 @@ MANY = 8
 
 
 @dataclass
-class Heard:
+class ServoTraffic:
     """What passed about one servo.
 
     Attributes
@@ -46,7 +46,7 @@ class Decoder(ABC):
     """
 
     def __init__(self) -> None:
-        self.heard: dict[int, Heard] = {}
+        self.heard: dict[int, ServoTraffic] = {}
 
     @abstractmethod
     def feed(self, sent: bool | None, data: bytes) -> list[str]:
@@ -73,7 +73,7 @@ class PacketDecoder(Decoder):
         self._asked: dict[int, tuple[int, int]] = {}
 
     def _said(self, servo: int, error: int) -> None:
-        heard = self.heard.setdefault(servo, Heard())
+        heard = self.heard.setdefault(servo, ServoTraffic())
         heard.packets += 1
         heard.error = error
 
@@ -99,7 +99,7 @@ class PacketDecoder(Decoder):
         items = self._items(servo, address, len(data))
         if not items:
             return f"{len(data)} bytes at {address}: {data.hex(' ')}"
-        heard = self.heard.setdefault(servo, Heard())
+        heard = self.heard.setdefault(servo, ServoTraffic())
         told = {item.name: item.decode(data[item.address - address :]) for item in items}
         heard.values.update(told)
         return ", ".join(f"{name} = {value}" for name, value in told.items())

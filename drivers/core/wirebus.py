@@ -142,7 +142,7 @@ class WireBus(Bus):
 
     def _start(self) -> None:
         with self._losing():
-            self._limits.begin(self._bring_up(), self._clock())
+            self._limits.reset(self._bring_up(), self._clock())
             self._running = True
 
     def stop(self) -> None:

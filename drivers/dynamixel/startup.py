@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, CorruptReply, NoReply, ServoRefused, together
+from drivers.base.errors import BusError, CorruptReply, NoReply, ServoRefused, merge_errors
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.registers import Registers
 from drivers.servos import startup
@@ -83,7 +83,7 @@ class Startup(startup.Startup):
             else:
                 wrong[servo.id] = self.wrong_model(servo, number)
         if wrong:
-            raise together(wrong)
+            raise merge_errors(wrong)
 
     def bring_up(self, servos: Sequence[ServoSpec], *, indirect: bool = False) -> startup.Started:
         """Start identified servos where they stand.

@@ -246,7 +246,7 @@ class SerialPort:
         return PortError(f"cannot open port {self.path}: {error}", hint="try `omote ports`", port=self.path)
 
 
-def link_to(port: str | os.PathLike[str] | SerialPort, baud: int) -> SerialPort:
+def as_serial_port(port: str | os.PathLike[str] | SerialPort, baud: int) -> SerialPort:
     """The port of a path or URL; one that is a port already stays what it is."""
     return SerialPort(port, baud) if isinstance(port, str | os.PathLike) else port
 

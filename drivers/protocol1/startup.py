@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, NoReply, together
+from drivers.base.errors import BusError, NoReply, merge_errors
 from drivers.packets.packet1 import Error1, Packet1
 from drivers.protocol1.registers import Registers
 from drivers.protocol1.settings import EEPROM_TRIES, apply_settings, write_surely
@@ -115,7 +115,7 @@ class Startup(startup.Startup):
             else:
                 wrong[servo.id] = self.wrong_model(servo, number)
         if wrong:
-            raise together(wrong)
+            raise merge_errors(wrong)
 
     def _greet(self, servo: int) -> Packet1:
         """A servo's first registers; one that answers pings only is told to answer everything."""

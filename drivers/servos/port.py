@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 from drivers.base.errors import DriverError
-from drivers.port.serialport import SerialPort, link_to, reply_margin_s
+from drivers.port.serialport import SerialPort, as_serial_port, reply_margin_s
 
 BITS_PER_BYTE = 10
 
@@ -30,7 +30,7 @@ class Port:
     """
 
     def __init__(self, path: str | SerialPort, baud: int = 1_000_000, margin_s: float | None = None) -> None:
-        self.link = link_to(path, baud)
+        self.link = as_serial_port(path, baud)
         self.clock, self.sleep = self.link.clock, self.link.sleep
         self.port_name, self.baudrate = self.link.path, baud
         self.suspects: set[int] = set()

@@ -8,7 +8,7 @@ from functools import partial
 from typing import ClassVar, Generic, TypeVar
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, CorruptReply, DriverError, NoReply, ServoRefused, together
+from drivers.base.errors import BusError, CorruptReply, DriverError, NoReply, ServoRefused, merge_errors
 from drivers.servos.exchange import Exchange, Exchanges, R
 from drivers.servos.layout import NAMES, item_of
 from drivers.servos.port import Port
@@ -187,7 +187,7 @@ class Registers(ABC, Generic[R]):
             except BusError as error:
                 failed[servo] = error
         if failed:
-            raise together(failed)
+            raise merge_errors(failed)
         return done
 
     # ------------------------------------------------------------------ every answer checked

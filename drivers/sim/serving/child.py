@@ -16,7 +16,7 @@ import time
 from typing import Any
 
 from drivers.base.errors import DriverError
-from drivers.base.priority import take_priority
+from drivers.base.priority import request_realtime
 from drivers.sim.serving.control import Commands
 from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import Control, PortServer
@@ -54,7 +54,7 @@ def main() -> int:
     for ending in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, ending):
             signal.signal(getattr(signal, ending), signal.SIG_IGN)
-    take_priority()  # a real servo is not kept waiting by a program that draws
+    request_realtime()  # a real servo is not kept waiting by a program that draws
     first = _first_line(sys.stdin.fileno())
     if not first:
         return 0
