@@ -25,12 +25,13 @@ def test_a_checksum_goes_on_from_any_byte() -> None:
 
 
 def test_travel_that_was_not_used_is_saved_up_to_a_burst() -> None:
-    saved, last = np.zeros(2), np.zeros(2)
+    wide, budget, last = np.full(2, 9.0), np.zeros(2), np.zeros(2)
     target, speed = np.array([1.0, -1.0]), np.array([0.5, 10.0])
-    assert kernels.spend_travel(target, speed, 0.1, 0.2, saved, last) == 1
+    assert kernels.limit_targets(target, -wide, wide, speed, 0.1, 0.2, target.copy(), budget, last) == (0, 0, 1)
     np.testing.assert_allclose(last, [0.05, -1.0])
-    assert kernels.spend_travel(last.copy(), speed, 100.0, 0.2, saved, last) == 0
-    np.testing.assert_allclose(saved, [0.1, 2.0])
+    here = last.copy()
+    assert kernels.limit_targets(here, -wide, wide, speed, 100.0, 0.2, here.copy(), budget, last) == (0, 0, 0)
+    np.testing.assert_allclose(budget, [0.1, 2.0])
 
 
 @pytest.mark.parametrize(
