@@ -1,6 +1,6 @@
-"""Hobby servos on a board that reads lines of text: a template says what a line looks like.
+"""Driver of hobby servos on a board that reads lines of text, whose format is given by templates.
 
-A line holds the servos whose goals changed, and one more in turn, so that a board that was reset hears of all of them.
+A line has the servos whose goals changed and one more in turn, so that a board that was reset gets all of them again.
 """
 
 from __future__ import annotations
@@ -15,36 +15,35 @@ import numpy as np
 
 from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import DriverError
+from drivers.boards.hobby import ValueScale
 from drivers.boards.pulses import GROUP, PulseBus
-from drivers.boards.scales import ValueScale
 from drivers.text.template import NAMES, VALUES, AnswerPattern, check_texts, decimals
 
 log = logging.getLogger(__name__)
 
 TIME_MS = (1, 1000)
-"""Shortest and longest time that a line may give the board for its moves."""
+"""Limits of the time that a line gives the board for its moves."""
 MISSES = 2
-"""So many answers in a row that do not come make a servo silent."""
+"""Missing answers in a row after which a servo is silent."""
 RETRY_S = 1.0
-"""Silent servos are asked about once in this time."""
+"""Interval of requests for silent servos."""
 
 
 class TextBus(PulseBus):
-    """A text board on one port. See :class:`~drivers.boards.bus.BoardBus` for what it shares with other boards.
+    """A text board on one port; a servo's ``id`` is the channel.
 
     Parameters
     ----------
-    servos : the servos; ``id`` is the channel.
     template : one servo's move, with placeholders (:mod:`drivers.text.template`).
-    begin, separator, end : what stands before, between and behind the moves of one line. With all of them empty each
-        move is a line of its own.
-    off : what switches one servo off; without it servos stay on when the bus is closed.
-    query, answer : what asks for one servo, and what comes back; ``answer`` must name the servo and end with text.
+    begin, separator, end : text before, between and after the moves of one line; where all are empty each move is a
+        line.
+    off : switches one servo off; without it servos stay on when the bus is closed.
+    query, answer : request for one servo and its answer; ``answer`` must name the servo and end with text.
     options : see :class:`~drivers.boards.bus.BoardBus`.
 
     Raises
     ------
-    DriverError : a template that does not fit, named with what is wrong; or an unknown model.
+    DriverError : a template that is not valid, named with what is wrong; or an unknown model.
     """
 
     tells_torque: ClassVar[bool] = False
@@ -72,11 +71,17 @@ class TextBus(PulseBus):
         if len(self.servos) > 1 and not self._move.fields & set(NAMES):
             raise DriverError("template: does not say which servo it is for", hint="put {ch} or {name} into it")
         self._scales = {
-            piece.field: ValueScale(piece.field, decimals(piece), self.servos, self._scale)
+            piece.field: ValueScale(piece.field, decimals(piece.spec), self.servos, self._scale)
             for piece in self._move.pieces
             if piece.field in VALUES
         }
-        self._read_scale = _read_scale(self._answer, self.servos, self._scale) if self._answer else None
+        self._read_scale = (
+            next(
+                (ValueScale(name, 0, self.servos, self._scale) for name in VALUES if name in self._answer.fields), None
+            )
+            if self._answer
+            else None
+        )
         self._main = next(iter(self._scales.values()))
         self._sent = np.full(len(self.servos), math.nan)
         self._refresh = 0
@@ -84,7 +89,6 @@ class TextBus(PulseBus):
         self._missed = np.zeros(len(self.servos), dtype=int)
 
     def far_end(self) -> dict[str, Any]:
-        """What a simulated board has to be set to."""
         return {"texts": self._texts, "names": [servo.wire_name or servo.name for servo in self.servos]}
 
     # ------------------------------------------------------------------ starting and stopping
@@ -96,12 +100,12 @@ class TextBus(PulseBus):
         self._missed[:] = 0
 
     def _begin(self) -> Floats:
-        """A board that is not asked, or does not answer yet, may put out anything: every servo begins at its rest."""
+        """What the board puts out is unknown: every servo starts at its rest position."""
         return np.full(len(self.servos), math.nan)
 
     def _bring_up(self) -> Floats:
         if not self._off_text:
-            self._say(f"servos on {self.path} cannot be switched off: give the bus an off template")
+            self._warn(f"servos on {self.path} cannot be switched off: give the bus an off template")
         return super()._bring_up()
 
     def _off(self, index: int) -> None:
@@ -123,7 +127,7 @@ class TextBus(PulseBus):
         self._track.go(self._scale.pulses(sent))
         if changed.any():
             self._write(np.flatnonzero(changed).tolist(), values)
-        self._forget_input()
+        self._drain_input()
         return sent
 
     def _write(self, indices: list[int], values: dict[str, Floats]) -> None:
@@ -141,13 +145,12 @@ class TextBus(PulseBus):
         servo = self.servos[index]
         return {"ch": servo.id, "id": servo.id, "name": servo.wire_name or servo.name}
 
-    def _forget_input(self) -> None:
-        """Without a question nobody reads what a board says; its words must not pile up."""
+    def _drain_input(self) -> None:
+        """Discard what a board sends that is never asked."""
         if not self._query:
             self._port.drain()
 
     def _poll(self) -> None:
-        """Ask some servos in turn, or believe what they were told."""
         if self._query is None or self._answer is None:
             here = self._limits.target if self._running else self._position
             self._position = np.where(np.isnan(self._sent), here, self._main.radians(self._sent))
@@ -157,17 +160,17 @@ class TextBus(PulseBus):
             return
         self._port.drain()
         self._port.write("".join(self._query.fill(self._named(index)) for index in group).encode())
-        answers = self._answers(group)
+        answers = self._answers(self._answer, group)
         lost = [self.ids[index] for index in group if index not in answers and self._miss(index)]
-        self._heard(bool(answers) or len(self._mute) < len(self.servos))
+        self._note_answer(bool(answers) or len(self._mute) < len(self.servos))
         if lost and not self._silent:
-            self._say(f"the board on {self.path} does not answer about {', '.join(map(str, lost))}")
+            self._warn(f"the board on {self.path} does not answer about {', '.join(map(str, lost))}")
         for index, pulse in answers.items():
             self._missed[index] = 0
             self._take([index], [pulse])
 
     def _asked_now(self) -> list[int]:
-        """The servos to ask in this cycle; those that are never answered about once a second, and by themselves."""
+        """Indices of the servos to ask in this cycle; silent ones in cycles of their own, every ``RETRY_S``."""
         now = self._clock()
         if self._mute and now >= self._retry_s:
             self._retry_s = now + RETRY_S
@@ -176,7 +179,7 @@ class TextBus(PulseBus):
         return [index for index in self._turn() if index not in self._mute]
 
     def _miss(self, index: int) -> bool:
-        """A servo that was asked about without an answer; whether nobody waits for it from now on."""
+        """Count a missing answer; True where the servo is silent from now on."""
         self._report.count("no_reply", self.ids[index])
         self._missed[index] += 1
         if self._missed[index] >= MISSES:
@@ -184,43 +187,34 @@ class TextBus(PulseBus):
             self._retry_s = self._clock() + RETRY_S
         return bool(self._missed[index] == MISSES)
 
-    def _answers(self, group: list[int]) -> dict[int, float]:
-        """Pulses (us) by index that answers bring; what is no answer is thrown away."""
-        pattern, found, data = self._answer, dict[int, float](), b""
-        if pattern is None:
-            return found
+    def _answers(self, pattern: AnswerPattern, group: list[int]) -> dict[int, float]:
+        """Pulses (us) by index from the answers that arrive in time; other lines are counted as stray."""
+        found, data = dict[int, float](), b""
         end = self._port.clock() + self._margin_s + self._wire_s(32 * len(group))
         while len(found) < len(group):
             got = self._port.read(end)
             *lines, data = (data + got).split(pattern.end)
             for line in lines:
-                found.update(self._answered(pattern, (line + pattern.end).decode("latin-1"), group))
+                values = pattern.read((line + pattern.end).decode("latin-1")) or {}
+                index = next((index for index in group if self._names_servo(values, index)), None)
+                if index is None:
+                    self._report.stray += 1
+                else:
+                    found[index] = self._pulse(index, values)
             if not got and self._port.clock() >= end:
                 break
         return found
 
-    def _answered(self, pattern: AnswerPattern, line: str, group: list[int]) -> dict[int, float]:
-        """The pulse (us) by index that one answer brings; nothing where it is none of a servo that was asked."""
-        values = pattern.read(line) or {}
-        for index in group if values else ():
-            named = self._named(index)
-            if all(values[name] == named[name] for name in NAMES if name in values):
-                return {index: self._pulse(index, values)}
-        self._report.stray += 1
-        return {}
+    def _names_servo(self, values: Mapping[str, float | str], index: int) -> bool:
+        """Whether the values of an answer are those of a servo."""
+        named = self._named(index)
+        return bool(values) and all(values[name] == named[name] for name in NAMES if name in values)
 
     def _pulse(self, index: int, values: Mapping[str, float | str]) -> float:
+        """The pulse (us) of an answer."""
         scale = self._read_scale
         if scale is None or scale.field == "us":
             return float(values["us"])
         angles = np.zeros(len(self.servos))
         angles[index] = scale.radian(index, float(values[scale.field]))
         return float(self._scale.pulses(angles)[index])
-
-    def _doubt(self) -> None:
-        """Answers name their servo: one that is wrong says nothing of the next."""
-
-
-def _read_scale(pattern: AnswerPattern, servos: tuple[ServoSpec, ...], pulses: Any) -> ValueScale:
-    field = next(name for name in VALUES if name in pattern.fields)
-    return ValueScale(field, VALUES[field][1], servos, pulses)

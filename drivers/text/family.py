@@ -1,4 +1,4 @@
-"""The family of boards that read lines of text."""
+"""Definition of the family of boards that read lines of text, and its options."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TEXTS = ("template", "begin", "separator", "end", "off", "query", "answer")
 
 @dataclass(frozen=True, kw_only=True)
 class TextSettings(PulseSettings):
-    """What the driver of a text board can be told."""
+    """Options of the driver of a text board."""
 
     template: str | None = option("How one servo's move is written.")
     begin: str | None = option("What stands before the moves of one line.")
@@ -25,7 +25,7 @@ class TextSettings(PulseSettings):
     answer: str | None = option("What comes back; it goes with query.")
 
     def check(self, rate_hz: float) -> None:
-        """Raises ValueError where the texts are no templates, or do not go together."""
+        """Raises ValueError where the texts are no valid templates, or contradict each other."""
         if self.template is None:
             raise ValueError(r'template is missing: how a move is written, for example "#{ch}P{us}\r"')
         try:
