@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import difflib
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import KW_ONLY, dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from operator import attrgetter
@@ -45,6 +46,7 @@ class Plugin(Protocol):
 P = TypeVar("P", bound=Plugin)
 
 
+@dataclass(eq=False)
 class Registry(Generic[P]):
     """All plug-ins of one sort.
 
@@ -63,31 +65,26 @@ class Registry(Generic[P]):
     check : raises an error for a definition that this sort cannot use.
     """
 
-    def __init__(
-        self,
-        sort: type[P],
-        what: str,
-        group: str,
-        version: int,
-        builtin: Callable[[], Mapping[str, str]],
-        attribute: str,
-        *,
-        reserved: Iterable[str] = (),
-        check: Callable[[P], None] = lambda plugin: None,
-    ) -> None:
-        self._sort, self.what, self.group, self.version = sort, what, group, version
-        self._builtin, self._attribute, self._reserved, self._check_own = builtin, attribute, tuple(reserved), check
-        self._loaded: dict[str, P] = {}
-        self._logged: set[str] = set()
+    sort: type[P]
+    what: str
+    group: str
+    version: int
+    builtin: Callable[[], Mapping[str, str]]
+    attribute: str
+    _: KW_ONLY
+    reserved: Collection[str] = ()
+    check: Callable[[P], None] = lambda plugin: None
+    _loaded: dict[str, P] = field(default_factory=dict, init=False)
+    _logged: set[str] = field(default_factory=set, init=False)
 
     def kinds(self) -> list[str]:
         """Every kind that is installed, whether or not it can be loaded, in order."""
-        return sorted({*self._builtin(), *self._foreign()} - set(self._reserved))
+        return sorted({*self.builtin(), *self._foreign()} - set(self.reserved))
 
     def all(self) -> list[P]:
         """Every plug-in that can be loaded: the built-in ones in the order of their kinds, then the others."""
         found = []
-        builtin = self._builtin()
+        builtin = self.builtin()
         for kind in sorted(self.kinds(), key=lambda kind: (kind not in builtin, kind)):
             try:
                 found.append(self.get(kind))
@@ -104,7 +101,7 @@ class Registry(Generic[P]):
         """
         if kind in self._loaded:
             return self._loaded[kind]
-        module = self._builtin().get(kind)
+        module = self.builtin().get(kind)
         if module is not None:
             name, hint = f"{self.what} {kind!r} in {module}", f"mend {module}"
         else:
@@ -112,7 +109,7 @@ class Registry(Generic[P]):
             name = f"{self.what} {kind!r} of the package {package}"
             hint = f"pip install --upgrade {package}, or ask its maker"
         try:
-            plugin: P = getattr(import_module(module), self._attribute) if module is not None else entry.load()
+            plugin: P = getattr(import_module(module), self.attribute) if module is not None else entry.load()
         except (Exception, SystemExit) as error:  # whatever a module of another package raises
             raise PluginError(f"{name} cannot be loaded: {_describe(error)}", hint=hint) from error
         self._check(plugin, kind, name, hint)
@@ -158,12 +155,12 @@ class Registry(Generic[P]):
 
     def package_of(self, kind: str) -> str:
         """Names and versions of the packages that have a kind; empty for a built-in one."""
-        entries = [] if kind in self._builtin() else self._foreign().get(kind, [])
+        entries = [] if kind in self.builtin() else self._foreign().get(kind, [])
         return ", ".join(f"{entry.dist.name} {entry.dist.version}" for entry in entries if entry.dist is not None)
 
     def shadowed(self) -> Iterator[tuple[str, str]]:
         """Kinds of other packages that are ignored because omote has them itself, with the name of the package."""
-        taken = {*self._builtin(), *self._reserved}
+        taken = {*self.builtin(), *self.reserved}
         for kind, entries in sorted(self._foreign().items()):
             if kind in taken:
                 yield from ((kind, _package(entry)) for entry in entries)
@@ -200,7 +197,7 @@ class Registry(Generic[P]):
 
     def _entry_point(self, kind: str) -> tuple[EntryPoint, str]:
         """The only entry point of a kind, and the name of its package."""
-        entries = self._foreign().get(kind, []) if kind not in self._reserved else []
+        entries = self._foreign().get(kind, []) if kind not in self.reserved else []
         packages = sorted({_package(entry) for entry in entries})
         if not entries:
             raise self._unknown(kind)
@@ -219,13 +216,13 @@ class Registry(Generic[P]):
                 f"{mine} is made for version {made_for} of {self.group}; this omote has version {self.version}",
                 hint="pip install --upgrade omote" if newer else hint,
             )
-        if not isinstance(plugin, self._sort):
-            raise PluginError(f"{mine} must be a {self._sort.__name__}, not {plugin!r}", hint=hint)
+        if not isinstance(plugin, self.sort):
+            raise PluginError(f"{mine} must be a {self.sort.__name__}, not {plugin!r}", hint=hint)
         if plugin.kind != kind:
             raise PluginError(f"{mine} says that its kind is {plugin.kind!r}; both must be the same", hint=hint)
         try:
             _check_types(plugin)
-            self._check_own(plugin)
+            self.check(plugin)
         except Exception as error:
             raise PluginError(f"{mine} cannot be used: {error}", hint=hint) from error
 

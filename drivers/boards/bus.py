@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec, frozen
-from drivers.base.errors import BusError, NoReply, PortLost
+from drivers.base.errors import BusError, DriverError, NoReply, PortLost
 from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.core.wirebus import WireBus
 from drivers.port.serialport import SerialPort, as_serial_port, reply_margin_s
@@ -116,10 +116,6 @@ class BoardBus(WireBus):
     def _close_link(self) -> None:
         self._port.close()
 
-    def _wire_s(self, count: int) -> float:
-        """Time of a number of bytes on the wire."""
-        return 10.0 * count / self._port.baud
-
     # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
@@ -175,15 +171,10 @@ class BoardBus(WireBus):
         except BusError:
             return False
 
-    def _not_off(self, left: Sequence[int], lost: PortLost | None) -> BusError | PortLost:
+    def _not_off(self, left: Sequence[int], lost: PortLost | None) -> DriverError:
         which = ", ".join(f"{self.ids[index]} ({self.servos[index].name})" for index in left)
-        kind = NoReply if lost is None else PortLost
-        return kind(
-            f"not confirmed off on {self.path}: {which}" + (f" ({lost})" if lost else ""),
-            hint="switch the servos' power off",
-            port=self.path,
-            servo_ids=tuple(self.ids[index] for index in left),
-        )
+        message = f"not confirmed off on {self.path}: {which}" + (f" ({lost})" if lost else "")
+        return self._error(PortLost if lost else NoReply, message, "switch the servos' power off", left)
 
     # ------------------------------------------------------------------ every cycle
 
@@ -194,25 +185,6 @@ class BoardBus(WireBus):
 
     def _ask(self) -> BusState:
         self._poll()
-        return self._state()
-
-    def _note(self, index: int, angle_rad: float) -> None:
-        """Store what the board reports of one servo; NaN is no pulses."""
-        on = not math.isnan(angle_rad)
-        if self._running and self._on[index] and not on:
-            self._report.count("torque_lost", self.servos[index].id)
-        self._on[index] = on
-        self._position_s[index] = self._clock()
-        if on:
-            self._position[index] = angle_rad
-
-    def _note_answer(self, answered: bool) -> None:
-        """Store whether the board answered in this cycle; log changes."""
-        if answered == self._silent:
-            self._silent = not answered
-            self._warn(f"the board on {self.path} {'answers again' if answered else 'does not answer'}")
-
-    def _state(self) -> BusState:
         n, now = len(self.servos), self._clock()
         unknown, none = frozen(np.full(n, math.nan)), frozen(np.zeros(n), np.uint8)
         silent = np.full(n, self._silent)
@@ -232,3 +204,19 @@ class BoardBus(WireBus):
             hardware_error=none,
             torque=frozen(self._on, bool),
         )
+
+    def _note(self, index: int, angle_rad: float) -> None:
+        """Store what the board reports of one servo; NaN is no pulses."""
+        on = not math.isnan(angle_rad)
+        if self._running and self._on[index] and not on:
+            self._report.count("torque_lost", self.servos[index].id)
+        self._on[index] = on
+        self._position_s[index] = self._clock()
+        if on:
+            self._position[index] = angle_rad
+
+    def _note_answer(self, answered: bool) -> None:
+        """Store whether the board answered in this cycle; log changes."""
+        if answered == self._silent:
+            self._silent = not answered
+            self._warn(f"the board on {self.path} {'answers again' if answered else 'does not answer'}")

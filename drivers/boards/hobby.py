@@ -142,42 +142,43 @@ def _extrapolated(x: Floats, at: Floats, gives: Floats) -> Floats:
 
 
 class ValueScale:
-    """Conversion between angles of n servos and one of the values that lines of text have.
+    """Conversion between angles of n servos and the values that lines of text have.
 
     Parameters
     ----------
-    field : ``us``, ``deg``, ``deg10``, ``angle``, ``unit`` (:mod:`drivers.text.template`), or ``parameter`` (1 for 90
-        degrees of the shaft).
-    decimals : of the value on the wire.
-    servos : n of them. pulses : their pulses, where the value is one.
+    fields : value of each servo: ``us``, ``deg``, ``deg10``, ``angle``, ``unit`` (:mod:`drivers.text.template`), or
+        ``parameter`` (1 for 90 degrees of the shaft).
+    decimals : of each value on the wire.
     """
 
-    def __init__(self, field: str, decimals: int, servos: Sequence[ServoSpec], pulses: PulseScale | None) -> None:
-        self.field, self._step = field, 10.0**-decimals
-        self._pulses = pulses if field == "us" else None
-        self._offset, self._slope = (
-            np.array(column) for column in zip(*(_line(field, s) for s in servos), strict=True)
-        )
-        ends = [self._plain(np.array([getattr(s, end) for s in servos])) for end in ("min_rad", "max_rad")]
+    def __init__(self, servos: Sequence[ServoSpec], fields: Sequence[str], decimals: Sequence[int]) -> None:
+        self._step = np.array([10.0**-places for places in decimals])
+        self._offset, self._slope = np.array([_line(field, s) for field, s in zip(fields, servos, strict=True)]).T
+        self._us = [i for i, field in enumerate(fields) if field == "us"]
+        self._pulses = PulseScale([servos[i] for i in self._us]) if self._us else None
+        ends = [self._exact(np.array([getattr(s, end) for s in servos])) for end in ("min_rad", "max_rad")]
         self._low, self._high = np.minimum(*ends), np.maximum(*ends)
 
     def values(self, angle_rad: Floats) -> Floats:
         """(n,) values for angles (n,) rad, rounded to the last decimal inside the servos' limits."""
-        rounded = np.rint(self._plain(angle_rad) / self._step)
+        rounded = np.rint(self._exact(angle_rad) / self._step)
         low = np.ceil(self._low / self._step - 1e-9)
         high = np.floor(self._high / self._step + 1e-9)
-        return np.minimum(np.maximum(rounded, low), high) * self._step
+        values: Floats = np.minimum(np.maximum(rounded, low), high) * self._step
+        return values
 
     def radians(self, values: Floats) -> Floats:
         """(n,) rad for values (n,)."""
-        return self._pulses.radians(values) if self._pulses else (values - self._offset) / self._slope
+        angles: Floats = (values - self._offset) / self._slope
+        if self._pulses:
+            angles[self._us] = self._pulses.radians(values[self._us])
+        return angles
 
-    def radian(self, index: int, value: float) -> float:
-        """The angle (rad) of one servo for a value."""
-        return float(self.radians(np.full(len(self._slope), value))[index])
-
-    def _plain(self, angle_rad: Floats) -> Floats:
-        return self._pulses.pulses(angle_rad) if self._pulses else self._offset + self._slope * angle_rad
+    def _exact(self, angle_rad: Floats) -> Floats:
+        values: Floats = self._offset + self._slope * angle_rad
+        if self._pulses:
+            values[self._us] = self._pulses.pulses(angle_rad[self._us])
+        return values
 
 
 def _line(field: str, servo: ServoSpec) -> tuple[float, float]:

@@ -122,14 +122,15 @@ class OrderedBus(PulseBus):
 
     def _begin(self) -> Floats:
         seen = np.full(len(self.servos), math.nan)
-        for group in self._groups():
+        for group in self._groups:
             pulses = self._ask_pulses(group, insist=True)
             if pulses is None:
-                ids = tuple(self.ids[index] for index in group)
-                text = self.SILENT.format(path=self.path, baud=self._port.baud, channels=", ".join(map(str, ids)))
-                raise NoReply(text, hint=self.SILENT_HINT, port=self.path, servo_ids=ids)
+                channels = ", ".join(str(self.ids[index]) for index in group)
+                message = self.SILENT.format(path=self.path, baud=self._port.baud, channels=channels)
+                raise self._error(NoReply, message, self.SILENT_HINT, group)
             seen[group] = pulses
-        return self._present(seen)
+        self._track.begin(seen)
+        return self._scale.radians(seen)
 
     def _off_confirmed(self, index: int) -> bool:
         pulses = self._ask_pulses([index], insist=True)

@@ -74,6 +74,8 @@ class PulseBus(BoardBus):
         self._scale = PulseScale(self.servos)
         self._track = PulseTrack(len(self.servos))
         self._stop_us = np.zeros(len(self.servos))  # braking distance, where the board limits the acceleration
+        indices = list(range(len(self.servos)))
+        self._groups = [indices[i : i + GROUP] for i in range(0, len(indices), GROUP)]
         self._next = 0
         self._forgot = False  # the board may have been reset
 
@@ -82,18 +84,8 @@ class PulseBus(BoardBus):
 
     def _turn(self) -> list[int]:
         """Indices of the servos to ask in this cycle."""
-        groups = self._groups()
-        self._next = (self._next + 1) % len(groups)
-        return groups[self._next]
-
-    def _groups(self) -> list[list[int]]:
-        indices = list(range(len(self.servos)))
-        return [indices[i : i + GROUP] for i in range(0, len(indices), GROUP)]
-
-    def _present(self, seen_us: Floats) -> Floats:
-        """Angles (n,) rad for pulses (n,) us that the board puts out at the start, NaN where there are none."""
-        self._track.begin(seen_us)
-        return self._scale.radians(seen_us)
+        self._next = (self._next + 1) % len(self._groups)
+        return self._groups[self._next]
 
     def _take(self, group: Sequence[int], pulses: Iterable[float]) -> None:
         """Check and store reported pulses (us); a servo that lost them shows that the board may have been reset."""

@@ -11,6 +11,7 @@ import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,8 @@ from drivers.base.errors import BusError, DriverError, PortLost
 from drivers.core.limits import TargetLimits
 
 log = logging.getLogger(__name__)
+
+E = TypeVar("E", bound=DriverError)
 
 
 class WireBus(Bus):
@@ -117,13 +120,15 @@ class WireBus(Bus):
             raise
 
     def _raise_if_lost(self) -> None:
-        if self._lost or not self.is_open:
-            raise PortLost(
-                f"port {self.path} is {'lost' if self._lost else 'not open'}",
-                hint="plug it in again and call reconnect()" if self._lost else "call open()",
-                port=self.path,
-                servo_ids=self.ids,
-            )
+        if self._lost:
+            raise self._error(PortLost, f"port {self.path} is lost", "plug it in again and call reconnect()")
+        if not self.is_open:
+            raise self._error(PortLost, f"port {self.path} is not open", "call open()")
+
+    def _error(self, kind: type[E], message: str, hint: str = "", indices: Iterable[int] | None = None) -> E:
+        """An error of this port that concerns some servos, by default all."""
+        ids = self.ids if indices is None else tuple(self.ids[index] for index in indices)
+        return kind(message, hint=hint, port=self.path, servo_ids=ids)
 
     def _note_loss(self) -> None:
         self._lost = True
@@ -156,12 +161,8 @@ class WireBus(Bus):
         try:
             self.reconnect()
         except DriverError as error:
-            raise PortLost(
-                f"servos not confirmed off, for their port is gone: {error}",
-                hint="switch the servos' power off",
-                port=self.path,
-                servo_ids=self.ids,
-            ) from error
+            message = f"servos not confirmed off, for their port is gone: {error}"
+            raise self._error(PortLost, message, "switch the servos' power off") from error
 
     # ------------------------------------------------------------------ every cycle
 

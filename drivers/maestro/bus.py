@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -51,14 +50,12 @@ class MaestroBus(OrderedBus):
         self,
         servos: Iterable[ServoSpec],
         *,
-        port: str,
         board: str = MINI,
         device: int | None = None,
         crc: bool = False,
-        clock: Callable[[], float] = time.monotonic,
         **options: Any,
     ) -> None:
-        super().__init__(servos, port=port, clock=clock, **options)
+        super().__init__(servos, **options)
         if board not in (MINI, MICRO):
             raise DriverError(f"there is no Maestro {board!r}", hint=f'use board = "{MINI}" or "{MICRO}"')
         if device is not None and not 0 <= device <= 127:
@@ -96,11 +93,10 @@ class MaestroBus(OrderedBus):
         errors = self._errors
         if errors:
             self._switch_off()
-            raise ServoRefused(
+            raise self._error(
+                ServoRefused,
                 f"the Maestro on {self.path} reports {', '.join(m.error_names(errors))}",
-                hint='set board = "micro" for one with 6 channels; look at its errors in the Control Center',
-                port=self.path,
-                servo_ids=self.ids,
+                'set board = "micro" for one with 6 channels; look at its errors in the Control Center',
             )
         present = self._begin()
         for index in np.flatnonzero(np.abs(present - start) * self._scale.us_per_rad > self.SLACK_US):

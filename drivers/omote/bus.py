@@ -6,25 +6,21 @@ a time, so a slow head gets the newest values and no queue. The values that the 
 
 from __future__ import annotations
 
-import logging
 import math
-import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
-from drivers.base.bus import BusReport, Floats, ServoSpec
+from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import BusError, DriverError, NoReply, ServoRefused, WrongModel
 from drivers.boards.bus import BoardBus
-from drivers.boards.hobby import PulseScale, ValueScale, check_hobby, known_models
+from drivers.boards.hobby import ValueScale, check_hobby, known_models
 from drivers.omote import protocol
 from drivers.omote.protocol import Answer
 
-log = logging.getLogger(__name__)
-
-MODELS = {"parameter": 4, "degrees": 2}
-"""Decimals of models besides hobby servos, which are sent as pulses (us). 90 degrees are 1 of a parameter."""
+MODELS = {"parameter": ("parameter", 4), "degrees": ("deg", 2)}
+"""Value and decimals of models besides hobby servos, which are sent as pulses (us)."""
 UNDER_WAY = 2
 """Lines that may be unanswered: small boards have small input buffers."""
 HELLO_S, HELLO_AGAIN_S = 5.0, 0.5
@@ -66,27 +62,27 @@ class LineOutBus(BoardBus):
         self,
         servos: Iterable[ServoSpec],
         *,
-        port: str,
         checksum: bool = True,
         heartbeat_s: float = 0.25,
-        clock: Callable[[], float] = time.monotonic,
         **options: Any,
     ) -> None:
-        super().__init__(servos, port=port, clock=clock, **options)
+        super().__init__(servos, **options)
         self._names = [servo.wire_name or servo.name for servo in self.servos]
-        for servo, name in zip(self.ids, self._names, strict=True):
+        for id, name in zip(self.ids, self._names, strict=True):
             if not protocol.is_word(name):
                 raise DriverError(
-                    f"servo {servo}: {name!r} cannot be a name in the line protocol",
+                    f"servo {id}: {name!r} cannot be a name in the line protocol",
                     hint="set its wire_name to one without blanks and *",
                 )
         twice = sorted({name for name in self._names if self._names.count(name) > 1})
         if twice:
             raise DriverError(f"two servos are called {', '.join(twice)}", hint="give each a wire_name of its own")
-        self._scales = _scales(self.servos)
+        for servo in self.servos:
+            check_lineout(servo.model)
+        fields = [MODELS.get(servo.model, ("us", 1)) for servo in self.servos]
+        self._scale = ValueScale(self.servos, *zip(*fields, strict=True))
         self._checked, self._heartbeat_s = checksum, heartbeat_s
         self._tag = 0
-        self._held_back = 0
         self._reset()
 
     def _reset(self) -> None:
@@ -122,7 +118,7 @@ class LineOutBus(BoardBus):
                 raise self._refusal(group, answer)
             for name, word in zip(group, answer.text.split()[1:], strict=False):
                 values[index[name]] = _value(word.partition("=")[2])
-        return self._radians(values)
+        return self._scale.radians(values)
 
     def _greet(self) -> Answer:
         end = self._port.clock() + HELLO_S
@@ -132,11 +128,10 @@ class LineOutBus(BoardBus):
             if answer is not None and answer.ok:
                 return answer
             if self._port.clock() >= end:
-                raise NoReply(
+                raise self._error(
+                    NoReply,
                     f"no head answers in the line protocol on {self.path} at {self._port.baud} baud",
-                    hint="check its power, its cable, its baud rate, and that it runs a sketch as in docs/boards.md",
-                    port=self.path,
-                    servo_ids=self.ids,
+                    "check its power, its cable, its baud rate, and that it runs a sketch as in docs/boards.md",
                 )
 
     def _refusal(self, group: Sequence[str], answer: Answer) -> BusError:
@@ -144,15 +139,11 @@ class LineOutBus(BoardBus):
         for name in group:
             single = self._insist(["GET", name])
             if not single.ok:
-                servo = self.servos[self._names.index(name)]
+                index = self._names.index(name)
                 kind = WrongModel if single.code == protocol.UNKNOWN_NAME else ServoRefused
-                return kind(
-                    f"the head on {self.path} does not take {name!r} (servo {servo.id}): {single.text}",
-                    hint="set wire_name of the channel to a name that it knows",
-                    port=self.path,
-                    servo_ids=(servo.id,),
-                )
-        return ServoRefused(f"the head on {self.path} refused GET: {answer.text}", port=self.path)
+                message = f"the head on {self.path} does not take {name!r} (servo {self.ids[index]}): {single.text}"
+                return self._error(kind, message, "set wire_name of the channel to a name that it knows", [index])
+        return self._error(ServoRefused, f"the head on {self.path} refused GET: {answer.text}", indices=())
 
     def _off(self, index: int) -> None:
         """Does nothing: :meth:`_switch_off` releases all names in a few lines."""
@@ -188,13 +179,14 @@ class LineOutBus(BoardBus):
     def _go(self, angle_rad: Floats) -> Floats:
         self._listen()
         known = np.isfinite(angle_rad)
-        values = self._values(np.where(known, angle_rad, 0.0))
-        sent = np.where(known, self._radians(values), math.nan)
+        values = self._scale.values(np.where(known, angle_rad, 0.0))
+        sent = np.where(known, self._scale.radians(values), math.nan)
         now = self._clock()
         refresh = now - self._all_sent_s >= self._heartbeat_s
         due = known & ((values != self._sent) | refresh)
         if len(self._waiting) >= UNDER_WAY:
-            self._held_back += bool(due.any())
+            if due.any():
+                self._report.count("held_back")
             return sent
         if refresh:
             self._all_sent_s = now
@@ -215,11 +207,6 @@ class LineOutBus(BoardBus):
             self._sent[:] = math.nan  # send all values again
         if self._running:
             self._note_answer(now - self._answer_s <= self._heartbeat_s + 2 * LOST_S)
-
-    def report(self) -> BusReport:
-        if self._held_back:
-            self._report.errors["held_back"] = self._held_back
-        return super().report()
 
     # ------------------------------------------------------------------ lines
 
@@ -247,7 +234,7 @@ class LineOutBus(BoardBus):
             answer = self._exchange(words, LOST_S)
             if answer is not None:
                 return answer
-        raise NoReply(f"the head on {self.path} does not answer {words[0]}", port=self.path, servo_ids=self.ids)
+        raise self._error(NoReply, f"the head on {self.path} does not answer {words[0]}")
 
     def _listen(self, deadline_s: float = 0.0) -> None:
         """Process the input; waits for some where a deadline is given."""
@@ -282,35 +269,6 @@ class LineOutBus(BoardBus):
         self._report.count("refused")
         self._sent[list(angles) or slice(None)] = math.nan
         self._warn(f"the head on {self.path} refused a line: {answer.code} {answer.text}")
-
-    # ------------------------------------------------------------------ values
-
-    def _values(self, angle_rad: Floats) -> Floats:
-        out = np.zeros(len(self.servos))
-        for indices, scale in self._scales:
-            out[indices] = scale.values(angle_rad[indices])
-        return out
-
-    def _radians(self, values: Floats) -> Floats:
-        out = np.full(len(self.servos), math.nan)
-        for indices, scale in self._scales:
-            out[indices] = scale.radians(values[indices])
-        return out
-
-
-def _scales(servos: Sequence[ServoSpec]) -> list[tuple[list[int], ValueScale]]:
-    """Indices of the servos with each kind of value, and its scale."""
-    fields: dict[str, list[int]] = {}
-    for i, servo in enumerate(servos):
-        check_lineout(servo.model)
-        fields.setdefault(servo.model if servo.model in MODELS else "us", []).append(i)
-    out = []
-    for field, indices in fields.items():
-        chosen = [servos[i] for i in indices]
-        pulses = PulseScale(chosen) if field == "us" else None
-        name = "deg" if field == "degrees" else field
-        out.append((indices, ValueScale(name, MODELS.get(field, 1), chosen, pulses)))
-    return out
 
 
 def _value(text: str) -> float:

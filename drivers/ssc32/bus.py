@@ -26,15 +26,12 @@ class Ssc32Bus(OrderedBus, TextBus):
     SILENT = "no SSC-32 answers on {path} at {baud} baud"
     SILENT_HINT = "check its power, its cable and the baud rate its jumpers or buttons are set to"
 
-    def __init__(self, servos: Iterable[ServoSpec], *, port: str, **options: Any) -> None:
-        super().__init__(servos, port=port, template=MOVE, end=END, off=OFF, **options)
+    def __init__(self, servos: Iterable[ServoSpec], **options: Any) -> None:
+        super().__init__(servos, template=MOVE, end=END, off=OFF, **options)
         self._talk = OrderedReplies(self._port, b"VER\r", _is_version, lambda: self._margin_s)
 
     def far_end(self) -> dict[str, Any]:
         return {}
-
-    def _drain_input(self) -> None:
-        """Keep the input, which the next request counts."""
 
     def _ask_pulses(self, group: Sequence[int], insist: bool = False) -> Floats | None:
         questions = "".join(f"QP{self.ids[index]}\r" for index in group).encode()

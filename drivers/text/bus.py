@@ -5,10 +5,8 @@ A line has the servos whose goals changed and one more in turn, so that a board 
 
 from __future__ import annotations
 
-import logging
 import math
-import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,9 +15,7 @@ from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import DriverError
 from drivers.boards.hobby import ValueScale
 from drivers.boards.pulses import GROUP, PulseBus
-from drivers.text.template import NAMES, VALUES, AnswerPattern, check_texts, decimals
-
-log = logging.getLogger(__name__)
+from drivers.text.template import NAMES, TEXTS, VALUES, AnswerPattern, check_texts, decimals
 
 TIME_MS = (1, 1000)
 """Limits of the time that a line gives the board for its moves."""
@@ -48,48 +44,32 @@ class TextBus(PulseBus):
 
     tells_torque: ClassVar[bool] = False
 
-    def __init__(
-        self,
-        servos: Iterable[ServoSpec],
-        *,
-        port: str,
-        template: str,
-        begin: str = "",
-        separator: str = "",
-        end: str = "",
-        off: str = "",
-        query: str = "",
-        answer: str = "",
-        clock: Callable[[], float] = time.monotonic,
-        **options: Any,
-    ) -> None:
-        super().__init__(servos, port=port, clock=clock, **options)
-        self._texts = {"template": template, "begin": begin, "separator": separator, "end": end, "off": off}
-        self._texts |= {"query": query, "answer": answer}
+    def __init__(self, servos: Iterable[ServoSpec], **options: Any) -> None:
+        self._texts: dict[str, str] = {key: options.pop(key, "") for key in TEXTS}
+        super().__init__(servos, **options)
         self._move, self._frame, self._off_text, self._query, self._answer = check_texts(**self._texts)
-        self._separator = separator
         if len(self.servos) > 1 and not self._move.fields & set(NAMES):
             raise DriverError("template: does not say which servo it is for", hint="put {ch} or {name} into it")
+        n = len(self.servos)
+        self._names: list[dict[str, float | str]] = [
+            {"ch": servo.id, "id": servo.id, "name": servo.wire_name or servo.name} for servo in self.servos
+        ]
         self._scales = {
-            piece.field: ValueScale(piece.field, decimals(piece.spec), self.servos, self._scale)
+            piece.field: ValueScale(self.servos, [piece.field] * n, [decimals(piece.spec)] * n)
             for piece in self._move.pieces
             if piece.field in VALUES
         }
-        self._read_scale = (
-            next(
-                (ValueScale(name, 0, self.servos, self._scale) for name in VALUES if name in self._answer.fields), None
-            )
-            if self._answer
-            else None
-        )
-        self._main = next(iter(self._scales.values()))
-        self._sent = np.full(len(self.servos), math.nan)
+        self._main = next(iter(self._scales))
+        answered = [field for field in VALUES if self._answer and field in self._answer.fields]
+        self._answered = (*answered, "us")[0]
+        self._read_scale = ValueScale(self.servos, [self._answered] * n, [0] * n)
+        self._sent = np.full(n, math.nan)
         self._refresh = 0
         self._sent_s = self._retry_s = -math.inf
-        self._missed = np.zeros(len(self.servos), dtype=int)
+        self._missed = np.zeros(n, dtype=int)
 
     def far_end(self) -> dict[str, Any]:
-        return {"texts": self._texts, "names": [servo.wire_name or servo.name for servo in self.servos]}
+        return {"texts": self._texts, "names": [named["name"] for named in self._names]}
 
     # ------------------------------------------------------------------ starting and stopping
 
@@ -110,24 +90,25 @@ class TextBus(PulseBus):
 
     def _off(self, index: int) -> None:
         if self._off_text:
-            self._port.write(self._off_text.fill(self._named(index)).encode())
+            self._port.write(self._off_text.fill(self._names[index]).encode())
 
     # ------------------------------------------------------------------ every cycle
 
     def _go(self, angle_rad: Floats) -> Floats:
         known = np.isfinite(angle_rad)
         values = {name: scale.values(np.where(known, angle_rad, 0.0)) for name, scale in self._scales.items()}
-        main = values[self._main.field]
+        main = values[self._main]
         changed = known & ((main != self._sent) | self._forgot)
         changed[self._refresh] |= known[self._refresh]
         self._refresh = (self._refresh + 1) % len(self.servos)
         self._forgot = False
         self._sent = np.where(known, main, self._sent)
-        sent = np.where(known, self._main.radians(main), math.nan)
+        sent = np.where(known, self._scales[self._main].radians(main), math.nan)
         self._track.go(self._scale.pulses(sent))
         if changed.any():
             self._write(np.flatnonzero(changed).tolist(), values)
-        self._drain_input()
+        if not self._query:
+            self._port.drain()  # nothing else reads what the board sends
         return sent
 
     def _write(self, indices: list[int], values: dict[str, Floats]) -> None:
@@ -135,31 +116,22 @@ class TextBus(PulseBus):
         wait_ms = min(max((now - self._sent_s) * 1000.0, TIME_MS[0]), TIME_MS[1])
         self._sent_s = now
         moves = [
-            self._move.fill({**self._named(i), "time_ms": wait_ms, **{name: v[i] for name, v in values.items()}})
+            self._move.fill({**self._names[i], "time_ms": wait_ms, **{name: v[i] for name, v in values.items()}})
             for i in indices
         ]
         begin, end = (part.fill({"time_ms": wait_ms}) for part in self._frame)
-        self._port.write((begin + self._separator.join(moves) + end).encode())
-
-    def _named(self, index: int) -> dict[str, float | str]:
-        servo = self.servos[index]
-        return {"ch": servo.id, "id": servo.id, "name": servo.wire_name or servo.name}
-
-    def _drain_input(self) -> None:
-        """Discard what a board sends that is never asked."""
-        if not self._query:
-            self._port.drain()
+        self._port.write((begin + self._texts["separator"].join(moves) + end).encode())
 
     def _poll(self) -> None:
         if self._query is None or self._answer is None:
             here = self._limits.target if self._running else self._position
-            self._position = np.where(np.isnan(self._sent), here, self._main.radians(self._sent))
+            self._position = np.where(np.isnan(self._sent), here, self._scales[self._main].radians(self._sent))
             return
         group = self._asked_now()
         if not group:
             return
         self._port.drain()
-        self._port.write("".join(self._query.fill(self._named(index)) for index in group).encode())
+        self._port.write("".join(self._query.fill(self._names[index]) for index in group).encode())
         answers = self._answers(self._answer, group)
         lost = [self.ids[index] for index in group if index not in answers and self._miss(index)]
         self._note_answer(bool(answers) or len(self._mute) < len(self.servos))
@@ -190,7 +162,7 @@ class TextBus(PulseBus):
     def _answers(self, pattern: AnswerPattern, group: list[int]) -> dict[int, float]:
         """Pulses (us) by index from the answers that arrive in time; other lines are counted as stray."""
         found, data = dict[int, float](), b""
-        end = self._port.clock() + self._margin_s + self._wire_s(32 * len(group))
+        end = self._port.clock() + self._margin_s + 320.0 * len(group) / self._port.baud
         while len(found) < len(group):
             got = self._port.read(end)
             *lines, data = (data + got).split(pattern.end)
@@ -207,14 +179,12 @@ class TextBus(PulseBus):
 
     def _names_servo(self, values: Mapping[str, float | str], index: int) -> bool:
         """Whether the values of an answer are those of a servo."""
-        named = self._named(index)
+        named = self._names[index]
         return bool(values) and all(values[name] == named[name] for name in NAMES if name in values)
 
     def _pulse(self, index: int, values: Mapping[str, float | str]) -> float:
         """The pulse (us) of an answer."""
-        scale = self._read_scale
-        if scale is None or scale.field == "us":
-            return float(values["us"])
-        angles = np.zeros(len(self.servos))
-        angles[index] = scale.radian(index, float(values[scale.field]))
-        return float(self._scale.pulses(angles)[index])
+        value = float(values[self._answered])
+        if self._answered == "us":
+            return value
+        return float(self._scale.pulses(self._read_scale.radians(np.full(len(self.servos), value)))[index])

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from drivers.base.errors import DriverError
 from drivers.base.options import option
 from drivers.core.families import Family, PulseSettings
-from drivers.text.template import check_texts
-
-TEXTS = ("template", "begin", "separator", "end", "off", "query", "answer")
+from drivers.text.template import TEXTS, check_texts
 
 
 @dataclass(frozen=True, kw_only=True)

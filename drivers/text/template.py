@@ -32,6 +32,10 @@ _FORMAT = re.compile(r"0?\d*(?:\.(\d))?([df]?)\Z")
 _NUMBER = r" *([+-]?\d+(?:\.\d*)?)"
 
 
+TEXTS = ("template", "begin", "separator", "end", "off", "query", "answer")
+"""Options of a text board that are templates."""
+
+
 class Piece(NamedTuple):
     """Text and the placeholder after it, which may be empty, with its format."""
 
