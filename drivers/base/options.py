@@ -68,12 +68,7 @@ def entries(options: type) -> Iterator[Entry]:
 
 
 def check_options(options: type, reserved: Iterable[str] = ()) -> None:
-    """Check that a dataclass of options can be read from files and commands; `reserved` names must not occur.
-
-    Raises
-    ------
-    ValueError : it is no dataclass, or an option's name or type cannot be used; says which.
-    """
+    """Raises ValueError for what is no dataclass, and for an option whose type or (`reserved`) name cannot be used."""
     if not (isinstance(options, type) and is_dataclass(options)):
         raise ValueError(f"its options must be a dataclass, not {options!r}")
     try:
@@ -90,12 +85,7 @@ def check_options(options: type, reserved: Iterable[str] = ()) -> None:
 
 
 def parse_ids(text: str, most: int = 252) -> list[int]:
-    """``1-3,7`` as [1, 2, 3, 7].
-
-    Raises
-    ------
-    DriverError : a part is no id or range of ids, an id is given twice or is above ``most``.
-    """
+    """``1-3,7`` as [1, 2, 3, 7]; raises DriverError for other text, and for ids given twice or above ``most``."""
     hint = "for example --ids 1-24, or --ids 1,3,7-9"
     outside = DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
     ids: list[int] = []

@@ -93,12 +93,7 @@ class Registry(Generic[P]):
         return found
 
     def get(self, kind: str) -> P:
-        """The plug-in of a kind.
-
-        Raises
-        ------
-        PluginError : nothing of that kind is installed, or it cannot be loaded.
-        """
+        """The plug-in of a kind; raises PluginError where it is not installed or cannot be loaded."""
         if kind in self._loaded:
             return self._loaded[kind]
         module = self.builtin().get(kind)
@@ -117,12 +112,7 @@ class Registry(Generic[P]):
         return plugin
 
     def load(self, plugin: P, reference: str) -> Any:
-        """Import what a plug-in names as ``"module:name"``.
-
-        Raises
-        ------
-        PluginError : a package is not installed, the module cannot be loaded, or it has nothing of that name.
-        """
+        """Import what a plug-in names as ``"module:name"``; raises PluginError where that fails."""
         module, _, name = reference.partition(":")
         mine = f"{self.what} {plugin.kind!r}"
         try:
@@ -271,8 +261,8 @@ def folders_with(package: str, module: str) -> dict[str, str]:
 
 def modules_in(package: str) -> dict[str, str]:
     """Modules of a package without those that begin with an underscore: name and full name of each."""
-    names = [path.stem for folder in _folders(package) for path in folder.glob("*.py")]
-    return {name: f"{package}.{name}" for name in names if not name.startswith("_")}
+    names = [path.stem for folder in _folders(package) for path in folder.glob("[!_]*.py")]
+    return {name: f"{package}.{name}" for name in names}
 
 
 def _folders(package: str) -> list[Path]:

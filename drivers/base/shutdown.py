@@ -27,11 +27,7 @@ SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP"
 
 @contextmanager
 def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
-    """Context manager that runs ``stop`` exactly once, however the context is left.
-
-    Parameters
-    ----------
-    stop : for example ``bus.stop`` or ``bus.close``.
+    """Context manager that runs ``stop``, as ``bus.close``, exactly once, however the context is left.
 
     Raises
     ------

@@ -71,8 +71,6 @@ class BoardBus(WireBus):
         self._mute: list[int] = []  # servos without answers, the one asked longest ago first
         self._warn = RateLimitedLogger(log, clock)
 
-    # ------------------------------------------------------------------ hooks
-
     @abstractmethod
     def _begin(self) -> Floats:
         """Check the board and return what it puts out: (n,) rad, NaN where a servo gets no pulses."""
@@ -92,8 +90,6 @@ class BoardBus(WireBus):
     def _off_confirmed(self, index: int) -> bool:
         """Whether the board reports that a servo is off; True where it cannot be asked."""
         return True
-
-    # ------------------------------------------------------------------ the port
 
     @property
     def is_open(self) -> bool:
@@ -115,8 +111,6 @@ class BoardBus(WireBus):
 
     def _close_link(self) -> None:
         self._port.close()
-
-    # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
         """The configured channels and whether they get pulses; what is connected to them is unknown."""
@@ -175,8 +169,6 @@ class BoardBus(WireBus):
         which = ", ".join(f"{self.ids[index]} ({self.servos[index].name})" for index in left)
         message = f"not confirmed off on {self.path}: {which}" + (f" ({lost})" if lost else "")
         return self._error(PortLost if lost else NoReply, message, "switch the servos' power off", left)
-
-    # ------------------------------------------------------------------ every cycle
 
     def _send(self, angle_rad: Floats) -> Floats:
         sent = self._go(angle_rad)

@@ -40,18 +40,13 @@ _MODULE = "drivers.core.dead_man_switch"  # not __name__, which is __main__ in t
 
 
 class DeadManSwitch:
-    """Starts the process, waits until it is ready, and ends it.
+    """Starts the process, waits until it is ready (else raises DriverError), and ends it.
 
     Parameters
     ----------
-    path : device path of the port.
-    baud : rate on the wire.
+    path, baud : device path and rate of the port.
     frames : packets that switch the motors off and have no answer.
     ready_s : time limit for the process to get ready.
-
-    Raises
-    ------
-    DriverError : the process does not get ready.
     """
 
     def __init__(self, path: str, baud: int, frames: Iterable[bytes], *, ready_s: float = READY_S) -> None:
@@ -163,14 +158,7 @@ def _read_line(descriptor: int, deadline_s: float | None = None) -> bytes | None
 def watch(source: int, answer: int, parent: int) -> bool:
     """Take orders, get ready, and switch the servos off when the parent ends without dismissing this process.
 
-    Parameters
-    ----------
-    source, answer : file descriptors of orders and of the answer.
-    parent : process id of the program.
-
-    Returns
-    -------
-    bool : False where the orders cannot be carried out.
+    Orders and answer have file descriptors, the parent a process id. False where the orders cannot be carried out.
     """
     line = _read_line(source) or b""
     if not line.endswith(b"\n"):

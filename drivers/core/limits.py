@@ -17,12 +17,7 @@ BURST_S = 0.05
 
 
 class TargetLimits:
-    """Applies the limits of servos to their targets and counts what it changed.
-
-    Parameters
-    ----------
-    servos : n of them, in the order of all arrays.
-    report : counters of what was refused, clipped and shortened.
+    """Applies the limits of n servos to their targets, and counts in a report what it changed.
 
     Attributes
     ----------
@@ -51,16 +46,9 @@ class TargetLimits:
         self._budget[index] = 0.0
 
     def apply(self, wanted_rad: Floats, now_s: float) -> Floats:
-        """Limit targets.
+        """Targets (n,) rad inside the angle limits and no further from the last ones than top speed allows.
 
-        Parameters
-        ----------
-        wanted_rad : (n,) targets; one that is no finite number keeps the last one.
-        now_s : monotonic time; going backwards counts as no time.
-
-        Returns
-        -------
-        (n,) float64 : inside the angle limits, and no further from the last call's than top speed allows.
+        A target that is no finite number keeps the last one. Time that goes backwards counts as none.
         """
         elapsed_s = min(max(now_s - self._time_s, 0.0), BURST_S)
         self._time_s = now_s

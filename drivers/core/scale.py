@@ -20,11 +20,6 @@ class Scale:
 
     ``shaft = (ticks - center) * rad_per_tick`` and ``shaft = zero_rad + sign * angle``.
 
-    Parameters
-    ----------
-    servos : n servos.
-    tables : their control tables, in the same order.
-
     Attributes
     ----------
     axes : (4, n): sign, zero_rad, center and rad_per_tick, which are its rows.
@@ -63,15 +58,9 @@ class Scale:
         return angle
 
     def goals(self, angle_rad: Floats, steps: Ticks) -> Floats:
-        """Goals in steps for angles (n,) rad, finite; a goal outside the limits may only move towards them.
+        """Set goals, (n,) steps, for angles (n,) rad, finite, and return their angles (n,).
 
-        Parameters
-        ----------
-        steps : (n,) the last goals, changed to the new ones.
-
-        Returns
-        -------
-        (n,) float64 : the angles of the new goals.
+        The last goals are in `steps`; one outside the limits may only move towards them.
         """
         sent: Floats = np.empty(len(steps))
         self._to_steps(angle_rad, self.axes, self._bounds, steps, sent)

@@ -42,8 +42,6 @@ class WireBus(Bus):
         self._running = False
         self._lost = False
 
-    # ------------------------------------------------------------------ hooks
-
     @property
     @abstractmethod
     def path(self) -> str:
@@ -79,8 +77,6 @@ class WireBus(Bus):
 
     def _settle(self, now_s: float) -> None:
         """Maintain the servos before a cycle, as after tripped watchdogs; does nothing by default."""
-
-    # ------------------------------------------------------------------ the port
 
     @property
     def running(self) -> bool:
@@ -136,8 +132,6 @@ class WireBus(Bus):
         self._report.count("port_lost")
         log.error("port %s went away", self.path)
 
-    # ------------------------------------------------------------------ starting and stopping
-
     def start(self) -> None:
         if not self._running:
             self._start()
@@ -163,8 +157,6 @@ class WireBus(Bus):
         except DriverError as error:
             message = f"servos not confirmed off, for their port is gone: {error}"
             raise self._error(PortLost, message, "switch the servos' power off") from error
-
-    # ------------------------------------------------------------------ every cycle
 
     def write(self, angle_rad: ArrayLike) -> Floats:
         """As :meth:`drivers.base.bus.Bus.write`; raises ValueError for not n angles, BusError when not started."""

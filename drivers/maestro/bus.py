@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import DriverError, ServoRefused
-from drivers.boards.ordered_replies import OrderedBus, OrderedReplies
+from drivers.boards.ordered_replies import OrderedBus
 from drivers.maestro import protocol as m
 
 log = logging.getLogger(__name__)
@@ -63,8 +63,6 @@ class MaestroBus(OrderedBus):
         self._board, self._device, self._crc = board, device, crc
         self._code = m.Encoder(device, crc)
         self._errors = 0
-        probe = self._code.command(m.SCRIPT_STATUS)
-        self._talk = OrderedReplies(self._port, probe, lambda data: data in (b"\0", b"\1"), lambda: self._margin_s)
 
     def far_end(self) -> dict[str, Any]:
         return {
@@ -74,7 +72,11 @@ class MaestroBus(OrderedBus):
             "limits_us": [float(self._scale.low_us.min()), float(self._scale.high_us.max())],
         }
 
-    # ------------------------------------------------------------------ looking, starting, stopping
+    def _probe(self) -> bytes:
+        return self._code.command(m.SCRIPT_STATUS)
+
+    def _answers_probe(self, data: bytes) -> bool:
+        return data in (b"\0", b"\1")
 
     def _open_link(self) -> None:
         super()._open_link()
@@ -125,8 +127,6 @@ class MaestroBus(OrderedBus):
     def _off(self, index: int) -> None:
         self._port.write(self._code.word(m.SET_TARGET, self.ids[index], 0))
 
-    # ------------------------------------------------------------------ every cycle
-
     def _go(self, angle_rad: Floats) -> Floats:
         if self._forgot:
             self._limit_motion()
@@ -159,9 +159,8 @@ class MaestroBus(OrderedBus):
 
     def _ask_pulses(self, group: Sequence[int], insist: bool = False) -> Floats | None:
         """As in the base class; also reads and clears the board's errors."""
-        questions = b"".join(self._code.command(m.GET_POSITION, self.ids[index]) for index in group)
-        questions += self._code.command(m.GET_ERRORS)
-        data = self._talk.ask(questions, 2 * len(group) + 2, insist=insist)
+        requests = b"".join(self._code.command(m.GET_POSITION, self.ids[index]) for index in group)
+        data = self._request(requests + self._code.command(m.GET_ERRORS), 2 * len(group) + 2, insist)
         words = np.frombuffer(data or b"\0\0", "<u2")
         self._errors = int(words[-1])
         return None if data is None else words[:-1] / m.QUARTER

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Any, ClassVar
 
 import numpy as np
@@ -97,8 +98,6 @@ class LineOutBus(BoardBus):
     def far_end(self) -> dict[str, Any]:
         return {"names": self._names}
 
-    # ------------------------------------------------------------------ starting and stopping
-
     def _open_link(self) -> None:
         super()._open_link()
         self._reset()
@@ -117,7 +116,8 @@ class LineOutBus(BoardBus):
             if not answer.ok:
                 raise self._refusal(group, answer)
             for name, word in zip(group, answer.text.split()[1:], strict=False):
-                values[index[name]] = _value(word.partition("=")[2])
+                with suppress(ValueError):
+                    values[index[name]] = float(word.partition("=")[2])
         return self._scale.radians(values)
 
     def _greet(self) -> Answer:
@@ -174,8 +174,6 @@ class LineOutBus(BoardBus):
                 return [name for one in group for name in self._release_names([one])]
         return list(group)
 
-    # ------------------------------------------------------------------ every cycle
-
     def _go(self, angle_rad: Floats) -> Floats:
         self._listen()
         known = np.isfinite(angle_rad)
@@ -207,8 +205,6 @@ class LineOutBus(BoardBus):
             self._sent[:] = math.nan  # send all values again
         if self._running:
             self._note_answer(now - self._answer_s <= self._heartbeat_s + 2 * LOST_S)
-
-    # ------------------------------------------------------------------ lines
 
     def _groups(self, words: Iterable[str]) -> list[list[str]]:
         return protocol.split_to_fit(words, self._max_line - len(f"#{protocol.MAX_TAG} RELEASE*00"))
@@ -269,10 +265,3 @@ class LineOutBus(BoardBus):
         self._report.count("refused")
         self._sent[list(angles) or slice(None)] = math.nan
         self._warn(f"the head on {self.path} refused a line: {answer.code} {answer.text}")
-
-
-def _value(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan

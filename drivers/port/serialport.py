@@ -135,16 +135,10 @@ class SerialPort:
         return sent
 
     def read(self, deadline_s: float) -> bytes:
-        """The bytes that have arrived; waits for the first one until a deadline. Raises PortLost.
+        """The bytes that have arrived, empty for none; waits for the first one until a deadline. Raises PortLost.
 
-        Parameters
-        ----------
-        deadline_s : time of ``time.monotonic()``. One in the past only takes what is there already, so that bytes that
-            came while this process was stalled still count.
-
-        Returns
-        -------
-        bytes : empty when nothing came.
+        A deadline of ``time.monotonic()`` in the past takes what is there already, so that bytes that came while this
+        process was stalled still count.
         """
         self._wait(deadline_s)
         try:

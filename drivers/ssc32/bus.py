@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from drivers.base.bus import Floats, ServoSpec
-from drivers.boards.ordered_replies import OrderedBus, OrderedReplies
+from drivers.boards.ordered_replies import OrderedBus
 from drivers.text.bus import TextBus
 
 MOVE, END, OFF = "#{ch}P{us}", "T{time_ms}\r", "STOP{ch}\r#{ch}P0\r"
@@ -28,16 +28,17 @@ class Ssc32Bus(OrderedBus, TextBus):
 
     def __init__(self, servos: Iterable[ServoSpec], **options: Any) -> None:
         super().__init__(servos, template=MOVE, end=END, off=OFF, **options)
-        self._talk = OrderedReplies(self._port, b"VER\r", _is_version, lambda: self._margin_s)
 
     def far_end(self) -> dict[str, Any]:
         return {}
 
+    def _probe(self) -> bytes:
+        return b"VER\r"
+
+    def _answers_probe(self, data: bytes) -> bool:
+        return data.startswith(b"SSC32") and data.endswith(b"\r") and data.count(b"\r") == 1
+
     def _ask_pulses(self, group: Sequence[int], insist: bool = False) -> Floats | None:
-        questions = "".join(f"QP{self.ids[index]}\r" for index in group).encode()
-        data = self._talk.ask(questions, len(group), insist=insist)
+        requests = "".join(f"QP{self.ids[index]}\r" for index in group).encode()
+        data = self._request(requests, len(group), insist)
         return None if data is None else np.array(list(data), np.float64) * 10.0
-
-
-def _is_version(data: bytes) -> bool:
-    return data.startswith(b"SSC32") and data.endswith(b"\r") and data.count(b"\r") == 1

@@ -71,8 +71,6 @@ class TextBus(PulseBus):
     def far_end(self) -> dict[str, Any]:
         return {"texts": self._texts, "names": [named["name"] for named in self._names]}
 
-    # ------------------------------------------------------------------ starting and stopping
-
     def _open_link(self) -> None:
         super()._open_link()
         self._sent[:] = math.nan
@@ -91,8 +89,6 @@ class TextBus(PulseBus):
     def _off(self, index: int) -> None:
         if self._off_text:
             self._port.write(self._off_text.fill(self._names[index]).encode())
-
-    # ------------------------------------------------------------------ every cycle
 
     def _go(self, angle_rad: Floats) -> Floats:
         known = np.isfinite(angle_rad)

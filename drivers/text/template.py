@@ -45,12 +45,7 @@ class Piece(NamedTuple):
 
 
 def pieces_of(key: str, text: str, allowed: Iterable[str]) -> list[Piece]:
-    """Parse a template.
-
-    Parameters
-    ----------
-    key : its name in the configuration, for messages.
-    allowed : placeholders that may occur in it.
+    """Parse a template; `key` is its name in the configuration, `allowed` are the placeholders that may occur.
 
     Raises
     ------
@@ -132,13 +127,7 @@ def pattern_of(pieces: Iterable[Piece]) -> re.Pattern[str]:
 class AnswerPattern(Template):
     """A template that reads values from an answer; numbers may have any format.
 
-    Attributes
-    ----------
-    end : the character an answer ends with.
-
-    Raises
-    ------
-    DriverError : as for a template; or it ends with a placeholder, so that the end of an answer is unknown.
+    Its attribute ``end`` is the character an answer ends with. It must not end with a placeholder.
     """
 
     def __init__(self, key: str, text: str, allowed: Iterable[str]) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+import numpy as np
 import pytest
 
-from drivers.boards.ordered_replies import OrderedReplies
+from drivers.base.bus import ServoSpec
+from drivers.boards.ordered_replies import OrderedBus
 from drivers.sim.serving.virtual import VirtualClock
 
 
@@ -36,9 +38,32 @@ class Script:
         return count
 
 
-def talk(answer: Callable[[bytes], list[tuple[float, bytes]]]) -> tuple[OrderedReplies, Script]:
+class Talker(OrderedBus):
+    """A board whose probe is V, answered by v!."""
+
+    def _probe(self) -> bytes:
+        return b"V"
+
+    def _answers_probe(self, data: bytes) -> bool:
+        return data == b"v!"
+
+    def _ask_pulses(self, group: Sequence[int], insist: bool = False) -> None:
+        raise NotImplementedError
+
+    def _go(self, angle_rad: np.ndarray) -> np.ndarray:
+        raise NotImplementedError
+
+    def _off(self, index: int) -> None:
+        raise NotImplementedError
+
+    def ask(self, requests: bytes, count: int, insist: bool = False) -> bytes | None:
+        return self._request(requests, count, insist)
+
+
+def talk(answer: Callable[[bytes], list[tuple[float, bytes]]]) -> tuple[Talker, Script]:
     port = Script(answer)
-    return OrderedReplies(port, b"V", lambda data: data == b"v!", lambda: 0.01), port  # type: ignore[arg-type]
+    servo = ServoSpec(0, "jaw", "rc-180", -0.5, 0.5, 5.0, 50.0)
+    return Talker([servo], port=port, margin_s=0.01, clock=port.clock), port
 
 
 def honest(data: bytes) -> list[tuple[float, bytes]]:
