@@ -221,18 +221,14 @@ class Bus(ABC):
     def start(self) -> None:
         """Check every servo and switch the motors on at their present positions, without a movement.
 
-        Raises
-        ------
-        NoReply, WrongModel, ServoFault, ServoRefused, CorruptReply : nothing was moved; see ``servo_ids``.
+        Raises NoReply, WrongModel, ServoFault, ServoRefused or CorruptReply, before anything moved; see ``servo_ids``.
         """
 
     @abstractmethod
     def write(self, angle_rad: ArrayLike) -> Floats:
         """Send targets (n,) rad, NaN to keep a servo's last one; returns what was sent after limits, (n,) read-only.
 
-        Raises
-        ------
-        PortLost : the port went away; see :meth:`reconnect`.
+        Raises PortLost where the port went away; see :meth:`reconnect`.
         """
 
     @abstractmethod
@@ -243,18 +239,14 @@ class Bus(ABC):
     def stop(self) -> None:
         """Switch every motor off, each by itself; does nothing when not running.
 
-        Raises
-        ------
-        NoReply : after everything was tried; ``servo_ids`` are those not confirmed off.
+        Raises NoReply after everything was tried; ``servo_ids`` are those not confirmed off.
         """
 
     @abstractmethod
     def reconnect(self) -> None:
         """Open the port again after PortLost, and start the servos again if they were running.
 
-        Raises
-        ------
-        PortMissing, BusError : still unplugged, or not all servos are back; call again later.
+        Raises PortMissing or BusError while it is unplugged or servos are missing; call again later.
         """
 
     @abstractmethod

@@ -190,7 +190,10 @@ class Registry(Generic[P]):
         entries = self._foreign().get(kind, []) if kind not in self.reserved else []
         packages = sorted({_package(entry) for entry in entries})
         if not entries:
-            raise self._unknown(kind)
+            known = self.kinds()
+            close = difflib.get_close_matches(kind, known, n=1)
+            guess = f", did you mean {close[0]!r}?" if close else ""
+            raise PluginError(f"unknown {self.what} {kind!r}{guess}", hint=f"use one of: {', '.join(known)}")
         if len(entries) > 1:
             raise PluginError(
                 f"{self.what} {kind!r} is in more than one package: {', '.join(packages)}",
@@ -220,12 +223,6 @@ class Registry(Generic[P]):
         if message not in self._logged:
             self._logged.add(message)
             log.warning("%s", message)
-
-    def _unknown(self, kind: str) -> PluginError:
-        known = self.kinds()
-        close = difflib.get_close_matches(kind, known, n=1)
-        guess = f", did you mean {close[0]!r}?" if close else ""
-        return PluginError(f"unknown {self.what} {kind!r}{guess}", hint=f"use one of: {', '.join(known)}")
 
 
 _UPDATE = "update the package that it comes from, or mend it"

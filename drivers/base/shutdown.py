@@ -78,7 +78,8 @@ def _raise_dropped_signals_again(numbers: Any) -> Iterator[None]:
         if number is None or threading.current_thread() is not threading.main_thread():
             before(dropped)
         else:
-            _raise_in(_interrupted_frame(dropped.exc_traceback), number)
+            traceback: TracebackType | None = dropped.exc_traceback  # its first frame is the destructor or callback
+            _raise_in(sys._getframe().f_back if traceback is None else traceback.tb_frame.f_back, number)
 
     sys.unraisablehook = hook
     try:
@@ -94,11 +95,6 @@ def _signal_of(error: BaseException | None) -> int | None:
     if isinstance(error, SystemExit) and isinstance(error.code, int) and error.code - 128 in SIGNALS:
         return error.code - 128
     return None
-
-
-def _interrupted_frame(traceback: TracebackType | None) -> FrameType | None:
-    """The frame that the destructor or callback of a traceback interrupted."""
-    return sys._getframe(1).f_back if traceback is None else traceback.tb_frame.f_back
 
 
 def _raise_in(frame: FrameType | None, number: int) -> None:

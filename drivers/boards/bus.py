@@ -160,8 +160,6 @@ class BoardBus(WireBus):
         try:
             self._off(index)
             return self._off_confirmed(index)
-        except PortLost:
-            raise
         except BusError:
             return False
 

@@ -26,7 +26,6 @@ LOWEST_US, HIGHEST_US = 64.0, 4080.0
 class HobbyModel:
     """Pulse widths ``us`` (k,) at shaft angles ``rad`` (k,) from the middle, which strictly increase."""
 
-    name: str
     rad: tuple[float, ...]
     us: tuple[float, ...]
 
@@ -36,7 +35,7 @@ def known_models() -> dict[str, HobbyModel]:
     """The models of hobby.toml by name."""
     data = tomllib.loads(Path(__file__).with_name("hobby.toml").read_text(encoding="utf-8"))
     return {
-        name: HobbyModel(name, tuple(math.radians(deg) for deg in entry["deg"]), tuple(map(float, entry["us"])))
+        name: HobbyModel(tuple(math.radians(deg) for deg in entry["deg"]), tuple(map(float, entry["us"])))
         for name, entry in data["models"].items()
     }
 

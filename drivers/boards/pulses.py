@@ -56,18 +56,10 @@ class PulseTrack:
 
 
 class PulseBus(BoardBus):
-    """A board of hobby servos, whose ``id`` is the channel; options as :class:`~drivers.boards.bus.BoardBus`.
-
-    Raises
-    ------
-    DriverError : a model that is no hobby servo.
-
-    Attributes
-    ----------
-    SLACK_US : deviation of a reported pulse by the board's own rounding.
-    """
+    """A board of hobby servos, whose ``id`` is the channel; options as :class:`~drivers.boards.bus.BoardBus`."""
 
     SLACK_US = 2.0
+    """Deviation of a reported pulse by the board's own rounding."""
 
     def __init__(self, servos: Iterable[ServoSpec], **options: Any) -> None:
         super().__init__(servos, **options)

@@ -58,12 +58,11 @@ class DeadManSwitch:
             anywhere = path if "://" in path else os.path.abspath(path)
             self._send(json.dumps({"path": anywhere, "baud": baud, "frames": [frame.hex() for frame in frames]}))
             why = self._why_not_ready(ready_s)
+            if why:
+                raise _not_ready(path, why)
         except BaseException:
             self._kill()
             raise
-        if why:
-            self._kill()
-            raise _not_ready(path, why)
         _close(self._process.stdout)
 
     @property

@@ -66,12 +66,7 @@ def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynami
 
 
 def driver_of(kind: str, servos: Sequence[ServoSpec]) -> type[WireBus]:
-    """The driver of a family for some servos.
-
-    Raises
-    ------
-    DriverError : unknown kind, a package is not installed, or an unknown model.
-    """
+    """The driver of a family for some servos; raises DriverError for an unknown kind or model, or a missing package."""
     try:
         family = FAMILIES.get(kind)
     except PluginError as error:

@@ -26,13 +26,7 @@ E = TypeVar("E", bound=DriverError)
 
 
 class WireBus(Bus):
-    """A bus on one port. See :class:`~drivers.base.bus.Bus` for the contract; the hooks are the abstract methods below.
-
-    Parameters
-    ----------
-    servos : the servos in the order of all arrays.
-    clock : monotonic seconds.
-    """
+    """A bus on one port; see :class:`~drivers.base.bus.Bus`. Its hooks are abstract methods; `clock` is monotonic."""
 
     def __init__(self, servos: Iterable[ServoSpec], *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(servos)
@@ -146,17 +140,13 @@ class WireBus(Bus):
             return
         self._running = False
         if self._lost:  # the adapter may be back
-            self._reconnect_to_stop()
+            try:
+                self.reconnect()
+            except DriverError as error:
+                message = f"servos not confirmed off, for their port is gone: {error}"
+                raise self._error(PortLost, message, "switch the servos' power off") from error
         with self._losing():
             self._switch_off()
-
-    def _reconnect_to_stop(self) -> None:
-        """Open the port again; where that fails the error says that the servos may still be on."""
-        try:
-            self.reconnect()
-        except DriverError as error:
-            message = f"servos not confirmed off, for their port is gone: {error}"
-            raise self._error(PortLost, message, "switch the servos' power off") from error
 
     def write(self, angle_rad: ArrayLike) -> Floats:
         """As :meth:`drivers.base.bus.Bus.write`; raises ValueError for not n angles, BusError when not started."""

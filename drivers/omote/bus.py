@@ -60,12 +60,7 @@ class LineOutBus(BoardBus):
     tells_torque: ClassVar[bool] = False
 
     def __init__(
-        self,
-        servos: Iterable[ServoSpec],
-        *,
-        checksum: bool = True,
-        heartbeat_s: float = 0.25,
-        **options: Any,
+        self, servos: Iterable[ServoSpec], *, checksum: bool = True, heartbeat_s: float = 0.25, **options: Any
     ) -> None:
         super().__init__(servos, **options)
         self._names = [servo.wire_name or servo.name for servo in self.servos]

@@ -39,14 +39,7 @@ _HUNG_UP = "it hung up"
 
 
 class Endpoint(ABC):
-    """One open far end that is read and written without blocking.
-
-    Attributes
-    ----------
-    device : the pyserial object or socket underneath. low_latency : the adapter's low-latency mode is on.
-    """
-
-    low_latency = False
+    """One open far end that is read and written without blocking; ``device`` is the pyserial object or socket."""
 
     def __init__(self, device: Any) -> None:
         self.device = device
@@ -90,7 +83,8 @@ class DeviceEnd(Endpoint):
         super().__init__(serial.Serial(path, baud, timeout=0, exclusive=True))
         self._fd: int = self.device.fileno()
         _set_vmin(self._fd)
-        self.low_latency = _set_low_latency(self.device)
+        with suppress(ValueError, NotImplementedError, AttributeError, *UNPLUGGED):
+            self.device.set_low_latency_mode(True)  # pseudo-terminals and many adapters have none
 
     def take(self) -> bytes:
         data = os.read(self._fd, _CHUNK)
@@ -184,15 +178,6 @@ def address_of(url: str) -> tuple[str, int]:
     if not parts.hostname or parts.port is None:
         raise ValueError(f"{url!r} is not socket://HOST:PORT")
     return parts.hostname, parts.port
-
-
-def _set_low_latency(device: serial.Serial) -> bool:
-    """Switch the adapter's low-latency mode on; pseudo-terminals and many adapters have none."""
-    try:
-        device.set_low_latency_mode(True)
-    except (ValueError, NotImplementedError, AttributeError, *UNPLUGGED):
-        return False
-    return True
 
 
 def _set_vmin(fd: int) -> None:

@@ -25,7 +25,7 @@ class PortRecord:
     by_id : path that stays the same after a replug; None where there is none. Use it in configurations.
     vid_pid : USB vendor and product as ``"0403:6014"``; empty when it is not USB.
     serial_number, description : as the device reports, may be empty.
-    readable, writable : permissions of this user.
+    usable : this user may read and write it.
     latency_s : the adapter's latency timer in seconds; None where there is none.
     hint : the command that fixes what is wrong; empty when nothing is.
     """
@@ -35,15 +35,9 @@ class PortRecord:
     vid_pid: str
     serial_number: str
     description: str
-    readable: bool
-    writable: bool
+    usable: bool
     latency_s: float | None
     hint: str
-
-    @property
-    def usable(self) -> bool:
-        """True when this user may open it."""
-        return self.readable and self.writable
 
     @property
     def path(self) -> str:
@@ -69,7 +63,7 @@ def list_ports(
 
 
 def _record(port: Any, by_id: dict[Path, str], sys_root: str | os.PathLike[str]) -> PortRecord:
-    readable, writable = os.access(port.device, os.R_OK), os.access(port.device, os.W_OK)
+    usable = os.access(port.device, os.R_OK | os.W_OK)
     latency = latency_s(port.device, sys_root)
     return PortRecord(
         device=port.device,
@@ -77,10 +71,9 @@ def _record(port: Any, by_id: dict[Path, str], sys_root: str | os.PathLike[str])
         vid_pid="" if port.vid is None else f"{port.vid:04x}:{port.pid:04x}",
         serial_number=port.serial_number or "",
         description="" if port.description in (None, "n/a") else port.description,
-        readable=readable,
-        writable=writable,
+        usable=usable,
         latency_s=latency,
-        hint=_hint(port.device, readable and writable, latency),
+        hint=_hint(port.device, usable, latency),
     )
 
 

@@ -63,7 +63,6 @@ class SerialPort:
     def __init__(self, path: str | os.PathLike[str], baud: int = 1_000_000) -> None:
         self.path = os.fspath(path)
         self.baud = int(baud)
-        self.low_latency = False
         self.tap: Callable[[bool, bytes], None] | None = _tap.get()
         self._end: Endpoint | None = None
 
@@ -87,14 +86,12 @@ class SerialPort:
         """
         self.close()
         try:
-            end = open_endpoint(self.path, self.baud)
+            self._end = open_endpoint(self.path, self.baud)
         except UNPLUGGED as error:
             raise self._opening_error(error) from error
         except ValueError as error:
             message = f"port {self.path} does not take {self.baud} baud: {error}"
             raise PortError(message, hint="set a baud rate the adapter has", port=self.path) from error
-        self._end = end
-        self.low_latency = end.low_latency
         try:
             self.drain()
         except PortLost:

@@ -164,7 +164,8 @@ class TextBus(PulseBus):
             *lines, data = (data + got).split(pattern.end)
             for line in lines:
                 values = pattern.read((line + pattern.end).decode("latin-1")) or {}
-                index = next((index for index in group if self._names_servo(values, index)), None)
+                names = {name: values[name] for name in NAMES if name in values}
+                index = next((i for i in group if names and names.items() <= self._names[i].items()), None)
                 if index is None:
                     self._report.stray += 1
                 else:
@@ -172,11 +173,6 @@ class TextBus(PulseBus):
             if not got and self._port.clock() >= end:
                 break
         return found
-
-    def _names_servo(self, values: Mapping[str, float | str], index: int) -> bool:
-        """Whether the values of an answer are those of a servo."""
-        named = self._names[index]
-        return bool(values) and all(values[name] == named[name] for name in NAMES if name in values)
 
     def _pulse(self, index: int, values: Mapping[str, float | str]) -> float:
         """The pulse (us) of an answer."""
