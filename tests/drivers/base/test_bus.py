@@ -72,6 +72,7 @@ def test_importing_the_room_loads_no_driver(root: Path) -> None:
 
 def test_counters_by_kind_and_servo() -> None:
     report = BusReport()
+    assert not any(report.as_dict().values())
     report.count("no_reply", 3)
     report.count("no_reply", 3)
     report.count("port_lost")

@@ -143,3 +143,15 @@ def test_pulses_of_every_board_are_the_widest_limits(end: float, good: bool) -> 
     else:
         with pytest.raises(DriverError, match="outside 64 to 4080"):
             PulseScale([servo])
+
+
+def test_curves_with_different_numbers_of_points_go_on_straight_beyond_their_ends() -> None:
+    bent = ((-0.8, 1000.0), (-0.4, 1200.0), (0.0, 1500.0), (0.3, 1900.0), (0.8, 2000.0))
+    scale = PulseScale([spec(), spec(pulse_us=bent), spec(reverse=True)])
+    slope = 2000 / math.pi
+    for angle in (-0.79, -0.2, 0.15, 0.79, 2.0):  # the shorter ones have only two points
+        pulses = scale.pulses(np.full(3, angle))
+        assert pulses[[0, 2]] == pytest.approx([1500 + slope * angle, 1500 - slope * angle])
+    assert scale.pulses(np.full(3, 0.9))[1] == pytest.approx(2020.0)
+    assert scale.pulses(np.full(3, -0.9))[1] == pytest.approx(950.0)
+    assert scale.radians(np.array([1500.0, 2020.0, 0.0]))[:2] == pytest.approx([0.0, 0.9])

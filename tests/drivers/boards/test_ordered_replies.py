@@ -111,3 +111,31 @@ def test_a_silent_board_is_tried_once_in_a_while() -> None:
     port.clock.sleep(1.0)
     assert conversation.ask(b"A", 1) is None
     assert asked == [b"V", b"V"]
+
+
+def test_a_probe_may_be_answered_in_pieces() -> None:
+    replies = [[(0.0, b"v"), (0.005, b"!")]]
+    conversation, _ = talk(lambda data: replies.pop(0) if replies else honest(data))
+    assert conversation.ask(b"A", 1) == b"a"
+
+
+def test_what_came_before_a_request_does_not_count() -> None:
+    conversation, port = talk(honest)
+    port.due.append((0.0, b"noise"))
+    assert conversation.ask(b"A", 1) == b"a"
+    port.due.append((port.clock(), b"noise"))
+    assert conversation.ask(b"B", 1) == b"b"
+
+
+def test_one_that_insists_is_not_kept_waiting() -> None:
+    asked: list[bytes] = []
+    conversation, _ = talk(lambda data: asked.append(data) or [])  # type: ignore[func-returns-value]
+    for _ in range(3):
+        assert conversation.ask(b"A", 1, insist=True) is None
+    assert asked == [b"V"] * 3
+
+
+def test_a_board_that_never_stops_talking_is_not_listened_to_for_ever() -> None:
+    conversation, port = talk(lambda data: [(0.002 * k, b"x") for k in range(10_000)])
+    assert conversation.ask(b"A", 1) is None
+    assert port.clock() < 1.0

@@ -198,3 +198,54 @@ def test_after_a_reset_the_board_gets_its_limits_again() -> None:
         assert (rig.line.speeds[5], rig.line.accelerations[5]) == limits
         assert bus.read().torque.all()
         np.testing.assert_allclose(bus.read().position_rad, 0.0, atol=1e-9)
+
+
+def test_several_channels_are_asked_in_one_go_with_the_boards_errors() -> None:
+    servos = [replace(SERVO, id=i, name=f"s{i}", rest_rad=0.1 * i) for i in range(3)]
+    rig = board(*servos)
+    with rig.bus() as bus:
+        bus.start()
+        data = sent_by(rig)
+        state = bus.read()
+        assert bytes(data) == bytes.fromhex("90 00  90 01  90 02  A1  AE")
+        np.testing.assert_allclose(state.position_rad, [0.0, 0.1, 0.2], atol=1e-3)
+        assert bus.report().errors == {}
+
+
+def test_more_than_eight_channels_are_asked_in_turn() -> None:
+    servos = [replace(SERVO, id=i, name=f"s{i}") for i in range(10)]
+    rig = board(*servos)
+    with rig.bus() as bus:
+        bus.start()
+        data = sent_by(rig)
+        asked = []
+        for _ in range(4):
+            data.clear()
+            bus.read()
+            asked.append([data[at + 1] for at in range(0, len(data) - 2, 2)])
+        assert sorted(asked[0] + asked[1]) == [*range(10)]
+        assert {len(asked[0]), len(asked[1])} == {8, 2}
+        assert asked[2:] == asked[:2]
+
+
+def test_silence_is_counted_and_a_start_after_it_does_not_wait() -> None:
+    rig = board()
+    with rig.bus() as bus:
+        bus.start()
+        rig.fault("mute:*")
+        assert bus.read().silent.all()
+        assert bus.report().errors == {"no_reply": 1}
+        with pytest.raises(NoReply):
+            bus.discover()
+        rig.clear()
+        assert [info.torque for info in bus.discover()] == [True]
+
+
+def test_a_board_that_holds_a_servo_back_is_named(caplog: pytest.LogCaptureFixture) -> None:
+    servos = (replace(SERVO, rest_rad=-0.7), replace(SERVO, id=6, name="brow", rest_rad=0.003))
+    rig = VirtualBus(servos, "maestro", driver=QUICK, baud=115_200, options={"limits_us": (1200, 1800)})
+    with rig.bus() as bus, caplog.at_level(logging.WARNING):
+        bus.start()
+        np.testing.assert_allclose(bus.read().position_rad, [-300 / US_PER_RAD, 0.003], atol=1e-3)
+    assert len(caplog.messages) == 1
+    assert caplog.messages[0].startswith("channel 5 (jaw) on virtual stays at 1200 us")

@@ -168,7 +168,9 @@ def test_a_servo_without_answers_is_silent_after_two_and_asked_once_a_second(cap
         bus.start()
         bus.read()
         rig.fault("silent:2")
+        before = rig.clock()
         assert bus.read().silent.tolist() == [False] * 3
+        assert 0.02 < rig.clock() - before < 0.05
         assert bus.read().silent.tolist() == [False, True, False]
         assert bus.report().errors_by_servo == {2: {"no_reply": 2}}
         assert bus.report().silent == (2,)
