@@ -459,4 +459,4 @@ def test_models_of_the_line_protocol(model: str) -> None:
     with pytest.raises(DriverError, match=f"there is no model '{model}' for the line protocol") as caught:
         open_bus("omote", [replace(NAMED[0], model=model)], port="")
     assert "parameter, degrees, rc-120, rc-180" in caught.value.hint
-    assert open_bus("omote", [replace(NAMED[0], model="rc-90")], port="")
+    assert open_bus("omote", [replace(NAMED[0], model="rc-90")], port="")._heartbeat_s == 0.25

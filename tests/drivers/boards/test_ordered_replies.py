@@ -139,3 +139,10 @@ def test_a_board_that_never_stops_talking_is_not_listened_to_for_ever() -> None:
     conversation, port = talk(lambda data: [(0.002 * k, b"x") for k in range(10_000)])
     assert conversation.ask(b"A", 1) is None
     assert port.clock() < 1.0
+
+
+def test_a_slow_wire_has_the_time_that_its_bytes_take() -> None:
+    conversation, port = talk(lambda data: [(0.008 * len(data), answer) for _, answer in honest(data)])
+    port.baud = 1000
+    assert conversation.ask(b"ABC", 3) == b"abc"
+    assert port.clock() == pytest.approx(0.008 + 0.01 + 0.032)

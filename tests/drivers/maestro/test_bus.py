@@ -249,3 +249,28 @@ def test_a_board_that_holds_a_servo_back_is_named(caplog: pytest.LogCaptureFixtu
         np.testing.assert_allclose(bus.read().position_rad, [-300 / US_PER_RAD, 0.003], atol=1e-3)
     assert len(caplog.messages) == 1
     assert caplog.messages[0].startswith("channel 5 (jaw) on virtual stays at 1200 us")
+
+
+def test_a_channel_that_goes_on_with_its_pulses_is_not_off() -> None:
+    rig = board(SERVO, replace(SERVO, id=6, name="brow"))
+    with rig.bus() as bus:
+        bus.start()
+        rig.line.channels[6].go = lambda *given: None  # it takes no target any more
+        with pytest.raises(NoReply, match=r"not confirmed off on virtual: 6 \(brow\)") as caught:
+            bus.stop()
+        assert caught.value.servo_ids == (6,)
+        assert not bus.running
+    assert rig.line.describe(rig.clock())[5]["pulse_us"] == 0
+
+
+def test_after_a_pulse_that_cannot_be_the_board_is_asked_for_its_state_alone_first() -> None:
+    rig = board(replace(SERVO, max_accel_rad_s2=1e6))
+    with rig.bus() as bus:
+        bus.start()
+        rig.line.channels[5].go(4 * 1900.0, rig.clock())  # not what it was told
+        state = bus.read()
+        np.testing.assert_allclose(state.position_rad, 0.0, atol=1e-9)
+        assert bus.report().errors_by_servo == {5: {"corrupt": 1}}
+        data = sent_by(rig)
+        bus.read()
+        assert bytes(data) == bytes.fromhex("AE  90 05 A1 AE")
