@@ -98,7 +98,7 @@ class Registry(Generic[P]):
             return self._loaded[kind]
         module = self.builtin().get(kind)
         if module is not None:
-            name, hint = f"{self.what} {kind!r} in {module}", f"mend {module}"
+            name, hint = f"{self.what} {kind!r} in {module}", f"fix {module}"
         else:
             entry, package = self._entry_point(kind)
             name = f"{self.what} {kind!r} of the package {package}"
@@ -225,7 +225,7 @@ class Registry(Generic[P]):
             log.warning("%s", message)
 
 
-_UPDATE = "update the package that it comes from, or mend it"
+_UPDATE = "update the package that it comes from, or fix it"
 
 
 def _check_types(plugin: Any) -> None:

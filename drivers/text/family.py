@@ -14,13 +14,13 @@ from drivers.text.template import TEXTS, check_texts
 class TextSettings(PulseSettings):
     """Options of the driver of a text board."""
 
-    template: str | None = option("How one servo's move is written.")
-    begin: str | None = option("What stands before the moves of one line.")
-    separator: str | None = option("What stands between them.")
-    end: str | None = option("What stands behind them.")
-    off: str | None = option("What switches one servo off.")
-    query: str | None = option("What asks for one servo.")
-    answer: str | None = option("What comes back; it goes with query.")
+    template: str | None = option("One servo's move.")
+    begin: str | None = option("Text before the moves of one line.")
+    separator: str | None = option("Text between the moves.")
+    end: str | None = option("Text after the moves.")
+    off: str | None = option("Text that switches one servo off.")
+    query: str | None = option("Request for one servo.")
+    answer: str | None = option("Answer to the request; needed with query.")
 
     def check(self, rate_hz: float) -> None:
         """Raises ValueError where the texts are no valid templates, or contradict each other."""
