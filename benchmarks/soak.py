@@ -21,7 +21,7 @@ from rich.table import Table
 from drivers import open_bus
 from drivers.base.bus import BusState, ServoSpec
 from drivers.base.errors import DriverError, PortLost
-from drivers.core.speed_limit import BURST_S
+from drivers.core.limits import BURST_S
 from drivers.sim.serving.virtual import VirtualClock, VirtualLink
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo

@@ -35,8 +35,8 @@ from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import Take, TakePlayer
 from controller.takes.reader import layer_of, load_take
 from controller.takes.recording import SUFFIX, Face, Recorder, Replay
-from drivers.base.priority import take_priority, take_turns_quickly
-from drivers.base.shutdown import Closers, with_those_before
+from drivers.base.priority import request_realtime, shorten_thread_switches
+from drivers.base.shutdown import Closers, combine_with_context
 
 _POLL_S = 0.1
 
@@ -175,7 +175,7 @@ class Body:
         self._closers.close()
 
     def _control(self) -> None:
-        take_priority()  # else a servo's thread waits for this one while that waits for a processor
+        request_realtime()  # else a servo's thread waits for this one while that waits for a processor
         try:
             self._control_loop()
         except Exception as error:  # noqa: BLE001  the body has to hear of it and stop the servos
@@ -233,7 +233,7 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
     try:
         _serve(orders, pipe, stop)
     except OMOTE_ERRORS as error:
-        all_told = with_those_before(error)
+        all_told = combine_with_context(error)
         _tell(pipe, Failed(str(all_told), getattr(all_told, "hint", "")))
     except Exception as error:
         if os.environ.get("OMOTE_DEBUG"):
@@ -247,7 +247,7 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     mailbox = _reached(orders.mailbox, len(parameters.names))
     insights = None if orders.insight is None else _reached(orders.insight, panel_state_size(parameters))
     body = _body(orders, stage, mailbox, parameters)
-    take_turns_quickly()  # before torque: what collects garbage later finds little to look at
+    shorten_thread_switches()  # before torque: what collects garbage later finds little to look at
     body.start()
     try:
         _tell(pipe, Ready())
@@ -303,8 +303,8 @@ def _handle(body: Body, pipe: Connection) -> bool:
     state, now = body.state, time.monotonic_ns()
     match request:
         case Begin():
-            take_turns_quickly()
-            take_priority()  # the links' threads too: one put off while it holds the interpreter puts off the servos
+            shorten_thread_switches()
+            request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
             body.begin()
         case Hold(index, None):
             state.release([index], now)

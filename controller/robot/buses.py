@@ -17,7 +17,7 @@ from controller.base.config import Settings
 from controller.base.schema import fields_of, given_in, known_kind, read_by
 from drivers.base.errors import PluginError
 from drivers.core.families import SERVO_BAUD, Family
-from drivers.core.registry import FAMILIES, SIMULATED, no_simulator
+from drivers.core.registry import FAMILIES, SIMULATED, no_simulator_error
 
 SIMULATION = ("simulates", "transport", "faults", "wire", "latency_s", "seed")
 """Options of a simulated bus, of whatever family."""
@@ -68,7 +68,7 @@ class BusSettings(Settings):
         if info.field_name == "kind" and value == SIMULATED:
             return value
         if info.field_name == "simulates" and value in FAMILIES.kinds() and not FAMILIES.get(value).simulator:
-            raise ValueError(f"{no_simulator(value)}; use a real one")
+            raise ValueError(f"{no_simulator_error(value)}; use a real one")
         return known_kind(FAMILIES, value)
 
     @model_validator(mode="after")

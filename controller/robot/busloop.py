@@ -26,7 +26,7 @@ from controller.robot.settings import ChannelSettings
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState
 from drivers.base.errors import DriverError, NoReply, PortLost
-from drivers.base.priority import take_priority
+from drivers.base.priority import request_realtime
 
 if TYPE_CHECKING:
     from controller.robot.anchors import AnchorMap  # start-up: loads the head
@@ -156,7 +156,7 @@ class BusLoop:
         )
 
     def _run(self) -> None:
-        self.realtime = take_priority()
+        self.realtime = request_realtime()
         try:
             for now in self.clock.run(lambda: not self._stopping.is_set()):
                 if self._retry_ns is None:

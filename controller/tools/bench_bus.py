@@ -27,7 +27,7 @@ from controller.base.steal_time import StealTime
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.children import environment as child_environment
-from drivers.base.priority import ORDINARY, give_priority_back, take_priority, take_turns_quickly
+from drivers.base.priority import NO_REALTIME, request_realtime, restore_priority, shorten_thread_switches
 from drivers.dynamixel.frames import GoalFrame, GroupRead, Run
 from drivers.port.serialport import SerialPort
 from drivers.sim import SimulatedBus
@@ -52,8 +52,8 @@ _FACE = (("as fast as it can, ordinary priority", _AS_FAST_AS_IT_CAN, True),
 _SLEEPER = """
 import select, sys
 from controller.base.clock import Clock, Samples
-from drivers.base.priority import take_priority
-take_priority()
+from drivers.base.priority import request_realtime
+request_realtime()
 clock = Clock(float(sys.argv[1]))
 clock.jitter_ms = Samples(int(sys.argv[2]))
 for _ in clock.run(lambda: not select.select([sys.stdin], [], [], 0)[0]):
@@ -121,8 +121,8 @@ def bench_bus(seconds: float, tell: Tell, *, face: bool = False) -> list[tuple[s
     face : also run the whole program, face and body, and measure the jitter of its bus.
     """
     specs = [ServoSpec(i + 1, f"servo{i + 1}", "xl330-m288", -1.0, 1.0, 6.0, 60.0) for i in range(SERVOS)]
-    take_turns_quickly()
-    realtime = take_priority()
+    shorten_thread_switches()
+    realtime = request_realtime()
     title = f"{SERVOS} servos at {BAUD} baud, wire-timed" + (", real-time priority" if realtime else "")
     steal = StealTime()
     with SimulatedBus(specs, process=True, wire=True, baud=BAUD) as wire:
@@ -135,7 +135,7 @@ def bench_bus(seconds: float, tell: Tell, *, face: bool = False) -> list[tuple[s
         bare_paced = _theirs(wire.path, seconds, PACED_HZ)
     tables = [(title, _rates(free) + _costs(paced, bare_paced) + _jitter(ticks, realtime) + _taken(steal))]
     if face:
-        give_priority_back()  # programs that are started would have it too, the picture's among them
+        restore_priority()  # programs that are started would have it too, the picture's among them
         tables.append(("the whole program: face and body, simulated head of 24 servos", _beside_face(seconds, tell)))
     return tables
 
@@ -225,12 +225,12 @@ def _theirs(path: str, seconds: float, rate_hz: float) -> Loop:
         ticks = [read.getData(servo, POSITION, WIDTH) for servo in range(1, SERVOS + 1)]
         return bool(result == sdk.COMM_SUCCESS and ticks)
 
-    give_priority_back()
+    restore_priority()
     try:
         return measure_loop(cycle, seconds, rate_hz)
     finally:
         port.closePort()
-        take_priority()
+        request_realtime()
 
 
 def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
@@ -339,7 +339,7 @@ def _run_program(frames_per_second: int, seconds: float, ordinary: bool) -> tupl
     """The report of ``omote run everything`` with the bus at 100 Hz and the face at a rate, and how late (ms, 99 of
     100) a program is meanwhile that does nothing but sleep from tick to tick: less is not to be had on the machine.
     """
-    environment = child_environment("controller") | ({ORDINARY: "1"} if ordinary else {})
+    environment = child_environment("controller") | ({NO_REALTIME: "1"} if ordinary else {})
     with tempfile.TemporaryDirectory(prefix="omote-") as folder:
         robot, stage, report = (Path(folder) / name for name in ("robot.toml", "stage.toml", "report.json"))
         _write_changed(find_config("robots", "head24"), robot, {"rate_hz": str(JITTER_HZ)})

@@ -15,7 +15,7 @@ from controller.tools.scan import Found, scan_port
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
-from drivers.core.traffic import Decoder, Decoder1, Decoder2, Heard
+from drivers.core.traffic import Decoder, Decoder1, Decoder2, ServoTraffic
 from drivers.port.serialport import SerialPort, tapped
 from drivers.tables.tables import ControlTable, load_table
 
@@ -164,6 +164,6 @@ def _heard_rows(decoder: Decoder) -> list[dict[str, Any]]:
     return [_heard_row(servo, heard) for servo, heard in sorted(decoder.heard.items())]
 
 
-def _heard_row(servo: int, heard: Heard) -> dict[str, Any]:
+def _heard_row(servo: int, heard: ServoTraffic) -> dict[str, Any]:
     row: dict[str, Any] = {"id": servo, "answers": heard.packets, "error": heard.error}
     return row | {name: heard.values[name] for name in SHOWN if name in heard.values}

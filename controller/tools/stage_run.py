@@ -25,7 +25,7 @@ from controller.stage.identity import check_identity
 from controller.stage.stage import Stage, load_stage
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
-from drivers.base.priority import yield_to_servos
+from drivers.base.priority import lower_process_priority
 
 if TYPE_CHECKING:
     from surface.head import Head  # start-up: the body gets its orders first
@@ -162,7 +162,7 @@ class StageRun:
 
     def _head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
         """The head and its values; the servos come up meanwhile in the body's process."""
-        yield_to_servos()
+        lower_process_priority()
         head = self.stage.load_head()
         return HeadValues(body.mailbox, PARAMETERS, head.parameters), head
 

@@ -1,14 +1,12 @@
-"""What every servo bus promises, whatever protocol is on the wire.
+"""The interface ``Bus`` that every servo driver implements: open, discover, start, write, read, stop, report.
 
-One bus is one wire with many servos. A driver implements :class:`Bus`; the caller owns the clock and calls
-``write`` and ``read`` once a cycle from one thread. Nothing here queues: ``write`` sends the newest target
-and returns what was really sent, ``read`` returns what is known, with an age for everything that is old.
+One bus is one wire with many servos. The caller owns the clock and calls ``write`` and ``read`` once a cycle from one
+thread. Nothing is queued: ``write`` sends the newest target and returns what was really sent, ``read`` returns what is
+known, with an age for everything that is old.
 
-All arrays are ordered as the ``servos`` given to the bus, so ``n`` below is ``len(bus.servos)``.
-
-Angles are the servo's own: radians from the middle of its range (tick 2048 of 4096), positive where ticks
-grow.
-With ``zero_rad`` and ``reverse`` set, ``shaft = zero_rad + (-1 if reverse else 1) * angle``.
+All arrays are in the order of the ``servos`` of the bus; ``n`` is ``len(bus.servos)``. Angles are the servo's own:
+radians from the middle of its range (tick 2048 of 4096), positive where ticks grow. With ``zero_rad`` and ``reverse``
+set, ``shaft = zero_rad + (-1 if reverse else 1) * angle``.
 """
 
 from __future__ import annotations
@@ -35,20 +33,20 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class ServoSpec:
-    """One servo as the configuration describes it.
+    """Configuration of one servo.
 
     Parameters
     ----------
     id : number on the bus, 0 to 252.
-    name : what messages call it, for example ``"jaw"``.
+    name : its name in messages, for example ``"jaw"``.
     model : vendor model name in any case, for example ``"xl330-m288"``.
     min_rad, max_rad : limits of the angle; nothing outside them is ever sent.
     max_speed_rad_s, max_accel_rad_s2 : limits of the motion, above zero.
     reverse : the angle grows where ticks fall.
     zero_rad : shaft angle from the middle of the range at which the angle is zero.
-    rest_rad : angle at which a servo begins that cannot tell where it is; kept inside the limits.
-    pulse_us : calibrated (angle rad, pulse us) of a hobby servo, two or more; empty takes the model's.
-    wire_name : what it is called on a wire that sends names; empty takes ``name``.
+    rest_rad : angle at which a servo starts whose position cannot be read; clipped to the limits.
+    pulse_us : calibrated (angle rad, pulse us) of a hobby servo, two or more; empty: those of the model.
+    wire_name : its name on a wire that sends names; empty: ``name``.
 
     Raises
     ------
@@ -82,10 +80,7 @@ class ServoSpec:
 
 @dataclass(frozen=True, slots=True)
 class ServoInfo:
-    """What a servo said about itself when it was looked for.
-
-    ``voltage_v``, ``temperature_c``, ``hardware_error`` and ``torque`` are None where it did not say.
-    """
+    """What discovery found out about a servo; None where the servo cannot be asked."""
 
     id: int
     model_number: int
@@ -99,21 +94,21 @@ class ServoInfo:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BusState:
-    """What is known of every servo after one read. All arrays are read-only, shape ``(n,)``.
+    """State of every servo after one read. All arrays are read-only, shape ``(n,)``.
 
     Attributes
     ----------
     time_s : monotonic clock when the read ended.
     position_rad : last good position; NaN before the first one.
     velocity_rad_s, current_a : from the same reply; NaN where the model does not measure it.
-    fresh : True where this cycle brought the position. Never use a position that is not fresh as a pose. On a bus
-        that does not measure it is always False, and the position is what the board says it puts out, or was told.
+    fresh : True where this cycle measured the position. Never use a position that is not fresh as a pose. Always False
+        on a bus that does not measure; the position is then what the board reports it puts out, or what was sent.
     age_s : seconds since the position arrived; inf before the first one, and where nothing can be asked.
     error : error byte of the last reply (bit 7: alert, a hardware error is latched; bits 0-6: a number).
     silent : True where the servo stopped answering and is only probed now and then.
     voltage_v, temperature_c : polled in turn; NaN before the first poll.
-    hardware_error : last polled register, 0 is none; the bits are the model's.
-    torque : True where the servo said that its motor is on (polled in turn).
+    hardware_error : last polled register, 0 is none; the bits depend on the model.
+    torque : True where the servo reported that its motor is on (polled in turn).
     """
 
     time_s: float
@@ -138,14 +133,14 @@ class BusReport:
     ----------
     cycles, writes : reads and writes done.
     errors : count by kind: ``no_reply``, ``corrupt``, ``refused``, ``alert``, ``torque_lost``, ``watchdog``,
-        ``reset`` (a servo forgot what it was told, as after a dip of its supply), ``port_lost``, ``unkept`` (nobody
-        would let the servos go should the program be killed), ``held_back`` (goals a line head had no room for) and
-        ``board_...`` (what a board says of itself). A kind that never happened is missing.
+        ``reset`` (a servo lost its settings, as after a dip of its supply), ``port_lost``, ``unkept`` (no dead man's
+        switch is running), ``held_back`` (goals not sent because a line head was busy) and ``board_...`` (errors that a
+        board reports). Kinds that never occurred are missing.
     errors_by_servo : the same by servo id.
     limits_hit : targets clipped to an angle limit.
     speed_limited : targets shortened because they asked for more than the servo's top speed.
     refused_targets : targets that were not a number.
-    stray : replies thrown away because nobody asked for them (late, duplicated, echo or noise).
+    stray : replies discarded because they answer no request (late, duplicated, echo or noise).
     eeprom_writes : one line for every permanent register written.
     silent : ids that are not answering now.
     """
@@ -176,9 +171,9 @@ class BusReport:
 class Bus(ABC):
     """One wire with servos. Use it as a context manager; one thread only.
 
-    ``with bus:`` opens the port and, on every way out, stops the servos and closes it. A program that is killed
-    (SIGKILL) can stop nothing: servos with a bus watchdog stop by themselves then; for those without one
-    ``drivers/core/dead_man_switch.py`` says what is done, and pulses of hobby servos go on.
+    ``with bus:`` opens the port and, on every way out, stops the servos and closes it. When the program is killed
+    (SIGKILL), servos with a bus watchdog stop by themselves, ``drivers/core/dead_man_switch.py`` switches off those
+    without one, and pulses of hobby servos go on.
 
     Parameters
     ----------
@@ -190,7 +185,7 @@ class Bus(ABC):
 
     Attributes
     ----------
-    measures : positions are measured at the shafts. Where they are not (hobby servos) no state is ever fresh.
+    measures : positions are measured at the shafts; False for hobby servos, whose states are never fresh.
     """
 
     measures: ClassVar[bool] = True
@@ -207,7 +202,7 @@ class Bus(ABC):
     @property
     @abstractmethod
     def is_open(self) -> bool:
-        """True while the port is held."""
+        """True while the port is open."""
 
     @property
     @abstractmethod
@@ -216,68 +211,42 @@ class Bus(ABC):
 
     @abstractmethod
     def open(self) -> None:
-        """Take the port. Nothing is sent.
-
-        Raises
-        ------
-        PortMissing, PortBusy, PortPermission
-        """
+        """Open the port; raises PortMissing, PortBusy or PortPermission. Nothing is sent."""
 
     @abstractmethod
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
-        """Look for servos; ``ids`` None asks everybody at once. Nothing moves."""
+        """Look for servos by id; None asks all at once. Nothing moves."""
 
     @abstractmethod
     def start(self) -> None:
-        """Check every servo and switch the motors on where they stand, without a movement.
+        """Check every servo and switch the motors on at their present positions, without a movement.
 
-        Raises
-        ------
-        NoReply, WrongModel, ServoFault, ServoRefused, CorruptReply : nothing was moved; see ``servo_ids``.
+        Raises NoReply, WrongModel, ServoFault, ServoRefused or CorruptReply, before anything moved; see ``servo_ids``.
         """
 
     @abstractmethod
     def write(self, angle_rad: ArrayLike) -> Floats:
-        """Send one target for every servo.
+        """Send targets (n,) rad, NaN to keep a servo's last one; returns what was sent after limits, (n,) read-only.
 
-        Parameters
-        ----------
-        angle_rad : (n,) targets. NaN keeps that servo's last target.
-
-        Returns
-        -------
-        (n,) float64, read-only : what was really sent after limits.
-
-        Raises
-        ------
-        PortLost : the port went away; see :meth:`reconnect`.
+        Raises PortLost where the port went away; see :meth:`reconnect`.
         """
 
     @abstractmethod
     def read(self) -> BusState:
-        """Ask every servo for its state; silent servos are marked, not raised.
-
-        Raises
-        ------
-        PortLost : the port went away; see :meth:`reconnect`.
-        """
+        """Ask every servo for its state; silent servos are marked, not raised. Raises PortLost as :meth:`write`."""
 
     @abstractmethod
     def stop(self) -> None:
         """Switch every motor off, each by itself; does nothing when not running.
 
-        Raises
-        ------
-        NoReply : after everything was tried; ``servo_ids`` are those not confirmed off.
+        Raises NoReply after everything was tried; ``servo_ids`` are those not confirmed off.
         """
 
     @abstractmethod
     def reconnect(self) -> None:
-        """Open the port again by its path after :class:`~drivers.base.errors.PortLost`; start if it was running.
+        """Open the port again after PortLost, and start the servos again if they were running.
 
-        Raises
-        ------
-        PortMissing, BusError : still unplugged, or not all servos are back; call again later.
+        Raises PortMissing or BusError while it is unplugged or servos are missing; call again later.
         """
 
     @abstractmethod
@@ -285,20 +254,15 @@ class Bus(ABC):
         """Counters since the bus was opened, as a copy."""
 
     def far_end(self) -> dict[str, Any]:
-        """What a simulated far end has to be set to, beyond ids and models; plain values for JSON."""
+        """Settings that a simulated far end needs beyond ids and models; plain values for JSON."""
         return {}
 
     @abstractmethod
     def _release(self) -> None:
-        """Give the port back; never raises."""
+        """Close the port; never raises."""
 
     def close(self) -> None:
-        """Stop the servos and give the port back; may be called any number of times.
-
-        Raises
-        ------
-        DriverError : what :meth:`stop` raised, after the port was closed.
-        """
+        """Stop the servos, then close the port and raise what :meth:`stop` raised; may be called repeatedly."""
         try:
             if self.running:
                 self.stop()
@@ -318,7 +282,7 @@ class Bus(ABC):
         except DriverError as closing:
             if error is None:
                 raise
-            log.error("%s", closing)  # the first error is the one to tell; this one must not hide it
+            log.error("%s", closing)  # it must not hide the first error
             error.add_note(f"also: {closing}")
 
 

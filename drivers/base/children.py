@@ -1,7 +1,6 @@
-"""Starting a module of this program as a process of its own, wherever the program is installed or was started from.
+"""Command line and environment that start a module of this program as a child process with the same module path.
 
-The child finds everything where its parent found it: it gets the parent's module path, in the same order, and nothing
-of the folder that happens to be the current one. Imports nothing that takes long.
+The child imports modules from where its parent does, in the same order, and not from the current folder.
 """
 
 from __future__ import annotations
@@ -9,35 +8,24 @@ from __future__ import annotations
 import os
 import sys
 
-_HOME = "PYTHONHOME"
-
 
 def command(module: str, *words: str, bare: bool = False) -> list[str]:
-    """What starts a module by its dotted name.
-
-    Parameters
-    ----------
-    words : arguments.
-    bare : without what ``site`` and its start-up files do, which takes time and may fail.
-    """
+    """The command line that runs a module, by its dotted name, with arguments; `bare` skips the ``site`` module."""
     return [sys.executable or "python3", "-P", *(["-S"] if bare else []), "-m", module, *words]
 
 
 def environment(module: str, *, bare: bool = False) -> dict[str, str]:
-    """The environment to start it in.
-
-    Parameters
-    ----------
-    bare : without the variables by which a user tells Python how to run, but for where it lives.
-    """
+    """The environment of the child; `bare` leaves out every variable of Python's but PYTHONHOME."""
     kept = {
-        name: value for name, value in os.environ.items() if not bare or not name.startswith("PYTHON") or name == _HOME
+        name: value
+        for name, value in os.environ.items()
+        if not bare or not name.startswith("PYTHON") or name == "PYTHONHOME"
     }
     return kept | {"PYTHONPATH": os.pathsep.join(module_path(module))}
 
 
 def module_path(module: str) -> list[str]:
-    """Folders in which this process finds modules; last the one that holds the package, however it was found."""
+    """Folders in which this process finds modules; last the one that holds the package of `module`."""
     package = sys.modules.get(module.partition(".")[0])
     folders = [*sys.path, *(os.path.dirname(folder) for folder in getattr(package, "__path__", ()))]
     return list(dict.fromkeys(os.path.abspath(folder) for folder in folders if isinstance(folder, str)))

@@ -1,21 +1,4 @@
-"""Errors of the drivers room.
-
-The tree::
-
-    DriverError
-    ├── PortError            the operating system's serial device
-    │   ├── PortMissing      no such device: unplugged, renamed, wrong name in the configuration
-    │   ├── PortBusy         another program holds it
-    │   ├── PortPermission   the user may not open it
-    │   └── PortLost         it went away while in use (unplugged)
-    ├── PluginError          a kind that is not installed, or a plug-in that cannot be loaded
-    └── BusError             the wire behind an open port
-        ├── NoReply          a servo did not answer in time
-        ├── CorruptReply     an answer failed its checks (CRC, id, length)
-        ├── WrongModel       the servo at an id is not the configured model
-        ├── ServoRefused     a servo answered with an error number
-        └── ServoFault       a servo latched a hardware error
-"""
+"""Exceptions of the drivers: one tree below :class:`DriverError`, each with message, hint, port and servo ids."""
 
 from __future__ import annotations
 
@@ -23,7 +6,7 @@ from collections.abc import Mapping
 
 
 class DriverError(Exception):
-    """Something the drivers room cannot do.
+    """Something that a driver cannot do.
 
     Parameters
     ----------
@@ -90,11 +73,11 @@ class ServoFault(BusError):
     """A servo latched a hardware error and needs a reboot."""
 
 
-def together(failed: Mapping[int, BusError]) -> BusError:
-    """One error for many servos: the first one's kind and hint, every servo's id, and how many there are."""
+def merge_errors(failed: Mapping[int, BusError]) -> BusError:
+    """One error for several servos, by id: kind, message and hint of the first one, and every servo's id."""
     first, *others = failed.values()
     if not others:
         return first
-    ids = ", ".join(map(str, sorted(failed)))
-    message = f"{first}; the same or worse for {len(failed)} servos: ids {ids}"
-    return type(first)(message, hint=first.hint, port=first.port, servo_ids=tuple(sorted(failed)))
+    ids = tuple(sorted(failed))
+    message = f"{first}; the same or worse for {len(ids)} servos: ids {', '.join(map(str, ids))}"
+    return type(first)(message, hint=first.hint, port=first.port, servo_ids=ids)

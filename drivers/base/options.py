@@ -1,11 +1,11 @@
-"""Options of plug-ins: a plain dataclass whose fields carry what a reader of files or a command line must know.
+"""Options of plug-ins: dataclass fields with help, limits and choices, which the controller checks and reads.
 
-Nothing here knows how they are read. The controller turns such a dataclass into keys of a robot file and into options
-of a command.
+The controller makes keys of a robot file and options of a command from such a dataclass.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from types import UnionType
@@ -16,12 +16,12 @@ from drivers.base.errors import DriverError
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """What a value of an option may be, and what people are told of it.
+    """Help and limits of one option.
 
     Attributes
     ----------
     help : one sentence for people.
-    at_least, at_most : ends of a number, themselves allowed; above : a number below all that are allowed.
+    at_least, at_most : limits of a number, both allowed; above : lower limit of a number, itself not allowed.
     choices : the only texts allowed. longest : characters of a text at most.
     """
 
@@ -43,7 +43,7 @@ def option(help: str, default: Any = None, **limits: Any) -> Any:
     Parameters
     ----------
     help : one sentence for people.
-    default : None says that the plug-in's own default holds; :data:`REQUIRED` that a value must be given.
+    default : None where the plug-in's own default applies; :data:`REQUIRED` where a value must be given.
     limits : further fields of :class:`Option`.
     """
     return field(default=default, metadata={"option": Option(help=help, **limits)})
@@ -68,16 +68,7 @@ def entries(options: type) -> Iterator[Entry]:
 
 
 def check_options(options: type, reserved: Iterable[str] = ()) -> None:
-    """Whether files and commands can be made to read a dataclass of options.
-
-    Parameters
-    ----------
-    reserved : names that mean something else where the options stand.
-
-    Raises
-    ------
-    ValueError : it is no dataclass, or an option's name or type cannot be used; says which.
-    """
+    """Raises ValueError for what is no dataclass, and for an option whose type or (`reserved`) name cannot be used."""
     if not (isinstance(options, type) and is_dataclass(options)):
         raise ValueError(f"its options must be a dataclass, not {options!r}")
     try:
@@ -94,25 +85,18 @@ def check_options(options: type, reserved: Iterable[str] = ()) -> None:
 
 
 def parse_ids(text: str, most: int = 252) -> list[int]:
-    """``1-3,7`` as [1, 2, 3, 7].
-
-    Raises
-    ------
-    DriverError : a part is no id or range of ids, an id stands twice or is beyond ``most``.
-    """
+    """``1-3,7`` as [1, 2, 3, 7]; raises DriverError for other text, and for ids given twice or above ``most``."""
     hint = "for example --ids 1-24, or --ids 1,3,7-9"
+    outside = DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
     ids: list[int] = []
     for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not _is_number(first) or (dash and not _is_number(last)):
+        match = re.fullmatch(r"([0-9]+)(?:-([0-9]+))?", part.strip())
+        if match is None:
             raise DriverError(f"--ids {text}: {part.strip()!r} is no id", hint=hint)
-        if int(last or first) > most:
-            raise DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
-        ids += range(int(first), int(last or first) + 1)
+        first, last = int(match[1]), int(match[2] or match[1])
+        if last > most:
+            raise outside
+        ids += range(first, last + 1)
     if not ids or len(set(ids)) != len(ids):
-        raise DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
+        raise outside
     return ids
-
-
-def _is_number(text: str) -> bool:
-    return text.isascii() and text.isdigit()

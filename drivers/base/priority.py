@@ -1,4 +1,4 @@
-"""Which process the operating system serves first: servos before the picture."""
+"""Scheduling of threads and processes by the operating system: threads that drive servos run before the picture."""
 
 from __future__ import annotations
 
@@ -9,73 +9,70 @@ import platform
 import struct
 import sys
 
-ORDINARY = "OMOTE_ORDINARY_PRIORITY"
-"""Environment variable: set to anything, nobody asks for real-time scheduling."""
+NO_REALTIME = "OMOTE_ORDINARY_PRIORITY"
+"""Environment variable: where it is set, no thread asks for real-time scheduling."""
 _REALTIME_PRIORITY = 10
 _PR_SET_TIMERSLACK = 29
 _SWITCH_S = 0.2e-3
-_TURN_NS = 100_000
+_TIME_SLICE_NS = 100_000
 _ATTRIBUTES = struct.Struct("=IIQiIQQQ")
 """``struct sched_attr``: size, policy, flags, nice, priority, then runtime, deadline and period in ns."""
 _SCHED_SETATTR = {"x86_64": 314, "aarch64": 274, "riscv64": 274, "armv7l": 380, "armv6l": 380, "i686": 351}
-"""Its number as a system call, by machine; the C library has no function for it."""
+"""Number of the system call by machine; the C library has no function for it."""
 
 
-def yield_to_servos() -> None:
-    """Let this process give way: a late frame is seen less than a late servo target."""
+def lower_process_priority() -> None:
+    """Lower the priority of this process: a late frame is seen less than a late servo target."""
     if hasattr(os, "nice"):
         os.nice(5)
 
 
-def wake_promptly() -> None:
-    """Let waits of the calling thread end when they should; Linux adds 50 us by default, to save power."""
+def reduce_timer_slack() -> None:
+    """Let waits of the calling thread end on time; Linux adds 50 us by default, to save power."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(1))
 
 
-def take_turns_quickly() -> None:
-    """Let threads of this process wait for each other, and for the collection of garbage, as short as can be.
+def shorten_thread_switches() -> None:
+    """Shorten how long threads of this process wait for each other and for garbage collection.
 
-    Python lets one thread run for 5 ms before another gets its turn, and a full collection looks at all that was
-    ever loaded: either is longer than a servo's tick may be late.
+    By default Python switches threads every 5 ms, and a full collection looks at all objects ever loaded: either is
+    longer than a servo's cycle may be late.
     """
     sys.setswitchinterval(_SWITCH_S)
     gc.collect()
     gc.freeze()
 
 
-def take_priority() -> bool:
-    """Ask for real-time scheduling and exact waits of the calling thread; False where the first is not allowed.
-
-    Where it is not the thread asks for short turns instead, as everybody may.
-    """
-    wake_promptly()
-    if hasattr(os, "sched_setscheduler") and not os.environ.get(ORDINARY):
+def request_realtime() -> bool:
+    """Ask for real-time scheduling and exact waits of the calling thread; False where it gets short slices instead."""
+    reduce_timer_slack()
+    if hasattr(os, "sched_setscheduler") and not os.environ.get(NO_REALTIME):
         try:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_REALTIME_PRIORITY))
         except OSError:
             pass
         else:
             return True
-    take_short_turns()
+    request_short_time_slice()
     return False
 
 
-def take_short_turns() -> bool:
-    """Let the calling thread run often and briefly, not seldom and long; False where the system has no such request.
+def request_short_time_slice() -> bool:
+    """Ask for short time slices for the calling thread; False where the system has no such request.
 
-    Linux 6.12 and later serves a thread that wakes up ahead of one in the middle of a longer turn (EEVDF, a slice asked
-    for by ``sched_setattr``); older ones take no notice.
+    Linux 6.12 and later (EEVDF) serves a thread that wakes up before one in the middle of a longer slice, asked for by
+    ``sched_setattr``; older ones ignore it.
     """
     number = _SCHED_SETATTR.get(platform.machine())
     if sys.platform != "linux" or number is None:
         return False
     nice = os.getpriority(os.PRIO_PROCESS, 0)
-    request = _ATTRIBUTES.pack(_ATTRIBUTES.size, os.SCHED_OTHER, 0, nice, 0, _TURN_NS, 0, 0)
+    request = _ATTRIBUTES.pack(_ATTRIBUTES.size, os.SCHED_OTHER, 0, nice, 0, _TIME_SLICE_NS, 0, 0)
     return bool(ctypes.CDLL(None).syscall(number, 0, request, 0) == 0)
 
 
-def give_priority_back() -> None:
-    """Ordinary scheduling of the calling thread again."""
+def restore_priority() -> None:
+    """Set ordinary scheduling of the calling thread again."""
     if hasattr(os, "sched_setscheduler"):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -1,6 +1,6 @@
-"""What a driver says of its servos: every fault at once, and the same one again only now and then.
+"""Logging of warnings with a rate limit: a new text at once, a repeated one only now and then, with its count.
 
-A loose cable makes a servo come and go many times a minute; a log that says so each time hides what else happens.
+A loose cable makes a servo fail many times a minute; logging each failure would hide everything else.
 """
 
 from __future__ import annotations
@@ -9,54 +9,45 @@ import logging
 import math
 from collections.abc import Callable
 
-AGAIN_S = 10.0
-"""The same is not said again before this time has passed; then with how often it was."""
+INTERVAL_S = 10.0
+"""A text is not logged again before this time has passed; then with how often it occurred."""
 BURST = 20
-"""So many lines that have been said before may follow each other at once, later ones one a second."""
+"""Repeated texts that may be logged in a row; later ones follow at one a second (a token bucket)."""
 KEPT = 1000
-"""Texts remembered; more come only from a board that words every refusal anew."""
+"""Texts remembered, so that a board that sends a different refusal each time uses no more memory."""
 
 
 class RateLimitedLogger:
-    """Says warnings of one bus.
-
-    Parameters
-    ----------
-    log : where to.
-    clock : monotonic seconds.
-    """
+    """Logs the warnings of one bus to `log`; `clock` gives monotonic seconds."""
 
     def __init__(self, log: logging.Logger, clock: Callable[[], float]) -> None:
         self._log, self._clock = log, clock
-        self._told: dict[str, tuple[float, int]] = {}  # text: when it was said last, how often it was not since
-        self._room, self._room_s = float(BURST), -math.inf
+        self._logged: dict[str, tuple[float, int]] = {}  # text: when it was logged last, repetitions since
+        self._tokens, self._tokens_s = float(BURST), -math.inf
 
     def __call__(self, text: str, *values: object) -> None:
-        """Say it, filled in as ``logging`` does, unless it was said a short while ago."""
+        """Log a text, formatted as ``logging`` does, unless it was logged a short while ago."""
         text = text % values if values else text
         now_s = self._clock()
-        if text not in self._told:
-            self._remember(text, now_s)
+        if text not in self._logged:
+            if len(self._logged) >= KEPT:
+                del self._logged[next(iter(self._logged))]
+            self._logged[text] = now_s, 0
             self._log.warning("%s", text)
             return
-        last_s, held = self._told[text]
-        if now_s - last_s < AGAIN_S or not self._has_room(now_s):
-            self._told[text] = last_s, held + 1
+        last_s, held = self._logged[text]
+        if now_s - last_s < INTERVAL_S or not self._take_token(now_s):
+            self._logged[text] = last_s, held + 1
             return
-        self._told[text] = now_s, 0
-        again = f" ({held + 1} times in {now_s - last_s:.0f} s)" if held else ""
-        self._log.warning("%s%s", text, again)
+        self._logged[text] = now_s, 0
+        count = f" ({held + 1} times in {now_s - last_s:.0f} s)" if held else ""
+        self._log.warning("%s%s", text, count)
 
-    def _remember(self, text: str, now_s: float) -> None:
-        if len(self._told) >= KEPT:
-            del self._told[next(iter(self._told))]
-        self._told[text] = now_s, 0
-
-    def _has_room(self, now_s: float) -> bool:
-        """Take one of the lines that may be said again now, where there is one."""
-        self._room = min(self._room + (now_s - self._room_s), float(BURST))
-        self._room_s = now_s
-        if self._room < 1.0:
+    def _take_token(self, now_s: float) -> bool:
+        """Whether a repeated text may be logged now; counts it."""
+        self._tokens = min(self._tokens + (now_s - self._tokens_s), float(BURST))
+        self._tokens_s = now_s
+        if self._tokens < 1.0:
             return False
-        self._room -= 1.0
+        self._tokens -= 1.0
         return True

@@ -1,12 +1,9 @@
-"""Clean up on every way out, and tell all that failed on it.
+"""Clean-up that runs exactly once on every way out of a program: end, exception, exit, SIGINT, SIGTERM and SIGHUP.
 
-:func:`stop_on_signals` runs one clean-up exactly once on every way out of a program: end, exception, SIGINT,
-SIGTERM, SIGHUP, exit.
-
-A signal handler may interrupt a transaction half way, so it does not touch the bus itself: it raises, the
-transaction unwinds, and the clean-up runs on the way out with further signals held back. What is raised while a
-destructor or a callback runs is lost in Python; that is noticed, and raised once more. SIGKILL cannot be caught; the
-servos' own bus watchdog covers it.
+A signal handler may interrupt a transaction half way, so it does not touch the bus itself: it raises, the transaction
+unwinds, and the clean-up runs afterwards while further signals are held back. Python drops what is raised while a
+destructor or a callback runs; that is noticed, and raised again. SIGKILL cannot be caught; the servos' own bus watchdog
+covers it.
 """
 
 from __future__ import annotations
@@ -18,7 +15,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -29,29 +25,9 @@ log = logging.getLogger(__name__)
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
-class _Once:
-    """Calls a function the first time only, whichever thread comes first."""
-
-    def __init__(self, function: Callable[[], object]) -> None:
-        self._function = function
-        self._lock = threading.Lock()
-        self._done = False
-
-    def __call__(self) -> None:
-        with self._lock:
-            if self._done:
-                return
-            self._done = True
-        self._function()
-
-
 @contextmanager
 def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
-    """Context in which ``stop`` will run exactly once, however it is left.
-
-    Parameters
-    ----------
-    stop : for example ``bus.stop`` or ``bus.close``.
+    """Context manager that runs ``stop``, as ``bus.close``, exactly once, however the context is left.
 
     Raises
     ------
@@ -60,19 +36,29 @@ def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
 
     Notes
     -----
-    Only the main thread receives signals; in another thread the handlers are left alone, all else still holds.
+    Only the main thread receives signals; in another thread the handlers stay unchanged, and all else still applies.
     """
-    once = _Once(stop)
-    at_exit = partial(_quietly, once)
+    first_call = threading.Lock()  # taken by the first call, never released
+
+    def stop_once() -> None:
+        if first_call.acquire(blocking=False):
+            stop()
+
+    def at_exit() -> None:
+        try:
+            stop_once()
+        except Exception:
+            log.exception("clean-up at exit failed")
+
     atexit.register(at_exit)
     previous = _install(_raise_signal)
     try:
-        with _raised_again_when_lost(previous):
+        with _raise_dropped_signals_again(previous):
             yield
     finally:
         _install(_hold_back, previous)
         try:
-            once()
+            stop_once()
         finally:
             atexit.unregister(at_exit)
             for number, handler in previous.items():
@@ -80,21 +66,22 @@ def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
 
 
 @contextmanager
-def _raised_again_when_lost(numbers: Any) -> Iterator[None]:
-    """Raise for a signal once more where what was raised had nowhere to go, as in a destructor."""
+def _raise_dropped_signals_again(numbers: Any) -> Iterator[None]:
+    """Raise again what Python dropped of a signal, as in a destructor; does nothing where no handler is installed."""
     if not numbers:
         yield
         return
     before = sys.unraisablehook
 
-    def notice(lost: Any) -> None:
-        number = _signal_of(lost.exc_value)
+    def hook(dropped: Any) -> None:
+        number = _signal_of(dropped.exc_value)
         if number is None or threading.current_thread() is not threading.main_thread():
-            before(lost)
+            before(dropped)
         else:
-            _raise_in(_interrupted(lost.exc_traceback), number)
+            traceback: TracebackType | None = dropped.exc_traceback  # its first frame is the destructor or callback
+            _raise_in(sys._getframe().f_back if traceback is None else traceback.tb_frame.f_back, number)
 
-    sys.unraisablehook = notice
+    sys.unraisablehook = hook
     try:
         yield
     finally:
@@ -102,7 +89,7 @@ def _raised_again_when_lost(numbers: Any) -> Iterator[None]:
 
 
 def _signal_of(error: BaseException | None) -> int | None:
-    """The signal for which :func:`_raise_signal` raised this, if it did."""
+    """The signal for which :func:`_raise_signal` raised an error; None for any other error."""
     if isinstance(error, KeyboardInterrupt):
         return signal.SIGINT
     if isinstance(error, SystemExit) and isinstance(error.code, int) and error.code - 128 in SIGNALS:
@@ -110,15 +97,8 @@ def _signal_of(error: BaseException | None) -> int | None:
     return None
 
 
-def _interrupted(traceback: TracebackType | None) -> FrameType | None:
-    """What was running when the destructor or callback came, of which the error is."""
-    if traceback is None:
-        return sys._getframe(1).f_back
-    return traceback.tb_frame.f_back
-
-
 def _raise_in(frame: FrameType | None, number: int) -> None:
-    """Raise for a signal at the next line of a frame: where we are now, it would be lost as well."""
+    """Raise for a signal at the next line of a frame; raised here it would be dropped as well."""
     if frame is None:
         return
 
@@ -147,52 +127,35 @@ def _hold_back(number: int, frame: FrameType | None) -> None:
     log.warning("stopping the servos; signal %d waits until that is done", number)
 
 
-def _quietly(once: _Once) -> None:
-    """At exit nobody is left to catch anything."""
-    try:
-        once()
-    except Exception:
-        log.exception("clean-up at exit failed")
-
-
 class Closers(ExitStack):
-    """An exit stack of which every callback runs, and every one that failed is told, not only the last.
-
-    ``close`` raises what failed: the error itself where it is one, a :class:`~drivers.base.errors.DriverError` that
-    names them all where there are more.
-    """
+    """An exit stack that runs every callback and reports all errors, not only the last one."""
 
     def __init__(self) -> None:
         super().__init__()
         self._failed: list[Exception] = []
 
     def callback(self, callback: Callable[..., Any], /, *args: Any, **kwds: Any) -> Callable[..., Any]:
-        """Run this on the way out; what it raises is kept for :meth:`close`."""
+        """Register a callback; what it raises is kept for :meth:`close`."""
         super().callback(self._try, callback, *args, **kwds)
         return callback
 
     def close(self) -> None:
-        """Run everything, last come first served.
-
-        Raises
-        ------
-        Exception : what failed.
-        """
+        """Run all callbacks, the last one first, then raise their errors; see :func:`combine_errors`."""
         super().close()
         failed, self._failed = self._failed, []
         if failed:
-            raise together(failed)
+            raise combine_errors(failed)
 
     def _try(self, callback: Callable[..., object], *args: Any, **kwds: Any) -> None:
         try:
             callback(*args, **kwds)
-        except Exception as error:  # noqa: BLE001  the others must run, and be told
-            log.debug("on the way out: %s", error)
+        except Exception as error:  # noqa: BLE001  the other callbacks must run
+            log.debug("clean-up: %s", error)
             self._failed.append(error)
 
 
-def together(failed: Sequence[Exception]) -> Exception:
-    """One error that tells several: their messages in order, each hint once, all servos."""
+def combine_errors(failed: Sequence[Exception]) -> Exception:
+    """A single error unchanged; several as one DriverError with all messages in order, each hint once, all servos."""
     if len(failed) == 1:
         return failed[0]
     hints = dict.fromkeys(hint for error in failed if (hint := getattr(error, "hint", "")))
@@ -201,15 +164,15 @@ def together(failed: Sequence[Exception]) -> Exception:
     return DriverError(message, hint="; ".join(hints), servo_ids=tuple(servos))
 
 
-def with_those_before(error: Exception) -> Exception:
-    """The error together with those that were under way when it was raised, which it would hide; oldest first.
+def combine_with_context(error: Exception) -> Exception:
+    """The error combined with those that were being handled when it was raised and would be hidden; oldest first.
 
-    One that it was raised from is in its message already, and is left out, as are those that are not for people.
+    Left out are causes that it was raised from, which its message names already, and errors without a ``hint``.
     """
     found: list[Exception] = [error]
     step: BaseException = error
     while step.__context__ is not None:
-        step, told = step.__context__, step.__context__ is step.__cause__
-        if isinstance(step, Exception) and hasattr(step, "hint") and not told:
+        step, is_cause = step.__context__, step.__context__ is step.__cause__
+        if isinstance(step, Exception) and hasattr(step, "hint") and not is_cause:
             found.append(step)
-    return together(found[::-1])
+    return combine_errors(found[::-1])

@@ -1,4 +1,4 @@
-"""Hobby servos: from angles to pulses and back, by model or as calibrated. A pulse is all that is ever known of one."""
+"""Conversion between angles of hobby servos and pulse widths or other values on the wire, by model or calibration."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from drivers.base.errors import DriverError
 Indices = NDArray[np.intp]
 
 LOWEST_US, HIGHEST_US = 64.0, 4080.0
-"""Pulses outside these no board makes and no servo understands."""
+"""Limits of the pulses that boards can make and servos understand."""
 
 
 @dataclass(frozen=True)
 class HobbyModel:
-    """Pulse widths ``us`` (k,) at shaft angles ``rad`` (k,) from the middle, both without a tie, ``rad`` growing."""
+    """Pulse widths ``us`` (k,) at shaft angles ``rad`` (k,) from the middle, which strictly increase."""
 
-    name: str
     rad: tuple[float, ...]
     us: tuple[float, ...]
 
@@ -36,18 +35,13 @@ def known_models() -> dict[str, HobbyModel]:
     """The models of hobby.toml by name."""
     data = tomllib.loads(Path(__file__).with_name("hobby.toml").read_text(encoding="utf-8"))
     return {
-        name: HobbyModel(name, tuple(math.radians(deg) for deg in entry["deg"]), tuple(map(float, entry["us"])))
+        name: HobbyModel(tuple(math.radians(deg) for deg in entry["deg"]), tuple(map(float, entry["us"])))
         for name, entry in data["models"].items()
     }
 
 
 def hobby_model(model: str) -> HobbyModel:
-    """A model by name, in any case.
-
-    Raises
-    ------
-    DriverError : there is no such model; the hint lists those that look like it, or all.
-    """
+    """A model by name, in any case; raises DriverError with similar names, or all, for an unknown one."""
     name = model.strip().lower().replace("_", "-")
     models = known_models()
     if name in models:
@@ -57,16 +51,12 @@ def hobby_model(model: str) -> HobbyModel:
 
 
 def check_hobby(model: str) -> None:
-    """Raises DriverError where a board for hobby servos cannot drive the model."""
+    """Raises DriverError for a model that is no hobby servo."""
     hobby_model(model)
 
 
 class PulseScale:
-    """Angles of ``n`` hobby servos as pulses, and back.
-
-    Parameters
-    ----------
-    servos : n of them.
+    """Conversion between angles and pulses of n hobby servos.
 
     Attributes
     ----------
@@ -74,25 +64,31 @@ class PulseScale:
 
     Raises
     ------
-    DriverError : unknown model, a calibration that does not rise or fall all the way, or pulses no board makes.
+    DriverError : unknown model, a calibration that is not monotonic, or pulses that no board can make.
     """
 
     def __init__(self, servos: Sequence[ServoSpec]) -> None:
         curves = [_curve(servo) for servo in servos]
-        self._rad, self._us = (_stacked([curve[side] for curve in curves]) for side in (0, 1))
+        self._rad, self._us = (_padded([curve[side] for curve in curves]) for side in (0, 1))
         self._sign = np.sign(self._us[:, -1] - self._us[:, 0])
         ends = [self.pulses(np.array([getattr(s, end) for s in servos])) for end in ("min_rad", "max_rad")]
         self.low_us, self.high_us = np.minimum(*ends), np.maximum(*ends)
         self.us_per_rad = np.abs(np.diff(self._us) / np.diff(self._rad)).max(axis=1)
         for i, servo in enumerate(servos):
-            _check_reach(servo, float(self.low_us[i]), float(self.high_us[i]))
+            low, high = float(self.low_us[i]), float(self.high_us[i])
+            if low < LOWEST_US or high > HIGHEST_US:
+                raise DriverError(
+                    f"servo {servo.name!r} (id {servo.id}): its limits would be pulses of {low:.0f} to {high:.0f} us, "
+                    f"and none is outside {LOWEST_US:g} to {HIGHEST_US:g}",
+                    hint="narrow limit_deg, or calibrate its pulses",
+                )
 
     def pulses(self, angle_rad: Floats) -> Floats:
         """(n,) us for angles (n,) rad."""
-        return _bent(angle_rad, self._rad, self._us)
+        return _extrapolated(angle_rad, self._rad, self._us)
 
     def steps(self, angle_rad: Floats, per_us: int) -> Indices:
-        """(n,) whole steps of ``1 / per_us`` us for angles (n,) rad, never beyond the servos' limits."""
+        """(n,) whole steps of ``1 / per_us`` us for angles (n,) rad, inside the servos' limits."""
         steps = np.rint(self.pulses(angle_rad) * per_us)
         low, high = np.ceil(self.low_us * per_us), np.floor(self.high_us * per_us)
         kept: Indices = np.minimum(np.maximum(steps, low), high).astype(np.intp)
@@ -100,7 +96,7 @@ class PulseScale:
 
     def radians(self, pulse_us: Floats) -> Floats:
         """(n,) rad for pulses (n,) us; NaN for 0, which is no pulse."""
-        angles = _bent(self._sign * pulse_us, self._sign[:, None] * self._us, self._rad)
+        angles = _extrapolated(self._sign * pulse_us, self._sign[:, None] * self._us, self._rad)
         return np.where(pulse_us > 0.0, angles, math.nan)
 
     def radian(self, index: int, pulse_us: float) -> float:
@@ -109,7 +105,7 @@ class PulseScale:
 
 
 def _curve(servo: ServoSpec) -> tuple[Floats, Floats]:
-    """The servo's angles (k,), growing, and its pulses (k,) there."""
+    """Increasing angles (k,) of a servo, and its pulses (k,) at them."""
     if servo.pulse_us:
         points = sorted(servo.pulse_us)
         rad, us = (np.array(column) for column in zip(*points, strict=True))
@@ -127,27 +123,72 @@ def _curve(servo: ServoSpec) -> tuple[Floats, Floats]:
     return rad, us
 
 
-def _check_reach(servo: ServoSpec, low_us: float, high_us: float) -> None:
-    if low_us < LOWEST_US or high_us > HIGHEST_US:
-        raise DriverError(
-            f"servo {servo.name!r} (id {servo.id}): its limits would be pulses of {low_us:.0f} to {high_us:.0f} us, "
-            f"and none is outside {LOWEST_US:g} to {HIGHEST_US:g}",
-            hint="narrow limit_deg, or calibrate its pulses",
-        )
-
-
-def _stacked(rows: Sequence[Floats]) -> Floats:
-    """Points of several curves as (n, k): shorter ones go on straight."""
+def _padded(rows: Sequence[Floats]) -> Floats:
+    """Points of several curves as (n, k); shorter ones are extended linearly."""
     k = max(len(row) for row in rows)
     return np.array([np.concatenate([row, row[-1] + (row[-1] - row[-2]) * np.arange(1, k - len(row) + 1)])
                      for row in rows])  # fmt: skip
 
 
-def _bent(x: Floats, at: Floats, gives: Floats) -> Floats:
-    """Each curve of points (n, k) at its own x (n,); beyond their ends they go on straight."""
+def _extrapolated(x: Floats, at: Floats, gives: Floats) -> Floats:
+    """Piecewise linear curves through points (n, k), each at its own x (n,); extrapolated beyond their ends."""
     rows = np.arange(len(x))
     piece = (x[:, None] > at[:, 1:-1]).sum(axis=1)
     start, end = at[rows, piece], at[rows, piece + 1]
     low, high = gives[rows, piece], gives[rows, piece + 1]
     out: Floats = low + (x - start) * (high - low) / (end - start)
     return out
+
+
+class ValueScale:
+    """Conversion between angles of n servos and the values that lines of text have.
+
+    Parameters
+    ----------
+    fields : value of each servo: ``us``, ``deg``, ``deg10``, ``angle``, ``unit`` (:mod:`drivers.text.template`), or
+        ``parameter`` (1 for 90 degrees of the shaft).
+    decimals : of each value on the wire.
+    """
+
+    def __init__(self, servos: Sequence[ServoSpec], fields: Sequence[str], decimals: Sequence[int]) -> None:
+        self._step = np.array([10.0**-places for places in decimals])
+        self._offset, self._slope = np.array([_line(field, s) for field, s in zip(fields, servos, strict=True)]).T
+        self._us = [i for i, field in enumerate(fields) if field == "us"]
+        self._pulses = PulseScale([servos[i] for i in self._us]) if self._us else None
+        ends = [self._exact(np.array([getattr(s, end) for s in servos])) for end in ("min_rad", "max_rad")]
+        self._low, self._high = np.minimum(*ends), np.maximum(*ends)
+
+    def values(self, angle_rad: Floats) -> Floats:
+        """(n,) values for angles (n,) rad, rounded to the last decimal inside the servos' limits."""
+        rounded = np.rint(self._exact(angle_rad) / self._step)
+        low = np.ceil(self._low / self._step - 1e-9)
+        high = np.floor(self._high / self._step + 1e-9)
+        values: Floats = np.minimum(np.maximum(rounded, low), high) * self._step
+        return values
+
+    def radians(self, values: Floats) -> Floats:
+        """(n,) rad for values (n,)."""
+        angles: Floats = (values - self._offset) / self._slope
+        if self._pulses:
+            angles[self._us] = self._pulses.radians(values[self._us])
+        return angles
+
+    def _exact(self, angle_rad: Floats) -> Floats:
+        values: Floats = self._offset + self._slope * angle_rad
+        if self._pulses:
+            values[self._us] = self._pulses.pulses(angle_rad[self._us])
+        return values
+
+
+def _line(field: str, servo: ServoSpec) -> tuple[float, float]:
+    """Value at angle 0, and value per radian; unused for pulses."""
+    if field == "us":
+        return 0.0, 1.0
+    if field == "unit":
+        span = servo.max_rad - servo.min_rad
+        return -servo.min_rad / span, 1.0 / span
+    middle, slope = math.degrees(servo.zero_rad), math.degrees(-1.0 if servo.reverse else 1.0)
+    if field == "angle":
+        middle -= math.degrees(hobby_model(servo.model).rad[0])
+    factor = {"deg10": 10.0, "parameter": 1.0 / 90.0}.get(field, 1.0)
+    return factor * middle, factor * slope

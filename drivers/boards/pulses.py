@@ -1,9 +1,8 @@
-"""Boards that put out pulses for hobby servos: what one says of a pulse is checked against what it was told."""
+"""Base class of drivers for boards that put out pulses, with a plausibility check of the pulses they report."""
 
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -18,14 +17,14 @@ GROUP = 8
 
 
 class PulseTrack:
-    """Between which pulses each of ``n`` outputs must be: those it was last seen at and those it was told since.
+    """Range of pulses that each of n outputs can have: where it was last seen, and its goals since.
 
-    A board moves towards its targets, and beyond one only as far as it needs to stop; so an answer outside is a
-    damaged or a foreign one.
+    A board moves its outputs towards their goals and overshoots only by its braking distance, so a pulse outside of the
+    range was damaged or belongs to another request.
 
     Attributes
     ----------
-    goal_us : (n,) last target; NaN for none.
+    goal_us : (n,) last goal; NaN for none.
     """
 
     def __init__(self, n: int) -> None:
@@ -33,20 +32,18 @@ class PulseTrack:
         self._low, self._high = self.goal_us, self.goal_us
 
     def begin(self, seen_us: Floats) -> None:
-        """Begin from what a board puts out (n,) us; 0 is no pulses."""
+        """Start from what a board puts out (n,) us; 0 is no pulses."""
         self._low, self._high = np.fmin(seen_us, self.goal_us), np.fmax(seen_us, self.goal_us)
 
     def go(self, goal_us: Floats) -> None:
-        """New targets (n,) us; NaN keeps the one before."""
+        """Set new goals (n,) us; NaN keeps the last one."""
         self.goal_us = np.where(np.isfinite(goal_us), goal_us, self.goal_us)
         self._low, self._high = np.fmin(self._low, self.goal_us), np.fmax(self._high, self.goal_us)
 
     def believes(self, index: int, pulse_us: float, slack_us: float, stop_us: float = 0.0) -> bool:
-        """Whether an output can be where an answer says; narrows the range when it has arrived.
+        """Whether an output can have a pulse; a pulse at the goal narrows the range to it.
 
-        Parameters
-        ----------
-        slack_us : the board's own rounding. stop_us : the way it may need to stop.
+        ``slack_us`` is the board's own rounding, ``stop_us`` its braking distance.
         """
         if not pulse_us:
             return True
@@ -59,50 +56,31 @@ class PulseTrack:
 
 
 class PulseBus(BoardBus):
-    """A board of hobby servos. See :class:`~drivers.boards.bus.BoardBus`.
-
-    Parameters
-    ----------
-    servos : the servos; ``id`` is the channel.
-    options : see :class:`~drivers.boards.bus.BoardBus`.
-
-    Raises
-    ------
-    DriverError : a model that is no hobby servo.
-    """
+    """A board of hobby servos, whose ``id`` is the channel; options as :class:`~drivers.boards.bus.BoardBus`."""
 
     SLACK_US = 2.0
-    """By how much an answer may be off for the board's own rounding."""
+    """Deviation of a reported pulse by the board's own rounding."""
 
     def __init__(self, servos: Iterable[ServoSpec], **options: Any) -> None:
         super().__init__(servos, **options)
         self._scale = PulseScale(self.servos)
         self._track = PulseTrack(len(self.servos))
-        self._stop_us = np.zeros(len(self.servos))  # way to stop, where the board limits the acceleration
+        self._stop_us = np.zeros(len(self.servos))  # braking distance, where the board limits the acceleration
+        indices = list(range(len(self.servos)))
+        self._groups = [indices[i : i + GROUP] for i in range(0, len(indices), GROUP)]
         self._next = 0
-        self._forgot = False
+        self._forgot = False  # the board may have been reset
 
-    @abstractmethod
     def _doubt(self) -> None:
-        """An answer cannot be right; what comes next may not be either."""
+        """React to an implausible answer; nothing where answers name their servo."""
 
     def _turn(self) -> list[int]:
-        """The servos to ask in this cycle."""
-        groups = self._groups()
-        self._next = (self._next + 1) % len(groups)
-        return groups[self._next]
-
-    def _groups(self) -> list[list[int]]:
-        indices = list(range(len(self.servos)))
-        return [indices[i : i + GROUP] for i in range(0, len(indices), GROUP)]
-
-    def _present(self, seen_us: Floats) -> Floats:
-        """Angles (n,) rad for pulses (n,) us that a board puts out, NaN where there are none."""
-        self._track.begin(seen_us)
-        return self._scale.radians(seen_us)
+        """Indices of the servos to ask in this cycle."""
+        self._next = (self._next + 1) % len(self._groups)
+        return self._groups[self._next]
 
     def _take(self, group: Sequence[int], pulses: Iterable[float]) -> None:
-        """What the board says of some servos. One that lost its pulses may have lost all it was set to."""
+        """Check and store reported pulses (us); a servo that lost them shows that the board may have been reset."""
         seen = np.zeros(len(self.servos))
         seen[list(group)] = pulses = list(pulses)
         angles = self._scale.radians(seen)

@@ -1,13 +1,12 @@
-"""A small process that lets servos go when the program that drives them is killed.
+"""Dead man's switch: a small child process that switches servos off when the program that drives them is killed.
 
-For servos without a bus watchdog, on POSIX systems. It sleeps beside the program and, when that ends without a word
-(SIGKILL, a crash of the interpreter), opens the port and sends what switches the motors off. It helps against nothing
-that takes the computer or the adapter away; and it stands back where another program has the port by then.
+For servos without a bus watchdog, on POSIX systems. When the program ends without dismissing it (SIGKILL, a crash of
+the interpreter), it opens the port and sends packets that switch the motors off, unless another program has the port
+by then. It does not help when the computer or the adapter fails.
 
-:class:`DeadManSwitch` starts it, as ``python -m drivers.core.dead_man_switch PARENT``. It reads its orders (a JSON
-line) from standard input, carries them out once on a pseudo-terminal of its own, so that nothing has to be imported
-when it matters, and answers ``ready``, or ``failed WHY``, on standard output. Then it waits for the end of its input or
-of its parent.
+:class:`DeadManSwitch` starts it, as ``python -m drivers.core.dead_man_switch PARENT``. The process reads its orders (a
+JSON line) from standard input, carries them out once on a pseudo-terminal, so that nothing has to be imported later,
+and answers ``ready`` or ``failed WHY`` on standard output. Then it waits for the end of its input or its parent.
 """
 
 from __future__ import annotations
@@ -29,11 +28,11 @@ if TYPE_CHECKING:
     import subprocess
 
 READY_S = 15.0
-"""A process that does not stand ready after this time is given up; it takes a tenth of a second, more on a busy one."""
+"""Time limit for the process to get ready; it takes a tenth of a second, more on a busy computer."""
 LOOK_S = 0.25
-"""How often it looks whether its parent is still there, should the pipe between them be held open by others."""
+"""Interval of checking the parent process, for a pipe that other processes hold open."""
 BUSY_S = 0.3
-"""Time in which a dying program gives its port back; who holds it later is another one."""
+"""Time in which a dying program closes its port; afterwards the port is in use by another one."""
 REPEATS = 5
 PAUSE_S = 0.02
 _END_S = 2.0
@@ -41,45 +40,40 @@ _MODULE = "drivers.core.dead_man_switch"  # not __name__, which is __main__ in t
 
 
 class DeadManSwitch:
-    """Starts the process, waits until it stands ready, and ends it.
+    """Starts the process, waits until it is ready (else raises DriverError), and ends it.
 
     Parameters
     ----------
-    path : device path of the port.
-    baud : rate on the wire.
-    frames : packets that switch the motors off; nobody answers them.
-    ready_s : how long to wait for it.
-
-    Raises
-    ------
-    DriverError : it does not stand ready: nobody would let the servos go.
+    path, baud : device path and rate of the port.
+    frames : packets that switch the motors off and have no answer.
+    ready_s : time limit for the process to get ready.
     """
 
     def __init__(self, path: str, baud: int, frames: Iterable[bytes], *, ready_s: float = READY_S) -> None:
         try:
             self._process = _start()
         except OSError as error:
-            raise _unready(path, f"{sys.executable or 'Python'} does not start: {error.strerror}") from error
+            raise _not_ready(path, f"{sys.executable or 'Python'} does not start: {error.strerror}") from error
         try:
-            self._say(json.dumps({"path": _anywhere(path), "baud": baud, "frames": [frame.hex() for frame in frames]}))
+            anywhere = path if "://" in path else os.path.abspath(path)
+            self._send(json.dumps({"path": anywhere, "baud": baud, "frames": [frame.hex() for frame in frames]}))
             why = self._why_not_ready(ready_s)
+            if why:
+                raise _not_ready(path, why)
         except BaseException:
             self._kill()
             raise
-        if why:
-            self._kill()
-            raise _unready(path, why)
         _close(self._process.stdout)
 
     @property
     def watching(self) -> bool:
-        """Whether the process is there."""
+        """Whether the process is running."""
         return self._process.poll() is None
 
     def dismiss(self) -> None:
-        """End it: the motors are off, or somebody else's matter. May be called any number of times."""
+        """End the process without switching anything off; may be called any number of times."""
         if self._process.stdin is not None and not self._process.stdin.closed:
-            self._say("bye")
+            self._send("bye")
             _close(self._process.stdin)
         import subprocess  # start-up: the process itself does without
 
@@ -89,18 +83,19 @@ class DeadManSwitch:
             self._kill()
 
     def _why_not_ready(self, ready_s: float) -> str:
-        """Wait for its answer; empty when it stands ready."""
-        said = _line(self._process.stdout, time.monotonic() + ready_s)
-        word, _, why = (said or "").partition(" ")
+        """Wait for the answer of the process; empty when it is ready."""
+        pipe, deadline_s = self._process.stdout, time.monotonic() + ready_s
+        answer = None if pipe is None else _read_line(pipe.fileno(), deadline_s)
+        if answer is None:
+            return f"its process was not ready within {ready_s:g} s"
+        word, _, why = answer.decode(errors="replace").strip().partition(" ")
         if word == "ready":
             return ""
-        if said is None:
-            return f"its process did not say that it stands ready within {ready_s:g} s"
         return why or f"its process ended with status {self._process.wait()}, see its message above"
 
-    def _say(self, line: str) -> None:
+    def _send(self, line: str) -> None:
         if self._process.stdin is not None:
-            with suppress(OSError):  # it died, which is told by who looks at it
+            with suppress(OSError):  # where the process has ended, its answer or `watching` shows it
                 self._process.stdin.write(line.encode() + b"\n")
                 self._process.stdin.flush()
 
@@ -112,7 +107,7 @@ class DeadManSwitch:
 
 
 def _start() -> subprocess.Popen[bytes]:
-    """The process; what it has to say beside its answer goes where the program's own errors go."""
+    """Start the process; its standard error is the program's own."""
     import subprocess  # the process itself does without
 
     return subprocess.Popen(
@@ -120,17 +115,12 @@ def _start() -> subprocess.Popen[bytes]:
         env=environment(_MODULE, bare=True),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        cwd="/",  # whoever takes the current folder away, or its disk, is not kept from it
-        start_new_session=True,  # signals of a terminal are not for it
+        cwd="/",  # so that it does not keep the current folder or its disk in use
+        start_new_session=True,  # signals of a terminal do not reach it
     )
 
 
-def _anywhere(path: str) -> str:
-    """A path that means the same from every folder."""
-    return path if "://" in path else os.path.abspath(path)
-
-
-def _unready(path: str, why: str) -> Exception:
+def _not_ready(path: str, why: str) -> Exception:
     from drivers.base.errors import DriverError  # start-up: the process itself loads it when it is ready
 
     return DriverError(
@@ -140,77 +130,53 @@ def _unready(path: str, why: str) -> Exception:
     )
 
 
-def _line(pipe: Any, deadline_s: float) -> str | None:
-    """One line; less where it ends before, None where the time is over first."""
-    data = b""
-    while not data.endswith(b"\n"):
-        if not _readable(pipe, deadline_s):
-            return None
-        part = os.read(pipe.fileno(), 1)
-        if not part:
-            break
-        data += part
-    return data.decode(errors="replace").strip()
-
-
-def _readable(pipe: Any, deadline_s: float) -> bool:
-    """Whether there is something to read by then, in a program with any number of open files."""
-    with selectors.DefaultSelector() as waiting:
-        waiting.register(pipe, selectors.EVENT_READ)
-        return bool(waiting.select(max(deadline_s - time.monotonic(), 0.0)))
-
-
 def _close(pipe: Any) -> None:
     if pipe is not None:
         with suppress(OSError):
             pipe.close()
 
 
+def _read_line(descriptor: int, deadline_s: float | None = None) -> bytes | None:
+    """One line, incomplete where the input ends before; None where the time is over first."""
+    data = b""
+    with selectors.DefaultSelector() as selector:  # unlike select() for any number of open files
+        selector.register(descriptor, selectors.EVENT_READ)
+        while not data.endswith(b"\n"):
+            if not selector.select(None if deadline_s is None else max(deadline_s - time.monotonic(), 0.0)):
+                return None
+            part = os.read(descriptor, 1)  # by byte, so that nothing behind the line is taken
+            if not part:
+                break
+            data += part
+    return data
+
+
 # ---------------------------------------------------------------------- the process itself
 
 
-def keep(source: int, answer: int, parent: int) -> bool:
-    """Take orders, say that all is ready, and let the servos go when the parent ends without a goodbye.
+def watch(source: int, answer: int, parent: int) -> bool:
+    """Take orders, get ready, and switch the servos off when the parent ends without dismissing this process.
 
-    Parameters
-    ----------
-    source, answer : descriptors of orders and of what is answered.
-    parent : process id of the program that is watched over.
-
-    Returns
-    -------
-    bool : False where the orders cannot be carried out.
+    Orders and answer have file descriptors, the parent a process id. False where the orders cannot be carried out.
     """
-    orders = _orders(source)
-    if orders is None:
+    line = _read_line(source) or b""
+    if not line.endswith(b"\n"):
         return True
+    orders = json.loads(line)
     try:
         dry_run(**orders)
-    except Exception as error:  # noqa: BLE001  whatever it is, the program must hear it
-        _tell(answer, f"failed {type(error).__name__}: {error}")
+    except Exception as error:  # noqa: BLE001  whatever it is, the program must report it
+        _print(answer, f"failed {type(error).__name__}: {error}")
         return False
-    _tell(answer, "ready")
-    if _left_alone(source, parent):
-        gone = let_go(**orders)
-        done = "were told to let go" if gone else "were left as they are: its port cannot be had"
-        _tell(2, f"the program that drove servos on {orders['path']} was killed; they {done}")
+    _print(answer, "ready")
+    if _parent_died(source, parent):
+        done = "were switched off" if switch_off(**orders) else "were not switched off: its port cannot be opened"
+        _print(2, f"the program that drove servos on {orders['path']} was killed; they {done}")
     return True
 
 
-def _orders(source: int) -> dict[str, Any] | None:
-    """The first line; None where there is none."""
-    data = b""
-    while not data.endswith(b"\n"):
-        part = os.read(source, 1)  # nothing behind it is taken away
-        if not part:
-            return None
-        data += part
-    orders: dict[str, Any] = json.loads(data)
-    return orders
-
-
-def _left_alone(source: int, parent: int) -> bool:
-    """Wait for the end of a descriptor, or of the parent; False where a goodbye came first."""
+def _parent_died(source: int, parent: int) -> bool:
+    """Wait for the end of a descriptor or of the parent; False where the parent sent ``bye`` first."""
     data = b""
     while True:
         ready, _, _ = select.select([source], [], [], LOOK_S)
@@ -218,30 +184,25 @@ def _left_alone(source: int, parent: int) -> bool:
             part = os.read(source, 4096)
             data += part
             if data.endswith(b"bye\n") or not part:
-                return bool(not part)
+                return not part
         elif os.getppid() != parent:
             return True
 
 
 def dry_run(path: str, baud: int, frames: Iterable[str]) -> None:
-    """Let go on a pseudo-terminal of our own: all that it takes is loaded then, and known to work.
-
-    Raises
-    ------
-    Exception : whatever would be in the way.
-    """
+    """Switch off on a pseudo-terminal, which loads and tries all code that is needed; raises whatever goes wrong."""
     scheme, has_scheme, _ = path.partition("://")
     if has_scheme:
         _load_scheme(scheme)
     try:
         far, near = os.openpty()
-    except OSError:  # a system without them: loading is what can be done
-        from drivers.port.serialport import SerialPort  # start-up: see let_go
+    except OSError:  # a system without them: loading is all that can be done
+        from drivers.port.serialport import SerialPort  # start-up: see switch_off
 
         SerialPort(path, baud)
         return
     try:
-        if not let_go(os.ttyname(near), baud, frames, repeats=1) and sys.platform == "linux":
+        if not switch_off(os.ttyname(near), baud, frames, repeats=1) and sys.platform == "linux":
             raise RuntimeError("cannot open a pseudo-terminal")  # other systems may refuse its rate
     finally:
         os.close(near)
@@ -249,7 +210,7 @@ def dry_run(path: str, baud: int, frames: Iterable[str]) -> None:
 
 
 def _load_scheme(scheme: str) -> None:
-    """What pyserial and the system load only when a port in the network is opened."""
+    """Import what pyserial and the system import only when a network port is opened."""
     from importlib import import_module  # start-up: few ports are in the network
 
     "localhost".encode("idna")
@@ -257,9 +218,9 @@ def _load_scheme(scheme: str) -> None:
         import_module(f"serial.urlhandler.protocol_{scheme}")
 
 
-def let_go(path: str, baud: int, frames: Iterable[str], repeats: int = REPEATS) -> bool:
-    """Send packets (hexadecimal) on a port, some times over. False where it cannot be had."""
-    # start-up: the process says that it is there before it loads this
+def switch_off(path: str, baud: int, frames: Iterable[str], repeats: int = REPEATS) -> bool:
+    """Send packets (hexadecimal) on a port several times; False where the port cannot be opened."""
+    # start-up: the parent waits until these are loaded
     from drivers.base.errors import PortBusy, PortError
     from drivers.port.serialport import SerialPort
 
@@ -282,18 +243,18 @@ def let_go(path: str, baud: int, frames: Iterable[str], repeats: int = REPEATS) 
     return True
 
 
-def _tell(descriptor: int, line: str) -> None:
-    """Write a line where somebody may listen; who is gone, or does not read, is not waited for."""
+def _print(descriptor: int, line: str) -> None:
+    """Write a line without waiting for the reader, which may be gone."""
     with suppress(OSError, ValueError):
         if select.select([], [descriptor], [], 0.0)[1]:
             os.write(descriptor, (" ".join(line.split()) + "\n").encode(errors="replace"))
 
 
 def main() -> int:
-    """Be the process. It ends with its parent, not by what a whole group of processes is told."""
+    """Run the process; signals to the whole process group do not end it, the end of its parent does."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    return 0 if keep(0, 1, int(sys.argv[1])) else 1
+    return 0 if watch(0, 1, int(sys.argv[1])) else 1
 
 
 if __name__ == "__main__":

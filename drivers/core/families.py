@@ -1,7 +1,7 @@
-"""What a family of servos or boards says of itself, and the options that many families share.
+"""Definition of a plug-in family of servos or boards, and the options that many families share.
 
-A family is a folder of ``drivers`` with a module ``family`` that holds ``FAMILY``, or a package of somebody else with
-an entry point in the group ``omote.drivers`` that names a :class:`Family`; see docs/extending.md.
+A family is a folder of ``drivers`` whose module ``family`` has a :class:`Family` named ``FAMILY``, or another package
+with an entry point to one in the group ``omote.drivers``; see docs/extending.md.
 """
 
 from __future__ import annotations
@@ -11,34 +11,34 @@ from dataclasses import dataclass
 from drivers.base.options import option
 
 API = 1
-"""Version of what a family must keep: this module, ``drivers.core.wirebus`` and ``drivers.sim.wire.simulator``."""
+"""Version of the interface: this module, ``drivers.core.wirebus`` and ``drivers.sim.wire.simulator``."""
 
 RESERVED = (
     "name", "kind", "port", "baud", "rate_hz", "simulates", "transport", "faults", "wire", "latency_s", "seed",
 )  # fmt: skip
-"""Keys of every bus in a robot file: no family's settings may have them."""
+"""Keys of every bus in a robot file, which no family's settings may use."""
 
 SERVO_BAUD, BOARD_BAUD = 1_000_000, 115_200
-"""Rates that servos and boards leave the factory with."""
+"""Factory default rates of servos and boards."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """What drives one sort of servos or boards, and what stands in for it.
+    """One family of servos or boards: its driver, settings and simulator.
 
     Attributes
     ----------
-    api : version of the registry it is made for; see :data:`API`.
-    kind : what robot files call it. title : what people call it, as "Pololu Maestro boards".
-    driver : ``"module:name"`` of a :class:`drivers.core.wirebus.WireBus`, or of a function that gives one for a
-        sequence of servos where the family needs more than one.
-    settings : dataclass of what the driver can be told besides :data:`RESERVED`, see :mod:`drivers.base.options`; a
-        method ``check(self, rate_hz)``, where it has one, raises ValueError where values do not go together.
+    api : version of the interface it is made for; see :data:`API`.
+    kind : name in robot files. title : name for people, as "Pololu Maestro boards".
+    driver : ``"module:name"`` of a :class:`drivers.core.wirebus.WireBus`, or of a function that returns one for a
+        sequence of servos.
+    settings : dataclass of the driver's options besides :data:`RESERVED`, see :mod:`drivers.base.options`; its method
+        ``check(self, rate_hz)``, if any, raises ValueError where values contradict each other.
     check_model : ``"module:name"`` of a function that raises DriverError for a model that it does not drive.
     simulator : ``"module:name"`` of a :class:`drivers.sim.wire.simulator.Simulator`; empty: none.
-    baud : rate of the port where a file gives none.
+    baud : default rate of the port.
     hobby : its servos are hobby servos, whose pulses can be calibrated.
-    install : what ``pip install`` takes where a package is missing.
+    install : argument of ``pip install`` where a package is missing.
     """
 
     api: int
@@ -55,7 +55,7 @@ class Family:
 
 @dataclass(frozen=True, kw_only=True)
 class AnySettings:
-    """What every driver can be told."""
+    """Options of every driver."""
 
     margin_s: float | None = option(
         "Longest wait for an answer beyond its time on the wire (s).", at_least=0, at_most=600
@@ -63,12 +63,12 @@ class AnySettings:
 
 
 WATCHDOG_MS = 200
-"""What drivers of servos set where a file says nothing."""
+"""Default bus watchdog of servos."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ServoSettings(AnySettings):
-    """What drivers of servos with control tables can be told."""
+    """Options of drivers of servos with control tables."""
 
     watchdog_ms: int | None = option(
         "Servos stop when nothing was heard for this time; 0 is never (ms).", at_least=0, at_most=2540
@@ -81,7 +81,7 @@ class ServoSettings(AnySettings):
     slow_group: int | None = option("Servos asked for slow values in one cycle.", at_least=0, at_most=252)
 
     def check(self, rate_hz: float) -> None:
-        """Raises ValueError for a watchdog that would bite between two cycles."""
+        """Raises ValueError for a watchdog that would trip between two cycles."""
         watchdog_ms = WATCHDOG_MS if self.watchdog_ms is None else self.watchdog_ms
         if 0 < watchdog_ms < 2000 / rate_hz:
             raise ValueError(f"watchdog_ms must be 0 or span two cycles, {2000 / rate_hz:g} at this rate_hz")
@@ -89,6 +89,6 @@ class ServoSettings(AnySettings):
 
 @dataclass(frozen=True, kw_only=True)
 class PulseSettings(AnySettings):
-    """What drivers of boards of hobby servos can be told."""
+    """Options of drivers of hobby servo boards."""
 
     stagger_s: float | None = option("Pause between switching servos on (s).", at_least=0, at_most=1)

@@ -1,10 +1,9 @@
-"""Compiled inner loops of a bus cycle. Importing this imports numba, so do it only where a bus is driven.
+"""Compiled inner loops of a bus cycle: decoding replies, CRC-16, target limits, and goals in encoder steps.
 
-Between the last byte of a reply and the first byte of the next goal the wire is idle: what is done there is done
-here, in one call each, because after every wait for the wire the interpreter starts cold.
-
-The types stand with each kernel so that it is compiled on import, before a port is opened: compiled at its first call,
-on a new machine, it would hold up a bus under torque for longer than the servos' watchdog waits.
+The wire is idle between the last byte of a reply and the first byte of the next goal, so each stage there is one call.
+Importing this module imports numba; do so only where a bus is driven. Every kernel declares its types, so that it is
+compiled on import, before a port is opened: compiled at its first call it would delay a bus under torque beyond the
+servos' watchdog.
 """
 
 from __future__ import annotations
@@ -29,10 +28,10 @@ _BOUNDS, _TABLE = types.int32[:, ::1], types.float64[:, ::1]
 _REAL, _FLAG = types.float64, types.boolean
 
 UNSIGNED, TWOS_COMPLEMENT, SIGN_MAGNITUDE = range(3)
-"""How a register keeps its sign; the last with one bit for the direction (XL-320)."""
+"""Encodings of a register's sign; the last has one bit for the direction (XL-320)."""
 FIELDS = ("position", "velocity", "current", "temperature", "hardware", "torque", "watchdog")
 TEMPERATURE, HARDWARE, TORQUE, WATCHDOG = range(3, 7)
-"""Registers that `take_replies` knows, in its order, and those of them that are not motion."""
+"""Registers that `take_replies` reads, in its order, and the indices of those that are not motion."""
 
 
 def _kernel(*parameters: Any) -> Any:
@@ -49,7 +48,7 @@ def crc_span(data, begin, end, state):  # type: ignore[no-untyped-def]
 
 @_kernel(_BYTES, int64, int64)
 def has_header(data, begin, end):  # type: ignore[no-untyped-def]
-    """Whether ``data[begin:end]`` (uint8) holds FF FF FD, which travels with another FD behind it."""
+    """Whether ``data[begin:end]`` (uint8) holds FF FF FD, which Protocol 2.0 stuffs with another FD."""
     for at in range(begin, end - 2):  # noqa: SIM110  numba compiles no any()
         if data[at] == 0xFF and data[at + 1] == 0xFF and data[at + 2] == 0xFD:
             return True
@@ -58,13 +57,13 @@ def has_header(data, begin, end):  # type: ignore[no-untyped-def]
 
 @_kernel(_BYTES, _SPANS, _HEADS, _STATES)
 def check_replies(data, spans, heads, states):  # type: ignore[no-untyped-def]
-    """Whether `data` is what k servos answer one by one when all is well: heads, CRCs, nothing stuffed.
+    """Whether `data` holds k valid status packets, one of each servo: heads and CRCs match, nothing is stuffed.
 
     Parameters
     ----------
     data : (m,) uint8, not shorter than the replies.
-    spans : (k, 3) int64: a servo's id, where its error byte stands, and where its reply ends.
-    heads : (k, 8) uint8, what each packet begins with.
+    spans : (k, 3) int64: a servo's id, index of its error byte, end of its reply.
+    heads : (k, 8) uint8, first bytes of each packet.
     states : (k,) int64, the CRC of each head.
     """
     for k in range(spans.shape[0]):
@@ -79,7 +78,7 @@ def check_replies(data, spans, heads, states):  # type: ignore[no-untyped-def]
 
 @_kernel(_BYTES, _SPANS, _HEADS, _STATES)
 def check_joint(data, spans, heads, states):  # type: ignore[no-untyped-def]
-    """The same for one packet of all servos, where each CRC covers all that comes before it; one head, one state."""
+    """As `check_replies` for a fast sync read, where each CRC covers all bytes before it; one head, one state."""
     for at in range(8):
         if data[at] != heads[0, at]:
             return False
@@ -95,7 +94,7 @@ def check_joint(data, spans, heads, states):  # type: ignore[no-untyped-def]
 
 @_kernel(_BYTES, int64, _STATES)
 def register(data, begin, field):  # type: ignore[no-untyped-def]
-    """A register, low byte first; `field` (3,) int64: offset from `begin`, bytes (0: not read), kind of sign."""
+    """Decode a little-endian register; `field` (3,) int64: offset from `begin`, bytes (0: not read), sign encoding."""
     value, size = 0, field[1]
     for i in range(size):
         value |= int64(data[begin + field[0] + i]) << (8 * i)
@@ -109,9 +108,9 @@ def register(data, begin, field):  # type: ignore[no-untyped-def]
 
 @_kernel(_BYTES, int64, int64, _SPANS, _TABLE, _OCTETS, _TABLE)
 def is_ordinary(data, begin, i, fields, scales, octets, known):  # type: ignore[no-untyped-def]
-    """Whether the reply that begins with the error byte at `begin` tells of servo `i` nothing that was not known.
+    """Whether the reply with its error byte at `begin` changes nothing of servo `i` but its motion.
 
-    One that reads 0 throughout has forgotten its pointers; other parameters see `take_replies`.
+    A servo whose indirect addresses were reset reads 0 throughout, which is a change. Parameters as in `take_replies`.
     """
     if data[begin] != octets[0, i]:
         return False
@@ -132,7 +131,7 @@ def is_ordinary(data, begin, i, fields, scales, octets, known):  # type: ignore[
 
 @_kernel(_TABLE, _TABLE, _REAL, _TABLE)
 def to_si(known, axes, now_s, out):  # type: ignore[no-untyped-def]
-    """Angle, speed, current and age of n servos into the rows of `out`, (4, n); others see `take_replies`."""
+    """Write angle, speed, current and age of n servos to the rows of `out` (4, n); parameters as in `take_replies`."""
     for i in range(known.shape[1]):
         out[0, i] = axes[0, i] * ((known[0, i] - axes[2, i]) * axes[3, i] - axes[1, i])
         out[1, i] = axes[0, i] * known[1, i]
@@ -142,16 +141,16 @@ def to_si(known, axes, now_s, out):  # type: ignore[no-untyped-def]
 
 @_kernel(_BYTES, _FLAG, _SPANS, _HEADS, _STATES, _PLACES, _FIELDS, _TABLE, _TABLE, _REAL, _OCTETS, _TABLE, _TABLE)
 def take_replies(data, joint, spans, heads, states, places, fields, scales, axes, now_s, octets, known, out):  # type: ignore[no-untyped-def]
-    """All that a cycle brings, where every servo answered and nothing is new but its motion; else False, unchanged.
+    """Decode the replies of one cycle where all are valid and only motion changed; else return False, all unchanged.
 
     Parameters
     ----------
     data, spans, heads, states : see `check_replies` and, with `joint`, `check_joint`.
-    places : (k,) int64, where in the arrays of the bus each servo stands.
+    places : (k,) int64, index of each servo in the arrays of the bus.
     fields : (k, 7, 3) int64, see `register`: the rows named by `FIELDS`, their offsets from the error byte.
     scales : (3, n), steps of velocity, current and temperature in SI units.
     axes : (4, n), see `to_steps`.
-    now_s : when the replies were in.
+    now_s : time of the replies.
     octets : (4, n) uint8: error byte, hardware error, torque, freshness.
     known : (6, n): position (steps), velocity, current, time, supply, temperature.
     out : (4, n), see `to_si`.
@@ -175,15 +174,14 @@ def take_replies(data, joint, spans, heads, states, places, fields, scales, axes
 
 @_kernel(_FRAME, int64, _STEPS, _PLACES, int64, int64)
 def put_goals(frame, at, goals, places, size, state):  # type: ignore[no-untyped-def]
-    """Goals into a sync write and its CRC behind them; False where they hold FF FF FD and must be stuffed.
+    """Write goals and CRC into a sync write packet; False where they hold FF FF FD and must be stuffed.
 
     Parameters
     ----------
-    frame : (m,) uint8, the packet with other goals.
-    at : where its rows begin: an id and `size` bytes each.
-    goals : (n,) int32 of the bus.
-    places : (k,) int64, which of them.
-    state : CRC of what lies before the rows.
+    frame : (m,) uint8, the packet.
+    at : index of its rows: an id and `size` bytes each.
+    goals : (n,) int32 of the bus. places : (k,) int64, indices of the goals in the packet.
+    state : CRC of the bytes before the rows.
     """
     for k in range(places.shape[0]):
         value, row = int64(goals[places[k]]), at + k * (1 + size) + 1
@@ -197,44 +195,33 @@ def put_goals(frame, at, goals, places, size, state):  # type: ignore[no-untyped
     return True
 
 
-@_kernel(*[_REALS] * 4)
-def clip_targets(wanted, low, high, target):  # type: ignore[no-untyped-def]
-    """Finite targets, inside their limits, into `target`; all (n,) float64. Returns how many were not, of each."""
-    refused = clipped = 0
+@_kernel(*[_REALS] * 4, _REAL, _REAL, *[_REALS] * 3)
+def limit_targets(wanted, low, high, speed, elapsed_s, burst_s, target, budget, last):  # type: ignore[no-untyped-def]
+    """Clip finite targets into `target`, and move `last` towards it as far as the travel budget allows; (n,) float64.
+
+    The budget grows by `elapsed_s` at top speed up to `burst_s` of it. Returns how many targets were not finite, were
+    clipped, and were not reached.
+    """
+    refused = clipped = short = 0
     for i in range(wanted.shape[0]):
         if np.isfinite(wanted[i]):
             target[i] = min(max(wanted[i], low[i]), high[i])
             clipped += target[i] != wanted[i]
         else:
             refused += 1
-    return refused, clipped
-
-
-@_kernel(_REALS, _REALS, _REAL, _REAL, _REALS, _REALS)
-def spend_travel(target, speed, elapsed_s, burst_s, saved, last):  # type: ignore[no-untyped-def]
-    """Move `last` towards `target` as far as saved-up travel allows; all (n,) float64. Returns how many fell short."""
-    short = 0
-    for i in range(target.shape[0]):
-        saved[i] = min(saved[i] + elapsed_s * speed[i], burst_s * speed[i])
-        move = min(max(target[i] - last[i], -saved[i]), saved[i])
-        saved[i] -= abs(move)
+        budget[i] = min(budget[i] + elapsed_s * speed[i], burst_s * speed[i])
+        move = min(max(target[i] - last[i], -budget[i]), budget[i])
+        budget[i] -= abs(move)
         last[i] += move
         short += abs(last[i] - target[i]) > 1e-9
-    return short
-
-
-@_kernel(*[_REALS] * 5, _REAL, _REAL, _REALS, _REALS)
-def limit_targets(wanted, low, high, target, speed, elapsed_s, burst_s, saved, last):  # type: ignore[no-untyped-def]
-    """`clip_targets` and `spend_travel` in one call; returns what both do, one behind the other."""
-    refused, clipped = clip_targets(wanted, low, high, target)
-    return refused, clipped, spend_travel(target, speed, elapsed_s, burst_s, saved, last)
+    return refused, clipped, short
 
 
 @_kernel(_REALS, _TABLE, _BOUNDS, _STEPS, _REALS)
 def to_steps(angle_rad, axes, bounds, goals, sent):  # type: ignore[no-untyped-def]
-    """Angles to the nearest steps within limits, into `goals` (n,) int32, and back into `sent` (n,) float64.
+    """Round angles to steps within limits in `goals` (n,) int32, and convert these back to `sent` (n,) float64.
 
-    A goal that lies outside low to high may only go nearer; nothing leaves lowest to highest.
+    A goal outside low to high may only move towards them; none leaves lowest to highest.
 
     Parameters
     ----------

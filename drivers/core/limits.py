@@ -1,4 +1,8 @@
-"""What may be asked of servos: finite, inside the angle limits, and no faster than they can follow."""
+"""Limits of targets before they are sent: finite, inside the angle limits, and no faster than the servo's top speed.
+
+Speed is limited by a budget of travel for each servo, which grows with time at its top speed up to ``BURST_S`` of it,
+and which every step spends. So the mean speed never exceeds the limit, whatever arrives after a pause or a stall.
+"""
 
 from __future__ import annotations
 
@@ -7,61 +11,52 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivers.base.bus import BusReport, Floats, ServoSpec
-from drivers.core.speed_limit import BURST_S, SpeedLimiter
+
+BURST_S = 0.05
+"""Time at top speed that the travel budget holds at most, so that uneven cycles lose no speed."""
 
 
 class TargetLimits:
-    """Carries targets through the limits of their servos and counts what it changed.
-
-    Parameters
-    ----------
-    servos : n of them, in the order of all arrays.
-    report : where it counts.
+    """Applies the limits of n servos to their targets, and counts in a report what it changed.
 
     Attributes
     ----------
-    target : (n,) what was last asked for, inside the angle limits.
+    target : (n,) last targets, inside the angle limits.
     """
 
     def __init__(self, servos: Sequence[ServoSpec], report: BusReport) -> None:
-        self.target: Floats = np.zeros(len(servos))
-        self._low = np.array([servo.min_rad for servo in servos], dtype=np.float64)
-        self._high = np.array([servo.max_rad for servo in servos], dtype=np.float64)
-        self._guard = SpeedLimiter(np.array([servo.max_speed_rad_s for servo in servos]))
-        self._report = report
         from drivers.core.kernels import limit_targets  # compiled: only who drives servos pays for it
 
         self._limit = limit_targets
+        self._low, self._high, self._speed = np.array(
+            [(servo.min_rad, servo.max_rad, servo.max_speed_rad_s) for servo in servos], dtype=np.float64
+        ).T.copy()
+        self._report = report
+        self.reset(np.zeros(len(servos)), 0.0)
 
-    def begin(self, position_rad: Floats, now_s: float) -> None:
-        """Begin from where the servos (n,) are."""
-        self.target = np.array(position_rad, dtype=np.float64)
-        self._guard.reset(self.target, now_s)
+    def reset(self, position_rad: Floats, now_s: float) -> None:
+        """Start from the servos' positions (n,) with an empty travel budget."""
+        self.target: Floats = np.array(position_rad, dtype=np.float64)
+        self._last, self._budget = self.target.copy(), np.zeros_like(self.target)
+        self._time_s = now_s
 
-    def begin_one(self, index: int, position_rad: float) -> None:
-        """One servo begins again from a position."""
-        self.target[index] = position_rad
-        self._guard.reset_one(index, position_rad)
+    def reset_one(self, index: int, position_rad: float) -> None:
+        """Start one servo again from a position."""
+        self.target[index] = self._last[index] = position_rad
+        self._budget[index] = 0.0
 
     def apply(self, wanted_rad: Floats, now_s: float) -> Floats:
-        """What may be asked for now.
+        """Targets (n,) rad inside the angle limits and no further from the last ones than top speed allows.
 
-        Parameters
-        ----------
-        wanted_rad : (n,) targets; one that is no finite number keeps the last one.
-        now_s : monotonic time.
-
-        Returns
-        -------
-        (n,) float64 : inside the angle limits, and no further from the last call's than top speed allows.
+        A target that is no finite number keeps the last one. Time that goes backwards counts as none.
         """
-        guard, report = self._guard, self._report
+        elapsed_s = min(max(now_s - self._time_s, 0.0), BURST_S)
+        self._time_s = now_s
         refused, clipped, shortened = self._limit(
-            wanted_rad, self._low, self._high, self.target,
-            guard.speed, guard.elapsed_s(now_s), BURST_S, guard.saved, guard.last,
-        )  # fmt: skip
+            wanted_rad, self._low, self._high, self._speed, elapsed_s, BURST_S, self.target, self._budget, self._last
+        )
         if refused or clipped or shortened:
-            report.refused_targets += refused
-            report.limits_hit += clipped
-            report.speed_limited += shortened
-        return guard.last.copy()
+            self._report.refused_targets += refused
+            self._report.limits_hit += clipped
+            self._report.speed_limited += shortened
+        return self._last.copy()

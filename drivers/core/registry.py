@@ -1,7 +1,6 @@
-"""Every kind of bus there is: the families in the folders of ``drivers``, and those that other packages add.
+"""Registry of bus families, built-in and of other packages; opens a bus by its kind and checks servo models.
 
-Nothing else in the house names a family. A driver is imported when it is asked for, so a missing vendor package never
-breaks anything else.
+A driver is imported when it is used, so a missing vendor package affects no other kind.
 """
 
 from __future__ import annotations
@@ -38,78 +37,56 @@ def kinds() -> list[str]:
 
 
 def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynamixel", **options: Any) -> Bus:
-    """Make the bus of a kind; it opens its port when it is entered or when ``open`` is called.
+    """Create the bus of a kind; it opens its port when it is entered or when ``open`` is called.
 
     Parameters
     ----------
-    kind : one of :func:`kinds` (a real port, or one that something serves), or ``"simulated"`` (the same driver over a
-        bus simulated in a child process).
+    kind : one of :func:`kinds`, or ``"simulated"`` (the same driver over a bus simulated in a child process).
     servos : the servos in the order of all arrays.
-    simulates : the family that ``"simulated"`` stands in for.
-    options : what the driver takes, for example ``port`` and ``baud``; see docs/drivers.md.
+    simulates : the family that ``"simulated"`` simulates.
+    options : options of the driver, for example ``port`` and ``baud``; see docs/drivers.md.
 
     Raises
     ------
     DriverError : unknown kind, or a package is not installed.
     """
     servos = tuple(servos)
-    if kind == SIMULATED:
-        driver = _simulated(simulates, servos)
-    else:
-        driver = driver_of(kind, servos)
+    if kind != SIMULATED:
+        family, driver = kind, driver_of(kind, servos)
         if options.pop("faults", ()):
             raise DriverError("faults can only be given to a simulated bus", hint='set kind = "simulated"')
-    with FAMILIES.blaming(simulates if kind == SIMULATED else kind):
-        bus: Bus = driver(servos, **options)
-    return bus
+    else:
+        family, plugin = simulates, FAMILIES.get(simulates)
+        if not plugin.simulator:
+            raise no_simulator_error(simulates)
+        simulated = FAMILIES.load(plugin, "drivers.sim.serving.simulated_driver:simulated")
+        driver = simulated(driver_of(simulates, servos), simulates)
+    with FAMILIES.blaming(family):
+        return driver(servos, **options)
 
 
 def driver_of(kind: str, servos: Sequence[ServoSpec]) -> type[WireBus]:
-    """The driver of a family for some servos.
-
-    Raises
-    ------
-    DriverError : unknown kind, a package is not installed, or an unknown model.
-    """
-    family = _family(kind)
-    driver = FAMILIES.load(family, family.driver)
+    """The driver of a family for some servos; raises DriverError for an unknown kind or model, or a missing package."""
+    try:
+        family = FAMILIES.get(kind)
+    except PluginError as error:
+        known = FAMILIES.kinds()
+        if kind in known:
+            raise
+        raise PluginError(str(error), hint=f"use one of: {', '.join(sorted([*known, SIMULATED]))}") from error
+    driver: Any = FAMILIES.load(family, family.driver)
     chosen: type[WireBus] = driver if isinstance(driver, type) else driver(servos)
     return chosen
 
 
-def _family(kind: str) -> Family:
-    """A family by its kind; where there is none, ``"simulated"`` is named among those there are."""
-    try:
-        return FAMILIES.get(kind)
-    except PluginError as error:
-        if kind in FAMILIES.kinds():
-            raise
-        raise PluginError(
-            str(error), hint=f"use one of: {', '.join(sorted([*FAMILIES.kinds(), SIMULATED]))}"
-        ) from error
-
-
 def check_model(kind: str, model: str, simulates: str = "dynamixel") -> None:
-    """Whether a kind of bus drives a servo model.
-
-    Raises
-    ------
-    DriverError : it does not; the hint lists names that look like it.
-    """
+    """Raises DriverError where a kind of bus does not drive a servo model; the hint lists similar names."""
     family = FAMILIES.get(simulates if kind == SIMULATED else kind)
     check = FAMILIES.load(family, family.check_model)
     with FAMILIES.blaming(family.kind):
         check(model)
 
 
-def _simulated(kind: str, servos: Sequence[ServoSpec]) -> Any:
-    """The driver of a family over a simulated far end; PluginError where the family has none."""
-    family = FAMILIES.get(kind)
-    if not family.simulator:
-        raise no_simulator(kind)
-    return FAMILIES.load(family, "drivers.sim.serving.simulated_driver:simulated")(driver_of(kind, servos), kind)
-
-
-def no_simulator(kind: str) -> PluginError:
-    """What is said of a family that nothing stands in for."""
+def no_simulator_error(kind: str) -> PluginError:
+    """The error for simulating a family that has no simulator."""
     return PluginError(f"bus kind {kind!r} has no simulator", hint=f'use a real one: kind = "{kind}", and its port')

@@ -1,4 +1,4 @@
-"""Steps of encoders and the angles they mean, for all servos of a bus at once."""
+"""Conversion between encoder steps and angles, speeds and currents, for all servos of a bus at once."""
 
 from __future__ import annotations
 
@@ -12,24 +12,19 @@ from drivers.tables.tables import ControlTable
 
 Ticks = NDArray[np.int32]
 
-_EDGE = 1e-6  # steps: a limit given as a whole step must not lose it to rounding
+_EDGE = 1e-6  # steps: rounding must not take a step from a limit that is a whole one
 
 
 class Scale:
-    """Steps of each servo's encoder and the angles they mean; shapes ``(n,)``.
+    """Conversion between steps of each servo's encoder and angles; shapes ``(n,)``.
 
     ``shaft = (ticks - center) * rad_per_tick`` and ``shaft = zero_rad + sign * angle``.
-
-    Parameters
-    ----------
-    servos : n servos.
-    tables : their control tables, in the same order.
 
     Attributes
     ----------
     axes : (4, n): sign, zero_rad, center and rad_per_tick, which are its rows.
-    low, high : where goals may lie, steps.
-    lowest, highest : what the servos take as a goal at all, steps.
+    low, high : limits of goals by the servos' angle limits, steps.
+    lowest, highest : limits of goals by the servos' own registers, steps.
     """
 
     def __init__(self, servos: Sequence[ServoSpec], tables: Sequence[ControlTable]) -> None:
@@ -42,8 +37,7 @@ class Scale:
             [sign, zero_rad, [table.center for table in tables], [table.rad_per_tick for table in tables]], np.float64
         )
         self.sign, self.zero_rad, self.center, self.rad_per_tick = self.axes
-        reach = np.array([(servo.min_rad, servo.max_rad) for servo in servos], dtype=np.float64)
-        ends = [self._steps(reach[:, 0]), self._steps(reach[:, 1])]
+        ends = [self._steps(np.array([getattr(servo, end) for servo in servos])) for end in ("min_rad", "max_rad")]
         top = np.array([table.ticks_per_turn - 1 for table in tables])
         low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), 0, top)
         high = np.clip(np.floor(np.maximum(*ends) + _EDGE), low, top)
@@ -64,16 +58,9 @@ class Scale:
         return angle
 
     def goals(self, angle_rad: Floats, steps: Ticks) -> Floats:
-        """Where the servos shall go, inside all limits; one that stands outside them is led in, not thrown in.
+        """Set goals, (n,) steps, for angles (n,) rad, finite, and return their angles (n,).
 
-        Parameters
-        ----------
-        angle_rad : (n,) finite.
-        steps : (n,) the goals before, changed to the new ones.
-
-        Returns
-        -------
-        (n,) float64 : the angles of the new goals.
+        The last goals are in `steps`; one outside the limits may only move towards them.
         """
         sent: Floats = np.empty(len(steps))
         self._to_steps(angle_rad, self.axes, self._bounds, steps, sent)
@@ -82,16 +69,14 @@ class Scale:
     def measured(self, known: Floats, now_s: float) -> Floats:
         """Angles (rad), speeds and currents with the angle's sign, and ages (s), (4, n).
 
-        Parameters
-        ----------
-        known : (at least 4, n): position in steps, speed, current, and when they were measured.
+        ``known`` is (at least 4, n): position in steps, speed, current, time of the measurement.
         """
         out: Floats = np.empty((4, known.shape[1]))
         self._to_si(known, self.axes, now_s, out)
         return out
 
     def narrow(self, index: int, low: int, high: int) -> None:
-        """Also keep one servo inside limits that its own registers hold, outside which it takes no goal."""
+        """Also apply the limits of one servo's own registers, outside which it refuses goals."""
         self.lowest[index], self.highest[index] = low, high
         self.low[index] = min(max(self.low[index], low), high)
         self.high[index] = max(min(self.high[index], high), self.low[index])

@@ -1,6 +1,6 @@
-"""What drivers of every family share on one wire: its loss and return, limits before every goal, and a sure stop.
+"""Base class of all drivers on one port: loss of the port and reconnecting, target limits, and a safe stop.
 
-A family says in a handful of hooks how its link is opened and its servos are started, asked and switched off.
+A family implements hooks that open its port and start, drive, read and switch off its servos.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,15 +22,11 @@ from drivers.core.limits import TargetLimits
 
 log = logging.getLogger(__name__)
 
+E = TypeVar("E", bound=DriverError)
+
 
 class WireBus(Bus):
-    """A bus on one port. See :class:`~drivers.base.bus.Bus` for the contract; the hooks are the abstract methods below.
-
-    Parameters
-    ----------
-    servos : the servos in the order of all arrays.
-    clock : monotonic seconds.
-    """
+    """A bus on one port; see :class:`~drivers.base.bus.Bus`. Its hooks are abstract methods; `clock` is monotonic."""
 
     def __init__(self, servos: Iterable[ServoSpec], *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(servos)
@@ -39,8 +36,6 @@ class WireBus(Bus):
         self._running = False
         self._lost = False
 
-    # ------------------------------------------------------------------ hooks
-
     @property
     @abstractmethod
     def path(self) -> str:
@@ -48,51 +43,47 @@ class WireBus(Bus):
 
     @abstractmethod
     def _use_path(self, path: str) -> None:
-        """Another device path, from the next opening on."""
+        """Set the device path for the next opening."""
 
     @abstractmethod
     def _open_link(self) -> None:
-        """Take the port; raises PortMissing, PortBusy or PortPermission."""
+        """Open the port; raises PortMissing, PortBusy or PortPermission."""
 
     @abstractmethod
     def _close_link(self) -> None:
-        """Give the port back; never raises."""
+        """Close the port; never raises."""
 
     @abstractmethod
     def _bring_up(self) -> Floats:
-        """Check every servo, switch it on where it stands, and return where (n,) rad; see :meth:`Bus.start`."""
+        """Check every servo, switch it on at its present position, and return these (n,) rad; see :meth:`Bus.start`."""
 
     @abstractmethod
     def _send(self, angle_rad: Floats) -> Floats:
-        """Send goals (n,) that passed the limits; returns what they became in the servos' steps, (n,) rad."""
+        """Send goals (n,) rad that passed the limits; returns them rounded to the servos' steps, (n,) rad."""
 
     @abstractmethod
     def _ask(self) -> BusState:
-        """Ask for one cycle's measurements."""
+        """Read one cycle's measurements."""
 
     @abstractmethod
     def _switch_off(self) -> None:
-        """Torque off for every reachable servo, each by itself; raises NoReply for those not confirmed."""
+        """Switch every reachable servo off, each by itself; raises NoReply for those not confirmed."""
 
     def _settle(self, now_s: float) -> None:
-        """Look after the servos before a cycle, such as watchdogs that tripped; nothing by default."""
-
-    # ------------------------------------------------------------------ the port
+        """Maintain the servos before a cycle, as after tripped watchdogs; does nothing by default."""
 
     @property
     def running(self) -> bool:
-        """True between ``start`` and ``stop``."""
         return self._running
 
     def open(self) -> None:
-        """Take the port; see :meth:`drivers.base.bus.Bus.open`."""
         self._open_link()
         self._lost = False
 
     def reconnect(self) -> None:
-        """Take the port again and, if the bus was running, start from where the servos are now.
+        """Open the port again and, if the bus was running, start from the servos' present positions.
 
-        When that fails the bus counts as lost still, so that no goal goes out; call again later.
+        When that fails the bus stays lost and sends no goals; call again later.
         """
         self._close_link()
         self.open()
@@ -110,7 +101,7 @@ class WireBus(Bus):
 
     @contextmanager
     def _losing(self) -> Iterator[None]:
-        """Close the port and count once when it goes away."""
+        """Context that closes the port and counts the loss when it goes away."""
         self._raise_if_lost()
         try:
             yield
@@ -119,13 +110,15 @@ class WireBus(Bus):
             raise
 
     def _raise_if_lost(self) -> None:
-        if self._lost or not self.is_open:
-            raise PortLost(
-                f"port {self.path} is {'lost' if self._lost else 'not open'}",
-                hint="plug it in again and call reconnect()" if self._lost else "call open()",
-                port=self.path,
-                servo_ids=self.ids,
-            )
+        if self._lost:
+            raise self._error(PortLost, f"port {self.path} is lost", "plug it in again and call reconnect()")
+        if not self.is_open:
+            raise self._error(PortLost, f"port {self.path} is not open", "call open()")
+
+    def _error(self, kind: type[E], message: str, hint: str = "", indices: Iterable[int] | None = None) -> E:
+        """An error of this port that concerns some servos, by default all."""
+        ids = self.ids if indices is None else tuple(self.ids[index] for index in indices)
+        return kind(message, hint=hint, port=self.path, servo_ids=ids)
 
     def _note_loss(self) -> None:
         self._lost = True
@@ -133,50 +126,30 @@ class WireBus(Bus):
         self._report.count("port_lost")
         log.error("port %s went away", self.path)
 
-    # ------------------------------------------------------------------ starting and stopping
-
     def start(self) -> None:
-        """Check every servo and switch it on where it stands; see :meth:`drivers.base.bus.Bus.start`."""
         if not self._running:
             self._start()
 
     def _start(self) -> None:
         with self._losing():
-            self._limits.begin(self._bring_up(), self._clock())
+            self._limits.reset(self._bring_up(), self._clock())
             self._running = True
 
     def stop(self) -> None:
-        """Torque off for every reachable servo; see :meth:`drivers.base.bus.Bus.stop`."""
         if not self._running:
             return
         self._running = False
         if self._lost:  # the adapter may be back
-            self._reconnect_to_stop()
+            try:
+                self.reconnect()
+            except DriverError as error:
+                message = f"servos not confirmed off, for their port is gone: {error}"
+                raise self._error(PortLost, message, "switch the servos' power off") from error
         with self._losing():
             self._switch_off()
 
-    def _reconnect_to_stop(self) -> None:
-        """Take the port again; without it nothing can be said of the servos, and that is what a user must hear."""
-        try:
-            self.reconnect()
-        except DriverError as error:
-            raise PortLost(
-                f"servos not confirmed off, for their port is gone: {error}",
-                hint="switch the servos' power off",
-                port=self.path,
-                servo_ids=self.ids,
-            ) from error
-
-    # ------------------------------------------------------------------ every cycle
-
     def write(self, angle_rad: ArrayLike) -> Floats:
-        """Send the goals that limits allow; see :meth:`drivers.base.bus.Bus.write`.
-
-        Raises
-        ------
-        ValueError : not n angles.
-        BusError : the bus was not started.
-        """
+        """As :meth:`drivers.base.bus.Bus.write`; raises ValueError for not n angles, BusError when not started."""
         wanted = np.asarray(angle_rad, dtype=np.float64)
         if wanted.shape != (len(self.servos),):
             raise ValueError(f"angle_rad: shape {wanted.shape}, expected {(len(self.servos),)}")
@@ -194,7 +167,6 @@ class WireBus(Bus):
         return frozen(sent)
 
     def read(self) -> BusState:
-        """Ask for this cycle's measurements; see :meth:`drivers.base.bus.Bus.read`."""
         self._raise_if_lost()
         try:
             self._settle(self._clock())
@@ -206,5 +178,4 @@ class WireBus(Bus):
         return state
 
     def report(self) -> BusReport:
-        """A copy of the counters."""
         return copy.deepcopy(self._report)

@@ -117,7 +117,7 @@ class MixedBus(WireBus):
                     continue
                 half.recover(chosen)
                 for servo in chosen:
-                    self._limits.begin_one(self.ids.index(servo), half._limits.target[half.ids.index(servo)])
+                    self._limits.reset_one(self.ids.index(servo), half._limits.target[half.ids.index(servo)])
 
     def _switch_off(self) -> None:
         failed = self._stop_halves()

@@ -1,4 +1,4 @@
-"""The family of Pololu Maestro boards."""
+"""Definition of the family of Pololu Maestro boards and its options."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.core.families import Family, PulseSettings
 
 @dataclass(frozen=True, kw_only=True)
 class MaestroSettings(PulseSettings):
-    """What the driver of a Maestro can be told."""
+    """Options of the Maestro driver."""
 
     board: str | None = option('"micro" is the one with 6 channels.', choices=("mini", "micro"))
     device: int | None = option("Device number, for the Pololu protocol.", at_least=0, at_most=127)

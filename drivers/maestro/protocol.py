@@ -1,4 +1,4 @@
-"""Bytes of a Pololu Maestro servo controller: compact and Pololu protocol, errors, CRC-7. No I/O here.
+"""Encoding of commands to a Pololu Maestro: compact and Pololu protocol, error bits, CRC-7.
 
 Source: Pololu Maestro User's Guide, sections 4.e and 5. Targets are in quarter microseconds.
 """
@@ -20,8 +20,6 @@ SPEED_US_S = 25.0
 ACCELERATION_US_S2 = 312.5
 """One step of acceleration: 0.25 us per 10 ms per 80 ms, in us/s²."""
 MAX_SPEED, MAX_ACCELERATION = 0x3FFF, 255
-MAX_PULSE_US = 4080.0
-"""Longest pulse a target may ask for."""
 
 
 class MaestroError(IntFlag):
@@ -58,8 +56,8 @@ class Encoder:
 
     Parameters
     ----------
-    device : device number for the Pololu protocol; None speaks the compact protocol, to any board.
-    crc : end every command with its CRC-7, as a board that is set so demands.
+    device : device number for the Pololu protocol; None: compact protocol, to any board.
+    crc : end every command with its CRC-7.
     """
 
     def __init__(self, device: int | None = None, crc: bool = False) -> None:
@@ -76,6 +74,6 @@ class Encoder:
         return self.command(code, channel, value & 0x7F, value >> 7)
 
     def targets(self, first: int, values: Sequence[int]) -> bytes:
-        """Set Multiple Targets: channels in a row, from ``first`` on."""
+        """Set Multiple Targets: consecutive channels, from ``first`` on."""
         data = [part for value in values for part in (value & 0x7F, value >> 7)]
         return self.command(SET_MULTIPLE, len(values), first, *data)

@@ -1,116 +1,107 @@
-"""The omote line protocol as an output: an Arduino, or another omote, is the head.
+"""Driver of a head that takes the omote line protocol, such as an Arduino or another omote.
 
-Each servo is a name in ``SET`` lines. Lines carry tags, and the answers are read: no more than a few lines are ever
-under way, so a slow head gets the newest values and no queue. What the head acknowledged is the position.
+Each servo is a name in ``SET`` lines. Lines have tags and their answers are read: only a few lines may be unanswered at
+a time, so a slow head gets the newest values and no queue. The values that the head acknowledged are the positions.
 """
 
 from __future__ import annotations
 
-import logging
 import math
-import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Any, ClassVar
 
 import numpy as np
 
-from drivers.base.bus import BusReport, Floats, ServoSpec
+from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import BusError, DriverError, NoReply, ServoRefused, WrongModel
 from drivers.boards.bus import BoardBus
-from drivers.boards.hobby import PulseScale, check_hobby, known_models
-from drivers.boards.scales import ValueScale
+from drivers.boards.hobby import ValueScale, check_hobby, known_models
 from drivers.omote import protocol
 from drivers.omote.protocol import Answer
 
-log = logging.getLogger(__name__)
-
-MODELS = {"parameter": 4, "degrees": 2}
-"""Models beside hobby servos, which are sent as pulses (us): decimals. 90 degrees are 1 of a parameter."""
+MODELS = {"parameter": ("parameter", 4), "degrees": ("deg", 2)}
+"""Value and decimals of models besides hobby servos, which are sent as pulses (us)."""
 UNDER_WAY = 2
-"""Lines that may wait for their answer: small boards have small input buffers."""
+"""Lines that may be unanswered: small boards have small input buffers."""
 HELLO_S, HELLO_AGAIN_S = 5.0, 0.5
-"""How long a head may take to come up (a board that resets when its port is opened), and how often it is asked."""
+"""Time in which a head must answer (a board resets when its port is opened), and interval of the requests."""
 LOST_S = 0.5
-"""A line that is not answered for so long never will be."""
+"""Time after which an unanswered line counts as lost."""
 TRIES = 3
 
 
 def check_lineout(model: str) -> None:
     """Raises DriverError for a model that is neither a parameter, degrees, nor a hobby servo."""
-    if model not in MODELS:
-        try:
+    try:
+        if model not in MODELS:
             check_hobby(model)
-        except DriverError as error:
-            names = ", ".join((*MODELS, *sorted(known_models())))
-            raise DriverError(
-                f"there is no model {model!r} for the line protocol", hint=f"use one of {names}"
-            ) from error
+    except DriverError as error:
+        names = ", ".join((*MODELS, *sorted(known_models())))
+        raise DriverError(f"there is no model {model!r} for the line protocol", hint=f"use one of {names}") from error
 
 
 class LineOutBus(BoardBus):
-    """A head at the other end of a line. See :class:`~drivers.boards.bus.BoardBus` for what it shares with boards.
+    """A head on one port.
 
     Parameters
     ----------
-    servos : the servos; ``wire_name`` or ``name`` is what the head calls them. ``model`` says what is sent:
-        ``"parameter"`` (90 degrees are 1), ``"degrees"``, or a hobby servo's name for its pulse in us.
+    servos : the servos; ``wire_name`` or ``name`` is the name on the wire. ``model`` selects the value: ``"parameter"``
+        (90 degrees are 1), ``"degrees"``, or a hobby servo's model for its pulse in us.
     checksum : end every line with a checksum.
-    heartbeat_s : all values are sent again after this time; a head may let go when it hears nothing for longer.
+    heartbeat_s : all values are sent again after this time; a head may switch off when nothing comes for longer.
     options : see :class:`~drivers.boards.bus.BoardBus`.
 
     Raises
     ------
-    DriverError : unknown model, or a name that cannot stand in a line.
+    DriverError : unknown model, or a name that cannot be used in a line.
     """
 
     tells_torque: ClassVar[bool] = False
 
     def __init__(
-        self,
-        servos: Iterable[ServoSpec],
-        *,
-        port: str,
-        checksum: bool = True,
-        heartbeat_s: float = 0.25,
-        clock: Callable[[], float] = time.monotonic,
-        **options: Any,
+        self, servos: Iterable[ServoSpec], *, checksum: bool = True, heartbeat_s: float = 0.25, **options: Any
     ) -> None:
-        super().__init__(servos, port=port, clock=clock, **options)
-        self._names = [_checked_name(servo) for servo in self.servos]
+        super().__init__(servos, **options)
+        self._names = [servo.wire_name or servo.name for servo in self.servos]
+        for id, name in zip(self.ids, self._names, strict=True):
+            if not protocol.is_word(name):
+                raise DriverError(
+                    f"servo {id}: {name!r} cannot be a name in the line protocol",
+                    hint="set its wire_name to one without blanks and *",
+                )
         twice = sorted({name for name in self._names if self._names.count(name) > 1})
         if twice:
             raise DriverError(f"two servos are called {', '.join(twice)}", hint="give each a wire_name of its own")
-        self._scales = _scales(self.servos)
+        for servo in self.servos:
+            check_lineout(servo.model)
+        fields = [MODELS.get(servo.model, ("us", 1)) for servo in self.servos]
+        self._scale = ValueScale(self.servos, *zip(*fields, strict=True))
         self._checked, self._heartbeat_s = checksum, heartbeat_s
         self._tag = 0
-        self._held_back = 0
-        self._forget()
+        self._reset()
 
-    def _forget(self) -> None:
-        """Begin as with a head that knows nothing."""
-        self._waiting: dict[int, tuple[float, dict[int, float]]] = {}  # tag: (when, angle by servo)
+    def _reset(self) -> None:
+        """Start with a head whose state is unknown."""
+        self._waiting: dict[int, tuple[float, dict[int, float]]] = {}  # tag: (when it was sent, angle by index)
         self._answers: dict[int, Answer] = {}
         self._input = b""
-        self._said = np.full(len(self.servos), math.nan)
-        self._all_said_s = self._heard_s = -math.inf
+        self._sent = np.full(len(self.servos), math.nan)
+        self._all_sent_s = self._answer_s = -math.inf
         self._max_line = protocol.MAX_LINE
 
     def far_end(self) -> dict[str, Any]:
-        """What a simulated head has to be set to."""
         return {"names": self._names}
-
-    # ------------------------------------------------------------------ starting and stopping
 
     def _open_link(self) -> None:
         super()._open_link()
-        self._forget()
+        self._reset()
 
     def _begin(self) -> Floats:
-        """Greet the head and ask what it shows; NaN where it does not say."""
-        hello = self._greet()
-        told = dict(word.partition("=")[::2] for word in hello.text.split() if "=" in word)
-        if told.get("max_line", "").isdecimal():
-            self._max_line = min(int(told["max_line"]), protocol.MAX_LINE)
+        """Send HELLO and ask for the present values; NaN where the head does not report them."""
+        hello = dict(word.partition("=")[::2] for word in self._greet().text.split() if "=" in word)
+        if hello.get("max_line", "").isdecimal():
+            self._max_line = min(int(hello["max_line"]), protocol.MAX_LINE)
         values = np.full(len(self.servos), math.nan)
         index = {name: i for i, name in enumerate(self._names)}
         for group in self._groups(self._names):
@@ -120,44 +111,40 @@ class LineOutBus(BoardBus):
             if not answer.ok:
                 raise self._refusal(group, answer)
             for name, word in zip(group, answer.text.split()[1:], strict=False):
-                values[index[name]] = _value(word.partition("=")[2])
-        return self._radians(values)
+                with suppress(ValueError):
+                    values[index[name]] = float(word.partition("=")[2])
+        return self._scale.radians(values)
 
     def _greet(self) -> Answer:
         end = self._port.clock() + HELLO_S
         while True:
-            self._port.write(b"\n")  # ends whatever half line the head may have got before
+            self._port.write(b"\n")  # ends an incomplete line that the head may have received
             answer = self._exchange(["HELLO"], HELLO_AGAIN_S)
             if answer is not None and answer.ok:
                 return answer
             if self._port.clock() >= end:
-                raise NoReply(
+                raise self._error(
+                    NoReply,
                     f"no head answers in the line protocol on {self.path} at {self._port.baud} baud",
-                    hint="check its power, its cable, its baud rate, and that it runs a sketch as in docs/boards.md",
-                    port=self.path,
-                    servo_ids=self.ids,
+                    "check its power, its cable, its baud rate, and that it runs a sketch as in docs/boards.md",
                 )
 
     def _refusal(self, group: Sequence[str], answer: Answer) -> BusError:
-        """Why a head does not take some names; each is asked for by itself to find the one that is wrong."""
+        """The error for names that a head refuses; asks for each by itself to find the wrong one."""
         for name in group:
             single = self._insist(["GET", name])
             if not single.ok:
-                servo = self.servos[self._names.index(name)]
+                index = self._names.index(name)
                 kind = WrongModel if single.code == protocol.UNKNOWN_NAME else ServoRefused
-                return kind(
-                    f"the head on {self.path} does not take {name!r} (servo {servo.id}): {single.text}",
-                    hint="set wire_name of the channel to a name that it knows",
-                    port=self.path,
-                    servo_ids=(servo.id,),
-                )
-        return ServoRefused(f"the head on {self.path} refused GET: {answer.text}", port=self.path)
+                message = f"the head on {self.path} does not take {name!r} (servo {self.ids[index]}): {single.text}"
+                return self._error(kind, message, "set wire_name of the channel to a name that it knows", [index])
+        return self._error(ServoRefused, f"the head on {self.path} refused GET: {answer.text}", indices=())
 
     def _off(self, index: int) -> None:
-        """Done for all together, in :meth:`_switch_off`."""
+        """Does nothing: :meth:`_switch_off` releases all names in a few lines."""
 
     def _switch_off(self) -> None:
-        """Release every name: the head falls back to what it does by itself, or lets go."""
+        """Release every name: the head goes on with other sources, or switches its servos off."""
         left: list[int] = []
         lost = None
         try:
@@ -166,12 +153,12 @@ class LineOutBus(BoardBus):
         except DriverError as error:
             left, lost = list(range(len(self.servos))), error
         self._on[:] = False
-        self._said[:] = math.nan
+        self._sent[:] = math.nan
         if left:
             raise self._not_off(left, None) from lost
 
     def _release_names(self, group: Sequence[str]) -> list[str]:
-        """Release some names, one by one where they are refused together; returns those that were not."""
+        """Release some names, one by one where they are refused together; returns those not released."""
         for _ in range(TRIES):
             answer = self._exchange(["RELEASE", *group], LOST_S)
             if answer is None:
@@ -182,55 +169,42 @@ class LineOutBus(BoardBus):
                 return [name for one in group for name in self._release_names([one])]
         return list(group)
 
-    # ------------------------------------------------------------------ every cycle
-
     def _go(self, angle_rad: Floats) -> Floats:
         self._listen()
         known = np.isfinite(angle_rad)
-        values = self._values(np.where(known, angle_rad, 0.0))
-        sent = np.where(known, self._radians(values), math.nan)
+        values = self._scale.values(np.where(known, angle_rad, 0.0))
+        sent = np.where(known, self._scale.radians(values), math.nan)
         now = self._clock()
-        refresh = now - self._all_said_s >= self._heartbeat_s
-        due = known & ((values != self._said) | refresh)
+        refresh = now - self._all_sent_s >= self._heartbeat_s
+        due = known & ((values != self._sent) | refresh)
         if len(self._waiting) >= UNDER_WAY:
-            self._held_back += bool(due.any())
+            if due.any():
+                self._report.count("held_back")
             return sent
         if refresh:
-            self._all_said_s = now
-        for group in self._parted(np.flatnonzero(due).tolist(), values):
-            words = [word for i in group for word in (self._names[i], protocol.number(values[i]))]
-            self._tell(["SET", *words], {i: float(sent[i]) for i in group})
-            self._said[group] = values[group]
+            self._all_sent_s = now
+        pairs = {f"{self._names[i]} {protocol.number(values[i])}": int(i) for i in np.flatnonzero(due)}
+        for words in self._groups(pairs):
+            group = [pairs[pair] for pair in words]
+            self._send_line(["SET", *words], {i: float(sent[i]) for i in group})
+            self._sent[group] = values[group]
         return sent
 
-    def _parted(self, indices: list[int], values: Floats) -> list[list[int]]:
-        """Servos in groups that fit into a line each."""
-        pairs = {f"{self._names[i]} {protocol.number(values[i])}": i for i in indices}
-        return [[pairs[pair] for pair in group] for group in self._groups(pairs)]
-
     def _poll(self) -> None:
-        """Take the answers that have come; nothing is waited for."""
+        """Process the answers that have arrived, without waiting."""
         self._listen()
         now = self._clock()
         for tag in [tag for tag, (when, _) in self._waiting.items() if now - when > LOST_S]:
             del self._waiting[tag]
             self._report.count("no_reply")
-            self._said[:] = math.nan  # say it all again
+            self._sent[:] = math.nan  # send all values again
         if self._running:
-            self._heard(now - self._heard_s <= self._heartbeat_s + 2 * LOST_S)
-
-    def report(self) -> BusReport:
-        """A copy of the counters."""
-        if self._held_back:
-            self._report.errors["held_back"] = self._held_back
-        return super().report()
-
-    # ------------------------------------------------------------------ lines
+            self._note_answer(now - self._answer_s <= self._heartbeat_s + 2 * LOST_S)
 
     def _groups(self, words: Iterable[str]) -> list[list[str]]:
-        return protocol.parted(words, self._max_line - len(f"#{protocol.MAX_TAG} RELEASE*00"))
+        return protocol.split_to_fit(words, self._max_line - len(f"#{protocol.MAX_TAG} RELEASE*00"))
 
-    def _tell(self, words: Sequence[str], angles: dict[int, float]) -> int:
+    def _send_line(self, words: Sequence[str], angles: dict[int, float]) -> int:
         """Send a line; returns its tag."""
         self._tag = self._tag % protocol.MAX_TAG + 1
         self._waiting[self._tag] = self._clock(), angles
@@ -239,7 +213,7 @@ class LineOutBus(BoardBus):
 
     def _exchange(self, words: Sequence[str], wait_s: float) -> Answer | None:
         """Send a line and wait for its answer; None when it does not come."""
-        tag = self._tell(words, {})
+        tag = self._send_line(words, {})
         end = self._port.clock() + wait_s + self._margin_s
         while tag not in self._answers and self._port.clock() < end:
             self._listen(end)
@@ -251,10 +225,10 @@ class LineOutBus(BoardBus):
             answer = self._exchange(words, LOST_S)
             if answer is not None:
                 return answer
-        raise NoReply(f"the head on {self.path} does not answer {words[0]}", port=self.path, servo_ids=self.ids)
+        raise self._error(NoReply, f"the head on {self.path} does not answer {words[0]}")
 
     def _listen(self, deadline_s: float = 0.0) -> None:
-        """Take what has come; waits for something where a deadline is given."""
+        """Process the input; waits for some where a deadline is given."""
         *lines, self._input = (self._input + self._port.read(deadline_s)).split(b"\n")
         self._input = self._input[-4 * protocol.MAX_LINE :]
         for line in lines:
@@ -271,7 +245,7 @@ class LineOutBus(BoardBus):
             if not answer.ok and answer.tag is None:
                 self._refused(answer, {})
             return
-        self._heard_s = self._clock()
+        self._answer_s = self._clock()
         angles = waiting[1]
         if not angles:
             self._answers[answer.tag or 0] = answer
@@ -282,53 +256,7 @@ class LineOutBus(BoardBus):
             self._refused(answer, angles)
 
     def _refused(self, answer: Answer, angles: dict[int, float]) -> None:
-        """A refused line changed nothing at the head; what it held is said again."""
+        """Count a refused line, which changed nothing at the head; its values are sent again."""
         self._report.count("refused")
-        self._said[list(angles) or slice(None)] = math.nan
-        self._say(f"the head on {self.path} refused a line: {answer.code} {answer.text}")
-
-    # ------------------------------------------------------------------ values
-
-    def _values(self, angle_rad: Floats) -> Floats:
-        out = np.zeros(len(self.servos))
-        for indices, scale in self._scales:
-            out[indices] = scale.values(angle_rad[indices])
-        return out
-
-    def _radians(self, values: Floats) -> Floats:
-        out = np.full(len(self.servos), math.nan)
-        for indices, scale in self._scales:
-            out[indices] = scale.radians(values[indices])
-        return out
-
-
-def _scales(servos: Sequence[ServoSpec]) -> list[tuple[list[int], ValueScale]]:
-    """Servos that are sent alike, and how."""
-    fields: dict[str, list[int]] = {}
-    for i, servo in enumerate(servos):
-        check_lineout(servo.model)
-        fields.setdefault(servo.model if servo.model in MODELS else "us", []).append(i)
-    out = []
-    for field, indices in fields.items():
-        chosen = [servos[i] for i in indices]
-        pulses = PulseScale(chosen) if field == "us" else None
-        name = {"us": "us", "degrees": "deg"}.get(field, field)
-        out.append((indices, ValueScale(name, MODELS.get(field, 1), chosen, pulses)))
-    return out
-
-
-def _checked_name(servo: ServoSpec) -> str:
-    name = servo.wire_name or servo.name
-    if not protocol.is_word(name):
-        raise DriverError(
-            f"servo {servo.id}: {name!r} cannot be a name in the line protocol",
-            hint="set its wire_name to one without blanks and *",
-        )
-    return name
-
-
-def _value(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+        self._sent[list(angles) or slice(None)] = math.nan
+        self._warn(f"the head on {self.path} refused a line: {answer.code} {answer.text}")

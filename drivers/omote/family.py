@@ -1,4 +1,4 @@
-"""The family of heads that take the omote line protocol."""
+"""Definition of the family of heads that take the omote line protocol, and its options."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.core.families import AnySettings, Family
 
 @dataclass(frozen=True, kw_only=True)
 class LineSettings(AnySettings):
-    """What the driver of such a head can be told."""
+    """Options of the driver of such a head."""
 
     checksum: bool | None = option("End every line with a checksum.")
     heartbeat_s: float | None = option("All values are sent again after this time (s).", above=0, at_most=10)

@@ -1,4 +1,4 @@
-"""Lines of the omote line protocol as the commanding side writes and reads them; docs/line-protocol.md. No I/O here."""
+"""Encoding of commands and decoding of answers of the omote line protocol; see docs/line-protocol.md."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 MAX_LINE = 1024
-"""Longest line to a peer that does not say otherwise, in bytes, without the line end."""
+"""Default of the longest line, in bytes, without the line end."""
 MAX_TAG = 999_999_999
 UNKNOWN_COMMAND, UNKNOWN_NAME = 20, 23
-"""Error codes that tell what a peer does not know."""
+"""Error codes of a peer that does not know a command or a name."""
 
 _NAME = re.compile(r"[\x21-\x22\x24-\x29\x2b-\x7e][\x21-\x29\x2b-\x7e]*\Z")
 _ANSWER = re.compile(rb"(?:#(\d{1,9})[ \t]+)?(OK|ERR)(?:[ \t]+(.*))?\Z")
@@ -28,12 +28,12 @@ def checksum(data: bytes) -> int:
 
 
 def is_word(name: str) -> bool:
-    """Whether a name can stand in a line: printable, no blank, no ``*``, no ``#`` in front."""
+    """Whether a name can be used in a line: printable, no blank, no ``*``, no ``#`` in front."""
     return _NAME.match(name) is not None
 
 
 def number(value: float) -> str:
-    """A value with at most 4 decimals and no needless zeros."""
+    """A value with at most 4 decimals, without trailing zeros."""
     text = f"{value:.4f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
@@ -46,7 +46,7 @@ def line(words: Iterable[str], tag: int, checked: bool) -> bytes:
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer: to which tag (None without one), whether the line was taken, the error code, and the text."""
+    """An answer: the tag of its line (None without one), whether it was accepted, the error code, and the text."""
 
     tag: int | None
     ok: bool
@@ -55,10 +55,7 @@ class Answer:
 
 
 def read_answer(data: bytes) -> Answer | None:
-    """An answer without its line end; None where it is none, or damaged.
-
-    Streamed lines are no answers. A checksum is checked where there is one.
-    """
+    """Decode an answer without its line end; None for other lines and for a wrong checksum, where there is one."""
     checked = _CHECKED.match(data)
     if checked is not None:
         if checksum(checked[1]) != int(checked[2], 16):
@@ -75,14 +72,14 @@ def read_answer(data: bytes) -> Answer | None:
     return Answer(tag, False, int(code), reason) if code.isdecimal() else None
 
 
-def parted(names: Iterable[str], room: int) -> list[list[str]]:
-    """Words in groups that fit into ``room`` bytes with a blank before each; one that is too long stands alone."""
+def split_to_fit(words: Iterable[str], room: int) -> list[list[str]]:
+    """Words in groups that fit into ``room`` bytes with a blank before each; a longer word is a group by itself."""
     groups: list[list[str]] = []
     used = room + 1
-    for name in names:
-        used += len(name) + 1
-        if used > room or not groups:
+    for word in words:
+        used += len(word) + 1
+        if used > room:
             groups.append([])
-            used = len(name) + 1
-        groups[-1].append(name)
+            used = len(word) + 1
+        groups[-1].append(word)
     return groups

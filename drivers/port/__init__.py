@@ -1,4 +1,4 @@
-"""Ports: the operating system's serial devices, TCP, and what stands in the way of each.
+"""Serial ports: devices of the operating system, TCP and sockets in this process; listing of those plugged in.
 
-In: a path or URL. Out: bytes in time, or an error that says what to type. Imports base.
+In: a path or URL. Out: bytes by a deadline, or an error with the command that fixes it. Imports base.
 """

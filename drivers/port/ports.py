@@ -1,4 +1,4 @@
-"""Which serial ports are plugged in, what stands in the way of using each, and what to type to mend it."""
+"""Listing of serial ports, with permissions, latency timer, and the command that fixes a problem with each."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class PortRecord:
 
     Attributes
     ----------
-    device : path the system gave it this time, for example ``/dev/ttyUSB0``.
+    device : path, for example ``/dev/ttyUSB0``.
     by_id : path that stays the same after a replug; None where there is none. Use it in configurations.
     vid_pid : USB vendor and product as ``"0403:6014"``; empty when it is not USB.
-    serial_number, description : as the device says, may be empty.
-    readable, writable : what this user may do.
+    serial_number, description : as the device reports, may be empty.
+    usable : this user may read and write it.
     latency_s : the adapter's latency timer in seconds; None where there is none.
-    hint : what to type to mend what is wrong; empty when nothing is.
+    hint : the command that fixes what is wrong; empty when nothing is.
     """
 
     device: str
@@ -35,15 +35,9 @@ class PortRecord:
     vid_pid: str
     serial_number: str
     description: str
-    readable: bool
-    writable: bool
+    usable: bool
     latency_s: float | None
     hint: str
-
-    @property
-    def usable(self) -> bool:
-        """True when this user may open it."""
-        return self.readable and self.writable
 
     @property
     def path(self) -> str:
@@ -57,52 +51,42 @@ def list_ports(
     sys_root: str | os.PathLike[str] = "/sys",
     comports: Callable[[], Iterable[Any]] = _pyserial.comports,
 ) -> list[PortRecord]:
-    """Serial devices of this machine, sorted by path. Opens none of them.
+    """Serial devices of this machine, sorted by path; opens none of them.
 
     Parameters
     ----------
-    dev_root, sys_root : where devices and their settings are; changed by tests.
+    dev_root, sys_root : folders of devices and of their settings; changed by tests.
     comports : gives pyserial's port records.
     """
-    links = _by_id(Path(dev_root))
-    return [_record(port, links, sys_root) for port in sorted(comports(), key=lambda port: port.device)]
+    by_id = {link.resolve(): str(link) for link in sorted(Path(dev_root).glob("serial/by-id/*"))}
+    return [_record(port, by_id, sys_root) for port in sorted(comports(), key=lambda port: port.device)]
 
 
-def _record(port: Any, links: dict[Path, str], sys_root: str | os.PathLike[str]) -> PortRecord:
-    readable, writable = os.access(port.device, os.R_OK), os.access(port.device, os.W_OK)
+def _record(port: Any, by_id: dict[Path, str], sys_root: str | os.PathLike[str]) -> PortRecord:
+    usable = os.access(port.device, os.R_OK | os.W_OK)
     latency = latency_s(port.device, sys_root)
     return PortRecord(
         device=port.device,
-        by_id=links.get(Path(port.device).resolve()),
+        by_id=by_id.get(Path(port.device).resolve()),
         vid_pid="" if port.vid is None else f"{port.vid:04x}:{port.pid:04x}",
         serial_number=port.serial_number or "",
         description="" if port.description in (None, "n/a") else port.description,
-        readable=readable,
-        writable=writable,
+        usable=usable,
         latency_s=latency,
-        hint=_hint(port.device, readable and writable, latency),
+        hint=_hint(port.device, usable, latency),
     )
-
-
-def _by_id(dev_root: Path) -> dict[Path, str]:
-    """Device path to its stable name under ``serial/by-id``."""
-    folder = dev_root / "serial" / "by-id"
-    if not folder.is_dir():
-        return {}
-    return {link.resolve(): str(link) for link in sorted(folder.iterdir())}
 
 
 def _hint(device: str, usable: bool, latency: float | None) -> str:
     if not usable:
         return f"sudo usermod -a -G {_group(device)} $USER, then log out and in again"
     if latency is not None and latency > SLOW_LATENCY_S:
-        name = Path(device).name
-        return f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer"
+        return f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{Path(device).name}/latency_timer"
     return ""
 
 
 def _group(device: str) -> str:
-    """Group that owns a device; dialout where that cannot be told."""
+    """Group that owns a device; dialout where that is unknown or root."""
     try:
         group = Path(device).group()
     except (OSError, KeyError, NotImplementedError):

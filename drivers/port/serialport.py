@@ -1,7 +1,7 @@
-"""A serial port that is opened exclusively, read without spinning, and fails with one error tree.
+"""A serial port that is opened exclusively, reads and writes with deadlines, and raises errors of one tree.
 
-pyserial raises four different exceptions when a device is unplugged, one of which (termios.error) is not even
-an OSError; here each of them becomes :class:`~drivers.base.errors.PortLost`. Deadlines are on the monotonic clock.
+pyserial raises four different exceptions when a device is unplugged, one of which (termios.error) is not even an
+OSError; here each becomes :class:`~drivers.base.errors.PortLost`. Deadlines are on the monotonic clock.
 """
 
 from __future__ import annotations
@@ -27,15 +27,14 @@ HOST_MARGIN_S = 0.010
 """Time a busy host may need to notice a reply, beyond the wire and the adapter."""
 UNKNOWN_LATENCY_S = 0.002
 PSEUDO_MARGIN_S = 0.05
-"""Behind a pseudo-terminal or a socket sits a program, which competes for the processor with everything else."""
-
+"""The same for a pseudo-terminal or a socket, whose far end is a program that competes for the processor."""
 
 _tap: ContextVar[Callable[[bool, bytes], None] | None] = ContextVar("tap", default=None)
 
 
 @contextmanager
 def tapped(tap: Callable[[bool, bytes], None]) -> Iterator[None]:
-    """Ports that are made in this context give ``tap`` (sent, bytes) for all that passes, however deep in a driver."""
+    """Context in which new ports call ``tap(sent, data)`` for all bytes that they send and receive."""
     token = _tap.set(tap)
     try:
         yield
@@ -44,7 +43,7 @@ def tapped(tap: Callable[[bool, bytes], None]) -> Iterator[None]:
 
 
 class SerialPort:
-    """One serial device, held by this process alone while it is open.
+    """One serial device, opened exclusively.
 
     Parameters
     ----------
@@ -55,7 +54,7 @@ class SerialPort:
     Attributes
     ----------
     tap : called with (sent, bytes) for everything that passes, or None.
-    clock, sleep : the time of this port's deadlines, and the way to let it pass.
+    clock, sleep : the clock of this port's deadlines, and how to wait on it.
     """
 
     clock: Callable[[], float] = staticmethod(time.monotonic)
@@ -64,40 +63,35 @@ class SerialPort:
     def __init__(self, path: str | os.PathLike[str], baud: int = 1_000_000) -> None:
         self.path = os.fspath(path)
         self.baud = int(baud)
-        self.low_latency = False
         self.tap: Callable[[bool, bytes], None] | None = _tap.get()
         self._end: Endpoint | None = None
 
     @property
     def is_open(self) -> bool:
-        """True while the device is held."""
+        """True while the device is open."""
         return self._end is not None
 
     @property
     def serial(self) -> Any:
-        """The pyserial object (or socket) underneath, for code that insists on one; None while closed."""
+        """The pyserial object (or socket) underneath; None while closed."""
         return None if self._end is None else self._end.device
 
     def open(self) -> None:
-        """Take the device for this process, ask for low latency, and throw away what lies in its input.
+        """Open the device exclusively, ask for low latency, and discard its input.
 
         Raises
         ------
-        PortMissing : no such device.
-        PortBusy : another program holds it.
-        PortPermission : this user may not open it.
+        PortMissing, PortBusy, PortPermission : see :mod:`drivers.base.errors`.
         PortError : the device does not take the baud rate.
         """
         self.close()
         try:
-            end = open_endpoint(self.path, self.baud)
+            self._end = open_endpoint(self.path, self.baud)
         except UNPLUGGED as error:
             raise self._opening_error(error) from error
         except ValueError as error:
             message = f"port {self.path} does not take {self.baud} baud: {error}"
             raise PortError(message, hint="set a baud rate the adapter has", port=self.path) from error
-        self._end = end
-        self.low_latency = end.low_latency
         try:
             self.drain()
         except PortLost:
@@ -105,67 +99,43 @@ class SerialPort:
             raise
 
     def close(self) -> None:
-        """Give the device back; never raises, may be called any number of times."""
+        """Close the device; never raises, may be called any number of times."""
         end, self._end = self._end, None
         if end is not None:
             with suppress(*UNPLUGGED):
                 end.close()
 
     def write(self, data: bytes) -> None:
-        """Hand all bytes to the system.
-
-        Raises
-        ------
-        PortLost : the device went away, or took nothing for half a second.
-        """
+        """Write all bytes; raises PortLost where the device went away, or took nothing for half a second."""
         deadline = 0.0
         if self.tap is not None:
             self.tap(True, data)
         view = memoryview(data)
         while view:
             try:
-                view = view[self._opened().put(view) :]
+                view = view[self._use("put", view) :]
                 continue
             except BlockingIOError:
                 deadline = deadline or time.monotonic() + _WRITE_LIMIT_S
-            except (*UNPLUGGED, ValueError) as error:
-                raise self._lost(error) from error
             if time.monotonic() > deadline:
                 raise self._lost("it takes no bytes")
             self._wait(deadline, writing=True)
 
     def put(self, data: bytes) -> int:
-        """Hand over what there is room for now, without waiting; returns how many bytes that was.
-
-        Raises
-        ------
-        PortLost : the device went away.
-        """
+        """Write what there is room for now, without waiting; returns the number of bytes. Raises PortLost."""
         try:
-            sent = self._opened().put(memoryview(data))
+            sent: int = self._use("put", memoryview(data))
         except BlockingIOError:
             return 0
-        except (*UNPLUGGED, ValueError) as error:
-            raise self._lost(error) from error
         if self.tap is not None:
             self.tap(True, data[:sent])
         return sent
 
     def read(self, deadline_s: float) -> bytes:
-        """What has arrived, waiting for the first byte until a deadline.
+        """The bytes that have arrived, empty for none; waits for the first one until a deadline. Raises PortLost.
 
-        Parameters
-        ----------
-        deadline_s : time of ``time.monotonic()``. One in the past only takes what is there already, so that
-            bytes which came while this process was stalled still count.
-
-        Returns
-        -------
-        bytes : empty when nothing came.
-
-        Raises
-        ------
-        PortLost : the device went away.
+        A deadline of ``time.monotonic()`` in the past takes what is there already, so that bytes that came while this
+        process was stalled still count.
         """
         self._wait(deadline_s)
         try:
@@ -174,46 +144,38 @@ class SerialPort:
             return b""
 
     def drain(self, quiet_s: float = 0.0, limit_s: float = 0.2) -> int:
-        """Throw away input until nothing came for ``quiet_s`` seconds, at most ``limit_s``.
-
-        Returns
-        -------
-        int : bytes thrown away.
-        """
+        """Discard input until nothing came for ``quiet_s``, at most for ``limit_s``; returns the bytes discarded."""
         count, end = 0, time.monotonic() + limit_s
         while True:
             try:
-                count += len(self._take() if quiet_s == 0.0 else self._awaited(quiet_s, end))
+                if quiet_s:
+                    self._wait(min(time.monotonic() + quiet_s, end))
+                count += len(self._take())
             except BlockingIOError:
                 return count
             if time.monotonic() > end:
                 return count
 
-    def _awaited(self, quiet_s: float, end_s: float) -> bytes:
-        self._wait(min(time.monotonic() + quiet_s, end_s))
-        return self._take()
-
     def _take(self) -> bytes:
-        try:
-            data = self._opened().take()
-        except BlockingIOError:
-            raise
-        except (*UNPLUGGED, ValueError) as error:
-            raise self._lost(error) from error
+        data: bytes = self._use("take")
         if self.tap is not None:
             self.tap(False, data)
         return data
 
     def _wait(self, deadline_s: float, writing: bool = False) -> None:
+        self._use("wait", max(0.0, deadline_s - time.monotonic()), writing)
+
+    def _use(self, method: str, *arguments: Any) -> Any:
+        """Call a method of the open endpoint; its BlockingIOError passes, every other error becomes PortLost."""
+        end = self._end
         try:
-            self._opened().wait(max(0.0, deadline_s - time.monotonic()), writing)
+            if end is None:
+                raise OSError(errno.EBADF, "it is not open")
+            return getattr(end, method)(*arguments)
+        except BlockingIOError:
+            raise
         except (*UNPLUGGED, ValueError) as error:
             raise self._lost(error) from error
-
-    def _opened(self) -> Endpoint:
-        if self._end is None:
-            raise OSError(errno.EBADF, "it is not open")
-        return self._end
 
     def _lost(self, why: object) -> PortLost:
         reason = why.strerror if isinstance(why, OSError) and why.strerror else why
@@ -225,36 +187,31 @@ class SerialPort:
 
     def _opening_error(self, error: BaseException) -> PortError:
         code = getattr(error, "errno", None)
+        kind: type[PortError] = PortError
+        message, hint = f"cannot open port {self.path}: {error}", "try `omote ports`"
         if code in _BUSY:
-            message = f"port {self.path} is held by another program"
-            return PortBusy(message, hint=f"close it; `fuser -v {self.path}` names it", port=self.path)
-        if code in _DENIED:
-            return PortPermission(
-                f"no permission to open port {self.path}",
-                hint="sudo usermod -a -G dialout $USER, then log out and in again",
-                port=self.path,
-            )
-        if "://" in self.path:
-            return PortMissing(
-                f"no port {self.path}: {getattr(error, 'strerror', None) or error}",
-                hint="start what serves it first, for example: omote simulate dynamixel --tcp HOST:PORT",
-                port=self.path,
-            )
-        if code in _MISSING or not Path(self.path).exists():
-            message = f"no port {self.path}"
-            return PortMissing(message, hint="`omote ports` lists what is plugged in", port=self.path)
-        return PortError(f"cannot open port {self.path}: {error}", hint="try `omote ports`", port=self.path)
+            kind, message = PortBusy, f"port {self.path} is held by another program"
+            hint = f"close it; `fuser -v {self.path}` names it"
+        elif code in _DENIED:
+            kind, message = PortPermission, f"no permission to open port {self.path}"
+            hint = "sudo usermod -a -G dialout $USER, then log out and in again"
+        elif "://" in self.path:
+            kind, message = PortMissing, f"no port {self.path}: {getattr(error, 'strerror', None) or error}"
+            hint = "start what serves it first, for example: omote simulate dynamixel --tcp HOST:PORT"
+        elif code in _MISSING or not Path(self.path).exists():
+            kind, message, hint = PortMissing, f"no port {self.path}", "`omote ports` lists what is plugged in"
+        return kind(message, hint=hint, port=self.path)
 
 
-def link_to(port: str | os.PathLike[str] | SerialPort, baud: int) -> SerialPort:
-    """The port of a path or URL; one that is a port already stays what it is."""
+def as_serial_port(port: str | os.PathLike[str] | SerialPort, baud: int) -> SerialPort:
+    """A port for a path or URL; a port is returned unchanged."""
     return SerialPort(port, baud) if isinstance(port, str | os.PathLike) else port
 
 
 def latency_s(path: str | os.PathLike[str], sys_root: str | os.PathLike[str] = "/sys") -> float | None:
-    """Latency timer of the USB adapter behind a device path, in seconds; None where the system knows none.
+    """Latency timer of the USB adapter behind a device path, in seconds; None where there is none.
 
-    Linux keeps it in ``/sys/bus/usb-serial/devices/<name>/latency_timer`` (milliseconds).
+    Linux has it in ``/sys/bus/usb-serial/devices/<name>/latency_timer`` (milliseconds).
     """
     name = Path(path).resolve().name
     try:
@@ -265,7 +222,7 @@ def latency_s(path: str | os.PathLike[str], sys_root: str | os.PathLike[str] = "
 
 
 def reply_margin_s(path: str | os.PathLike[str]) -> float:
-    """Longest wait for a reply beyond its time on the wire, for what a device path leads to, in seconds."""
+    """Longest wait (s) for a reply beyond its time on the wire, by the kind of device that a path leads to."""
     if str(Path(path).resolve()).startswith("/dev/pts/") or "://" in str(path):
         return PSEUDO_MARGIN_S
     latency = latency_s(path)

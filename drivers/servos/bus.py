@@ -120,7 +120,7 @@ class ServoBus(WireBus):
         """Let the goals of one servo begin at a position."""
         full = np.zeros(len(self.ids))
         full[index] = ticks
-        self._limits.begin_one(index, float(self.scale.radians(full)[index]))
+        self._limits.reset_one(index, float(self.scale.radians(full)[index]))
 
     def report(self) -> BusReport:
         """A copy of the counters."""

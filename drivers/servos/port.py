@@ -11,7 +11,7 @@ import threading
 from dynamixel_sdk import port_handler
 
 from drivers.base.errors import DriverError
-from drivers.port.serialport import SerialPort, link_to, reply_margin_s
+from drivers.port.serialport import SerialPort, as_serial_port, reply_margin_s
 
 BITS_PER_BYTE = 10
 LEAST_SLEEP_S = 0.0005
@@ -46,7 +46,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
 
     def __init__(self, path: str | SerialPort, baud: int = 1_000_000, margin_s: float | None = None) -> None:
         self._busy = threading.Lock()
-        self.link = link_to(path, baud)
+        self.link = as_serial_port(path, baud)
         self.clock, self.sleep = self.link.clock, self.link.sleep
         super().__init__(self.link.path)
         self.baudrate = baud

@@ -8,7 +8,7 @@ from functools import partial
 from typing import ClassVar, Generic, TypeVar
 
 from drivers.base.bus import ServoInfo, ServoSpec
-from drivers.base.errors import BusError, CorruptReply, DriverError, NoReply, PortLost, ServoRefused, together
+from drivers.base.errors import BusError, CorruptReply, DriverError, NoReply, PortLost, ServoRefused, merge_errors
 from drivers.servos.exchange import Exchange, Exchanges, R
 from drivers.servos.layout import NAMES, item_of
 from drivers.servos.port import Port
@@ -181,7 +181,7 @@ class Registers(ABC, Generic[R]):
             except BusError as error:
                 failed[servo] = error
         if failed:
-            raise together(failed)
+            raise merge_errors(failed)
         return done
 
     # ------------------------------------------------------------------ every answer checked

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Generic
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel, together
+from drivers.base.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel, merge_errors
 from drivers.servos.exchange import R
 from drivers.servos.layout import Block
 from drivers.servos.registers import Registers
@@ -152,7 +152,7 @@ class Startup(ABC, Generic[R]):
             hint = "correct the configuration, or the servo's id with `omote scan PORT`"
             wrong[servo.id] = self.registers.error(WrongModel, message, hint, servo.id)
         if wrong:
-            raise together(wrong)
+            raise merge_errors(wrong)
 
     def bring_up(self, servos: Sequence[ServoSpec]) -> Started:
         """Start identified servos where they are.

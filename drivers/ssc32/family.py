@@ -1,4 +1,4 @@
-"""The family of Lynxmotion SSC-32 boards."""
+"""Definition of the family of Lynxmotion SSC-32 boards."""
 
 from __future__ import annotations
 

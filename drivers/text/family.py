@@ -1,4 +1,4 @@
-"""The family of boards that read lines of text."""
+"""Definition of the family of boards that read lines of text, and its options."""
 
 from __future__ import annotations
 
@@ -7,25 +7,23 @@ from dataclasses import dataclass
 from drivers.base.errors import DriverError
 from drivers.base.options import option
 from drivers.core.families import Family, PulseSettings
-from drivers.text.template import check_texts
-
-TEXTS = ("template", "begin", "separator", "end", "off", "query", "answer")
+from drivers.text.template import TEXTS, check_texts
 
 
 @dataclass(frozen=True, kw_only=True)
 class TextSettings(PulseSettings):
-    """What the driver of a text board can be told."""
+    """Options of the driver of a text board."""
 
-    template: str | None = option("How one servo's move is written.")
-    begin: str | None = option("What stands before the moves of one line.")
-    separator: str | None = option("What stands between them.")
-    end: str | None = option("What stands behind them.")
-    off: str | None = option("What switches one servo off.")
-    query: str | None = option("What asks for one servo.")
-    answer: str | None = option("What comes back; it goes with query.")
+    template: str | None = option("One servo's move.")
+    begin: str | None = option("Text before the moves of one line.")
+    separator: str | None = option("Text between the moves.")
+    end: str | None = option("Text after the moves.")
+    off: str | None = option("Text that switches one servo off.")
+    query: str | None = option("Request for one servo.")
+    answer: str | None = option("Answer to the request; needed with query.")
 
     def check(self, rate_hz: float) -> None:
-        """Raises ValueError where the texts are no templates, or do not go together."""
+        """Raises ValueError where the texts are no valid templates, or contradict each other."""
         if self.template is None:
             raise ValueError(r'template is missing: how a move is written, for example "#{ch}P{us}\r"')
         try:

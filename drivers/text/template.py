@@ -1,4 +1,4 @@
-"""Templates of text boards: ``"#{ch}P{us}\\r"`` with values put in, or read out of an answer; checked when made.
+"""Templates of text boards, as ``"#{ch}P{us}\\r"``: values formatted into lines, and read from answers.
 
 =========== ==================================================================================
 ``ch``      channel, the servo's id (``id`` is the same)
@@ -6,12 +6,12 @@
 ``us``      pulse width in microseconds
 ``deg``     degrees of the shaft from the middle of its range
 ``deg10``   the same in tenths of a degree
-``angle``   degrees of the shaft from the low end of its range, as Arduino's ``Servo.write`` takes them
+``angle``   degrees of the shaft from the low end of its range, as for Arduino's ``Servo.write``
 ``unit``    0 at the lower limit of the channel, 1 at the upper one
-``time_ms`` time since the line before
+``time_ms`` time since the last line
 =========== ==================================================================================
 
-A format may follow, as ``{us:04d}`` or ``{deg:.2f}``.
+A placeholder may have a format, as ``{us:04d}`` or ``{deg:.2f}``.
 """
 
 from __future__ import annotations
@@ -24,16 +24,20 @@ from typing import NamedTuple
 
 from drivers.base.errors import DriverError
 
-VALUES = {"us": ("d", 0), "deg": (".1f", 1), "deg10": ("d", 0), "angle": ("d", 0), "unit": (".4f", 4)}
-"""What a servo is told: the format without one given, and the decimals that format leaves."""
+VALUES = {"us": "d", "deg": ".1f", "deg10": "d", "angle": "d", "unit": ".4f"}
+"""Placeholders of positions, with their default formats."""
 NAMES = ("ch", "id", "name")
-OTHERS = {"ch": "d", "id": "d", "name": "s", "time_ms": "d"}
+FORMATS = VALUES | {"ch": "d", "id": "d", "name": "s", "time_ms": "d"}
 _FORMAT = re.compile(r"0?\d*(?:\.(\d))?([df]?)\Z")
 _NUMBER = r" *([+-]?\d+(?:\.\d*)?)"
 
 
+TEXTS = ("template", "begin", "separator", "end", "off", "query", "answer")
+"""Options of a text board that are templates."""
+
+
 class Piece(NamedTuple):
-    """Text, and the placeholder behind it; empty for none."""
+    """Text and the placeholder after it, which may be empty, with its format."""
 
     text: str
     field: str
@@ -41,16 +45,11 @@ class Piece(NamedTuple):
 
 
 def pieces_of(key: str, text: str, allowed: Iterable[str]) -> list[Piece]:
-    """Take a template apart.
-
-    Parameters
-    ----------
-    key : what the configuration calls it, for messages.
-    allowed : placeholders that may stand in it.
+    """Parse a template; `key` is its name in the configuration, `allowed` are the placeholders that may occur.
 
     Raises
     ------
-    DriverError : it is not ASCII, its braces do not pair, a placeholder is unknown, or a format does not fit.
+    DriverError : it is not ASCII, its braces do not match, a placeholder is unknown, or a format does not fit.
     """
     if not text.isascii():
         raise DriverError(
@@ -77,7 +76,7 @@ def _piece(
     if conversion or not _fits(field, spec or ""):
         given = f"!{conversion}" if conversion else spec
         raise DriverError(f"{key}: {{{field}}} cannot have the format {given!r}", hint="for example {us:04d}")
-    return Piece(text, field, spec or (VALUES[field][0] if field in VALUES else OTHERS[field]))
+    return Piece(text, field, spec or FORMATS[field])
 
 
 def _fits(field: str, spec: str) -> bool:
@@ -88,28 +87,18 @@ def _fits(field: str, spec: str) -> bool:
     return not spec or (match[2] == "f" if match[1] else bool(match[2]))
 
 
-def decimals(piece: Piece) -> int:
-    """Decimals that a value keeps in its format."""
-    match = _FORMAT.match(piece.spec)
+def decimals(spec: str) -> int:
+    """Decimals of a number in a format; 6 for ``f`` alone."""
+    match = _FORMAT.match(spec)
     return int(match[1] or (6 if match[2] == "f" else 0)) if match else 0
 
 
 class Template:
-    """A line, or a part of one, with places for values.
-
-    Parameters
-    ----------
-    key : what the configuration calls it, for messages.
-    text : the template.
-    allowed : placeholders that may stand in it.
+    """A line, or a part of one, with placeholders; parameters and errors as :func:`pieces_of`.
 
     Attributes
     ----------
     fields : the placeholders in it.
-
-    Raises
-    ------
-    DriverError : see :func:`pieces_of`.
     """
 
     def __init__(self, key: str, text: str, allowed: Iterable[str]) -> None:
@@ -117,69 +106,50 @@ class Template:
         self.fields = frozenset(piece.field for piece in self.pieces if piece.field)
 
     def fill(self, values: Mapping[str, float | str]) -> str:
-        """The text with values in it."""
+        """The text with values in place of placeholders."""
         return "".join(
-            piece.text + (_shown(piece, values[piece.field]) if piece.field else "") for piece in self.pieces
+            piece.text + (_formatted(piece.spec, values[piece.field]) if piece.field else "") for piece in self.pieces
         )
 
 
-def _shown(piece: Piece, value: float | str) -> str:
+def _formatted(spec: str, value: float | str) -> str:
     if isinstance(value, str):
         return value
-    return format(round(value) if piece.spec.endswith("d") else value, piece.spec)
+    return format(round(value) if spec.endswith("d") else value, spec)
 
 
 def pattern_of(pieces: Iterable[Piece]) -> re.Pattern[str]:
-    """What finds a template's text, with a group for each placeholder."""
-    groups = {name: r"(\S+?)" if name == "name" else _NUMBER for name in {*VALUES, *OTHERS}}
-    return re.compile("".join(re.escape(piece.text) + groups.get(piece.field, "") for piece in pieces))
+    """Regular expression that matches a filled template, with a group for each placeholder."""
+    groups = {"": "", "name": r"(\S+?)"}
+    return re.compile("".join(re.escape(piece.text) + groups.get(piece.field, _NUMBER) for piece in pieces))
 
 
-class AnswerPattern:
-    """The inverse of a :class:`Template`: finds the values in an answer.
+class AnswerPattern(Template):
+    """A template that reads values from an answer; numbers may have any format.
 
-    Parameters
-    ----------
-    key, text, allowed : as for :class:`Template`. Numbers may have any format.
-
-    Attributes
-    ----------
-    fields : the placeholders in it. end : the character an answer ends with.
-
-    Raises
-    ------
-    DriverError : as for a template; or it ends with a placeholder, so that nobody knows where an answer ends.
+    Its attribute ``end`` is the character an answer ends with. It must not end with a placeholder.
     """
 
     def __init__(self, key: str, text: str, allowed: Iterable[str]) -> None:
-        pieces = pieces_of(key, text, allowed)
-        self.fields = frozenset(piece.field for piece in pieces if piece.field)
-        if not pieces or pieces[-1].field:
+        super().__init__(key, text, allowed)
+        if not self.pieces or self.pieces[-1].field:
             raise DriverError(f"{key}: an answer must end with text, as \\n", hint=r'for example "{ch}={us}\n"')
-        self.end = pieces[-1].text[-1].encode()
-        self._names = [piece.field for piece in pieces if piece.field]
-        self._pattern = pattern_of(pieces)
+        self.end = self.pieces[-1].text[-1].encode()
+        self._pattern = pattern_of(self.pieces)
 
     def read(self, answer: str) -> dict[str, float | str] | None:
-        """The values in an answer; None where it is none."""
+        """The values in an answer; None where it does not match."""
         match = self._pattern.fullmatch(answer)
         if match is None:
             return None
-        return {
-            name: text if name == "name" else float(text)
-            for name, text in zip(self._names, match.groups(), strict=True)
-        }
+        names = [piece.field for piece in self.pieces if piece.field]
+        return {name: text if name == "name" else float(text) for name, text in zip(names, match.groups(), strict=True)}
 
 
 def check_texts(
     template: str, begin: str = "", separator: str = "", end: str = "", off: str = "", query: str = "", answer: str = ""
 ) -> tuple[Template, tuple[Template, Template], Template | None, Template | None, AnswerPattern | None]:
-    """The templates of a text board, read and checked: move, (begin, end), off, query and answer.
-
-    Raises
-    ------
-    DriverError : one does not fit; the message names it and what is wrong.
-    """
+    """Parse the templates of a text board: move, (begin, end), off, query and answer; raises DriverError."""
     move = Template("template", template, (*VALUES, *NAMES, "time_ms"))
     if not move.fields & set(VALUES):
         raise DriverError("template: holds no value", hint="put one of {us}, {deg}, {deg10}, {angle}, {unit} into it")
@@ -193,7 +163,7 @@ def check_texts(
     pattern = AnswerPattern("answer", answer, (*VALUES, *NAMES))
     if not pattern.fields & set(NAMES) or len(pattern.fields & set(VALUES)) != 1:
         raise DriverError(
-            "answer: must name its servo and hold one value, for answers are told apart by nothing else",
+            "answer: must name its servo and hold one value, which nothing else identifies",
             hint=r'for example "{ch}={us}\n"',
         )
     return move, frame, switch, Template("query", query, NAMES), pattern

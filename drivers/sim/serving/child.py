@@ -14,7 +14,7 @@ import sys
 import threading
 
 from drivers.base.errors import DriverError
-from drivers.base.priority import take_priority
+from drivers.base.priority import request_realtime
 from drivers.sim.serving.serve import Control, make_server
 
 
@@ -23,7 +23,7 @@ def main() -> int:
     for ending in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, ending):
             signal.signal(getattr(signal, ending), signal.SIG_IGN)
-    take_priority()  # servos answer in time while another program draws
+    request_realtime()  # servos answer in time while another program draws
     try:
         server = make_server(json.loads(sys.argv[1]))
     except DriverError as error:

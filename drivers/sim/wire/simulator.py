@@ -9,7 +9,7 @@ from typing import Any
 from drivers.base.errors import PluginError
 from drivers.base.options import check_options, entries, option
 from drivers.core.families import BOARD_BAUD
-from drivers.core.registry import FAMILIES, no_simulator
+from drivers.core.registry import FAMILIES, no_simulator_error
 from drivers.core.traffic import Decoder, TextDecoder
 from drivers.sim.wire.line import Line
 
@@ -42,7 +42,7 @@ def simulator_of(kind: str) -> Simulator:
     """
     family = FAMILIES.get(kind)
     if not family.simulator:
-        raise no_simulator(kind)
+        raise no_simulator_error(kind)
     found = FAMILIES.load(family, family.simulator)
     update = "update the package that it comes from"
     if not isinstance(found, Simulator):

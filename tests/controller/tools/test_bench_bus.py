@@ -34,8 +34,8 @@ def test_a_paced_loop_keeps_its_rate_and_a_free_one_its_own() -> None:
 def test_a_run_measures_both_drivers_on_one_wire(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "SERVOS", 4)
     monkeypatch.setattr(module, "ROUNDS", 1)
-    monkeypatch.setattr(module, "take_priority", lambda: False)
-    monkeypatch.setattr(module, "take_turns_quickly", lambda: None)
+    monkeypatch.setattr(module, "request_realtime", lambda: False)
+    monkeypatch.setattr(module, "shorten_thread_switches", lambda: None)
     told: list[str] = []
     tables = json.loads(to_json(bench_bus(0.1, told.append)))
     (lines,) = tables.values()

@@ -35,26 +35,26 @@ def policy_after(*calls: Callable[[], object]) -> object:
 
 @linux
 def test_real_time_is_taken_where_it_is_allowed_and_given_back() -> None:
-    allowed = in_thread(priority.take_priority)
-    assert policy_after(priority.take_priority) == (os.SCHED_FIFO if allowed else os.SCHED_OTHER)
-    assert policy_after(priority.take_priority, priority.give_priority_back) == os.SCHED_OTHER
+    allowed = in_thread(priority.request_realtime)
+    assert policy_after(priority.request_realtime) == (os.SCHED_FIFO if allowed else os.SCHED_OTHER)
+    assert policy_after(priority.request_realtime, priority.restore_priority) == os.SCHED_OTHER
 
 
 @linux
 def test_nobody_asks_for_real_time_who_was_told_not_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(priority.ORDINARY, "1")
-    assert in_thread(priority.take_priority) is False
-    assert policy_after(priority.take_priority) == os.SCHED_OTHER
+    monkeypatch.setenv(priority.NO_REALTIME, "1")
+    assert in_thread(priority.request_realtime) is False
+    assert policy_after(priority.request_realtime) == os.SCHED_OTHER
 
 
 @linux
 def test_short_turns_are_asked_for_instead(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(priority.ORDINARY, "1")
+    monkeypatch.setenv(priority.NO_REALTIME, "1")
 
     def turn() -> tuple[bool, str]:
         nice = os.getpriority(os.PRIO_PROCESS, 0)
-        priority.take_priority()
-        taken = priority.take_short_turns()
+        priority.request_realtime()
+        taken = priority.request_short_time_slice()
         assert os.getpriority(os.PRIO_PROCESS, 0) == nice
         told = Path(f"/proc/self/task/{threading.get_native_id()}/sched")
         return taken, told.read_text() if told.exists() else ""
@@ -68,4 +68,4 @@ def test_short_turns_are_asked_for_instead(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_machine_nobody_knows_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(priority.platform, "machine", lambda: "pdp11")
-    assert not priority.take_short_turns()
+    assert not priority.request_short_time_slice()

@@ -57,7 +57,7 @@ def test_what_was_said_before_comes_at_a_bounded_rate_whoever_it_is_about(
 def test_texts_are_not_kept_for_ever(say: RateLimitedLogger) -> None:
     for number in range(3 * KEPT):
         say("refused line %d", number)
-    assert len(say._told) == KEPT
+    assert len(say._logged) == KEPT
 
 
 def test_many_servos_that_come_and_go_are_all_told_and_flood_no_log(caplog: pytest.LogCaptureFixture) -> None:

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from drivers.base.errors import DriverError, NoReply, PortLost
-from drivers.base.shutdown import Closers, stop_on_signals, with_those_before
+from drivers.base.shutdown import Closers, combine_with_context, stop_on_signals
 
 PROGRAM = """
 import os, signal, sys, time
 from drivers.base.errors import DriverError, NoReply, PortLost
-from drivers.base.shutdown import Closers, stop_on_signals, with_those_before
+from drivers.base.shutdown import Closers, stop_on_signals, combine_with_context
 calls = 0
 def stop():
     global calls
@@ -151,7 +151,7 @@ def test_an_error_on_the_way_out_does_not_hide_what_led_there() -> None:
             raise NoReply("servo 3 is silent", hint="check its cable")
         finally:
             stop()
-    told = with_those_before(caught.value)
+    told = combine_with_context(caught.value)
     assert str(told) == "2 things failed: servo 3 is silent; port lost: cable"
     assert isinstance(told, DriverError)
     assert told.hint == "check its cable; plug it in"

@@ -416,3 +416,47 @@ def test_a_name_that_cannot_stand_in_a_line_is_told() -> None:
 def test_two_servos_of_one_name_are_told() -> None:
     with pytest.raises(DriverError, match="two servos are called jaw"):
         open_bus("omote", [NAMED[0], replace(NAMED[1], wire_name="jaw")], port="")
+
+
+def test_a_head_gets_all_values_again_after_the_heartbeat() -> None:
+    with rig("omote", heartbeat_s=0.5) as (bus, board):
+        sent = bytearray()
+        cycle(bus, [0.1, 0.1, 0.1], 10)
+        board.clock.sleep(0.6)
+        cycle(bus, [0.1, 0.1, 0.1], 3)  # the refresh
+        board.link.tap = lambda out, data: sent.extend(data) if out else None
+        cycle(bus, [0.1, 0.1, 0.1], 20)  # 0.2 s: nothing is new
+        assert bytes(sent) == b""
+        cycle(bus, [0.1, 0.1, 0.1], 40)
+        assert bytes(sent).count(b" SET jaw 0.0637 brow ") == 1
+        sent.clear()
+        cycle(bus, [0.1, 0.2, 0.1], 1)
+        assert b"jaw" not in sent and b" SET brow -0.1" in sent
+
+
+def test_a_slow_head_gets_two_lines_at_most_and_what_is_held_back_is_counted() -> None:
+    with rig("omote", margin_s=0.02) as (bus, board):
+        cycle(bus, [0.1, 0.1, 0.1], 10)
+        board.fault("mute:*")
+        sent = bytearray()
+        board.link.tap = lambda out, data: sent.extend(data) if out else None
+        for k in range(5):
+            cycle(bus, [0.11 + 0.01 * k] * 3)
+        assert sent.count(b"\n") == 2
+        assert bus.report().errors == {"held_back": 3}
+        board.clock.sleep(0.6)
+        state = bus.read()
+        assert bus.report().errors == {"held_back": 3, "no_reply": 2}
+        np.testing.assert_allclose(state.position_rad, 0.1, atol=0.02)
+        board.clear()
+        sent.clear()
+        cycle(bus, [0.1, 0.1, 0.1], 2)
+        assert b"jaw" in sent and b"brow" in sent and b"neck" in sent  # what was lost is said again
+
+
+@pytest.mark.parametrize("model", ["nothing", "xl330-m288"])
+def test_models_of_the_line_protocol(model: str) -> None:
+    with pytest.raises(DriverError, match=f"there is no model '{model}' for the line protocol") as caught:
+        open_bus("omote", [replace(NAMED[0], model=model)], port="")
+    assert "parameter, degrees, rc-120, rc-180" in caught.value.hint
+    assert open_bus("omote", [replace(NAMED[0], model="rc-90")], port="")._heartbeat_s == 0.25

@@ -19,7 +19,7 @@ import pytest
 from drivers import open_bus
 from drivers.base.errors import DriverError
 from drivers.core import dead_man_switch as module
-from drivers.core.dead_man_switch import DeadManSwitch, keep, let_go
+from drivers.core.dead_man_switch import DeadManSwitch, switch_off, watch
 from drivers.packets.packet1 import BROADCAST_ID, Instruction1, encode
 from drivers.port.serialport import SerialPort
 from drivers.sim import SimulatedBus
@@ -52,20 +52,20 @@ def orders(path: str) -> bytes:
 
 
 def test_it_lets_go_on_a_port_that_is_free(wire: SimulatedBus) -> None:
-    assert let_go(wire.path, 1_000_000, [OFF.hex()])
+    assert switch_off(wire.path, 1_000_000, [OFF.hex()])
     wait_until(lambda: torques(wire) == [False, False])
 
 
 def test_it_stands_back_from_a_port_that_another_program_has(wire: SimulatedBus) -> None:
     port = SerialPort(wire.path)
     port.open()
-    assert not let_go(wire.path, 1_000_000, [OFF.hex()])
+    assert not switch_off(wire.path, 1_000_000, [OFF.hex()])
     port.close()
     assert torques(wire) == [True, True]
 
 
 def test_a_port_that_is_gone_is_no_error() -> None:
-    assert not let_go("/dev/no-such-port", 1_000_000, [OFF.hex()])
+    assert not switch_off("/dev/no-such-port", 1_000_000, [OFF.hex()])
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_it_acts_on_an_end_without_a_goodbye(
 ) -> None:
     reading, writing = os.pipe()
     hearing, answering = os.pipe()
-    thread = threading.Thread(target=keep, args=(reading, answering, os.getppid() if parent == "me" else -1))
+    thread = threading.Thread(target=watch, args=(reading, answering, os.getppid() if parent == "me" else -1))
     thread.start()
     if words is not None:
         os.write(writing, orders(wire.path))
@@ -92,7 +92,7 @@ def test_it_acts_on_an_end_without_a_goodbye(
     thread.join(20)
     assert not thread.is_alive()
     wait_until(lambda: torques(wire) == [not lets_go] * 2)
-    assert ("told to let go" in capfd.readouterr().err) is lets_go
+    assert ("were switched off" in capfd.readouterr().err) is lets_go
     for descriptor in (reading, hearing, answering, *([] if parent == "me" else [writing])):
         os.close(descriptor)
 
@@ -120,7 +120,7 @@ def test_what_a_group_of_processes_is_told_does_not_end_it(wire: SimulatedBus) -
 CANNOT_IMPORT = """
 import sys
 from drivers.core import dead_man_switch
-wait = dead_man_switch._left_alone
+wait = dead_man_switch._parent_died
 def wait_and_forget(*given):
     loaded = {name.partition(".")[0] for name in sys.modules}
     if loaded & {"numpy", "numba", "subprocess", "asyncio", "tomllib"}:
@@ -128,7 +128,7 @@ def wait_and_forget(*given):
     left = wait(*given)
     sys.meta_path.clear(), sys.path.clear(), sys.path_hooks.clear()
     return left
-dead_man_switch._left_alone = wait_and_forget
+dead_man_switch._parent_died = wait_and_forget
 sys.exit(dead_man_switch.main())
 """
 
@@ -149,7 +149,7 @@ def test_nothing_has_to_be_imported_once_it_stands_ready(wire: SimulatedBus, mon
     [
         ("echo no such module >&2; exit 3", "ended with status 3, see its message above"),
         ("read orders; echo failed ImportError: no serial", "ImportError: no serial"),
-        ("exec sleep 60", "did not say that it stands ready within 0.2 s"),
+        ("exec sleep 60", "was not ready within 0.2 s"),
     ],
     ids=["dies", "fails", "hangs"],
 )

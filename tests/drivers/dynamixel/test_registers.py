@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.base.errors import CorruptReply, NoReply, ServoRefused, together
+from drivers.base.errors import CorruptReply, NoReply, ServoRefused, merge_errors
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
 from drivers.servos.port import Port
@@ -94,7 +94,7 @@ def test_a_servo_without_a_name_is_called_by_its_id(registers: Registers) -> Non
 
 def test_errors_of_many_servos_become_one() -> None:
     one = NoReply("a", hint="h", port="p", servo_ids=(3,))
-    assert together({3: one}) is one
-    both = together({3: one, 1: CorruptReply("b", servo_ids=(1,))})
+    assert merge_errors({3: one}) is one
+    both = merge_errors({3: one, 1: CorruptReply("b", servo_ids=(1,))})
     assert isinstance(both, NoReply)
     assert (both.servo_ids, both.hint, both.port) == ((1, 3), "h", "p")

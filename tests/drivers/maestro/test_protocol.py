@@ -33,3 +33,25 @@ def test_many_targets_in_one_command() -> None:
 def test_errors_by_name() -> None:
     assert m.error_names(0) == []
     assert m.error_names(0x114) == ["buffer full", "protocol", "program counter"]
+
+
+def test_commands_are_numbered_as_in_the_guide() -> None:
+    targets = (m.SET_TARGET, m.SET_SPEED, m.SET_ACCELERATION, m.SET_PWM, m.SET_MULTIPLE)
+    assert targets == (0x84, 0x87, 0x89, 0x8A, 0x9F)
+    assert (m.GET_POSITION, m.GET_MOVING, m.GET_ERRORS, m.GO_HOME) == (0x90, 0x93, 0xA1, 0xA2)
+    scripts = (m.STOP_SCRIPT, m.RESTART_SCRIPT, m.RESTART_WITH_PARAMETER, m.SCRIPT_STATUS)
+    assert scripts == (0xA4, 0xA7, 0xA8, 0xAE)
+    assert (m.POLOLU, m.MINI_SSC) == (0xAA, 0xFF)
+
+
+def test_units_are_those_of_the_guide() -> None:
+    assert pytest.approx(0.25 / 0.010) == m.SPEED_US_S  # 0.25 us per 10 ms
+    assert pytest.approx(0.25 / 0.010 / 0.080) == m.ACCELERATION_US_S2  # 0.25 us per 10 ms per 80 ms
+    assert (m.MAX_SPEED, m.MAX_ACCELERATION, m.QUARTER) == (16383, 255, 4)
+
+
+def test_every_error_has_its_bit() -> None:
+    assert m.error_names(0x1FF) == [
+        "signal", "overrun", "buffer full", "crc", "protocol", "timeout", "script stack", "call stack",
+        "program counter",
+    ]  # fmt: skip

@@ -47,7 +47,7 @@ def test_what_is_no_answer_is_none(line: bytes) -> None:
 
 def test_words_are_parted_so_that_every_line_fits() -> None:
     for room in (20, 64, 1000):
-        groups = protocol.parted(PARAMETERS.names, room)
+        groups = protocol.split_to_fit(PARAMETERS.names, room)
         assert [name for group in groups for name in group] == list(PARAMETERS.names)
         assert all(sum(len(name) + 1 for name in group) <= max(room, 17) for group in groups)
 

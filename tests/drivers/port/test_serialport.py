@@ -12,7 +12,7 @@ import pytest
 import serial
 
 from drivers.base.errors import PortBusy, PortError, PortLost, PortMissing, PortPermission
-from drivers.port.serialport import SerialPort, latency_s
+from drivers.port.serialport import SerialPort, as_serial_port, latency_s, reply_margin_s, tapped
 
 
 class Pty:
@@ -185,3 +185,66 @@ def test_latency_timer_is_read_where_the_system_keeps_it(tmp_path: os.PathLike[s
         file.write("16\n")
     assert latency_s("/dev/ttyUSB3", tmp_path) == 0.016
     assert latency_s("/dev/ttyUSB4", tmp_path) is None
+
+
+def test_the_margin_for_a_reply_is_by_what_the_path_leads_to(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert reply_margin_s(pty.path) == reply_margin_s("socket://host:1") == 0.05
+    assert reply_margin_s("/dev/ttyNowhere7") == pytest.approx(0.010 + 2 * 0.002)
+    monkeypatch.setattr("drivers.port.serialport.latency_s", lambda path: 0.016)
+    assert reply_margin_s("/dev/ttyUSB0") == pytest.approx(0.042)
+
+
+def test_opening_again_lets_go_of_the_device_before(pty: Pty) -> None:
+    port = SerialPort(pty.path)
+    port.open()
+    first = port.serial
+    port.open()
+    assert not first.is_open and port.serial.is_open
+    port.close()
+    assert port.serial is None
+
+
+def test_everything_that_passes_can_be_watched(pty: Pty) -> None:
+    seen: list[tuple[bool, bytes]] = []
+    with tapped(lambda sent, data: seen.append((sent, data))):
+        port = SerialPort(pty.path)
+    assert SerialPort(pty.path).tap is None
+    port.open()
+    port.write(b"out")
+    assert port.put(b"more") == 4
+    os.read(pty.master, 100)
+    os.write(pty.master, b"in")
+    assert port.read(time.monotonic() + 20) == b"in"
+    assert seen == [(True, b"out"), (True, b"more"), (False, b"in")]
+    port.close()
+
+
+def test_put_takes_what_there_is_room_for(pty: Pty) -> None:
+    port = SerialPort(pty.path)
+    port.open()
+    total = 0
+    while sent := port.put(bytes(4096)):
+        total += sent
+    assert total > 0
+    assert port.put(b"x") == 0
+    port.close()
+    with pytest.raises(PortLost, match="not open"):
+        port.put(b"x")
+
+
+def test_a_url_that_nobody_serves_says_what_to_start() -> None:
+    with pytest.raises(PortMissing, match="no port memory://nobody: nothing in this process serves") as caught:
+        SerialPort("memory://nobody").open()
+    assert "omote simulate" in caught.value.hint
+
+
+def test_a_rate_that_the_device_does_not_take_is_named(pty: Pty) -> None:
+    with pytest.raises(PortError, match=r"does not take -1 baud") as caught:
+        SerialPort(pty.path, -1).open()
+    assert "baud rate" in caught.value.hint
+
+
+def test_a_path_or_a_port_gives_a_port(pty: Pty) -> None:
+    port = as_serial_port(pty.path, 9600)
+    assert (port.path, port.baud, port.is_open) == (pty.path, 9600, False)
+    assert as_serial_port(port, 1) is port

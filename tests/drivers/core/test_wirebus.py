@@ -1,0 +1,184 @@
+"""drivers.core.wirebus: losing a port, coming back, and stopping whatever happens, over a simulated board."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+from drivers.base.bus import ServoSpec
+from drivers.base.errors import BusError, NoReply, PortLost, PortMissing, ServoRefused
+from drivers.sim.serving.virtual import VirtualBus
+
+SERVOS = tuple(ServoSpec(i, f"s{i}", "rc-180", -0.5, 0.5, 2.0, 50.0) for i in (1, 4))
+
+
+@pytest.fixture
+def board() -> VirtualBus:
+    return VirtualBus(SERVOS, "maestro", driver={"stagger_s": 0.0, "margin_s": 0.02}, baud=115_200)
+
+
+def outputs(board: VirtualBus) -> list[float]:
+    rows = {row["id"]: row["pulse_us"] for row in board.line.describe(board.clock())}
+    return [rows[servo.id] for servo in SERVOS]
+
+
+def test_goals_need_a_started_bus_and_an_angle_for_each_servo(board: VirtualBus) -> None:
+    with board.bus() as bus:
+        with pytest.raises(BusError, match="the bus on virtual is not started") as caught:
+            bus.write([0.0, 0.0])
+        assert (caught.value.hint, caught.value.port) == ("call start()", "virtual")
+        bus.start()
+        for wrong in ([0.0], [0.0] * 3, [[0.0, 0.0]], 0.0):
+            with pytest.raises(ValueError, match=r"angle_rad: shape .*, expected \(2,\)"):
+                bus.write(wrong)
+        assert bus.report().writes == 0
+
+
+def test_a_closed_bus_says_what_to_call(board: VirtualBus) -> None:
+    bus = board.bus()
+    for use in (bus.read, bus.start, bus.discover):
+        with pytest.raises(PortLost, match="port virtual is not open") as caught:
+            use()
+        assert (caught.value.hint, caught.value.servo_ids) == ("call open()", (1, 4))
+    assert bus.report().errors == {}
+
+
+def test_cycles_and_writes_are_counted_and_goals_limited(board: VirtualBus) -> None:
+    with board.bus() as bus:
+        bus.start()
+        board.clock.sleep(0.01)
+        sent = bus.write([0.5, np.nan])
+        np.testing.assert_allclose(sent, [0.02, 0.0], atol=1e-3)
+        assert not sent.flags.writeable
+        bus.read()
+        bus.read()
+        report = bus.report()
+        assert (report.cycles, report.writes, report.speed_limited, report.refused_targets) == (2, 1, 1, 1)
+
+
+def test_starting_twice_brings_nothing_up_again(board: VirtualBus) -> None:
+    with board.bus() as bus:
+        bus.start()
+        bus._bring_up = None  # a second one would fail
+        bus.start()
+        assert bus.running
+
+
+@pytest.mark.parametrize("use", ["write", "read"])
+def test_a_loss_is_counted_once_and_nothing_goes_out_until_it_is_back(
+    board: VirtualBus, use: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with board.bus() as bus:
+        bus.start()
+        board.fault("unplug")
+        call = {"write": lambda: bus.write([0.0, 0.0]), "read": bus.read}[use]
+        with caplog.at_level(logging.ERROR), pytest.raises(PortLost, match="went away"):
+            call()
+        assert caplog.messages == ["port virtual went away"]
+        for again in (lambda: bus.write([0.0, 0.0]), bus.read):
+            with pytest.raises(PortLost, match="port virtual is lost") as caught:
+                again()
+            assert "reconnect()" in caught.value.hint
+        assert bus.report().errors == {"port_lost": 1}
+        assert bus.running and not bus.is_open
+        board.clear()
+        bus.reconnect()
+        bus.write([0.0, 0.0])
+        assert bus.read().torque.all()
+
+
+def test_coming_back_starts_from_where_the_servos_are(board: VirtualBus) -> None:
+    with board.bus() as bus:
+        bus.start()
+        board.fault("unplug")
+        with pytest.raises(PortLost):
+            bus.read()
+        board.clear()
+        board.line.channels[1].go(4 * 1700.0, board.clock())  # another hand moved it
+        bus.reconnect()
+        sent = bus.write([0.0, 0.0])
+        np.testing.assert_allclose(sent, [200 * np.pi / 2000, 0.0], atol=0.1)
+        assert sent[0] > 0.2  # no jump to the old goal
+
+
+def test_a_start_that_fails_on_the_way_back_leaves_the_bus_lost(board: VirtualBus) -> None:
+    with board.bus() as bus:
+        bus.start()
+        board.fault("unplug")
+        with pytest.raises(PortLost):
+            bus.read()
+        with pytest.raises(PortMissing):
+            bus.reconnect()
+        board.clear()
+        board.fault("mute:*")
+        with pytest.raises(NoReply):
+            bus.reconnect()
+        assert not bus.is_open
+        with pytest.raises(PortLost, match="is lost"):
+            bus.write([0.0, 0.0])
+        board.clear()
+        bus.reconnect()
+        bus.write([0.0, 0.0])
+
+
+def test_a_bus_that_was_not_started_is_not_started_on_the_way_back(board: VirtualBus) -> None:
+    with board.bus() as bus:
+        bus.reconnect()
+        assert bus.is_open and not bus.running
+        assert outputs(board) == [0, 0]
+
+
+def test_a_loss_while_starting_is_a_loss(board: VirtualBus) -> None:
+    with board.bus() as bus:
+        board.fault("unplug")
+        with pytest.raises(PortLost):
+            bus.start()
+        assert bus.report().errors == {"port_lost": 1}
+        assert not bus.running
+        board.clear()
+
+
+def test_stopping_takes_a_lost_port_again_to_switch_off(board: VirtualBus) -> None:
+    bus = board.bus()
+    bus.open()
+    bus.start()
+    board.fault("unplug")
+    with pytest.raises(PortLost):
+        bus.read()
+    board.clear()
+    assert all(outputs(board))
+    bus.stop()
+    assert outputs(board) == [0, 0]
+    assert not bus.running
+    bus.stop()  # nothing is left to do
+    bus.close()
+
+
+def test_servos_behind_a_port_that_does_not_come_back_are_not_confirmed_off(board: VirtualBus) -> None:
+    bus = board.bus()
+    bus.open()
+    bus.start()
+    board.fault("unplug")
+    with pytest.raises(PortLost):
+        bus.read()
+    with pytest.raises(PortLost, match="servos not confirmed off, for their port is gone: no port virtual") as caught:
+        bus.stop()
+    assert (caught.value.hint, caught.value.servo_ids) == ("switch the servos' power off", (1, 4))
+    assert not bus.running
+
+
+def test_an_error_of_a_bus_names_port_and_servos(board: VirtualBus) -> None:
+    bus = board.bus()
+    every = bus._error(ServoRefused, "no", "try again")
+    assert (type(every), str(every), every.hint) == (ServoRefused, "no", "try again")
+    assert (every.port, every.servo_ids) == ("virtual", (1, 4))
+    assert bus._error(NoReply, "no", indices=[1]).servo_ids == (4,)
+    assert bus._error(NoReply, "no", indices=[]).servo_ids == ()
+
+
+def test_the_report_is_a_copy_in_depth(board: VirtualBus) -> None:
+    with board.bus() as bus:
+        bus.report().count("no_reply", 1)
+        assert bus.report().errors == {} and bus.report().errors_by_servo == {}
