@@ -85,7 +85,7 @@ class Mailbox:
                 break
         return sequence, stamp
 
-    def unname(self) -> None:
+    def unlink(self) -> None:
         """Remove the file; those that have reached the memory keep it. A maker that is killed then leaves nothing.
 
         Nothing happens where a file in use cannot be removed, as on Windows.

@@ -24,13 +24,13 @@ def fields_of(options: type) -> dict[str, tuple[Any, Any]]:
     }
 
 
-def given_in(table: BaseModel, options: type) -> Any:
+def to_options(table: BaseModel, options: type) -> Any:
     """An instance of a dataclass of options with what a table of :func:`fields_of` it was given."""
     names = table.model_fields_set & {entry.name for entry in entries(options)}
     return options(**{name: getattr(table, name) for name in names})
 
 
-def from_words(options: type, given: dict[str, Any]) -> Any:
+def from_command_line(options: type, given: dict[str, Any]) -> Any:
     """An instance of a dataclass of options from what a command line gave.
 
     Raises
@@ -46,7 +46,7 @@ def from_words(options: type, given: dict[str, Any]) -> Any:
     return options(**{entry.name: getattr(table, entry.name) for entry in entries(options)})
 
 
-def known_kind(registry: Registry[Any], kind: str) -> str:
+def check_kind(registry: Registry[Any], kind: str) -> str:
     """A kind that is installed.
 
     Raises
@@ -60,7 +60,7 @@ def known_kind(registry: Registry[Any], kind: str) -> str:
     return kind
 
 
-def read_by(read: Callable[[dict[str, Any]], Model]) -> WrapValidator:
+def parse_with(read: Callable[[dict[str, Any]], Model]) -> WrapValidator:
     """For an entry of a list in a file: a table is read by ``read``, which knows the model of its kind."""
 
     def check(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:

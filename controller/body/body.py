@@ -20,11 +20,11 @@ from controller.base.clock import Clock
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS, Floats, Parameters
-from controller.base.signals import endings, let_interrupts_through
+from controller.base.signals import termination_signals, unblock_interrupts
 from controller.body.messages import Begin, BodyOrders, Failed, Finished, Hold, Neutral, Ready, Report, Show
 from controller.body.panel_state import PanelStateWriter, panel_state_size
 from controller.body.sources import Sources, Voice
-from controller.links.kind import Around, Link
+from controller.links.kind import Link, LinkContext
 from controller.links.line.host import load_script
 from controller.links.line.show import Shows
 from controller.links.links import open_links
@@ -80,7 +80,7 @@ class Body:
         self.links: list[Link] = []
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
         self.reflection = self._measured_face(parameters)
-        self.state.watch = self.reflection
+        self.state.servo_monitor = self.reflection
         self.state.shows = Shows(
             lambda name: load_script(name, parameters, stage.vocabulary, beside=stage.path), self.state
         )
@@ -154,7 +154,8 @@ class Body:
         """
         if self.live:
             links = [link for link in self.stage.settings.links if self.puppet is None or link.simulated is None]
-            self.links = open_links(links, Around(self.state, self._closers, self.stage.vocabularies, self.stage.path))
+            context = LinkContext(self.state, self._closers, self.stage.vocabularies, self.stage.path)
+            self.links = open_links(links, context)
             self._closers.callback(self.sources.stop)
             self.sources.begin()
         for bus in self.buses:
@@ -227,8 +228,8 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
     """
     stop = threading.Event()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
-    let_interrupts_through()
-    for ending in endings():
+    unblock_interrupts()
+    for ending in termination_signals():
         signal.signal(ending, lambda *_: stop.set())
     try:
         _serve(orders, pipe, stop)
@@ -260,7 +261,7 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
 def _reached(path: str, count: int) -> Mailbox:
     """A mailbox of main's, which nobody else has to find from now on."""
     mailbox = Mailbox(path, count)
-    mailbox.unname()
+    mailbox.unlink()
     return mailbox
 
 

@@ -32,7 +32,7 @@ class Player(Protocol):
     def start(self, name: str) -> None:
         """Play a script from its beginning. Raises ConfigError."""
 
-    def act(self, what: str, to: str | float = 0.0) -> None:
+    def control(self, what: str, to: str | float = 0.0) -> None:
         """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s). Raises ParameterError."""
 
     def tick(self, now_ns: int) -> None:
@@ -94,7 +94,7 @@ class CommandSink(Protocol):
         """How the face is, as short words and numbers."""
 
 
-class Watch(Protocol):
+class ServoMonitor(Protocol):
     """What looks at the servos; see :class:`controller.robot.following.MeasuredFace`."""
 
     def measured(self, out: Floats) -> bool:
@@ -117,7 +117,7 @@ class CommandState:
 
     Attributes
     ----------
-    watch : looks at the servos; None without any. shows : plays scripts; None where none can be.
+    servo_monitor : looks at the servos; None without any. shows : plays scripts; None where none can be.
 
     Raises
     ------
@@ -146,7 +146,7 @@ class CommandState:
         self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
         self._speech = self.mixer["speech"]
         self._everything = np.ones(len(parameters), dtype=bool)
-        self.watch: Watch | None = None
+        self.servo_monitor: ServoMonitor | None = None
         self.shows: Player | None = None
         self._lock = threading.Lock()
         self._stamp_ns = 0
@@ -171,8 +171,8 @@ class CommandState:
     def _write_layers(self, now_s: float) -> None:
         self._expression.write_masked(self._player.update(now_s), self._everything, now_s)
         self._live(now_s)
-        self._looking.hold_back(self._player.gaze_block)
-        self._speech.hold_back(self._player.mouth_block)
+        self._looking.attenuate(self._player.gaze_block)
+        self._speech.attenuate(self._player.mouth_block)
         if self._gaze.active:
             self._looking.write(self._gaze.indices, self._gaze.update(self._present, self._life), now_s)
 
@@ -296,7 +296,7 @@ class CommandState:
 
     def measured(self, out: Floats) -> bool:
         """See :class:`CommandSink`."""
-        return self.watch is not None and self.watch.measured(out)
+        return self.servo_monitor is not None and self.servo_monitor.measured(out)
 
     def holder(self, index: int) -> str | None:
         """See :class:`CommandSink`."""
@@ -321,7 +321,7 @@ class CommandState:
                 "limited": int(np.count_nonzero(self.limiter.limited)),
                 "ticks": self._ticks,
                 "layers": ",".join(self.mixer.active) or "none",
-                **(self.watch.status() if self.watch is not None else {}),
+                **(self.servo_monitor.status() if self.servo_monitor is not None else {}),
             }
 
     def _stop_looking(self, fade_s: float | None = None) -> None:

@@ -94,7 +94,7 @@ class Layer:
         self.held[indices] = False
         self._fade_out[:] = self.settings.fade_out_s if fade_s is None else fade_s
 
-    def hold_back(self, amount: float) -> None:
+    def attenuate(self, amount: float) -> None:
         """Take away ``amount`` 0..1 of its say, as an expression does that blocks it."""
         self._block[:] = 1.0 - amount
 

@@ -20,8 +20,8 @@ API = 1
 
 
 @dataclass(frozen=True)
-class Around:
-    """What a link is opened into.
+class LinkContext:
+    """Where the commands of a link go, and what it may use.
 
     Attributes
     ----------
@@ -54,8 +54,8 @@ class LinkKind:
     settings : dataclass of what a stage can say of it (:mod:`drivers.base.options`). It may have a method ``check()``
         that raises ValueError, a property ``address`` (where it listens, for people), and a property ``simulated``
         (the script that a simulated far end plays, or None).
-    open : ``"module:name"`` of a function that takes such settings and an :class:`Around` and gives a :class:`Link`;
-        it raises LinkError or PortError.
+    open : ``"module:name"`` of a function that takes such settings and a :class:`LinkContext`, and returns a
+        :class:`Link`; it raises LinkError or PortError.
     install : what ``pip install`` takes where a package is missing.
     """
 

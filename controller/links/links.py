@@ -9,8 +9,8 @@ from typing import Annotated, Any
 from pydantic import create_model, field_validator, model_validator
 
 from controller.base.config import Settings
-from controller.base.schema import fields_of, given_in, known_kind, read_by
-from controller.links.kind import LINKS, Around, Link, LinkKind
+from controller.base.schema import check_kind, fields_of, parse_with, to_options
+from controller.links.kind import LINKS, Link, LinkContext, LinkKind
 from drivers.base.errors import PluginError
 
 
@@ -28,7 +28,7 @@ class LinkSettings(Settings):
     @property
     def own(self) -> Any:
         """What the kind itself is told: an instance of its settings."""
-        return given_in(self, LINKS.get(self.kind).settings)
+        return to_options(self, LINKS.get(self.kind).settings)
 
     @property
     def simulated(self) -> str | None:
@@ -42,7 +42,7 @@ class LinkSettings(Settings):
     @field_validator("kind")
     @classmethod
     def _is_known(cls, value: str) -> str:
-        return known_kind(LINKS, value)
+        return check_kind(LINKS, value)
 
     @model_validator(mode="after")
     def _fits(self) -> LinkSettings:
@@ -67,8 +67,8 @@ def read_link(table: dict[str, Any]) -> LinkSettings:
     return _model_of(kind).model_validate(table)
 
 
-def open_links(choices: Sequence[LinkSettings], around: Around) -> list[Link]:
-    """Open every link of a stage; ``around.closers`` gets what closes them.
+def open_links(choices: Sequence[LinkSettings], context: LinkContext) -> list[Link]:
+    """Open every link of a stage; ``context.closers`` gets what closes them.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def open_links(choices: Sequence[LinkSettings], around: Around) -> list[Link]:
         kind = LINKS.get(choice.kind)
         start = LINKS.load(kind, kind.open)
         with LINKS.blaming(kind.kind):
-            link: Link = start(choice.own, around)
+            link: Link = start(choice.own, context)
         found.append(link)
     return found
 
@@ -95,5 +95,5 @@ def _model_of(kind: LinkKind) -> type[LinkSettings]:
     return made
 
 
-LinkTable = Annotated[LinkSettings, read_by(read_link)]
+LinkTable = Annotated[LinkSettings, parse_with(read_link)]
 """An entry of ``[[links]]``: read by its kind's own options."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from controller.base.errors import ControllerError
 from controller.base.formats import format_fault
 from controller.base.parameters import Floats, Parameters
-from controller.layers.commands import CommandState, Player, StatusValue, Watch
+from controller.layers.commands import CommandState, Player, ServoMonitor, StatusValue
 from controller.vocabulary.vocabulary import Vocabulary
 
 SUFFIX = ".rec"
@@ -133,13 +133,13 @@ class Recorder:
         self.state.snapshot(out)
 
     @property
-    def watch(self) -> Watch | None:
+    def servo_monitor(self) -> ServoMonitor | None:
         """See :class:`CommandState`."""
-        return self.state.watch
+        return self.state.servo_monitor
 
-    @watch.setter
-    def watch(self, watch: Watch | None) -> None:
-        self.state.watch = watch
+    @servo_monitor.setter
+    def servo_monitor(self, servo_monitor: ServoMonitor | None) -> None:
+        self.state.servo_monitor = servo_monitor
 
     def measured(self, out: Floats) -> bool:
         """See :class:`CommandSink`."""

@@ -55,7 +55,7 @@ class VoiceEnvelope:
         self._least = _QUIET * math.sqrt(float((self._shape**2).sum()) * len(self._heard) / 2)
         self._loudest, self._level = np.full(2, self._least), np.zeros(2)
 
-    def hear(self, sound: Floats) -> Floats:
+    def process(self, sound: Floats) -> Floats:
         """(P,) the mouth after one hop of samples -1..1, (hop,) float64; shorter at the end of a stream."""
         self._heard = np.concatenate([self._heard, sound])[-len(self._shape) :]
         power = np.abs(np.fft.rfft(self._heard * self._shape)) ** 2
@@ -124,7 +124,7 @@ class VoiceListener:
             if ahead > 0:
                 self._stopping.wait(ahead)
             now = time.monotonic_ns()
-            values = self._envelope.hear(samples(data, self._width, self._channels))
+            values = self._envelope.process(samples(data, self._width, self._channels))
             self._state.write_layer("speech", values, self._envelope.mask, now, now, through=self._through)
 
 

@@ -21,7 +21,7 @@ from controller.base.clock import Samples
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import Parameters, standard
 from controller.base.paths import find_config
-from controller.base.signals import ENDINGS
+from controller.base.signals import TERMINATION_SIGNALS
 from controller.links.line.hostport import HostPort
 from controller.links.line.protocol import MAX_REPLY, LineDecoder, LineError, Reply, format_words, number, parse_reply
 from controller.links.line.script import Script, Wave
@@ -192,7 +192,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--vocabulary", type=Path, action="append", default=[], help="file of further expressions")
     parser.add_argument("--link", type=Path, default=None, help="make this path a link to the port")
     options = parser.parse_args(arguments)
-    for ending in (signal.SIGINT, *ENDINGS):  # they reach the whole group; the end of stdin ends this
+    for ending in (signal.SIGINT, *TERMINATION_SIGNALS):  # they reach the whole group; the end of stdin ends this
         signal.signal(ending, signal.SIG_IGN)
     try:
         parameters = standard()

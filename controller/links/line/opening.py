@@ -10,7 +10,7 @@ from pathlib import Path
 
 from controller.base.errors import LinkError
 from controller.base.paths import find_config
-from controller.links.kind import Around
+from controller.links.kind import LinkContext
 from controller.links.line.kind import LineSettings
 from controller.links.line.link import LineLink
 from drivers.base.children import command as module_command
@@ -21,7 +21,7 @@ _START_LIMIT_S = 20.0
 _END_LIMIT_S = 3.0
 
 
-def open_line(settings: LineSettings, around: Around) -> LineLink:
+def open_line(settings: LineSettings, context: LinkContext) -> LineLink:
     """Open the port and listen.
 
     Raises
@@ -30,12 +30,12 @@ def open_line(settings: LineSettings, around: Around) -> LineLink:
     """
     port = settings.port
     if settings.simulated is not None:
-        script = find_config("scripts", settings.simulated, beside=around.beside)
-        host = HostProcess(str(script), around.vocabularies)
-        around.closers.callback(host.stop)
+        script = find_config("scripts", settings.simulated, beside=context.beside)
+        host = HostProcess(str(script), context.vocabularies)
+        context.closers.callback(host.stop)
         port = host.path
-    link = LineLink(port, settings.baud, around.sink).start()
-    around.closers.callback(link.stop)
+    link = LineLink(port, settings.baud, context.sink).start()
+    context.closers.callback(link.stop)
     return link
 
 

@@ -264,9 +264,9 @@ def _play(shows: Player | None, what: str, to: str) -> None:
         shows.start(what)
         return
     try:
-        shows.act(what, float(to) if to else 0.0)
+        shows.control(what, float(to) if to else 0.0)
     except ValueError:
-        shows.act(what, to)
+        shows.control(what, to)
 
 
 def _unzip(shown: list[tuple[str, float]]) -> tuple[list[str], list[float]]:

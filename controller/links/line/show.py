@@ -122,7 +122,7 @@ class Shows:
         with self._lock:
             self._show = show
 
-    def act(self, what: str, to: str | float = 0.0) -> None:
+    def control(self, what: str, to: str | float = 0.0) -> None:
         """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s).
 
         Raises

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from controller.base.errors import ConfigError
-from controller.base.schema import from_words
+from controller.base.schema import from_command_line
 from drivers.base.options import REQUIRED, option
 
 
@@ -23,7 +23,7 @@ class Options:
 
 
 def test_good_values_become_an_instance() -> None:
-    assert from_words(Options, {"count": 2, "side": "right"}) == Options(count=2, side="right")
+    assert from_command_line(Options, {"count": 2, "side": "right"}) == Options(count=2, side="right")
 
 
 @pytest.mark.parametrize(
@@ -39,5 +39,5 @@ def test_good_values_become_an_instance() -> None:
 )
 def test_values_beyond_their_limits_are_told_by_their_flag(given: dict[str, Any], flag: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        from_words(Options, given)
+        from_command_line(Options, given)
     assert flag in str(caught.value) and caught.value.hint

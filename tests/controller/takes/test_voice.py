@@ -26,7 +26,7 @@ def tone(hz: float, seconds: float, loud: float = 0.5) -> np.ndarray:
 
 def heard(ear: VoiceEnvelope, sound: np.ndarray) -> np.ndarray:
     hops = len(sound) // ear.hop
-    return np.array([ear.hear(hop) for hop in sound[: hops * ear.hop].reshape(hops, ear.hop)])
+    return np.array([ear.process(hop) for hop in sound[: hops * ear.hop].reshape(hops, ear.hop)])
 
 
 def wav(sound: np.ndarray, width: int = 2) -> bytes:
