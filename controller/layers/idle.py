@@ -7,21 +7,19 @@ from __future__ import annotations
 
 import math
 import random
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from controller.base.config import Settings, config_error, load
+from controller.base.config import Number, Settings, Share, load
 from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import find_config
 from controller.motion.motion import Envelope, minimum_jerk
 
-Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
-Degrees = Annotated[float, Field(ge=0, le=45, allow_inf_nan=False)]
-Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
-Span = tuple[Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)], Seconds]
+Seconds = Annotated[Number, Field(gt=0, le=3600)]
+Degrees = Annotated[Number, Field(ge=0, le=45)]
+Span = tuple[Annotated[Number, Field(ge=0, le=3600)], Seconds]
 
 
 class _Table(Settings):
@@ -101,17 +99,12 @@ class IdleSettings(Settings):
     @classmethod
     def named(cls, name: str, parameters: Parameters) -> IdleSettings:
         """The settings at a path or of a name in ``configs/life``. Raises ConfigError."""
-        path: Path = find_config("life", name)
-        settings = load(path, cls)
-        names = settings.fidget.parameters
-        faults = [
-            f"fidget.parameters[{i}]: unknown parameter {name!r}{did_you_mean(name, parameters.names)}"
-            for i, name in enumerate(names)
-            if name not in parameters.names
-        ]
-        if faults:
-            raise config_error(path, faults)
-        return settings
+
+        def faults(settings: IdleSettings) -> list[str]:
+            return [f"fidget.parameters[{i}]: unknown parameter {name!r}{did_you_mean(name, parameters.names)}"
+                    for i, name in enumerate(settings.fidget.parameters) if name not in parameters.names]  # fmt: skip
+
+        return load(find_config("life", name), cls, faults)
 
 
 class IdleMotion:

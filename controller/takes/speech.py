@@ -168,10 +168,8 @@ def wav_take(path: Path, parameters: Parameters, visemes: Visemes | None = None)
 
 def voice_shapes(parameters: Parameters) -> tuple[Floats, Floats]:
     """(P,) each: the mouth at full voice, and at full hiss."""
-    faults: list[str] = []
-    jaw = spread(parameters, "jaw", {"jawOpen": 0.55, "mouthLowerDown": 0.2, "mouthUpperUp": 0.1}, 0.0, faults)
-    lips = spread(parameters, "lips", {"mouthStretch": 0.3, "mouthLowerDown": 0.25, "jawOpen": 0.06}, 0.0, faults)
-    return jaw, lips
+    jaw = spread(parameters, {"jawOpen": 0.55, "mouthLowerDown": 0.2, "mouthUpperUp": 0.1})
+    return jaw, spread(parameters, {"mouthStretch": 0.3, "mouthLowerDown": 0.25, "jawOpen": 0.06})
 
 
 def _read_wav(path: Path) -> tuple[Floats, int]:

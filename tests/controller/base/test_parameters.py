@@ -134,8 +134,8 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
     text = str(caught.value)
     for part in (
         str(path), "8 faults", "colour: unknown key", "parameters.wide.region", "parameters.wide.range",
-        "parameters.slow.max_speed", "parameters.slow.sped: unknown key", "parameters.lost.profile",
-        "parameters.bare", "aliases.other: unknown parameter 'god', did you mean 'good'",
+        "parameters.slow.max_speed", "parameters.slow.sped: unknown key", "parameters.lost: unknown profile 'b'",
+        "parameters.bare: must be a table (is 3)", "aliases.other: unknown parameter 'god', did you mean 'good'",
     ):  # fmt: skip
         assert part in text
 

@@ -38,13 +38,14 @@ def test_a_wrong_script_lists_every_fault(tmp_path: Path) -> None:
         Script.load(path, P, VOCABULARY)
     text = str(caught.value)
     for part in (
-        "8 faults", "marks.b: must be", "loop: unknown key, did you mean 'loop_s'", "steps[1]: begins with a time",
+        "8 faults", "marks.b: input should be greater than or equal to 0 (is -1)",
+        "loop: unknown key, did you mean 'loop_s'", "steps[1]: begins with a time",
         "steps[2]: unknown parameter 'jawOpn', did you mean 'jawOpen'", "steps[3]: no command",
-        "steps[5]: times must rise", "frames_hz: must be", "loop_s: 1 is before the last step at 3",
+        "steps[5]: times must rise", "frames_hz: input should be", "loop_s: 1 is before the last step at 3",
     ):  # fmt: skip
         assert part in text
     path.write_text('steps = "0 PING"')
-    with pytest.raises(ConfigError, match="steps: must be a list"):
+    with pytest.raises(ConfigError, match="steps: input should be a valid list"):
         Script.load(path, P, VOCABULARY)
 
 
