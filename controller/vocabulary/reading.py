@@ -1,4 +1,4 @@
-"""Reading a face back in other vocabularies, so that a receiver that speaks one of them can be driven."""
+"""Reads a face in other vocabularies: action units, emotions, visemes, moods."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Readings:
 
         Parameters
         ----------
-        what : one of :data:`controller.links.line.words.READINGS`.
+        what : ``UNITS``, ``EMOTION``, ``VISEMES`` or ``MOOD``.
 
         Raises
         ------
