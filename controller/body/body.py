@@ -34,7 +34,7 @@ from controller.robot.settings import RobotSettings
 from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import Take, TakePlayer
 from controller.takes.reader import layer_of, load_take
-from controller.takes.recording import SUFFIX, Face, Recorder, Replay
+from controller.takes.recording import SUFFIX, Replay, recorded
 from drivers.base.priority import take_priority, take_turns_quickly
 from drivers.base.shutdown import Closers, with_those_before
 
@@ -70,10 +70,10 @@ class Body:
     ) -> None:
         self.stage = stage
         self._closers = Closers()
-        self.state: Face = stage.state(parameters)
+        self.state = stage.state(parameters)
         if record is not None:
-            recorder = Recorder(self.state, record, seed=stage.settings.seed, period_s=stage.period_s)
-            self.state = self._closers.enter_context(recorder)
+            seed, period_s = stage.settings.seed, stage.period_s
+            self._closers.enter_context(recorded(self.state, record, seed=seed, period_s=period_s))
         self.clock = Clock(stage.settings.control_hz)
         self.state.live(0.0 if mirror else stage.settings.liveliness, 0)  # no command: it has no time of arrival
         self.replay = replay

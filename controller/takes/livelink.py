@@ -13,13 +13,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.errors import ParameterError, TakeError
 from controller.base.parameters import Floats, Parameters, fold
+from controller.layers.commands import CommandState
 
 _FRAMES_PER_S = 60.0
 _DAY_S = 86_400.0
@@ -109,22 +109,6 @@ class Take:
         return np.clip(out, self.low, self.high, out=out)
 
 
-class LayerSink(Protocol):
-    """Whatever a take can be played into: a command state, or a recorder of one."""
-
-    def write_layer(
-        self,
-        name: str,
-        values: Floats,
-        mask: NDArray[np.bool_],
-        now_ns: int,
-        stamp_ns: int = 0,
-        *,
-        through: Floats | None = None,
-    ) -> None:
-        """Give a layer the values of the mask and release the rest."""
-
-
 class TakePlayer:
     """Plays a take into a layer at its own rate.
 
@@ -137,7 +121,7 @@ class TakePlayer:
     finished : the last row has been given.
     """
 
-    def __init__(self, take: Take, state: LayerSink, layer: str = "capture") -> None:
+    def __init__(self, take: Take, state: CommandState, layer: str = "capture") -> None:
         self.take = take
         self._layer = layer
         self.finished = False

@@ -16,7 +16,7 @@ import numpy as np
 
 from controller.base.errors import TakeError
 from controller.base.parameters import Floats, Parameters
-from controller.takes.recording import Face
+from controller.layers.commands import CommandState
 from controller.takes.speech import voice_shapes
 from controller.vocabulary.visemes import Visemes
 
@@ -88,7 +88,7 @@ class VoiceListener:
     TakeError : the stream does not begin as WAV of 8, 16 or 32 bit PCM.
     """
 
-    def __init__(self, stream: IO[bytes], state: Face, *, raw_hz: int | None = None) -> None:
+    def __init__(self, stream: IO[bytes], state: CommandState, *, raw_hz: int | None = None) -> None:
         self._file = _open(stream) if raw_hz is None else RawPcm(stream, raw_hz)
         self._channels, self._width = self._file.getnchannels(), self._file.getsampwidth()
         self._rate = self._file.getframerate()
