@@ -1,4 +1,4 @@
-"""Takes of Live Link Face: the CSV file, its traps, and playing it at its own rate.
+"""Reads takes of Live Link Face from CSV files, and plays takes at their own rate.
 
 What the format hides (measured on public takes): the timecode counts frames of 1/60 s even in takes of 30 Hz; rows
 are missing; values may exceed 1; head angles that are zero throughout mean "not recorded"; eye angles repeat what the
@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,9 +59,8 @@ class Take:
         Parameters
         ----------
         path : the file. parameters : the registry.
-        swap_jaw_mouth_lr : take the labels jaw and mouth left and right for each other, as the evidence has it.
-        use_eye_angles : drive the eyes by the eye angle columns even when eyeLook columns carry data; these are
-            left out then, for the eyes must not turn twice.
+        swap_jaw_mouth_lr : swap the labels left and right of jaw and mouth, which the format has the wrong way round.
+        use_eye_angles : take the eyes from the eye angle columns, not from the eyeLook columns, where both carry data.
 
         Raises
         ------
@@ -118,7 +116,7 @@ class TakePlayer:
 
     Attributes
     ----------
-    finished : the last row has been given.
+    position_s : how far it has played. finished : the last row has been given.
     """
 
     def __init__(self, take: Take, state: CommandState, layer: str = "capture") -> None:
@@ -128,23 +126,17 @@ class TakePlayer:
         self._state = state
         self._values = np.zeros(take.values.shape[1])
         self._start_ns: int | None = None
-
-    @property
-    def position_s(self) -> float:
-        """How far it has played."""
-        return self._position_s
-
-    _position_s = 0.0
+        self.position_s = 0.0
 
     def tick(self, now_ns: int) -> None:
         """Give the layer the values of ``now_ns`` (monotonic clock); the first call is the take's beginning."""
         if self._start_ns is None:
             self._start_ns = now_ns
-        self._position_s = (now_ns - self._start_ns) * 1e-9
+        self.position_s = (now_ns - self._start_ns) * 1e-9
         if self.finished:
             return
-        self.finished = self._position_s >= self.take.duration_s
-        values = self.take.sample(self._position_s, self._values)
+        self.finished = self.position_s >= self.take.duration_s
+        values = self.take.sample(self.position_s, self._values)
         self._state.write_layer(self._layer, values, self.take.mask, now_ns, now_ns, through=self.take.through)
 
 
@@ -187,29 +179,20 @@ def _cells(
             f"{path}, line {lines[back[0] + 1][0]}, column Timecode: goes back in time",
             hint="two takes in one file? split it there",
         )
-    try:
-        table = np.array([[row[i] for i in keep] for _, row in lines], dtype=np.float64)
-    except ValueError:
-        table = np.full((1, 1), math.nan)
-    if not np.isfinite(table).all():
-        raise _bad_cell(path, header, keep, lines)
+    table = np.array([[_number(path, number, header[i], row[i]) for i in keep] for number, row in lines])
     return [folded[i] for i in keep], times, table
 
 
-def _bad_cell(path: Path, header: list[str], keep: Sequence[int], lines: list[tuple[int, list[str]]]) -> TakeError:
-    """Look for the cell that is not a finite number, now that there is one."""
-    for number, row in lines:
-        for i in keep:
-            try:
-                good = math.isfinite(float(row[i]))
-            except ValueError:
-                good = False
-            if not good:
-                return TakeError(
-                    f"{path}, line {number}, column {header[i]}: {row[i]!r} is not a finite number",
-                    hint="mend or remove that line",
-                )
-    return TakeError(f"{path}: a cell is not a finite number", hint="export the take again")
+def _number(path: Path, line: int, column: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise TakeError(
+            f"{path}, line {line}, column {column}: {text!r} is not a finite number", hint="mend or remove that line"
+        )
+    return value
 
 
 def _timecode(path: Path, number: int, text: str) -> float:

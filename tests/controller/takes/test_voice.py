@@ -65,8 +65,8 @@ def test_noise_of_a_silent_room_moves_nothing() -> None:
 
 def test_a_stream_moves_the_speech_layer_until_it_ends() -> None:
     state, out = CommandState(P), P.neutral()
-    listener = VoiceListener(io.BytesIO(wav(tone(200, 0.3))), state).start()
-    assert listener.join(30.0)
+    listener = VoiceListener(io.BytesIO(wav(tone(200, 0.3))), state)
+    listener.run()
     assert listener.hops == 30
     now = int(1e18)  # long after
     assert state.mixer["speech"].holding > 0
@@ -92,8 +92,8 @@ def test_a_pipe_of_unknown_length_is_heard_as_it_comes() -> None:
     sender = threading.Thread(target=send)
     sender.start()
     with os.fdopen(reading, "rb") as stream:
-        listener = VoiceListener(stream, CommandState(P)).start()
-        assert listener.join(30.0)
+        listener = VoiceListener(stream, CommandState(P))
+        listener.run()
     sender.join()
     assert listener.hops == 20
 
