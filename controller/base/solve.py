@@ -184,7 +184,3 @@ class BoundedSolver:
         right = wanted @ self._weighted
         self.rounds = int(_descend(self._gram, right, self._low, self._high, self._sparsity, self._tolerance, x))
         return x
-
-    def residual(self, x: Floats, wanted: Floats) -> Floats:
-        """(m,) what ``x`` does not reach of ``wanted``."""
-        return wanted - self._matrix @ x

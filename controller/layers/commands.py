@@ -14,7 +14,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
@@ -187,15 +186,18 @@ class CommandState:
     def _write_layers(self, now_s: float) -> None:
         self._expression.write_masked(self._player.update(now_s), self._everything, now_s)
         self._update_idle(now_s)
-        self._looking.attenuate(self._player.gaze_block)
-        self._speech.attenuate(self._player.mouth_block)
+        _, gaze_block, mouth_block = self._player.blocks
+        self._looking.attenuate(gaze_block)
+        self._speech.attenuate(mouth_block)
         if self._gaze.active:
-            self._looking.write(self._gaze.indices, self._gaze.update(self._present, self._life), now_s)
+            eyes_rad = self._life.eye_yaw_rad, self._life.eye_pitch_rad
+            values = self._gaze.update(self._present, eyes_rad, self._life.head_rad[:2])
+            self._looking.write(self._gaze.indices, values, now_s)
 
     def _update_idle(self, now_s: float) -> None:
-        life, player = self._life, self._player
+        life, (blink_block, gaze_block, _) = self._life, self._player.blocks
         if life.liveliness > 0.0:
-            life.update(now_s, looking=self._gaze.active, blink_block=player.blink_block, gaze_block=player.gaze_block)
+            life.update(now_s, looking=self._gaze.active, blink_block=blink_block, gaze_block=gaze_block)
             self._idle.write_masked(life.values, self._everything, now_s)
         elif self._idle.holding:
             life.update(now_s, looking=False)
@@ -280,22 +282,6 @@ class CommandState:
             else:
                 np.subtract(1.0, through, out=layer.share)
             self._stamp(stamp_ns)
-
-    def set_gains(self, name: str, gains: Mapping[str, float]) -> None:
-        """Scale what a layer gives, by region: ``{"brows": 0.6}``; regions not named stay at 1.
-
-        Raises
-        ------
-        KeyError : no layer of that name. ParameterError : no such region, or a gain that is not 0 to 4.
-        """
-        layer = self.mixer[name]
-        gain = np.ones(len(self.parameters))
-        for region, factor in gains.items():
-            if not 0.0 <= factor <= 4.0:
-                raise ParameterError(f"gain of {region} must be 0 to 4, not {factor}", hint="1 leaves it as it is")
-            gain[self.parameters.region(region)] = factor
-        with self._journaled("set_gains", name, gains):
-            layer.gain[:] = gain
 
     def snapshot(self, out: Floats) -> None:
         with self._lock:

@@ -1,4 +1,4 @@
-"""Layers: many sources, one parameter vector, and for every parameter the name of the layer that holds it.
+"""Mixes layers, the values of many sources, into one parameter vector, and says which layer holds each parameter.
 
 A layer keeps the latest value of each parameter it was given; nothing queues. From the lowest priority to the
 highest, with s the layer's share of a parameter (weight x fade) and v its value:
@@ -25,7 +25,7 @@ _SHORTEST_S = 1e-9
 
 @dataclass(frozen=True)
 class LayerSettings:
-    """What a layer is.
+    """Name, priority and timing of a layer; :class:`controller.layers.settings.LayerTable` checks those of files.
 
     Attributes
     ----------
@@ -44,24 +44,16 @@ class LayerSettings:
     timeout_s: float = math.inf
     gains: Mapping[str, float] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        if self.mode not in ("set", "add", "max"):
-            raise ValueError(f"mode must be 'set', 'add' or 'max', not {self.mode!r}")
-        if not 0.0 <= self.weight <= 1.0:
-            raise ValueError(f"weight must be 0 to 1, not {self.weight}")
-        if not (self.fade_in_s >= 0 and self.fade_out_s >= 0 and self.timeout_s > 0):
-            raise ValueError("fade_in_s and fade_out_s must not be negative, timeout_s must be positive")
-
 
 class Layer:
-    """One source's place in a :class:`Mixer`; all arrays are rows of the mixer's, (P,) each.
+    """The values of one source in a :class:`Mixer`; all arrays are rows of the mixer's, (P,) each.
 
     Attributes
     ----------
     values : latest values. held : which parameters the source has given and not released.
     gain : factor on the values, for instance per region.
     share : factor on the weight, for what blocks or fades the layer.
-    applied : share it had in the last mix. settings : what it was made from.
+    applied : share it had in the last mix.
     """
 
     def __init__(self, settings: LayerSettings, table: _Table, row: int) -> None:
@@ -95,7 +87,7 @@ class Layer:
         self._fade_out[:] = self.settings.fade_out_s if fade_s is None else fade_s
 
     def attenuate(self, amount: float) -> None:
-        """Take away ``amount`` 0..1 of its say, as an expression does that blocks it."""
+        """Reduce the layer's weight by ``amount`` 0..1, for an expression that blocks it."""
         self._block[:] = 1.0 - amount
 
     @property
@@ -105,7 +97,7 @@ class Layer:
 
 
 class _Table:
-    """What ``n`` layers hold of ``p`` parameters, and how they come and go; (n, p) or (n, 1) each."""
+    """What ``n`` layers hold of ``p`` parameters, and how they fade; (n, p) or (n, 1) each."""
 
     def __init__(self, settings: Sequence[LayerSettings], p: int) -> None:
         shape = (len(settings), p)
@@ -119,7 +111,7 @@ class _Table:
         self._rate, self.block = np.zeros(shape), np.ones((len(settings), 1))
 
     def advance(self, now_s: float, dt: float) -> Flags:
-        """Let fades and time-outs pass; (n,) which layers have any say."""
+        """Advance fades and time-outs; (n,) which layers have any effect."""
         np.greater(self.stamp, now_s - self._timeout_s, out=self._fresh)
         self.held &= self._fresh
         rise, fall = (dt / np.maximum(fade, max(dt, _SHORTEST_S)) for fade in (self._fade_in_s, self.fade_out_s))
@@ -182,7 +174,7 @@ class Mixer:
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Layers that had any say in the last mix, lowest priority first."""
+        """Layers that had any effect in the last mix, lowest priority first."""
         return tuple(layer.name for layer in self.layers if layer.applied.any())
 
     def holder(self, index: int) -> str | None:
@@ -197,10 +189,6 @@ class Mixer:
                     return layer.name
                 adding = adding or layer.name
         return adding
-
-    def holders(self) -> list[str | None]:
-        """:meth:`holder` of every parameter."""
-        return [self.holder(i) for i in range(len(self._work))]
 
     def _apply(self, mode: Mode, given: Floats, share: Floats, out: Floats) -> None:
         work = self._work

@@ -24,7 +24,7 @@ SUFFIX = ".rec"
 """What names of recordings end in."""
 
 _KIND, _VERSION = "omote recording", 1
-_COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live", "set_gains")
+_COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live")
 
 
 Maker = Callable[[Parameters, int, float], CommandState]

@@ -25,7 +25,6 @@ LETTERS = "ABCDE"
 
 _TERM = re.compile(r"([LR]?)(?:AU|AD)?(\d{1,2})([LR]?)([A-E]?)", re.IGNORECASE)
 _SPARSITY = 2e-3
-_SHOWN = 0.05
 _LEAST_INTENSITY = 0.1
 _LEAST_LIKENESS = 0.35  # cosine to the nearest emotion below which a face shows none
 _TOLERANCE = 1e-5
@@ -154,17 +153,6 @@ class Facs:
         levels: Floats = self._solver.solve(np.asarray(values, dtype=np.float64)) * self._read
         return levels
 
-    def formula(self, levels: Floats) -> str:
-        """Levels (n,) as a formula with letters; both sides as one where they agree, nothing below 0.05."""
-        terms = []
-        for unit, indices in self._of_unit.items():
-            shown = {self.names[i].removesuffix(unit): _letter(levels[i]) for i in indices if levels[i] >= _SHOWN}
-            if len(set(shown.values())) == 1 and len(shown) == len(indices):
-                terms.append(unit + next(iter(shown.values())))
-            else:
-                terms += [side + unit + letter for side, letter in shown.items()]
-        return "+".join(terms)
-
     def read_emotion(self, values: Floats) -> tuple[str, float]:
         """The emotion whose units ``values`` : (P,) show most, and its intensity 0..1; neutral when little shows."""
         levels = self.read(values)
@@ -208,10 +196,6 @@ class Facs:
             if not indices:
                 raise ParameterError(f"action unit {unit} has no sides", hint=f"write it as {unit}")
         return indices, (LETTERS.index(letter) + 1) / 5 if letter else 1.0
-
-
-def _letter(level: float) -> str:
-    return LETTERS[min(max(round(float(level) * 5), 1), 5) - 1]
 
 
 def _columns(parameters: Parameters, name: str, unit: _Unit) -> list[_Column]:

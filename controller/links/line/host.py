@@ -45,7 +45,6 @@ class RobotHost:
     ----------
     sent, accepted, refused, unanswered, damaged, streamed : lines counted.
     refusals : the first refused lines with their answers. round_trip_ms : from a line to its answer.
-    newest : the newest streamed line.
     """
 
     def __init__(
@@ -60,7 +59,6 @@ class RobotHost:
         self.script = script
         self.refusals: list[str] = []
         self.round_trip_ms = Samples(8192)
-        self.newest: Reply | None = None
         self.counts: Counter[str] = Counter()
         self._wave = Wave(parameters)
         self._decoder = LineDecoder(MAX_REPLY)
@@ -146,7 +144,6 @@ class RobotHost:
             return
         if reply.kind in ("P", "F"):
             self.counts["streamed"] += 1
-            self.newest = reply
             return
         self._answered(reply)
 

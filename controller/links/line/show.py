@@ -23,14 +23,13 @@ class Show:
 
     Attributes
     ----------
-    playing : whether time passes. position_s : where it is. loops : how often it began again.
+    playing : whether time passes. position_s : where it is.
     """
 
     def __init__(self, script: Script, sink: CommandSink) -> None:
         self.script = script
         self.playing = False
         self.position_s = 0.0
-        self.loops = 0
         self._session = LineSession(sink, 0)
         self._times = [at_s for at_s, _ in script.steps]
         self._next = 0
@@ -40,12 +39,6 @@ class Show:
     def finished(self) -> bool:
         """The last step has been played and nothing begins again."""
         return not self.script.loop_s and self._next >= len(self._times)
-
-    @property
-    def mark(self) -> str | None:
-        """The last mark that was passed."""
-        passed = [(at_s, name) for name, at_s in self.script.marks.items() if at_s <= self.position_s]
-        return max(passed)[1] if passed else None
 
     def play(self) -> None:
         """Let time pass."""
@@ -85,7 +78,6 @@ class Show:
         if self.script.loop_s and self.position_s >= self.script.loop_s:
             self.position_s %= self.script.loop_s
             self._next = 0
-            self.loops += 1
             said += self._say_due(now_ns)
         return said
 

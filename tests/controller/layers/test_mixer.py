@@ -30,7 +30,6 @@ def test_the_higher_layer_wins_parameter_by_parameter() -> None:
     out = mix(mixer)
     assert out[[JAW, SMILE, BROW]] == pytest.approx([0.9, 0.3, 0.0])
     assert (mixer.holder(JAW), mixer.holder(SMILE), mixer.holder(BROW)) == ("top", "base", None)
-    assert mixer.holders()[JAW] == "top"
 
 
 def test_weight_set_add_and_max() -> None:
@@ -137,11 +136,5 @@ def test_mixing_does_not_allocate() -> None:
 def test_wrong_layers_are_refused() -> None:
     with pytest.raises(ValueError, match="different names"):
         Mixer(P, [*default_layers(), LayerSettings("gaze", 99)])
-    with pytest.raises(ValueError, match="mode"):
-        LayerSettings("a", 1, "mul")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="weight"):
-        LayerSettings("a", 1, weight=2.0)
-    with pytest.raises(ValueError, match="timeout_s"):
-        LayerSettings("a", 1, timeout_s=0.0)
     with pytest.raises(KeyError, match="did you mean 'manual'"):
         Mixer(P, default_layers())["manuel"]

@@ -135,13 +135,12 @@ def test_a_replay_ticks_at_its_own_pace_whatever_the_clock(tmp_path: Path) -> No
     np.testing.assert_array_equal(rows[-1], recorded[-1])
 
 
-def test_gains_and_captures_are_recorded(tmp_path: Path) -> None:
+def test_captures_are_recorded(tmp_path: Path) -> None:
     path, out = tmp_path / "a.rec", P.neutral()
     with recorded(CommandState(P), path) as state:
-        state.set_gains("capture", {"jaw": 0.5})
         state.capture(np.full(len(P), 0.6), np.ones(len(P), dtype=bool), 10**9)
         for i in range(60):
             state.tick(10**9 + i * STEP_NS, 0.01, out)
     *_, (_, values) = replay(path, P)
     np.testing.assert_array_equal(values, out)
-    assert values[P.index("jawOpen")] == pytest.approx(0.3, abs=0.01)
+    assert values[P.index("jawOpen")] == pytest.approx(0.6, abs=0.01)

@@ -74,11 +74,6 @@ def test_faces_that_show_no_emotion_read_as_neutral() -> None:
         assert FACS.read_emotion(vocabulary[name].weights)[0] == "neutral", name
 
 
-def test_read_out_as_a_formula() -> None:
-    assert FACS.formula(FACS.read(FACS.expand("1+4B+R12C"))) == "1E+4B+R12C"
-    assert FACS.formula(np.zeros(len(FACS.names))) == ""
-
-
 def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
     path = tmp_path / "own.toml"
     path.write_text(
