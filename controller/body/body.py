@@ -25,7 +25,7 @@ from controller.body.messages import Begin, BodyOrders, Failed, Finished, Hold, 
 from controller.body.panel_state import PanelStateWriter, panel_state_size
 from controller.body.sources import Sources, Voice
 from controller.links.kind import Link, LinkContext
-from controller.links.line.host import load_script
+from controller.links.line.script import load_script
 from controller.links.line.show import Shows
 from controller.links.links import open_links
 from controller.robot.busloop import BusLoop

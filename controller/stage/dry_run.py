@@ -9,8 +9,7 @@ import numpy as np
 
 from controller.base.parameters import Parameters
 from controller.layers.commands import CommandState
-from controller.links.line.host import load_script
-from controller.links.line.script import Script
+from controller.links.line.script import Script, load_script
 from controller.links.line.show import Show
 from controller.robot.anchors import AnchorMap, load_anchors
 from controller.robot.channels import build_table
@@ -65,7 +64,7 @@ def _feed(stage: Stage, take: Path | None, state: CommandState) -> tuple[Feed, f
     ]
     shows = [Show(script, state) for script in scripts]
     for show in shows:
-        show.play()
+        show.playing = True
     return _all([show.tick for show in shows]), max(script.loop_s or _last_s(script) for script in scripts)
 
 

@@ -1,4 +1,4 @@
-"""A simulated robot host: it sends a script over a pseudo-terminal and checks every answer.
+"""Simulates a robot host: it sends a script over a pseudo-terminal and checks every answer.
 
 ``python -m controller.links.line.host --script tour`` makes the port, prints ``ready PATH``, serves until its standard
 input ends, and prints what it counted as one line of JSON. It so ends with whoever started it.
@@ -20,11 +20,10 @@ from pathlib import Path
 from controller.base.clock import Samples
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import Parameters, standard
-from controller.base.paths import find_config
 from controller.base.signals import TERMINATION_SIGNALS
 from controller.links.line.hostport import HostPort
 from controller.links.line.protocol import MAX_REPLY, LineDecoder, LineError, Reply, format_words, number, parse_reply
-from controller.links.line.script import Script, Wave
+from controller.links.line.script import Script, Wave, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
 _ANSWER_LIMIT_S = 1.0
@@ -162,24 +161,6 @@ class RobotHost:
         for tag in [tag for tag, (sent_s, _) in self._waiting.items() if sent_s < before_s]:
             del self._waiting[tag]
             self.counts["unanswered"] += self._greeted
-
-
-def load_script(
-    name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
-) -> Script:
-    """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
-
-    Parameters
-    ----------
-    beside : the file that names it; its folder is looked through first.
-
-    Raises
-    ------
-    ConfigError : it is not there, or wrong; every fault with its key.
-    """
-    return Script.load(
-        find_config("scripts", name, beside=beside), parameters, vocabulary or Vocabulary.load(parameters)
-    )
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from controller.base.config import Number, Settings, load
 from controller.base.parameters import Floats, Parameters
+from controller.base.paths import find_config
 from controller.links.line.commands import Grammar
 from controller.links.line.protocol import LineError
 from controller.vocabulary.vocabulary import Vocabulary
@@ -85,6 +86,23 @@ def _read_step(text: str, grammar: Grammar, earliest_s: float) -> tuple[float, s
     if grammar.parse(line.encode("utf-8")) is None:
         raise ValueError("no command after the time")
     return at_s, line.strip()
+
+
+def load_script(
+    name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
+) -> Script:
+    """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
+
+    Parameters
+    ----------
+    beside : the file that names it; its folder is searched first.
+
+    Raises
+    ------
+    ConfigError : it is not there, or wrong; every fault with its key.
+    """
+    path = find_config("scripts", name, beside=beside)
+    return Script.load(path, parameters, vocabulary or Vocabulary.load(parameters))
 
 
 class Wave:

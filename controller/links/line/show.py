@@ -1,4 +1,4 @@
-"""Shows: a script played straight into the face, with marks, pause, seek and loop."""
+"""Plays scripts as shows, straight into the face, with marks, pause, seek and loop."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Show:
 
     Attributes
     ----------
-    playing : whether time passes. position_s : where it is.
+    playing : whether time passes; the face stays as it is otherwise. position_s : where it is.
     """
 
     def __init__(self, script: Script, sink: CommandSink) -> None:
@@ -40,17 +40,8 @@ class Show:
         """The last step has been played and nothing begins again."""
         return not self.script.loop_s and self._next >= len(self._times)
 
-    def play(self) -> None:
-        """Let time pass."""
-        self.playing = True
-        self._last_ns = None
-
-    def pause(self) -> None:
-        """Stop time; the face stays as it is."""
-        self.playing = False
-
     def seek(self, to: str | float) -> None:
-        """Go to a mark or a time (s). What was said before is not said again: begin such a place with NEUTRAL.
+        """Go to a mark or a time (s). Earlier lines are not sent: begin such a place with NEUTRAL.
 
         Raises
         ------
@@ -68,30 +59,28 @@ class Show:
         self._last_ns = None
 
     def tick(self, now_ns: int) -> list[str]:
-        """Say what is due at ``now_ns`` (monotonic clock); returns the lines that were said."""
+        """Send the lines that are due at ``now_ns`` (monotonic clock) to the face; returns them."""
         if not self.playing:
+            self._last_ns = None
             return []
         if self._last_ns is not None:
             self.position_s += (now_ns - self._last_ns) * 1e-9
         self._last_ns = now_ns
-        said = self._say_due(now_ns)
+        sent = self._send_due(now_ns)
         if self.script.loop_s and self.position_s >= self.script.loop_s:
             self.position_s %= self.script.loop_s
             self._next = 0
-            said += self._say_due(now_ns)
-        return said
+            sent += self._send_due(now_ns)
+        return sent
 
-    def _say_due(self, now_ns: int) -> list[str]:
-        said = []
+    def _send_due(self, now_ns: int) -> list[str]:
+        sent = []
         while self._next < len(self._times) and self._times[self._next] <= self.position_s:
             line = self.script.steps[self._next][1]
             self._session.feed(line.encode("ascii") + b"\n", now_ns)
-            said.append(line)
+            sent.append(line)
             self._next += 1
-        return said
-
-
-Find = Callable[[str], Script]
+        return sent
 
 
 class Shows:
@@ -102,7 +91,7 @@ class Shows:
     find : the script of a name; raises ConfigError. sink : the face.
     """
 
-    def __init__(self, find: Find, sink: CommandSink) -> None:
+    def __init__(self, find: Callable[[str], Script], sink: CommandSink) -> None:
         self._find, self._sink = find, sink
         self._show: Show | None = None
         self._lock = threading.RLock()  # a show may start another
@@ -110,7 +99,7 @@ class Shows:
     def start(self, name: str) -> None:
         """Play a script from its beginning. Raises ConfigError."""
         show = Show(self._find(name), self._sink)
-        show.play()
+        show.playing = True
         with self._lock:
             self._show = show
 
@@ -130,10 +119,10 @@ class Shows:
             elif what == "STOP":
                 self._show = None
             else:
-                show.play() if what == "PLAY" else show.pause()
+                show.playing = what == "PLAY"
 
     def tick(self, now_ns: int) -> None:
-        """Say what is due."""
+        """Send the lines that are due."""
         with self._lock:
             if self._show is not None:
                 self._show.tick(now_ns)

@@ -9,7 +9,7 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.links.line.script import Script, Wave
+from controller.links.line.script import Script, Wave, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
@@ -47,6 +47,15 @@ def test_a_wrong_script_lists_every_fault(tmp_path: Path) -> None:
     path.write_text('steps = "0 PING"')
     with pytest.raises(ConfigError, match="steps: input should be a valid list"):
         Script.load(path, P, VOCABULARY)
+
+
+def test_scripts_by_name_and_path(tmp_path: Path) -> None:
+    assert load_script("tour", P).steps
+    path = tmp_path / "own.toml"
+    path.write_text('steps = ["0 PING"]')
+    assert load_script(str(path), P).name == "own"
+    with pytest.raises(ConfigError, match="did you mean 'tour'"):
+        load_script("tuor", P)
 
 
 def test_in_a_wave_every_parameter_moves_every_frame_and_stays_in_range() -> None:
