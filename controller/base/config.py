@@ -51,10 +51,7 @@ def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str
     cross_check : returns the faults between values, such as unknown names; of a file that does not fit the model it
         gets the part that does.
 
-    Raises
-    ------
-    ConfigError
-        when the file cannot be read, is not TOML, or does not fit; lists every fault with its key.
+    Raises ConfigError: when the file cannot be read, is not TOML, or does not fit; lists every fault with its key.
     """
     return check(read_toml(path), model, path, cross_check)
 

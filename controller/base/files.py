@@ -15,10 +15,7 @@ from controller.base.errors import ControllerError
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path beside ``path`` that takes its place when the block ends well.
 
-    Raises
-    ------
-    ControllerError
-        when the folder cannot be written; ``path`` stays as it was.
+    Raises ControllerError: when the folder cannot be written; ``path`` stays as it was.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

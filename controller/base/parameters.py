@@ -63,9 +63,7 @@ class Parameters:
     def load(cls, path: Path | None = None) -> Parameters:
         """Read a base vocabulary; the shipped one without ``path``.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
         path = path or config_dir() / "vocabularies" / "arkit.toml"
         return _build(load(path, _File, _unknown_aliases))
@@ -76,9 +74,7 @@ class Parameters:
     def index(self, name: str) -> int:
         """Position of ``name``, any known spelling.
 
-        Raises
-        ------
-        ParameterError : no such parameter; the message says the nearest names.
+        Raises ParameterError: no such parameter; the message says the nearest names.
         """
         found = self._lookup.get(name)  # the canonical spelling needs no folding
         if found is None:

@@ -22,12 +22,7 @@ _SHARE = Path("share/omote/configs")
 
 
 def config_dir() -> Path:
-    """Folder that holds heads, vocabularies, robots and stages.
-
-    Raises
-    ------
-    ConfigError : no such folder is found.
-    """
+    """Folder that holds heads, vocabularies, robots and stages. Raises ConfigError: no such folder is found."""
     looked: list[Path] = []
     for folder in _candidates():
         if (folder / "vocabularies").is_dir():
@@ -48,9 +43,7 @@ def find_config(kind: str, name: str, *, beside: Path | None = None) -> Path:
     name : a path (also relative to the folder of ``beside``), or a name from ``configs/<kind>``.
     beside : the file that says ``name``.
 
-    Raises
-    ------
-    ConfigError : nothing of that name; the message lists what there is.
+    Raises ConfigError: nothing of that name; the message lists what there is.
     """
     folder = config_dir() / kind
     places = [Path(name), folder / name, folder / f"{name}.toml"]

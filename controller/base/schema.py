@@ -33,9 +33,7 @@ def to_options(table: BaseModel, options: type) -> Any:
 def from_command_line(options: type, given: dict[str, Any]) -> Any:
     """An instance of a dataclass of options from what a command line gave.
 
-    Raises
-    ------
-    ConfigError : a value is beyond its limits; names every such option.
+    Raises ConfigError: a value is beyond its limits; names every such option.
     """
     make: Any = create_model
     try:
@@ -47,12 +45,7 @@ def from_command_line(options: type, given: dict[str, Any]) -> Any:
 
 
 def check_kind(registry: Registry[Any], kind: str) -> str:
-    """A kind that is installed.
-
-    Raises
-    ------
-    ValueError : it is not, or it cannot be loaded; says which there are.
-    """
+    """A kind that is installed. Raises ValueError: it is not, or it cannot be loaded; says which there are."""
     try:
         registry.get(kind)
     except PluginError as error:

@@ -132,9 +132,7 @@ class BoundedSolver:
     ridge : pulls towards 0 and settles what the rows leave open. sparsity : prefers few values that are not 0.
     tolerance : largest change of a value at which it stops.
 
-    Raises
-    ------
-    ValueError : shapes do not fit, a number is not finite, or bounds are inside out.
+    Raises ValueError: shapes do not fit, a number is not finite, or bounds are inside out.
     """
 
     def __init__(
@@ -173,9 +171,7 @@ class BoundedSolver:
         ----------
         start : (n,) where to begin; the last solution of something that moves. Zero without.
 
-        Raises
-        ------
-        ValueError : ``wanted`` is not finite.
+        Raises ValueError: ``wanted`` is not finite.
         """
         if not np.isfinite(wanted).all():
             raise ValueError("wanted must be finite")

@@ -121,9 +121,7 @@ class CommandState:
     ----------
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
 
-    Raises
-    ------
-    ConfigError : the shipped expressions or figures cannot be read.
+    Raises ConfigError: the shipped expressions or figures cannot be read.
     """
 
     def __init__(
@@ -270,9 +268,7 @@ class CommandState:
         ----------
         through : (P,) how much of the layers below shows through, 0..1; nothing without.
 
-        Raises
-        ------
-        KeyError : no layer of that name.
+        Raises KeyError: no layer of that name.
         """
         with self._journaled("write_layer", name, values, mask, now_ns, stamp_ns, through):
             layer = self.mixer[name]

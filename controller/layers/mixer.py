@@ -134,9 +134,7 @@ class Mixer:
     ----------
     parameters : the registry. layers : what layers there are; order in priority, not in the list.
 
-    Raises
-    ------
-    ValueError : two layers of one name. ParameterError : gains of a region that is none.
+    Raises ValueError: two layers of one name. ParameterError: gains of a region that is none.
     """
 
     def __init__(self, parameters: Parameters, layers: Sequence[LayerSettings]) -> None:

@@ -57,9 +57,7 @@ def load_layers(
     ----------
     where : the file the changes are from, for messages.
 
-    Raises
-    ------
-    ConfigError : a wrong key or value; two layers of one priority. Every fault with its key.
+    Raises ConfigError: a wrong key or value; two layers of one priority. Every fault with its key.
     """
     path = config_dir() / "vocabularies" / "layers.toml"
     base = read_toml(path)

@@ -56,9 +56,7 @@ class LinkSettings(Settings):
 def read_link(table: dict[str, Any]) -> LinkSettings:
     """A link from its table in a stage, with the options of its kind.
 
-    Raises
-    ------
-    pydantic.ValidationError : every fault with its key.
+    Raises pydantic.ValidationError: every fault with its key.
     """
     try:
         kind = LINKS.get(str(table.get("kind", "line")))
@@ -70,9 +68,7 @@ def read_link(table: dict[str, Any]) -> LinkSettings:
 def open_links(choices: Sequence[LinkSettings], context: LinkContext) -> list[Link]:
     """Open every link of a stage; ``context.closers`` gets what closes them.
 
-    Raises
-    ------
-    LinkError, PortError : one does not come up. PluginError : a package that it needs is not installed.
+    Raises LinkError, PortError: one does not come up. PluginError: a package that it needs is not installed.
     """
     found = []
     for choice in choices:

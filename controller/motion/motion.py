@@ -77,9 +77,7 @@ class MotionLimiter:
     ----------
     limited : (n,) bool, whether the last step was held back by a speed or acceleration limit.
 
-    Raises
-    ------
-    ValueError : a limit or ``response_s`` is not positive, or ``low`` is above ``high``.
+    Raises ValueError: a limit or ``response_s`` is not positive, or ``low`` is above ``high``.
     """
 
     def __init__(

@@ -62,9 +62,7 @@ class Take:
         swap_jaw_mouth_lr : swap the labels left and right of jaw and mouth, which the format has the wrong way round.
         use_eye_angles : take the eyes from the eye angle columns, not from the eyeLook columns, where both carry data.
 
-        Raises
-        ------
-        TakeError : the file cannot be read or a cell is wrong; names file, line and column.
+        Raises TakeError: the file cannot be read or a cell is wrong; names file, line and column.
         """
         columns, times, table = _read(Path(path))
         values, present = _by_parameter(columns, table, parameters, swap_jaw_mouth_lr)

@@ -68,12 +68,7 @@ def suffixes() -> list[str]:
 
 
 def reader_of(path: Path) -> TakeReader:
-    """Who reads a file, told apart by the ending of its name.
-
-    Raises
-    ------
-    TakeError : nobody does.
-    """
+    """Who reads a file, told apart by the ending of its name. Raises TakeError: nobody does."""
     kind = path.suffix.lower()
     for reader in TAKES.all():
         if kind in reader.suffixes:
@@ -86,9 +81,7 @@ def reader_of(path: Path) -> TakeReader:
 def load_take(path: Path, parameters: Parameters) -> Take:
     """A take of any kind omote reads.
 
-    Raises
-    ------
-    TakeError : the file cannot be read or is wrong. PluginError : a package that it needs is not installed.
+    Raises TakeError: the file cannot be read or is wrong. PluginError: a package that it needs is not installed.
     """
     reader = reader_of(path)
     read = TAKES.load(reader, reader.read)

@@ -43,9 +43,7 @@ def recorded(state: CommandState, path: Path, *, seed: int = 0, period_s: float 
     ----------
     path : the file to write. seed, period_s : those of ``state``, for the replay.
 
-    Raises
-    ------
-    ControllerError : the file cannot be written.
+    Raises ControllerError: the file cannot be written.
     """
     try:
         file = path.open("w", encoding="ascii")
@@ -85,9 +83,7 @@ def replay(
     check : compare each tick with the recorded one.
     make : makes the state to play into, of the parameters, a seed and the length of a tick (s).
 
-    Raises
-    ------
-    ControllerError : the file cannot be read, is damaged, or ``check`` finds a tick that came out differently.
+    Raises ControllerError: the file cannot be read, is damaged, or ``check`` finds a tick that came out differently.
     """
     lines = _lines(path)
     seed, period_s = _header(path, lines, parameters)

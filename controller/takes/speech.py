@@ -44,9 +44,7 @@ def speech_take(name: str, cues: Sequence[Cue], end_s: float, parameters: Parame
     ----------
     cues : rising in time; the last lasts until ``end_s``.
 
-    Raises
-    ------
-    TakeError : no cue, or times that do not rise.
+    Raises TakeError: no cue, or times that do not rise.
     """
     starts = np.array([cue.start_s for cue in cues])
     if len(cues) == 0 or np.any(np.diff(starts) < 0) or end_s < starts[-1]:

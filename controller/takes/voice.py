@@ -37,12 +37,7 @@ _HINT = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le -"
 
 
 def wav_take(path: Path, parameters: Parameters) -> Take:
-    """A take of a WAV file, a row every 10 ms.
-
-    Raises
-    ------
-    TakeError : not a WAV file of PCM, or an empty one.
-    """
+    """A take of a WAV file, a row every 10 ms. Raises TakeError: not a WAV file of PCM, or an empty one."""
     try:
         with path.open("rb") as stream:
             file = _open(stream, str(path))
@@ -114,9 +109,7 @@ class VoiceListener:
     ----------
     hops : how many pieces of 10 ms were heard.
 
-    Raises
-    ------
-    TakeError : the stream does not begin as WAV of 8, 16 or 32 bit PCM.
+    Raises TakeError: the stream does not begin as WAV of 8, 16 or 32 bit PCM.
     """
 
     def __init__(self, stream: IO[bytes], state: CommandState, *, raw_hz: int | None = None) -> None:

@@ -49,9 +49,7 @@ class Affect:
     def load(cls, expressions: Expressions, path: Path | None = None) -> Affect:
         """Read a space of moods; the shipped one without ``path``.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
 
         def faults(file: _File) -> list[str]:

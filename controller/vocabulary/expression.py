@@ -85,9 +85,7 @@ def read_expressions(parameters: Parameters, files: Iterable[Path]) -> tuple[dic
     ----------
     files : may mix the expressions of those before them.
 
-    Raises
-    ------
-    ConfigError : a file cannot be read or is wrong; every fault of every file with its key.
+    Raises ConfigError: a file cannot be read or is wrong; every fault of every file with its key.
     """
     known: dict[str, Expression] = {}
     aliases: dict[str, str] = {}

@@ -95,9 +95,7 @@ class Facs:
     def load(cls, parameters: Parameters, path: Path | None = None) -> Facs:
         """Read action units; the shipped ones without ``path``.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
         path = path or config_dir() / "vocabularies" / "facs.toml"
         return cls._build(parameters, load(path, _File, lambda file: cls._faults(parameters, file)))
@@ -130,9 +128,7 @@ class Facs:
 
         ``12`` is both sides at full intensity, ``L12B`` the face's own left side at 0.4.
 
-        Raises
-        ------
-        ParameterError : a term is not understood or no unit has its number.
+        Raises ParameterError: a term is not understood or no unit has its number.
         """
         levels = np.zeros(len(self.names))
         for term in filter(None, formula.replace(" ", "").split("+")):

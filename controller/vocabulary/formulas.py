@@ -31,9 +31,7 @@ class Formulas:
     def __call__(self, text: str) -> Expression | None:
         """The expression of a formula; None when ``text`` is none.
 
-        Raises
-        ------
-        ParameterError : a formula that is wrong. ConfigError : the file behind it is.
+        Raises ParameterError: a formula that is wrong. ConfigError: the file behind it is.
         """
         if _UNITS.match(text):
             return Expression(text.upper(), self._facs.expand(text), source="FACS")

@@ -37,9 +37,7 @@ class Readings:
         ----------
         what : ``UNITS``, ``EMOTION``, ``VISEMES`` or ``MOOD``.
 
-        Raises
-        ------
-        KeyError : another word. ConfigError : a vocabulary's file is wrong.
+        Raises KeyError: another word. ConfigError: a vocabulary's file is wrong.
         """
         with self._lock:
             return {"UNITS": self._units, "EMOTION": self._emotion, "VISEMES": self._shapes, "MOOD": self._mood}[what](

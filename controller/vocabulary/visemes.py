@@ -57,9 +57,7 @@ class Visemes:
     def load(cls, parameters: Parameters, path: Path | None = None) -> Visemes:
         """Read visemes; the shipped ones without ``path``.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
         path = path or config_dir() / "vocabularies" / "visemes.toml"
         return _build(parameters, load(path, _File, lambda file: _faults(parameters, file)))
@@ -73,9 +71,7 @@ class Visemes:
     def weights(self, name: str) -> Floats:
         """(n,) weights of a viseme by name, or of a phoneme with or without stress digit.
 
-        Raises
-        ------
-        ParameterError : neither is known.
+        Raises ParameterError: neither is known.
         """
         name = self.aliases.get(name, name)
         if name in self.names:

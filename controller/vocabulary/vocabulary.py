@@ -42,9 +42,7 @@ class Vocabulary:
         ----------
         more : further files whose expressions are added, such as a user's own; they may mix those before them.
 
-        Raises
-        ------
-        ConfigError : a file cannot be read or is wrong; every fault of every file with its key.
+        Raises ConfigError: a file cannot be read or is wrong; every fault of every file with its key.
         """
         files = (path or config_dir() / "vocabularies" / "expressions.toml", *more)
         expressions, aliases = read_expressions(parameters, files)
@@ -58,9 +56,7 @@ class Vocabulary:
     def __getitem__(self, name: str) -> Expression:
         """The expression called ``name``, any case, or of a formula such as ``AU1+2+5B`` or ``VA:0.6,-0.2``.
 
-        Raises
-        ------
-        ParameterError : unknown name, with the nearest ones, or a wrong formula.
+        Raises ParameterError: unknown name, with the nearest ones, or a wrong formula.
         """
         made = self._formulas(name) if self._formulas is not None else None
         if made is not None:

@@ -78,9 +78,7 @@ class Grammar:
     def parse(self, line: bytes) -> Request | None:
         """The request of a line without its line end; None for an empty line.
 
-        Raises
-        ------
-        LineError : the line is refused; it carries code, reason and tag.
+        Raises LineError: the line is refused; it carries code, reason and tag.
         """
         words = parse_words(line)
         if words is None:

@@ -22,9 +22,7 @@ class HostPort(PtyPort):
     ----------
     path : what the controller opens. dropped : bytes that the other side did not take in time.
 
-    Raises
-    ------
-    PortError : the system has no pseudo-terminals, or ``link`` cannot be made.
+    Raises PortError: the system has no pseudo-terminals, or ``link`` cannot be made.
     """
 
     @property

@@ -55,12 +55,7 @@ class LineLink:
         self._thread = threading.Thread(target=self._run, name=f"link {port}", daemon=True)
 
     def start(self) -> LineLink:
-        """Open the port and begin to listen.
-
-        Raises
-        ------
-        PortError : the port cannot be opened; its subclasses say why.
-        """
+        """Open the port and begin to listen. Raises PortError: the port cannot be opened; its subclasses say why."""
         self._serial.open()
         self.connected = True
         self._thread.start()

@@ -25,9 +25,7 @@ _END_LIMIT_S = 3.0
 def open_line(settings: LineSettings, context: LinkContext) -> LineLink:
     """Open the port and listen.
 
-    Raises
-    ------
-    LinkError : the simulated host does not start. PortError : the port cannot be opened.
+    Raises LinkError: the simulated host does not start. PortError: the port cannot be opened.
     """
     port = settings.port
     if settings.simulated is not None:
@@ -51,9 +49,7 @@ class HostProcess:
     ----------
     path : the port it serves. counts : what it counted, once stopped.
 
-    Raises
-    ------
-    LinkError : it does not start.
+    Raises LinkError: it does not start.
     """
 
     def __init__(self, script: str, vocabularies: Sequence[Path] = ()) -> None:

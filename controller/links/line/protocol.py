@@ -114,9 +114,7 @@ def checksum(data: bytes) -> int:
 def parse_words(line: bytes) -> Words | None:
     """Take a line (without its line end) apart; None for one with nothing in it.
 
-    Raises
-    ------
-    LineError : not printable ASCII, too long, reserved for binary frames, wrong checksum or tag.
+    Raises LineError: not printable ASCII, too long, reserved for binary frames, wrong checksum or tag.
     """
     if not line.strip(b" \t"):
         return None

@@ -51,9 +51,7 @@ class Script:
     def load(cls, path: Path, parameters: Parameters, vocabulary: Vocabulary) -> Script:
         """Read a script and check every line of it.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
         grammar = Grammar(parameters, lambda name: vocabulary[name].name)
         file = load(path, _File, lambda file: _read_steps(file, grammar)[1])
@@ -97,9 +95,7 @@ def load_script(
     ----------
     beside : the file that names it; its folder is searched first.
 
-    Raises
-    ------
-    ConfigError : it is not there, or wrong; every fault with its key.
+    Raises ConfigError: it is not there, or wrong; every fault with its key.
     """
     path = find_config("scripts", name, beside=beside)
     return Script.load(path, parameters, vocabulary or Vocabulary.load(parameters))

@@ -43,9 +43,7 @@ class Show:
     def seek(self, to: str | float) -> None:
         """Go to a mark or a time (s). Earlier lines are not sent: begin such a place with NEUTRAL.
 
-        Raises
-        ------
-        ParameterError : no such mark, or not a time from 0 on.
+        Raises ParameterError: no such mark, or not a time from 0 on.
         """
         if isinstance(to, str):
             if to not in self.script.marks:
@@ -106,9 +104,7 @@ class Shows:
     def control(self, what: str, to: str | float = 0.0) -> None:
         """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s).
 
-        Raises
-        ------
-        ParameterError : there is no show, or no such mark or time.
+        Raises ParameterError: there is no show, or no such mark or time.
         """
         with self._lock:
             show = self._show
