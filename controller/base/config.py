@@ -11,7 +11,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, RootModel, ValidationError
 
 from controller.base.errors import ConfigError
-from controller.base.formats import NEWER
+from controller.base.files import NEWER
 from controller.base.partial_config import PartialConfig
 
 Model = TypeVar("Model", bound=BaseModel)

@@ -1,13 +1,4 @@
-"""Errors of the controller room, and the one tuple a command line has to catch.
-
-The tree::
-
-    ControllerError
-    ├── ConfigError      a configuration file: every fault at once, each with its path in the file
-    ├── ParameterError   an unknown parameter or a value that is not a number
-    ├── LinkError        a link to the outside cannot be opened or went away
-    └── TakeError        a recorded take cannot be read
-"""
+"""Defines the errors of the controller room, and the tuple of all errors that a command line has to catch."""
 
 from __future__ import annotations
 
@@ -16,7 +7,7 @@ from surface.base.errors import SurfaceError
 
 
 class ControllerError(Exception):
-    """Something the controller room cannot do.
+    """Base of the errors of the controller room.
 
     Parameters
     ----------
@@ -46,4 +37,4 @@ class TakeError(ControllerError):
 
 
 OMOTE_ERRORS = (ControllerError, DriverError, SurfaceError)
-"""Everything omote raises on purpose; the command line turns these into one message and exit code 1."""
+"""Everything omote raises on purpose; the command line prints one message and exits with code 1."""

@@ -33,7 +33,7 @@ from controller.robot.following import FollowMode, MeasuredFace
 from controller.robot.settings import RobotSettings
 from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import Take, TakePlayer
-from controller.takes.reader import layer_of, load_take
+from controller.takes.reader import load_take, reader_of
 from controller.takes.recording import SUFFIX, Replay, recorded
 from drivers.base.priority import take_priority, take_turns_quickly
 from drivers.base.shutdown import Closers, with_those_before
@@ -211,7 +211,7 @@ def _own(stage: Stage, parameters: Parameters, voice: Voice | None) -> tuple[Tak
     settings, take, layer = stage.settings, None, "capture"
     if settings.take is not None:
         path = stage.file(settings.take)
-        take, layer = load_take(path, parameters), layer_of(path)
+        take, layer = load_take(path, parameters), reader_of(path).layer
     if voice is None and settings.voice is not None:
         voice = Voice(str(stage.file(settings.voice)), settings.voice_hz)
     return take, layer, voice
@@ -272,7 +272,7 @@ def _body(orders: BodyOrders, stage: Stage, mailbox: Mailbox, parameters: Parame
     path = Path(orders.take)
     if path.suffix == SUFFIX:
         return Body(stage, parameters, mailbox, replay=Replay(path, parameters, stage.state))
-    return Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path), record=record)
+    return Body(stage, parameters, mailbox, load_take(path, parameters), reader_of(path).layer, record=record)
 
 
 def _panel_state(insights: Mailbox | None, body: Body) -> Callable[[], None]:

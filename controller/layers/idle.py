@@ -1,6 +1,6 @@
-"""Idle life: blinks, glances, micro-saccades, breathing, sway and small fidgets; seeded, so it can be repeated.
+"""Generates idle motion: blinks, glances, micro-saccades, breathing, sway and small fidgets.
 
-Everything is a function of the seed and of the times it is asked for; the figures are in ``configs/life``.
+It depends on nothing but the seed and the times it is updated to; the settings are in ``configs/life``.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import random
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field
 
 from controller.base.config import Number, Settings, Share, load
 from controller.base.parameters import Floats, Parameters, did_you_mean
@@ -19,22 +19,19 @@ from controller.motion.motion import Envelope, minimum_jerk
 
 Seconds = Annotated[Number, Field(gt=0, le=3600)]
 Degrees = Annotated[Number, Field(ge=0, le=45)]
-Span = tuple[Annotated[Number, Field(ge=0, le=3600)], Seconds]
 
 
-class _Table(Settings):
-    """A table whose spans must not be inside out."""
-
-    @model_validator(mode="after")
-    def _spans_rise(self) -> _Table:
-        for key, value in self:
-            if isinstance(value, tuple) and len(value) == 2 and value[0] > value[1]:
-                raise ValueError(f"{key} must be [shortest, longest]")
-        return self
+def _in_order(span: tuple[float, float]) -> tuple[float, float]:
+    if span[0] > span[1]:
+        raise ValueError(f"must be [shortest, longest], not {list(span)}")
+    return span
 
 
-class BlinkSettings(_Table):
-    """When and how it blinks."""
+Span = Annotated[tuple[Annotated[Number, Field(ge=0, le=3600)], Seconds], AfterValidator(_in_order)]
+
+
+class BlinkSettings(Settings):
+    """Rate and shape of blinks."""
 
     interval_s: Span
     double_share: Share
@@ -46,8 +43,8 @@ class BlinkSettings(_Table):
     shift_share: Share
 
 
-class EyeSettings(_Table):
-    """Where the eyes go by themselves."""
+class EyeSettings(Settings):
+    """Glances, and micro-saccades while something is looked at."""
 
     interval_s: Span
     yaw_deg: Degrees
@@ -57,8 +54,8 @@ class EyeSettings(_Table):
     micro_deg: Degrees
 
 
-class HeadSettings(_Table):
-    """How the head sways."""
+class HeadSettings(Settings):
+    """Sway of the head."""
 
     yaw_deg: Degrees
     pitch_deg: Degrees
@@ -66,8 +63,8 @@ class HeadSettings(_Table):
     period_s: Span
 
 
-class BreathSettings(_Table):
-    """How it breathes."""
+class BreathSettings(Settings):
+    """Breathing, which moves the head."""
 
     inhale_s: Seconds
     hold_s: Seconds
@@ -76,8 +73,8 @@ class BreathSettings(_Table):
     pitch_deg: Degrees
 
 
-class FidgetSettings(_Table):
-    """What small things it does."""
+class FidgetSettings(Settings):
+    """Small random movements of single parameters."""
 
     interval_s: Span
     rise_s: Seconds
@@ -88,7 +85,7 @@ class FidgetSettings(_Table):
 
 
 class IdleSettings(Settings):
-    """Everything about idle life."""
+    """All settings of idle motion."""
 
     blink: BlinkSettings
     eyes: EyeSettings
@@ -108,11 +105,11 @@ class IdleSettings(Settings):
 
 
 class IdleMotion:
-    """Idle life of one face.
+    """Idle motion of one face.
 
     Parameters
     ----------
-    parameters : the registry. settings : the figures. seed : the same seed lives the same life.
+    parameters : the registry. settings : rates and sizes. seed : the same seed gives the same motion.
 
     Attributes
     ----------
@@ -145,7 +142,7 @@ class IdleMotion:
             self._next_blink_s = min(self._next_blink_s, now_s)
 
     def update(self, now_s: float, *, looking: bool, blink_block: float = 0.0, gaze_block: float = 0.0) -> Floats:
-        """Live until ``now_s``; returns :attr:`values`.
+        """Move to ``now_s``; returns :attr:`values`.
 
         Parameters
         ----------

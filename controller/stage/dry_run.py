@@ -17,7 +17,7 @@ from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.stage.offline import Feed, OfflineRun
 from controller.stage.stage import Stage
 from controller.takes.livelink import TakePlayer
-from controller.takes.reader import layer_of, load_take
+from controller.takes.reader import load_take, reader_of
 from controller.takes.recording import SUFFIX, replay
 
 _LONGEST_S = 30.0
@@ -72,7 +72,7 @@ def _of_take(stage: Stage, take: Path, state: CommandState) -> tuple[Feed, float
     if take.suffix == SUFFIX:
         return _of_recording(stage, take, state)
     loaded = load_take(take, state.parameters)
-    return TakePlayer(loaded, state, layer_of(take)).tick, loaded.duration_s
+    return TakePlayer(loaded, state, reader_of(take).layer).tick, loaded.duration_s
 
 
 def _of_recording(stage: Stage, path: Path, state: CommandState) -> tuple[Feed, float]:

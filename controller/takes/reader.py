@@ -90,8 +90,3 @@ def load_take(path: Path, parameters: Parameters) -> Take:
     if not isinstance(take, Take):
         raise TakeError(f"{path}: take kind {reader.kind!r} gave no take, but {take!r}", hint="update its package")
     return take
-
-
-def layer_of(path: Path) -> str:
-    """The layer a take plays into."""
-    return reader_of(path).layer

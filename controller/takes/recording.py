@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from controller.base.errors import ControllerError
-from controller.base.formats import format_fault
+from controller.base.files import format_fault
 from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import select
-from types import TracebackType
 
 from drivers.sim.serving.ptyport import PtyPort
 
@@ -49,7 +48,5 @@ class HostPort(PtyPort):
     def __enter__(self) -> HostPort:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from types import TracebackType
 
 from controller.layers.commands import CommandSink
 from controller.links.line.session import LineSession
@@ -85,9 +84,7 @@ class LineLink:
     def __enter__(self) -> LineLink:
         return self.start()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def _run(self) -> None:

@@ -196,7 +196,7 @@ def test_the_same_seed_lives_the_same_life() -> None:
 def test_an_expression_holds_speech_and_gaze_back(rule: str, share: float) -> None:
     plain, silent = Vocabulary.load(P), P.neutral()
     shown = Expression("stern", silent, mouth=rule, gaze=rule)
-    state = CommandState(P, Vocabulary({"neutral": plain["neutral"], "stern": shown}))
+    state = CommandState(P, Vocabulary(P, {"neutral": plain["neutral"], "stern": shown}))
     now, values = 10**9, P.neutral()
     state.expression("stern", 0.5, None, now)
     state.gaze(0.8, 0.0, now)

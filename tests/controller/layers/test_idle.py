@@ -106,7 +106,11 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path, root: Path) -> None:
     path.write_text(text.replace("interval_s = [2.0, 6.0]", "interval_s = [6.0, 2.0]").replace("roll_deg", "rol_deg"))
     with pytest.raises(ConfigError) as caught:
         IdleSettings.named(str(path), P)
-    for part in ("blink: interval_s must be", "head.roll_deg: missing", "head.rol_deg: unknown key"):
+    for part in (
+        "blink.interval_s: must be [shortest, longest], not [6.0, 2.0]",
+        "head.roll_deg: missing",
+        "head.rol_deg: unknown key",
+    ):
         assert part in str(caught.value)
     path.write_text(text.replace('"mouthPucker"', '"mouthPuker"'))
     with pytest.raises(ConfigError, match="did you mean 'mouthPucker'"):
