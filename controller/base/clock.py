@@ -1,7 +1,6 @@
-"""Fixed-rate clock on absolute deadlines, and the statistics a report needs.
+"""Ticks at a fixed rate on absolute deadlines, and collects statistics of measurements.
 
-A tick that comes too late is skipped and counted, never made up for: a face that runs after its own past
-is worse than one that misses a step.
+A tick that comes too late is skipped and counted, never made up for.
 """
 
 from __future__ import annotations
@@ -37,14 +36,9 @@ class Samples:
         """Mean, median, p95, p99 and maximum, in the unit that was added; empty without measurements."""
         if not self.count:
             return {}
-        p50, p95, p99 = np.percentile(self._values[: self.count], [50, 95, 99])
-        return {
-            "mean": self._sum / self.count,
-            "p50": float(p50),
-            "p95": float(p95),
-            "p99": float(p99),
-            "max": self.maximum,
-        }
+        percentiles = np.percentile(self._values[: self.count], [50, 95, 99]).tolist()
+        middle = dict(zip(("p50", "p95", "p99"), percentiles, strict=True))
+        return {"mean": self._sum / self.count, **middle, "max": self.maximum}
 
 
 class Clock:

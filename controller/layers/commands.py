@@ -12,9 +12,8 @@ from contextlib import contextmanager
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.base.parameters import Floats, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
 from controller.layers.idle import IdleMotion, IdleSettings
@@ -175,9 +174,11 @@ class CommandState:
             self._journal = journal
 
     @contextmanager
-    def _journaled(self, name: str, *arguments: Any) -> Iterator[None]:
+    def _journaled(self, name: str, *arguments: Any, stamp_ns: int = 0) -> Iterator[None]:
+        """Hold the lock; at the end note when the command arrived, and pass it to the journal."""
         with self._lock:
             yield
+            self._stamp_ns = max(self._stamp_ns, stamp_ns)
             if self._journal is not None:
                 self._journal(name, *arguments)
 
@@ -204,63 +205,48 @@ class CommandState:
     # What links call
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
-        with self._journaled("set_parameters", indices, values, stamp_ns):
+        with self._journaled("set_parameters", indices, values, stamp_ns, stamp_ns=stamp_ns):
             self._manual.write(list(indices), values, stamp_ns * 1e-9)
-            self._stamp(stamp_ns)
 
     def release(self, indices: Sequence[int], stamp_ns: int) -> None:
-        with self._journaled("release", indices, stamp_ns):
+        with self._journaled("release", indices, stamp_ns, stamp_ns=stamp_ns):
             self._manual.release(list(indices))
-            self._stamp(stamp_ns)
 
     def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
         expression = self.vocabulary[name]
-        with self._journaled("expression", name, intensity, duration_s, stamp_ns):
+        with self._journaled("expression", name, intensity, duration_s, stamp_ns, stamp_ns=stamp_ns):
             self._player.play(expression, intensity, duration_s, self._time(stamp_ns))
-            self._stamp(stamp_ns)
 
     def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
-        with self._journaled("gaze", yaw_rad, pitch_rad, stamp_ns):
+        with self._journaled("gaze", yaw_rad, pitch_rad, stamp_ns, stamp_ns=stamp_ns):
             self._gaze.look(yaw_rad, pitch_rad)
             self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
-            self._stamp(stamp_ns)
 
     def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
-        with self._journaled("gaze_at", x_mm, y_mm, z_mm, stamp_ns):
+        with self._journaled("gaze_at", x_mm, y_mm, z_mm, stamp_ns, stamp_ns=stamp_ns):
             self._gaze.look_at(x_mm, y_mm, z_mm)
             self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
-            self._stamp(stamp_ns)
 
     def gaze_off(self, stamp_ns: int) -> None:
-        with self._journaled("gaze_off", stamp_ns):
+        with self._journaled("gaze_off", stamp_ns, stamp_ns=stamp_ns):
             self._stop_looking()
-            self._stamp(stamp_ns)
 
     def neutral(self, seconds: float, stamp_ns: int) -> None:
-        with self._journaled("neutral", seconds, stamp_ns):
+        with self._journaled("neutral", seconds, stamp_ns, stamp_ns=stamp_ns):
             self._manual.release(fade_s=seconds)
             self._stop_looking(seconds)
             self._player.rest(seconds, self._time(stamp_ns))
-            self._stamp(stamp_ns)
 
     def live(self, amount: float, stamp_ns: int) -> None:
-        with self._journaled("live", amount, stamp_ns):
+        with self._journaled("live", amount, stamp_ns, stamp_ns=stamp_ns):
             self._life.liveliness = min(max(amount, 0.0), 1.0)
-            self._stamp(stamp_ns)
 
-    def capture(self, values: Floats, mask: NDArray[np.bool_], now_ns: int, stamp_ns: int = 0) -> None:
+    def capture(self, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
         """Give the live-capture layer ``values`` : (P,) where ``mask`` : (P,) bool; released after 1 s of silence."""
         self.write_layer("capture", values, mask, now_ns, stamp_ns)
 
     def write_layer(
-        self,
-        name: str,
-        values: Floats,
-        mask: NDArray[np.bool_],
-        now_ns: int,
-        stamp_ns: int = 0,
-        *,
-        through: Floats | None = None,
+        self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0, *, through: Floats | None = None
     ) -> None:
         """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest.
 
@@ -270,14 +256,13 @@ class CommandState:
 
         Raises KeyError: no layer of that name.
         """
-        with self._journaled("write_layer", name, values, mask, now_ns, stamp_ns, through):
+        with self._journaled("write_layer", name, values, mask, now_ns, stamp_ns, through, stamp_ns=stamp_ns):
             layer = self.mixer[name]
             layer.write_masked(values, mask, now_ns * 1e-9)
             if through is None:
                 layer.share.fill(1.0)
             else:
                 np.subtract(1.0, through, out=layer.share)
-            self._stamp(stamp_ns)
 
     def snapshot(self, out: Floats) -> None:
         with self._lock:
@@ -312,9 +297,6 @@ class CommandState:
     def _stop_looking(self, fade_s: float | None = None) -> None:
         self._gaze.off()
         self._looking.release(fade_s=fade_s)
-
-    def _stamp(self, stamp_ns: int) -> None:
-        self._stamp_ns = max(self._stamp_ns, stamp_ns)
 
     def _time(self, stamp_ns: int) -> float:
         """When a command takes effect: when it came, but not before the last tick."""

@@ -62,16 +62,17 @@ class Layer:
         self.values, self.gain, self.share = table.values[row], table.gain[row], table.share[row]
         self.applied, self.held, self._stamp = table.applied[row], table.held[row], table.stamp[row]
         self._fade_out, self._block = table.fade_out_s[row], table.block[row]
-        self._fresh = np.zeros(len(self.values), dtype=bool)
+        self._fresh, self._positions = np.zeros(len(self.values), dtype=bool), np.arange(len(self.values))
 
     def write(self, indices: Which, values: Floats | Sequence[float] | float, now_s: float) -> None:
         """Hold some parameters at ``values`` from ``now_s`` on; what is not finite changes nothing."""
-        given = np.asarray(values, dtype=np.float64)
-        if not np.isfinite(given).all():
-            indices, given = _only_finite(indices, given, len(self.values))
-        self.values[indices] = given
-        self._stamp[indices] = now_s
-        self.held[indices] = True
+        positions = self._positions[indices]
+        given = np.broadcast_to(np.asarray(values, dtype=np.float64), positions.shape)
+        finite = np.isfinite(given)
+        positions = positions[finite]
+        self.values[positions] = given[finite]
+        self._stamp[positions] = now_s
+        self.held[positions] = True
 
     def write_masked(self, values: Floats, mask: Flags, now_s: float) -> None:
         """Hold the parameters of ``mask`` : (P,) bool at ``values`` : (P,); all others are released."""
@@ -207,11 +208,3 @@ class Mixer:
 def by_priority(layers: Sequence[LayerSettings]) -> list[LayerSettings]:
     """Layers in the order in which they are mixed, lowest priority first."""
     return sorted(layers, key=lambda layer: layer.priority)
-
-
-def _only_finite(indices: Which, values: Floats, count: int) -> tuple[Indices, Floats]:
-    """The finite part of ``values`` and the positions it belongs to."""
-    positions = np.arange(count)[indices]
-    spread = np.broadcast_to(values, positions.shape)
-    good = np.isfinite(spread)
-    return positions[good], spread[good]

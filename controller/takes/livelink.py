@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.base.errors import ParameterError, TakeError
-from controller.base.parameters import Floats, Parameters, fold
+from controller.base.parameters import Flags, Floats, Parameters, fold
 from controller.layers.commands import CommandState
 
 _FRAMES_PER_S = 60.0
@@ -45,7 +44,7 @@ class Take:
     name: str
     times_s: Floats
     values: Floats
-    mask: NDArray[np.bool_]
+    mask: Flags
     low: Floats
     high: Floats
     through: Floats | None = None
@@ -156,27 +155,14 @@ def _read(path: Path) -> tuple[list[str], Floats, Floats]:
     lines = [(number, row) for number, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
     if not lines:
         raise TakeError(f"{path}: a header but no rows", hint="record the take again, or export it again")
-    return _cells(path, header, folded, lines)
-
-
-def _cells(
-    path: Path, header: list[str], folded: list[str], lines: list[tuple[int, list[str]]]
-) -> tuple[list[str], Floats, Floats]:
     for number, row in lines:
         if len(row) != len(header):
             raise TakeError(
                 f"{path}, line {number}: {len(row)} cells where the header has {len(header)}",
                 hint="the file may be cut off; export the take again",
             )
-    clock = folded.index("timecode")
+    times = _times(path, [(number, row[folded.index("timecode")]) for number, row in lines])
     keep = [i for i, name in enumerate(folded) if name not in ("timecode", "blendshapecount", "framerate")]
-    times = _unwrap(np.array([_timecode(path, number, row[clock]) for number, row in lines]))
-    back = np.flatnonzero(np.diff(times) < 0)
-    if len(back):
-        raise TakeError(
-            f"{path}, line {lines[back[0] + 1][0]}, column Timecode: goes back in time",
-            hint="two takes in one file? split it there",
-        )
     table = np.array([[_number(path, number, header[i], row[i]) for i in keep] for number, row in lines])
     return [folded[i] for i in keep], times, table
 
@@ -193,27 +179,26 @@ def _number(path: Path, line: int, column: str, text: str) -> float:
     return value
 
 
-def _timecode(path: Path, number: int, text: str) -> float:
-    """Seconds since midnight; the frame counts 1/60 s."""
-    match = _TIMECODE.fullmatch(text)
-    if match is None:
-        raise TakeError(
-            f"{path}, line {number}, column Timecode: {text!r} is not HH:MM:SS:FF.fff", hint="mend or remove that line"
-        )
-    hours, minutes, seconds = (int(group) for group in match.groups()[:3])
-    return 3600 * hours + 60 * minutes + seconds + float(match[4]) / _FRAMES_PER_S
+def _times(path: Path, lines: list[tuple[int, str]]) -> Floats:
+    """Seconds from the first line, of line numbers and timecodes; a fall by more than half a day is midnight."""
+    seconds = np.empty(len(lines))
+    for i, (number, text) in enumerate(lines):
+        match = _TIMECODE.fullmatch(text)
+        if match is None:
+            message = f"{path}, line {number}, column Timecode: {text!r} is not HH:MM:SS:FF.fff"
+            raise TakeError(message, hint="mend or remove that line")
+        hours, minutes, whole = map(int, match.groups()[:3])
+        seconds[i] = 3600 * hours + 60 * minutes + whole + float(match[4]) / _FRAMES_PER_S
+    seconds += _DAY_S * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -_DAY_S / 2)
+    for (number, _), step in zip(lines[1:], np.diff(seconds), strict=True):
+        if step < 0:
+            message = f"{path}, line {number}, column Timecode: goes back in time"
+            raise TakeError(message, hint="two takes in one file? split it there")
+    since_first: Floats = seconds - seconds[0]
+    return since_first
 
 
-def _unwrap(times: Floats) -> Floats:
-    """Seconds from the first row; a fall by more than half a day is midnight."""
-    days = np.cumsum(np.diff(times, prepend=times[0]) < -_DAY_S / 2)
-    seconds: Floats = times + _DAY_S * days - times[0]
-    return seconds
-
-
-def _by_parameter(
-    columns: list[str], table: Floats, parameters: Parameters, swap: bool
-) -> tuple[Floats, NDArray[np.bool_]]:
+def _by_parameter(columns: list[str], table: Floats, parameters: Parameters, swap: bool) -> tuple[Floats, Flags]:
     """Cells (n, P) under their parameters, angles normalised, and which parameters there are columns for."""
     values = np.zeros((len(table), len(parameters)))
     present = np.zeros(len(parameters), dtype=bool)
@@ -231,7 +216,7 @@ def _by_parameter(
     return values, present
 
 
-def _leave_out(values: Floats, present: NDArray[np.bool_], parameters: Parameters, use_eye_angles: bool) -> None:
+def _leave_out(values: Floats, present: Flags, parameters: Parameters, use_eye_angles: bool) -> None:
     """Drop columns that carry nothing or say the same as others; changes both arrays."""
     head, eyes = parameters.indices(_HEAD), parameters.indices(_EYES)
     looks = np.array([i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")])

@@ -80,17 +80,17 @@ def _dominance(t: float, start: float, end: float, room: float) -> float:
     return 1.0
 
 
-def cue_take(path: Path, parameters: Parameters, visemes: Visemes | None = None) -> Take:
+def cue_take(path: Path, parameters: Parameters) -> Take:
     """A take from Rhubarb's TSV or JSON, or from a TSV of phonemes or visemes (time, tab, name). Raises TakeError."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise TakeError(f"{path}: cannot be read: {error}", hint=f"look at: ls -l {path}") from error
-    visemes = visemes or Visemes.load(parameters)
+    visemes = Visemes.load(parameters)
     rows, end_s = _json_rows(path, text) if path.suffix.lower() == ".json" else _tsv_rows(path, text)
     shapes = all(name in visemes.rhubarb for _, _, name in rows)
     cues = [Cue(start_s, _weights(path, line, name, visemes, shapes)) for line, start_s, name in rows]
-    return speech_take(path.name, cues, end_s or _last_end(cues), parameters, visemes)
+    return speech_take(path.name, cues, end_s, parameters, visemes)
 
 
 def _weights(path: Path, line: str, name: str, visemes: Visemes, shapes: bool) -> Floats:
@@ -108,13 +108,16 @@ def _tsv_rows(path: Path, text: str) -> tuple[list[tuple[str, float, str]], floa
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
-        cells = line.split()
-        start = _seconds(cells[0])
-        if len(cells) != 2 or start is None:
+        try:
+            time, name = line.split()
+            start = float(time)
+            if not 0.0 <= start < math.inf:
+                raise ValueError
+        except ValueError:
             raise TakeError(f"{path}, line {number}: {line!r} is not a time in seconds, a tab and a name",
-                            hint="write it like: 0.27<tab>C")  # fmt: skip
-        rows.append((f"line {number}", start, cells[1]))
-    return rows, 0.0
+                            hint="write it like: 0.27<tab>C") from None  # fmt: skip
+        rows.append((f"line {number}", start, name))
+    return rows, rows[-1][1] + 0.1 if rows else 0.0
 
 
 def _json_rows(path: Path, text: str) -> tuple[list[tuple[str, float, str]], float]:
@@ -126,15 +129,3 @@ def _json_rows(path: Path, text: str) -> tuple[list[tuple[str, float, str]], flo
         raise TakeError(
             f"{path}: not the output of rhubarb -f json: {error}", hint="rhubarb -f json voice.wav"
         ) from error
-
-
-def _last_end(cues: Sequence[Cue]) -> float:
-    return cues[-1].start_s + 0.1 if cues else 0.0
-
-
-def _seconds(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) and value >= 0.0 else None

@@ -7,7 +7,7 @@ is an anchor at the origin.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
@@ -15,7 +15,9 @@ from pydantic import Field
 from controller.base.config import Number, Settings, load
 from controller.base.parameters import Floats, did_you_mean
 from controller.base.paths import config_dir
-from controller.vocabulary.expression import Expressions
+
+if TYPE_CHECKING:
+    from controller.vocabulary.vocabulary import Vocabulary  # which imports this module
 
 _POWER = 3.0
 _NEAR = 1e-6
@@ -46,7 +48,7 @@ class Affect:
         self._faces = faces
 
     @classmethod
-    def load(cls, expressions: Expressions, path: Path | None = None) -> Affect:
+    def load(cls, expressions: Vocabulary, path: Path | None = None) -> Affect:
         """Read a space of moods; the shipped one without ``path``.
 
         Raises ConfigError: the file cannot be read or is wrong; every fault with its key.

@@ -227,14 +227,14 @@ def format_frame(time_ms: int, values: np.ndarray, *, checked: bool = False) -> 
     return _finish(f"F {time_ms} " + " ".join(map(number, values.tolist())), checked)
 
 
-def format_parameters(time_ms: int, names: Iterable[str], values: Iterable[float], *, checked: bool = False) -> bytes:
-    """Some parameters, by name: ``P t name=value ...``."""
-    return _finish(f"P {time_ms} {pairs(names, values)}", checked)
+def format_pairs(time_ms: int, items: Iterable[tuple[str, float]], *, checked: bool = False) -> bytes:
+    """Some values, by name: ``P t name=value ...``."""
+    return _finish(f"P {time_ms} {pairs(items)}", checked)
 
 
-def pairs(names: Iterable[str], values: Iterable[float]) -> str:
+def pairs(items: Iterable[tuple[str, float]]) -> str:
     """``name=value name=value ...``."""
-    return " ".join(f"{name}={number(value)}" for name, value in zip(names, values, strict=True))
+    return " ".join(f"{name}={number(value)}" for name, value in items)
 
 
 def number(value: float) -> str:

@@ -19,7 +19,7 @@ from controller.links.line.protocol import (
     format_error,
     format_frame,
     format_ok,
-    format_parameters,
+    format_pairs,
     number,
     pairs,
 )
@@ -72,12 +72,10 @@ class LineSession:
         if not self._look(question.measured):
             return b""
         if question.name == "READ":
-            shown = self._readings.read(question.words[0], self._values)
-            return format_parameters(time_ms, *_unzip(shown), checked=checked)
+            return format_pairs(time_ms, self._readings.read(question.words[0], self._values), checked=checked)
         if len(question.indices) == len(self._values):
             return format_frame(time_ms, self._values, checked=checked)
-        names = [self._parameters.names[i] for i in question.indices]
-        return format_parameters(time_ms, names, self._values[list(question.indices)], checked=checked)
+        return format_pairs(time_ms, self._named(question.indices), checked=checked)
 
     def _look(self, measured: bool) -> bool:
         """Take the face that is shown, or that the servos make; False when that is not known."""
@@ -149,7 +147,7 @@ class LineSession:
             case "GET" | "MEASURED":
                 return f"{name} {self._get(command.indices)}"
             case "READ":
-                return f"READ {words[0]} " + pairs(*_unzip(self._readings.read(words[0], self._values)))
+                return f"READ {words[0]} " + pairs(self._readings.read(words[0], self._values))
             case "INFO":
                 return "INFO " + self._info(command.indices[0])
             case "STATUS":
@@ -168,7 +166,10 @@ class LineSession:
     def _get(self, indices: tuple[int, ...]) -> str:
         if len(indices) == len(self._values):
             return "ALL " + " ".join(map(number, self._values.tolist()))
-        return pairs((self._parameters.names[i] for i in indices), (self._values[i] for i in indices))
+        return pairs(self._named(indices))
+
+    def _named(self, indices: tuple[int, ...]) -> list[tuple[str, float]]:
+        return [(self._parameters.names[i], float(self._values[i])) for i in indices]
 
     def _info(self, index: int) -> str:
         p = self._parameters
@@ -217,10 +218,6 @@ def _play(shows: Player | None, what: str, to: str = "0") -> None:
     except ValueError:
         seek = to
     shows.control(what, seek)
-
-
-def _unzip(shown: list[tuple[str, float]]) -> tuple[list[str], list[float]]:
-    return [name for name, _ in shown], [value for _, value in shown]
 
 
 def _word(value: str | int | float) -> str:

@@ -80,7 +80,6 @@ def test_a_tick_that_comes_out_differently_is_noticed(tmp_path: Path) -> None:
     path.write_text("\n".join(lines))
     with pytest.raises(ControllerError, match="came out differently"):
         list(replay(path, P))
-    assert len(list(replay(path, P, check=False))) == 100
 
 
 @pytest.mark.parametrize(
