@@ -48,8 +48,8 @@ class Clock:
     ----------
     rate_hz : ticks per second.
     now_ns, sleep_s : the time source and the way to wait; replaced in tests.
-    prompt : after a tick that took too long the next comes at once, and the deadlines move with it; else it comes at
-        the next one that is still to come. Servos want even steps; pictures want to be many.
+    prompt : after a tick that took too long the next comes at once, and the deadlines move with it; else it waits for
+        the next deadline. Servos need even steps, pictures a high rate.
 
     Attributes
     ----------

@@ -42,7 +42,7 @@ class Parameters:
     names : canonical names, in the order of the vectors.
     regions : region of each parameter, one of :data:`REGIONS`.
     low, high : range of each parameter.
-    full_scale_rad : angle (rad) the value 1 stands for; NaN where the parameter is not an angle.
+    full_scale_rad : angle (rad) of the value 1; NaN where the parameter is not an angle.
     max_speed : largest speed (units/s). max_acceleration : largest acceleration (units/s^2).
     max_jerk : largest jerk (units/s^3); infinity for none. response_s : time constant (s) of the approach to a target.
     aliases : other spellings, folded, to canonical names.
@@ -74,7 +74,7 @@ class Parameters:
     def index(self, name: str) -> int:
         """Position of ``name``, any known spelling.
 
-        Raises ParameterError: no such parameter; the message says the nearest names.
+        Raises ParameterError: no such parameter; the message suggests the nearest names.
         """
         found = self._lookup.get(name)  # the canonical spelling needs no folding
         if found is None:
@@ -133,19 +133,14 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return ", did you mean " + " or ".join(repr(folded[c]) for c in close) + "?"
 
 
-@cache
-def standard() -> Parameters:
-    """The shipped parameters, read once."""
-    return Parameters.load()
-
-
 PARAMETERS: Parameters
-"""The shipped parameters; read when first asked for."""
+"""The shipped parameters; read at first use."""
 
 
+@cache
 def __getattr__(name: str) -> Any:
     if name == "PARAMETERS":
-        return standard()
+        return Parameters.load()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

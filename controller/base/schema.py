@@ -1,4 +1,4 @@
-"""Dataclasses of options (:mod:`drivers.base.options`) as fields of a checked table, and tables that name a plug-in."""
+"""Makes pydantic models of dataclasses of options (:mod:`drivers.base.options`), and of tables that name a plug-in."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def fields_of(options: type) -> dict[str, tuple[Any, Any]]:
 
 
 def to_options(table: BaseModel, options: type) -> Any:
-    """An instance of a dataclass of options with what a table of :func:`fields_of` it was given."""
+    """An instance of a dataclass of options, from the keys given in a table made by :func:`fields_of`."""
     names = table.model_fields_set & {entry.name for entry in entries(options)}
     return options(**{name: getattr(table, name) for name in names})
 
@@ -40,12 +40,12 @@ def from_command_line(options: type, given: dict[str, Any]) -> Any:
         table = make(options.__name__, **fields_of(options)).model_validate(given)
     except ValidationError as error:
         faults = [f"--{str(fault['loc'][0]).replace('_', '-')}: {fault['msg']}" for fault in error.errors()]
-        raise ConfigError("; ".join(faults), hint="add --help to see what it takes") from error
+        raise ConfigError("; ".join(faults), hint="add --help to see the options") from error
     return options(**{entry.name: getattr(table, entry.name) for entry in entries(options)})
 
 
 def check_kind(registry: Registry[Any], kind: str) -> str:
-    """A kind that is installed. Raises ValueError: it is not, or it cannot be loaded; says which there are."""
+    """A kind that is installed. Raises ValueError: it is not installed, or cannot be loaded; lists those that are."""
     try:
         registry.get(kind)
     except PluginError as error:

@@ -1,4 +1,4 @@
-"""SIGINT, SIGTERM and SIGHUP as a flag, so that every way out is the ordinary one."""
+"""Turns SIGINT, SIGTERM and SIGHUP into a flag, so that programs end in the ordinary way."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def stop_flag() -> Iterator[threading.Event]:
     flag = threading.Event()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, *termination_signals())}
 
-    def note(number: int, _frame: object) -> None:
+    def set_flag(number: int, _frame: object) -> None:
         if flag.is_set() and number == signal.SIGINT:
             raise KeyboardInterrupt
         flag.set()
 
     for number in before:
-        signal.signal(number, note)
+        signal.signal(number, set_flag)
     try:
         yield flag
     finally:

@@ -194,8 +194,8 @@ class IdleMotion:
         home = not looking and self._random.random() < eyes.home_share
         yaw, pitch = (eyes.micro_deg, eyes.micro_deg) if looking else (eyes.yaw_deg, eyes.pitch_deg)
         spread = 0.0 if home else 0.5  # two standard deviations reach the figure in the file
-        self.eye_yaw_rad = math.radians(_held(self._random.gauss(0.0, spread), 1.0) * yaw)
-        self.eye_pitch_rad = math.radians(_held(self._random.gauss(0.0, spread), 1.0) * pitch)
+        yaw_share, pitch_share = (min(max(self._random.gauss(0.0, spread), -1.0), 1.0) for _ in range(2))
+        self.eye_yaw_rad, self.eye_pitch_rad = math.radians(yaw_share * yaw), math.radians(pitch_share * pitch)
 
     def _move_head(self, now_s: float) -> None:
         head, breath = self._settings.head, self._settings.breath
@@ -223,7 +223,3 @@ def _breath(breath: BreathSettings, now_s: float) -> float:
     if t < breath.inhale_s + breath.hold_s:
         return minimum_jerk(t / breath.inhale_s)
     return 1.0 - minimum_jerk((t - breath.inhale_s - breath.hold_s) / breath.exhale_s)
-
-
-def _held(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)

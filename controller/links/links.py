@@ -1,4 +1,4 @@
-"""The links of a stage: read from their tables, and opened."""
+"""Reads the links of a stage from their tables, and opens them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drivers.base.errors import PluginError
 
 
 class LinkSettings(Settings):
-    """One way in, as a stage has it; the fields of its kind's own options come besides (:func:`read_link`)."""
+    """A link of a stage; :func:`read_link` adds the options of its kind."""
 
     kind: str = "line"
 
@@ -27,7 +27,7 @@ class LinkSettings(Settings):
 
     @property
     def own(self) -> Any:
-        """What the kind itself is told: an instance of its settings."""
+        """The options of its kind: an instance of its settings."""
         return to_options(self, LINKS.get(self.kind).settings)
 
     @property
@@ -61,7 +61,7 @@ def read_link(table: dict[str, Any]) -> LinkSettings:
     try:
         kind = LINKS.get(str(table.get("kind", "line")))
     except PluginError:
-        return _Unknown.model_validate(table)  # which says what is wrong with the kind
+        return _Unknown.model_validate(table)  # whose error names the kind
     return _model_of(kind).model_validate(table)
 
 

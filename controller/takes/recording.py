@@ -37,7 +37,7 @@ def _default_state(parameters: Parameters, seed: int, period_s: float) -> Comman
 
 @contextmanager
 def recorded(state: CommandState, path: Path, *, seed: int = 0, period_s: float = 0.01) -> Iterator[CommandState]:
-    """Record what ``state`` is asked, until the block ends.
+    """Record the calls of ``state`` until the block ends.
 
     Parameters
     ----------

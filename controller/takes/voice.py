@@ -107,7 +107,7 @@ class VoiceListener:
 
     Attributes
     ----------
-    hops : how many pieces of 10 ms were heard.
+    hops : how many pieces of 10 ms were processed.
 
     Raises TakeError: the stream does not begin as WAV of 8, 16 or 32 bit PCM.
     """
@@ -127,7 +127,7 @@ class VoiceListener:
         self.hops = 0
 
     def stop(self) -> None:
-        """Stop listening; a stream that is silent is left to end by itself."""
+        """Stop listening; a blocked read ends when the stream does."""
         self._stopping.set()
 
     def run(self) -> None:

@@ -35,7 +35,7 @@ class HostPort(PtyPort):
         return super().read() if ready else b""
 
     def write(self, data: bytes) -> None:
-        """Send bytes; what nobody takes within 0.2 s is dropped, as on a wire, and counted."""
+        """Send bytes; what the other side does not take within 0.2 s is dropped and counted."""
         view = memoryview(data)
         while view:
             try:

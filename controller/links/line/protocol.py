@@ -62,7 +62,7 @@ class LineError(LinkError):
 
 @dataclass(frozen=True)
 class Words:
-    """A line taken apart: its tag, its words, and whether it came with a (right) checksum."""
+    """A parsed line: its tag, its words, and whether it had a checksum."""
 
     words: tuple[str, ...]
     tag: int | None = None
@@ -71,7 +71,7 @@ class Words:
 
 @dataclass(frozen=True)
 class Reply:
-    """A line from omote, taken apart.
+    """A parsed line from omote.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ def checksum(data: bytes) -> int:
 
 
 def parse_words(line: bytes) -> Words | None:
-    """Take a line (without its line end) apart; None for one with nothing in it.
+    """Parse a line without its line end; None for an empty one.
 
     Raises LineError: not printable ASCII, too long, reserved for binary frames, wrong checksum or tag.
     """
@@ -178,7 +178,7 @@ def _finish(text: str, checked: bool) -> bytes:
 
 
 def parse_reply(line: bytes) -> Reply | None:
-    """Take a line from omote apart; None for an empty one. Raises LineError when it is damaged."""
+    """Parse a line from omote; None for an empty one. Raises LineError when it is damaged."""
     if not line.strip(b" \t"):
         return None
     body, checked = _strip_checksum(line)
@@ -191,7 +191,7 @@ def parse_reply(line: bytes) -> Reply | None:
 
 
 class LineDecoder:
-    """Cuts a byte stream into lines, whatever the stream brings.
+    """Splits a byte stream into lines.
 
     CR and LF both end a line. A line that grows past ``limit`` is dropped up to its end and reported once,
     as the bytes kept so far, which are one longer than ``limit``.
@@ -214,7 +214,7 @@ class LineDecoder:
         return lines
 
     def clear(self) -> None:
-        """Forget a line that has begun, as after the port was lost."""
+        """Discard a line that is not complete, as after the port was lost."""
         self._buffer.clear()
 
     def _take(self, piece: bytes) -> None:

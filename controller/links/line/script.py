@@ -47,17 +47,6 @@ class Script:
     name: str = ""
     marks: dict[str, float] = field(default_factory=dict)
 
-    @classmethod
-    def load(cls, path: Path, parameters: Parameters, vocabulary: Vocabulary) -> Script:
-        """Read a script and check every line of it.
-
-        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
-        """
-        grammar = Grammar(parameters, lambda name: vocabulary[name].name)
-        file = load(path, _File, lambda file: _read_steps(file, grammar)[1])
-        name = path.stem if file.name is None else file.name
-        return cls(tuple(_read_steps(file, grammar)[0]), file.loop_s, file.frames_hz, name, file.marks)
-
 
 def _read_steps(file: _File, grammar: Grammar) -> tuple[list[tuple[float, str]], list[str]]:
     """The steps of a file, and what is wrong with the others."""
@@ -98,7 +87,11 @@ def load_script(
     Raises ConfigError: it is not there, or wrong; every fault with its key.
     """
     path = find_config("scripts", name, beside=beside)
-    return Script.load(path, parameters, vocabulary or Vocabulary.load(parameters))
+    vocabulary = vocabulary or Vocabulary.load(parameters)
+    grammar = Grammar(parameters, lambda name: vocabulary[name].name)
+    file = load(path, _File, lambda file: _read_steps(file, grammar)[1])
+    steps, _ = _read_steps(file, grammar)
+    return Script(tuple(steps), file.loop_s, file.frames_hz, path.stem if file.name is None else file.name, file.marks)
 
 
 class Wave:

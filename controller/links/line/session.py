@@ -27,7 +27,7 @@ from controller.vocabulary.reading import Readings
 
 
 class LineSession:
-    """The state of one link: what was half received, what is streamed, what was counted.
+    """The state of one link: its incomplete line, its stream, its counts.
 
     Parameters
     ----------
@@ -78,14 +78,14 @@ class LineSession:
         return format_pairs(time_ms, self._named(question.indices), checked=checked)
 
     def _look(self, measured: bool) -> bool:
-        """Take the face that is shown, or that the servos make; False when that is not known."""
+        """Read the face that is shown, or that the servos make; False when that is not known."""
         if measured:
             return self._sink.measured(self._values)
         self._sink.snapshot(self._values)
         return True
 
     def drop(self) -> None:
-        """The other side is gone for a while: forget its half line; its subscription goes on when it is back."""
+        """Discard a line that is not complete, after the port was lost; a subscription goes on."""
         self._decoder.clear()
 
     def _line(self, line: bytes, now_ns: int) -> bytes:
@@ -142,7 +142,7 @@ class LineSession:
         """Text of the reply to a question."""
         name, words = command.name, command.words
         if name in ("GET", "MEASURED", "READ", "INFO") and not self._look(command.measured):
-            raise LineError(Code.BUSY, "no servo says where it stands")
+            raise LineError(Code.BUSY, "no servo reports its position")
         match name:
             case "GET" | "MEASURED":
                 return f"{name} {self._get(command.indices)}"

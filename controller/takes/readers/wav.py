@@ -1,4 +1,4 @@
-"""Voices."""
+"""Defines the reader of WAV files of voices."""
 
 from controller.takes.reader import TakeReader
 

@@ -9,7 +9,7 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.links.line.script import Script, Wave, load_script
+from controller.links.line.script import Wave, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
@@ -17,7 +17,7 @@ VOCABULARY = Vocabulary.load(P)
 
 def test_the_shipped_scripts_are_right(root: Path) -> None:
     paths = sorted((root / "configs" / "scripts").glob("*.toml"))
-    scripts = {path.stem: Script.load(path, P, VOCABULARY) for path in paths}
+    scripts = {path.stem: load_script(str(path), P, VOCABULARY) for path in paths}
     assert {"tour", "everything"} <= set(scripts)
     tour = scripts["tour"]
     said = " ".join(line for _, line in tour.steps)
@@ -35,7 +35,7 @@ def test_a_wrong_script_lists_every_fault(tmp_path: Path) -> None:
         'steps = ["0 PING", "x PING", "2 SET jawOpn 1", "2.5", "3 GAZE 0 0", "1 PING"]\n'
     )
     with pytest.raises(ConfigError) as caught:
-        Script.load(path, P, VOCABULARY)
+        load_script(str(path), P, VOCABULARY)
     text = str(caught.value)
     for part in (
         "8 faults", "marks.b: input should be greater than or equal to 0 (is -1)",
@@ -46,7 +46,7 @@ def test_a_wrong_script_lists_every_fault(tmp_path: Path) -> None:
         assert part in text
     path.write_text('steps = "0 PING"')
     with pytest.raises(ConfigError, match="steps: input should be a valid list"):
-        Script.load(path, P, VOCABULARY)
+        load_script(str(path), P, VOCABULARY)
 
 
 def test_scripts_by_name_and_path(tmp_path: Path) -> None:
