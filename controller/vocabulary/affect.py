@@ -7,7 +7,7 @@ is an anchor at the origin.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -15,9 +15,7 @@ from pydantic import Field
 from controller.base.config import Number, Settings, load
 from controller.base.parameters import Floats, did_you_mean
 from controller.base.paths import config_dir
-
-if TYPE_CHECKING:
-    from controller.vocabulary.vocabulary import Vocabulary  # which imports this module
+from controller.vocabulary.expression import Expressions
 
 _POWER = 3.0
 _NEAR = 1e-6
@@ -48,7 +46,7 @@ class Affect:
         self._faces = faces
 
     @classmethod
-    def load(cls, expressions: Vocabulary, path: Path | None = None) -> Affect:
+    def load(cls, expressions: Expressions, path: Path | None = None) -> Affect:
         """Read a space of moods; the shipped one without ``path``.
 
         Raises ConfigError: the file cannot be read or is wrong; every fault with its key.

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 from pydantic import Field, RootModel, ValidationInfo, field_validator
@@ -42,6 +42,17 @@ class Expression:
     blink: str = "keep"
     gaze: str = "keep"
     mouth: str = "keep"
+
+
+class Expressions(Protocol):
+    """Named expressions, as what blends them uses them."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Canonical names, in file order."""
+
+    def __getitem__(self, name: str) -> Expression:
+        """The expression called ``name``. Raises ParameterError."""
 
 
 class _Table(Settings):
