@@ -59,7 +59,7 @@ def speech_take(name: str, cues: Sequence[Cue], end_s: float, parameters: Parame
 
 def _mix(t: float, starts: Floats, ends: Floats, weights: Floats, hold: Floats) -> Floats:
     """(n,) weights of the visemes at a time: the sounds near it, each by its dominance there."""
-    here = min(max(int(np.searchsorted(starts, t, side="right")) - 1, 0), len(starts) - 1)
+    here = max(int(np.searchsorted(starts, t, side="right")) - 1, 0)
     near = range(max(here - _NEIGHBOURS, 0), min(here + _NEIGHBOURS + 1, len(starts)))
     room = 1.0 - _FIRM * hold[here]
     dominance = np.array([_dominance(t, starts[k], ends[k], room) * (0.2 + 0.8 * hold[k]) for k in near])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -48,3 +49,15 @@ def test_versions_up_to_the_newest_are_read(found: int) -> None:
 def test_others_are_refused_with_what_they_are(found: object, says: str) -> None:
     fault = format_fault(found, 3)
     assert fault is not None and says in fault and repr(found) in fault
+
+
+def test_a_new_file_has_the_permissions_that_programs_usually_give(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        with replacing(tmp_path / "a.json") as path:
+            path.write_text("1")
+            assert path.parent == tmp_path and path.suffix == ".json" and path.name.startswith(".a-")
+        assert os.umask(0o027) == 0o027  # and leaves the mask as it was
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a.json").stat().st_mode & 0o777 == 0o640
