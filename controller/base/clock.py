@@ -12,12 +12,7 @@ import numpy as np
 
 
 class Samples:
-    """The newest ``capacity`` measurements, without growing.
-
-    Parameters
-    ----------
-    capacity : how many are kept for percentiles; older ones are overwritten.
-    """
+    """The newest ``capacity`` measurements; older ones are overwritten."""
 
     def __init__(self, capacity: int = 65536) -> None:
         self._values = np.zeros(capacity)

@@ -7,13 +7,7 @@ from surface.base.errors import SurfaceError
 
 
 class ControllerError(Exception):
-    """Base of the errors of the controller room.
-
-    Parameters
-    ----------
-    message : what failed, where (file and key, port, line) and why.
-    hint : the next thing to type or do; may be empty.
-    """
+    """Says what failed, where (file and key, port, line) and why; ``hint`` is the next thing to type, or empty."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)

@@ -167,9 +167,7 @@ class BoundedSolver:
     def solve(self, wanted: Floats, start: Floats | None = None) -> Floats:
         """The best (n,) values for ``wanted`` : (m,).
 
-        Parameters
-        ----------
-        start : (n,) where to begin; the last solution of something that moves. Zero without.
+        ``start`` : (n,) where to begin; the last solution of something that moves. Zero without.
 
         Raises ValueError: ``wanted`` is not finite.
         """

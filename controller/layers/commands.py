@@ -24,7 +24,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 StatusValue = str | int | float
 Journal = Callable[..., None]
-"""Called with the name of a method and its arguments, in the order in which calls took effect."""
+"""Gets the name of a method and its arguments, in the order in which calls took effect."""
 
 
 class Player(Protocol):
@@ -250,9 +250,7 @@ class CommandState:
     ) -> None:
         """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest.
 
-        Parameters
-        ----------
-        through : (P,) how much of the layers below shows through, 0..1; nothing without.
+        ``through`` : (P,) how much of the layers below shows through, 0..1; nothing without.
 
         Raises KeyError: no layer of that name.
         """

@@ -28,12 +28,7 @@ class _Pose:
 
 
 class ExpressionPlayer:
-    """Moves between expressions.
-
-    Parameters
-    ----------
-    neutral : the expression to begin with and to return to.
-    """
+    """Moves between expressions, from and back to ``neutral``."""
 
     def __init__(self, neutral: Expression) -> None:
         self._neutral = neutral

@@ -31,8 +31,6 @@ Span = Annotated[tuple[Annotated[Number, Field(ge=0, le=3600)], Seconds], AfterV
 
 
 class BlinkSettings(Settings):
-    """Rate and shape of blinks."""
-
     interval_s: Span
     double_share: Share
     double_gap_s: Span
@@ -44,8 +42,6 @@ class BlinkSettings(Settings):
 
 
 class EyeSettings(Settings):
-    """Glances, and micro-saccades while something is looked at."""
-
     interval_s: Span
     yaw_deg: Degrees
     pitch_deg: Degrees
@@ -55,8 +51,6 @@ class EyeSettings(Settings):
 
 
 class HeadSettings(Settings):
-    """Sway of the head."""
-
     yaw_deg: Degrees
     pitch_deg: Degrees
     roll_deg: Degrees
@@ -64,8 +58,6 @@ class HeadSettings(Settings):
 
 
 class BreathSettings(Settings):
-    """Breathing, which moves the head."""
-
     inhale_s: Seconds
     hold_s: Seconds
     exhale_s: Seconds
@@ -74,8 +66,6 @@ class BreathSettings(Settings):
 
 
 class FidgetSettings(Settings):
-    """Small random movements of single parameters."""
-
     interval_s: Span
     rise_s: Seconds
     hold_s: Span

@@ -23,8 +23,6 @@ _Gain = Annotated[Number, Field(ge=0, le=4)]
 
 
 class LayerTable(Settings):
-    """One layer of a file."""
-
     priority: int
     mode: Mode = "set"
     weight: Share = 1.0
@@ -43,8 +41,6 @@ class LayerTable(Settings):
 
 
 class LayersTable(Settings):
-    """All layers of a file, by name."""
-
     layers: dict[str, LayerTable]
 
 
@@ -53,9 +49,7 @@ def load_layers(
 ) -> tuple[LayerSettings, ...]:
     """The shipped layers, with the ``changes`` of a stage: single keys of them, or layers of its own.
 
-    Parameters
-    ----------
-    where : the file the changes are from, for messages.
+    ``where`` : the file the changes are from, for messages.
 
     Raises ConfigError: a wrong key or value; two layers of one priority. Every fault with its key.
     """

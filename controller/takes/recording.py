@@ -39,9 +39,7 @@ def _default_state(parameters: Parameters, seed: int, period_s: float) -> Comman
 def recorded(state: CommandState, path: Path, *, seed: int = 0, period_s: float = 0.01) -> Iterator[CommandState]:
     """Record the calls of ``state`` until the block ends.
 
-    Parameters
-    ----------
-    path : the file to write. seed, period_s : those of ``state``, for the replay.
+    ``path`` : the file to write; ``seed`` and ``period_s`` : those of ``state``, for the replay.
 
     Raises ControllerError: the file cannot be written.
     """
@@ -76,9 +74,7 @@ def recorded(state: CommandState, path: Path, *, seed: int = 0, period_s: float 
 def replay(path: Path, parameters: Parameters, *, make: Maker = _default_state) -> Iterator[tuple[int, Floats]]:
     """Play a recording again: time (ns) and parameters (P,) of each tick; the array is used again for the next.
 
-    Parameters
-    ----------
-    make : makes the state to play into, of the parameters, a seed and the length of a tick (s).
+    ``make`` : makes the state to play into, of the parameters, a seed and the length of a tick (s).
 
     Raises ControllerError: the file cannot be read, is damaged, or a tick comes out differently.
     """

@@ -40,9 +40,7 @@ class Cue:
 def speech_take(name: str, cues: Sequence[Cue], end_s: float, parameters: Parameters, visemes: Visemes) -> Take:
     """A take of timed sounds.
 
-    Parameters
-    ----------
-    cues : rising in time; the last lasts until ``end_s``.
+    ``cues`` : rising in time; the last lasts until ``end_s``.
 
     Raises TakeError: no cue, or times that do not rise.
     """

@@ -81,9 +81,7 @@ _File = RootModel[dict[str, _Table]]
 def read_expressions(parameters: Parameters, files: Iterable[Path]) -> tuple[dict[str, Expression], dict[str, str]]:
     """The expressions of files, in order, and folded other names to canonical ones.
 
-    Parameters
-    ----------
-    files : may mix the expressions of those before them.
+    ``files`` : may mix the expressions of those before them.
 
     Raises ConfigError: a file cannot be read or is wrong; every fault of every file with its key.
     """

@@ -138,11 +138,7 @@ class Facs:
 
     def expand(self, formula: str, intensity: float = 1.0) -> Floats:
         """(P,) parameters of a formula, clipped to 1. Raises ParameterError."""
-        return self.parameters_of(self.levels(formula, intensity))
-
-    def parameters_of(self, levels: Floats) -> Floats:
-        """(P,) parameters of ``levels`` : (n,), clipped to 1."""
-        return np.minimum(self.matrix @ levels, 1.0)
+        return np.minimum(self.matrix @ self.levels(formula, intensity), 1.0)
 
     def read(self, values: Floats) -> Floats:
         """(n,) levels 0..1 that show ``values`` : (P,) best, with few units."""

@@ -34,9 +34,7 @@ class Readings:
     def read(self, what: str, values: Floats) -> list[tuple[str, float]]:
         """Names and values 0..1 (moods -1..1) of what the face ``values`` : (P,) shows.
 
-        Parameters
-        ----------
-        what : ``UNITS``, ``EMOTION``, ``VISEMES`` or ``MOOD``.
+        ``what`` : ``UNITS``, ``EMOTION``, ``VISEMES`` or ``MOOD``.
 
         Raises KeyError: another word. ConfigError: a vocabulary's file is wrong.
         """

@@ -40,9 +40,7 @@ class Vocabulary:
     def load(cls, parameters: Parameters, path: Path | None = None, more: Sequence[Path] = ()) -> Vocabulary:
         """Read a vocabulary of expressions; the shipped one without ``path``.
 
-        Parameters
-        ----------
-        more : further files whose expressions are added, such as a user's own; they may mix those before them.
+        ``more`` : further files whose expressions are added, such as a user's own; they may mix those before them.
 
         Raises ConfigError: a file cannot be read or is wrong; every fault of every file with its key.
         """

@@ -50,12 +50,7 @@ class RobotHost:
     """
 
     def __init__(
-        self,
-        port: HostPort,
-        script: Script,
-        parameters: Parameters,
-        *,
-        now_s: Callable[[], float] = time.monotonic,
+        self, port: HostPort, script: Script, parameters: Parameters, *, now_s: Callable[[], float] = time.monotonic
     ) -> None:
         self.port = port
         self.script = script

@@ -80,9 +80,7 @@ def load_script(
 ) -> Script:
     """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
 
-    Parameters
-    ----------
-    beside : the file that names it; its folder is searched first.
+    ``beside`` : the file that names it; its folder is searched first.
 
     Raises ConfigError: it is not there, or wrong; every fault with its key.
     """
@@ -95,12 +93,7 @@ def load_script(
 
 
 class Wave:
-    """Every parameter in motion, each at its own pace, for measuring under load.
-
-    Parameters
-    ----------
-    parameters : gives number and ranges.
-    """
+    """Every parameter in motion, each at its own rate inside its range, for measurements under load."""
 
     def __init__(self, parameters: Parameters) -> None:
         index = np.arange(len(parameters))

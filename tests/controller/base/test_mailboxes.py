@@ -67,3 +67,12 @@ def test_no_torn_vector_from_another_process() -> None:
             seen = sequence
         writer.join()
         assert seen == last
+
+
+def test_a_vector_without_a_stamp_has_none() -> None:
+    with Mailbox.create(2) as box:
+        out = np.zeros(2)
+        box.publish(np.ones(2), 7)
+        box.publish(np.array([3.0, 4.0]))
+        assert box.read(out) == (2, 0) and out.tolist() == [3.0, 4.0]
+        assert box.sequence == 2

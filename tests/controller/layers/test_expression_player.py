@@ -94,3 +94,31 @@ def test_overrides_of_blink_and_gaze(player: ExpressionPlayer) -> None:
     player.play(plain("c", SMILE, mouth="block"), 0.0, None, 9.0)
     player.update(19.0)
     assert player.blocks == (0.0, 0.0, 0.0)
+
+
+def test_a_late_update_falls_from_where_the_expression_had_got_to(player: ExpressionPlayer) -> None:
+    player.play(plain("mood", SMILE), 0.5, None, 0.0)
+    player.play(plain("flash", SMILE + 2), 1.0, 1.0, 1.0)
+    face = player.update(2.2)  # nothing asked for the second in between
+    assert (face[SMILE], face[SMILE + 2]) == pytest.approx((0.25, 0.5))
+
+
+def test_an_expression_with_its_own_times(player: ExpressionPlayer) -> None:
+    weights = P.neutral()
+    weights[SMILE] = 1.0
+    slow = Expression("slow", weights, onset_s=2.0, offset_s=4.0)
+    player.play(slow, 1.0, 5.0, 0.0)
+    assert [float(player.update(t)[SMILE]) for t in (1.0, 2.0, 5.0, 7.0, 9.0)] == pytest.approx([0.5, 1, 1, 0.5, 0])
+    player.play(slow, 1.0, 1.0, 10.0)  # shorter than its onset
+    assert player.update(10.5)[SMILE] == pytest.approx(0.5)
+    player.play(slow, 0.4, None, 20.0)
+    assert player.update(22.0)[SMILE] == pytest.approx(0.4) and (player.name, player.intensity) == ("slow", 0.4)
+
+
+def test_a_mood_ends_what_was_timed(player: ExpressionPlayer) -> None:
+    player.play(plain("flash", SMILE), 1.0, 1.0, 0.0)
+    player.play(plain("mood", SMILE + 2), 1.0, None, 0.5)
+    assert player.update(50.0)[[SMILE, SMILE + 2]].tolist() == [0.0, 1.0]
+    player.play(plain("flash", SMILE), 1.0, 1.0, 60.0)
+    player.rest(0.1, 60.5)
+    assert not player.update(70.0).any() and player.name == "neutral"
