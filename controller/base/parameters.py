@@ -193,10 +193,10 @@ def _with_profile(given: Any, info: ValidationInfo) -> Any:
     """The table of a parameter on top of that of its profile."""
     if not isinstance(given, dict) or "profile" not in given:
         return given
-    profiles = info.data.get("profile", {})
-    if given["profile"] not in profiles:
-        raise ValueError(f"unknown profile {given['profile']!r}{did_you_mean(str(given['profile']), profiles)}")
-    return profiles[given["profile"]] | given
+    profiles, name = info.data.get("profile", {}), str(given["profile"])
+    if name not in profiles:
+        raise ValueError(f"unknown profile {name!r}{did_you_mean(name, profiles)}")
+    return profiles[name] | given
 
 
 class _File(Settings):

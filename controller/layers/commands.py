@@ -202,8 +202,6 @@ class CommandState:
             life.update(now_s, looking=False)
             self._idle.release()
 
-    # What links call
-
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         with self._journaled("set_parameters", indices, values, stamp_ns, stamp_ns=stamp_ns):
             self._manual.write(list(indices), values, stamp_ns * 1e-9)

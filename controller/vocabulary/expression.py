@@ -91,7 +91,7 @@ def read_expressions(parameters: Parameters, files: Iterable[Path]) -> tuple[dic
     for path in files:
 
         def faults(file: _File) -> list[str]:
-            mixing = [] if errors else _mixing_faults(file.root, known)  # noqa: B023  called before the next file
+            mixing = _mixing_faults(file.root, known, complete=not errors)  # noqa: B023  called before the next file
             return _faults(parameters, file.root, known, aliases) + mixing  # noqa: B023  the same
 
         try:
@@ -128,7 +128,7 @@ def _faults(
     parameters: Parameters, tables: Mapping[str, _Table], known: Iterable[str], aliases: Mapping[str, str]
 ) -> list[str]:
     """Names that are taken, unknown parameters and weights out of their range."""
-    faults = [f"{name}: is already an expression of a file before this one" for name in tables if name in known]
+    faults = [f"{name}: is already in an earlier file; choose another name" for name in tables if name in known]
     taken = {fold(name): name for name in (*known, *tables)} | dict(aliases)
     for name, table in tables.items():
         faults += unknown_names(parameters, f"{name}.weights", table.weights)
@@ -143,11 +143,11 @@ def _faults(
     return faults
 
 
-def _mixing_faults(tables: Mapping[str, _Table], known: Iterable[str]) -> list[str]:
-    """Unknown expressions and circles in what expressions are mixed of."""
+def _mixing_faults(tables: Mapping[str, _Table], known: Iterable[str], *, complete: bool) -> list[str]:
+    """Circles in what expressions are mixed of, and unknown ones where the ``known`` expressions are ``complete``."""
     names = [*tables, *known]
     faults = [f"{name}.of.{part}: unknown expression {part!r}{did_you_mean(part, names)}"
-              for name, table in tables.items() for part in table.of if part not in names]  # fmt: skip
+              for name, table in tables.items() for part in table.of if complete and part not in names]  # fmt: skip
     graph = {name: list(table.of) for name, table in tables.items()}
     while True:
         try:

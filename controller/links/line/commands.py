@@ -101,8 +101,6 @@ class Grammar:
             raise LineError(Code.ARGUMENTS, f"{len(given)} arguments; usage: {usage}")
         return read(self, given)
 
-    # What the rules call
-
     def read_set(self, given: Sequence[str]) -> Command:
         if len(given) % 2:
             raise LineError(Code.ARGUMENTS, f"a name without a value; {_usage('SET')}")

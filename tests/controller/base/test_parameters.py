@@ -205,6 +205,7 @@ def test_a_file_of_ones_own_in_units_and_degrees(tmp_path: Path) -> None:
         ("range = [0, 2]", "range = [2, 2]", "parameters.bare.range: must be [lowest, highest], not [2.0, 2.0]"),
         ("range = [0, 2]", "range = [2]", "parameters.bare.range[1]: missing"),
         ('region = "jaw", ', "", "parameters.bare.region: missing"),
+        ('profile = "skin"', "profile = [1]", "parameters.smile: unknown profile '[1]'"),
         ('profile = "skin"', 'profile = "skn"', "parameters.smile: unknown profile 'skn', did you mean 'skin'?"),
         ('"smile"\n', '"smle"\n', "aliases.Grin_L: unknown parameter 'smle', did you mean 'smile'?"),
     ],

@@ -114,3 +114,28 @@ def test_what_is_no_wav_is_refused(data: bytes) -> None:
 def test_three_byte_samples_are_refused() -> None:
     with pytest.raises(TakeError, match="24 bit"):
         VoiceListener(io.BytesIO(wav(tone(200, 0.3), 3)), CommandState(P))
+
+
+def test_sound_without_a_header_is_signed_16_bit_mono() -> None:
+    raw = (tone(200, 0.2) * 32767).astype("<i2").tobytes()
+    state = CommandState(P)
+    listener = VoiceListener(io.BytesIO(raw), state, raw_hz=RATE)
+    listener.run()
+    assert listener.hops == 20  # 160 samples of 2 bytes each
+    layer = state.mixer["speech"]
+    assert layer.values[JAW] > 0.3 and layer.holding == np.count_nonzero(VoiceEnvelope(P, RATE).mask)
+
+
+def test_a_listener_that_was_stopped_hears_nothing() -> None:
+    state = CommandState(P)
+    listener = VoiceListener(io.BytesIO(wav(tone(200, 5.0))), state)
+    listener.stop()
+    listener.run()
+    assert listener.hops == 0 and state.mixer["speech"].holding == 0
+
+
+@pytest.mark.parametrize("rate", [999, 0])
+def test_rates_that_are_no_sound_are_refused(rate: int) -> None:
+    with pytest.raises(ValueError, match="rate_hz must be 1000 or more"):
+        VoiceEnvelope(P, rate)
+    assert VoiceEnvelope(P, 1000).hop == 10

@@ -137,19 +137,20 @@ def test_faults_of_all_files_come_together_circles_too(tmp_path: Path) -> None:
         aliases = ["joy"]
         """,
     )
-    second = own(tmp_path, "[d]\nof = 3", "second.toml")
+    second = own(tmp_path, "[d]\nof = 3\n[e]\nof = { e = 1, x = 1 }", "second.toml")
     with pytest.raises(ConfigError) as caught:
         Vocabulary.load(P, more=[first, second])
     text = str(caught.value)
     for part in (
         "own.toml: 5 faults",
-        "smile: is already an expression of a file before this one",
+        "smile: is already in an earlier file; choose another name",
         "a.of.b: goes in a circle: a -> b -> a",
         "c.of.happines: unknown expression 'happines', did you mean 'happiness'",
         "c.of.sadness: input should be less than or equal to 1 (is 2.0)",
         "c.aliases: 'joy' is already a name of 'happiness'",
-        "second.toml: 1 fault",
+        "second.toml: 2 faults",
         "d.of: must be a table (is 3)",
+        "e.of.e: goes in a circle: e -> e",
     ):
         assert part in text
 
