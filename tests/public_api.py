@@ -32,7 +32,7 @@ SINGLE = {
     "surface.export.exporter": ("API", "Exporter"),
     "controller.base.parameters": ("PARAMETERS", "Parameters"),
     "controller.layers.commands": ("CommandSink",),
-    "controller.links.kind": ("API", "Around", "Link", "LinkKind"),
+    "controller.links.kind": ("API", "LinkContext", "Link", "LinkKind"),
     "controller.takes.livelink": ("Take",),
     "controller.takes.reader": ("API", "TakeReader"),
 }

@@ -1,4 +1,4 @@
-"""What every room of the controller stands on: errors, files, settings, parameters, clocks, mailboxes.
+"""Provides what all rooms of the controller use: errors, files, settings, parameters, clocks, mailboxes.
 
-In: files a user edits. Out: checked settings, and errors that say where and what to type. Imports no other room of it.
+In: files a user edits. Out: checked settings, and errors with their place. Imports no other sub-room.
 """

@@ -1,7 +1,6 @@
-"""Fixed-rate clock on absolute deadlines, and the statistics a report needs.
+"""Ticks at a fixed rate on absolute deadlines, and collects statistics of measurements.
 
-A tick that comes too late is skipped and counted, never made up for: a face that runs after its own past
-is worse than one that misses a step.
+A tick that comes too late is skipped and counted, never made up for.
 """
 
 from __future__ import annotations
@@ -13,12 +12,7 @@ import numpy as np
 
 
 class Samples:
-    """The newest ``capacity`` measurements, without growing.
-
-    Parameters
-    ----------
-    capacity : how many are kept for percentiles; older ones are overwritten.
-    """
+    """The newest ``capacity`` measurements; older ones are overwritten."""
 
     def __init__(self, capacity: int = 65536) -> None:
         self._values = np.zeros(capacity)
@@ -37,14 +31,9 @@ class Samples:
         """Mean, median, p95, p99 and maximum, in the unit that was added; empty without measurements."""
         if not self.count:
             return {}
-        p50, p95, p99 = np.percentile(self._values[: self.count], [50, 95, 99])
-        return {
-            "mean": self._sum / self.count,
-            "p50": float(p50),
-            "p95": float(p95),
-            "p99": float(p99),
-            "max": self.maximum,
-        }
+        percentiles = np.percentile(self._values[: self.count], [50, 95, 99]).tolist()
+        middle = dict(zip(("p50", "p95", "p99"), percentiles, strict=True))
+        return {"mean": self._sum / self.count, **middle, "max": self.maximum}
 
 
 class Clock:
@@ -54,8 +43,8 @@ class Clock:
     ----------
     rate_hz : ticks per second.
     now_ns, sleep_s : the time source and the way to wait; replaced in tests.
-    prompt : after a tick that took too long the next comes at once, and the deadlines move with it; else it comes at
-        the next one that is still to come. Servos want even steps; pictures want to be many.
+    prompt : after a tick that took too long the next comes at once, and the deadlines move with it; else it waits for
+        the next deadline. Servos need even steps, pictures a high rate.
 
     Attributes
     ----------

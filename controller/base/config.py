@@ -1,4 +1,4 @@
-"""Reading a TOML file into a checked model: every fault at once, each with its path in the file."""
+"""Reads TOML files into pydantic models and reports every fault at once, each with its path in the file."""
 
 from __future__ import annotations
 
@@ -6,26 +6,41 @@ import difflib
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, RootModel, ValidationError
 
 from controller.base.errors import ConfigError
-from controller.base.formats import NEWER
+from controller.base.files import NEWER
 from controller.base.partial_config import PartialConfig
 
-Model = TypeVar("Model", bound="Settings")
+Model = TypeVar("Model", bound=BaseModel)
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""A finite number; neither ``true`` nor ``"1"`` is one."""
+Positive = Annotated[Number, Field(gt=0)]
+Share = Annotated[Number, Field(ge=0, le=1)]
 
 
 class Settings(BaseModel):
-    """Base of every configuration table: unknown keys are faults, values are fixed once read."""
+    """Base of every configuration table: unknown keys are faults, and values cannot be changed."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     @classmethod
     def known_keys(cls) -> list[str]:
-        """Keys that such a table may have, for who misspelt one."""
+        """Keys that such a table may have, for suggestions."""
         return list(cls.model_fields)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """A TOML file as tables. Raises ConfigError when it cannot be read or is not TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}", hint="mend the line named above") from error
 
 
 def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
@@ -33,21 +48,12 @@ def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str
 
     Parameters
     ----------
-    cross_check : gives the faults that only the whole file can have, such as names that nothing has; of a file that
-        does not fit the model it is asked about the rest.
+    cross_check : returns the faults between values, such as unknown names; of a file that does not fit the model it
+        gets the part that does.
 
-    Raises
-    ------
-    ConfigError
-        when the file cannot be read, is not TOML, or does not fit; lists every fault with its key.
+    Raises ConfigError: when the file cannot be read, is not TOML, or does not fit; lists every fault with its key.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}", hint="mend the line named above") from error
-    return check(table, model, path, cross_check)
+    return check(read_toml(path), model, path, cross_check)
 
 
 def check(table: dict[str, Any], model: type[Model], path: Path,
@@ -59,7 +65,7 @@ def check(table: dict[str, Any], model: type[Model], path: Path,
         faults = [describe(fault, model) for fault in error.errors()]
         rest = PartialConfig(table, model, error)
         if cross_check is not None and rest.read is not None:
-            faults += rest.tell(cross_check(rest.read))
+            faults += rest.relocate(cross_check(rest.read))
         raise config_error(path, faults) from error
     if cross_check is not None and (faults := cross_check(read)):
         raise config_error(path, faults)
@@ -85,6 +91,8 @@ def describe(fault: Any, model: type[BaseModel]) -> str:
     if fault["type"] == "missing":
         return f"{where}: missing"
     reason = fault["msg"].removeprefix("Value error, ")
+    if fault["type"] in ("model_type", "dict_type"):
+        reason = "must be a table"
     given = fault.get("input")
     shown = f" (is {given!r})" if isinstance(given, str | int | float | bool) else ""
     return f"{where}: {reason[:1].lower()}{reason[1:]}{shown}"
@@ -102,10 +110,8 @@ def _keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[st
     """The keys the table at ``location`` may have."""
     current: Any = model
     for part in location:
-        if isinstance(part, int):
-            continue
-        field = current.model_fields.get(part)
-        if field is None:  # the name of an entry of a table of tables
+        field = current.model_fields.get("root" if issubclass(current, RootModel) else part)
+        if field is None:  # the number of an entry of a list, or the name of one of a table of tables
             continue
         current = _inner_model(field.annotation)
         if current is None:

@@ -1,13 +1,4 @@
-"""Errors of the controller room, and the one tuple a command line has to catch.
-
-The tree::
-
-    ControllerError
-    ├── ConfigError      a configuration file: every fault at once, each with its path in the file
-    ├── ParameterError   an unknown parameter or a value that is not a number
-    ├── LinkError        a link to the outside cannot be opened or went away
-    └── TakeError        a recorded take cannot be read
-"""
+"""Defines the errors of the controller room, and the tuple of all errors that a command line has to catch."""
 
 from __future__ import annotations
 
@@ -16,13 +7,7 @@ from surface.base.errors import SurfaceError
 
 
 class ControllerError(Exception):
-    """Something the controller room cannot do.
-
-    Parameters
-    ----------
-    message : what failed, where (file and key, port, line) and why.
-    hint : the next thing to type or do; may be empty.
-    """
+    """Says what failed, where (file and key, port, line) and why; ``hint`` is the next thing to type, or empty."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -46,4 +31,4 @@ class TakeError(ControllerError):
 
 
 OMOTE_ERRORS = (ControllerError, DriverError, SurfaceError)
-"""Everything omote raises on purpose; the command line turns these into one message and exit code 1."""
+"""Everything omote raises on purpose; the command line prints one message and exits with code 1."""

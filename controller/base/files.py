@@ -1,4 +1,4 @@
-"""Writing a file whole or not at all."""
+"""Replaces files atomically, and checks the format version that a file states."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from pathlib import Path
 
 from controller.base.errors import ControllerError
 
+NEWER = "written by a newer omote"
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path beside ``path`` that takes its place when the block ends well.
 
-    Raises
-    ------
-    ControllerError
-        when the folder cannot be written; ``path`` stays as it was.
+    Raises ControllerError: when the folder cannot be written; ``path`` stays as it was.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -43,3 +42,17 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def format_fault(found: object, newest: int) -> str | None:
+    """What is wrong with the version that a file states; None when this omote reads it.
+
+    Parameters
+    ----------
+    found : what the file states; it grows when older readers could misread a file. newest : the newest known version.
+    """
+    if isinstance(found, bool) or not isinstance(found, int) or found < 1:
+        return f"format: must be a whole number from 1 (is {found!r})"
+    if found > newest:
+        return f"format: is {found}, {NEWER}; this one reads up to {newest}"
+    return None

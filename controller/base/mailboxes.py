@@ -1,4 +1,4 @@
-"""Latest-value mailbox between processes: one writer, any number of readers, nothing queues.
+"""Shares the latest value of a vector between processes: one writer, any number of readers, no queue.
 
 Layout of the mapped file, all native 8-byte words::
 
@@ -15,7 +15,6 @@ import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ _RETRIES = 100
 class Mailbox:
     """A vector of ``count`` float64 that another process can read at any time.
 
-    Make one with :meth:`create`, reach it elsewhere with ``Mailbox(path, count)``.
+    Create one with :meth:`create`, open it elsewhere with ``Mailbox(path, count)``.
 
     Parameters
     ----------
@@ -85,16 +84,13 @@ class Mailbox:
                 break
         return sequence, stamp
 
-    def unname(self) -> None:
-        """Remove the file; those that have reached the memory keep it. A maker that is killed then leaves nothing.
-
-        Nothing happens where a file in use cannot be removed, as on Windows.
-        """
+    def unlink(self) -> None:
+        """Remove the file; processes that have mapped it keep it. Does nothing where a file in use must stay."""
         with suppress(OSError):
             Path(self.path).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Let go of the memory; the maker also removes the file."""
+        """Unmap the memory; the process that created the file also removes it."""
         del self._head, self._stamps, self._slots
         self._map.close()
         if self._owned:
@@ -103,7 +99,5 @@ class Mailbox:
     def __enter__(self) -> Mailbox:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -1,4 +1,4 @@
-"""The parameters: names, order, ranges, regions and motion limits, read from the base vocabulary.
+"""The registry of face parameters: names, order, ranges, regions and motion limits, read from the base vocabulary.
 
 Every parameter vector in omote is (P,) float64 in the order of ``configs/vocabularies/arkit.toml``.
 """
@@ -8,30 +8,28 @@ from __future__ import annotations
 import difflib
 import math
 import re
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
-from controller.base.errors import ConfigError, ParameterError
+from controller.base.config import Number, Positive, Settings, load
+from controller.base.errors import ParameterError
 from controller.base.paths import config_dir
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
-REGIONS = ("brows", "lids", "eyes", "cheeks", "nose", "jaw", "mouth", "tongue", "head")
+Region = Literal["brows", "lids", "eyes", "cheeks", "nose", "jaw", "mouth", "tongue", "head"]
+REGIONS: tuple[str, ...] = get_args(Region)
 """Regions of the face, in the order reports list them."""
 
-_KEYS = {
-    "range", "region", "profile", "max_speed", "max_acceleration", "max_jerk", "response_s",
-    "full_scale_deg", "max_speed_deg_s", "max_acceleration_deg_s2", "max_jerk_deg_s3",
-}  # fmt: skip
 _ARRAYS = ("low", "high", "full_scale_rad", "max_speed", "max_acceleration", "max_jerk", "response_s")
 
 
@@ -41,10 +39,10 @@ class Parameters:
 
     Attributes
     ----------
-    names : canonical names, in canonical order.
+    names : canonical names, in the order of the vectors.
     regions : region of each parameter, one of :data:`REGIONS`.
     low, high : range of each parameter.
-    full_scale_rad : angle (rad) the value 1 stands for; NaN where the parameter is not an angle.
+    full_scale_rad : angle (rad) of the value 1; NaN where the parameter is not an angle.
     max_speed : largest speed (units/s). max_acceleration : largest acceleration (units/s^2).
     max_jerk : largest jerk (units/s^3); infinity for none. response_s : time constant (s) of the approach to a target.
     aliases : other spellings, folded, to canonical names.
@@ -65,12 +63,10 @@ class Parameters:
     def load(cls, path: Path | None = None) -> Parameters:
         """Read a base vocabulary; the shipped one without ``path``.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
         path = path or config_dir() / "vocabularies" / "arkit.toml"
-        return _build(path, read_toml(path))
+        return _build(load(path, _File, _unknown_aliases))
 
     def __len__(self) -> int:
         return len(self.names)
@@ -78,9 +74,7 @@ class Parameters:
     def index(self, name: str) -> int:
         """Position of ``name``, any known spelling.
 
-        Raises
-        ------
-        ParameterError : no such parameter; the message says the nearest names.
+        Raises ParameterError: no such parameter; the message suggests the nearest names.
         """
         found = self._lookup.get(name)  # the canonical spelling needs no folding
         if found is None:
@@ -139,36 +133,14 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return ", did you mean " + " or ".join(repr(folded[c]) for c in close) + "?"
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file as tables. Raises ConfigError when it cannot be read."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}", hint="mend the line named above") from error
-
-
-def file_error(path: Path, faults: list[str]) -> ConfigError:
-    """One error for all faults of a file. Imports the models of configuration only when there is one to report."""
-    from controller.base.config import config_error  # start-up: pydantic, only for a fault
-
-    return config_error(path, faults)
+PARAMETERS: Parameters
+"""The shipped parameters; read at first use."""
 
 
 @cache
-def standard() -> Parameters:
-    """The shipped parameters, read once."""
-    return Parameters.load()
-
-
-PARAMETERS: Parameters
-"""The shipped parameters; read when first asked for."""
-
-
 def __getattr__(name: str) -> Any:
     if name == "PARAMETERS":
-        return standard()
+        return Parameters.load()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
@@ -177,78 +149,73 @@ def _other_side(name: str) -> str:
     return re.sub("Left$|Right$|^left|^right", lambda m: swap[m.group()], name)
 
 
-def _build(path: Path, table: dict[str, Any]) -> Parameters:
-    faults = [f"{key}: unknown key" for key in sorted(set(table) - {"profile", "parameters", "aliases"})]
-    entries = {
-        name: _entry(name, given, table.get("profile", {}), faults)
-        for name, given in table.get("parameters", {}).items()
-    }
-    if not entries and not faults:
-        faults.append("parameters: missing")
-    aliases = table.get("aliases", {})
-    faults += [f"aliases.{a}: unknown parameter {n!r}{did_you_mean(str(n), entries)}"
-               for a, n in aliases.items() if n not in entries]  # fmt: skip
-    if faults:
-        raise file_error(path, faults)
-    arrays = {key: np.array([entry[key] for entry in entries.values()], dtype=np.float64) for key in _ARRAYS}
-    for array in arrays.values():
-        array.flags.writeable = False
-    regions = tuple(entry["region"] for entry in entries.values())
-    return Parameters(tuple(entries), regions, **arrays, aliases={fold(a): n for a, n in aliases.items()})
+def _rising(value: tuple[float, float]) -> tuple[float, float]:
+    if value[0] >= value[1]:
+        raise ValueError(f"must be [lowest, highest], not {list(value)}")
+    return value
 
 
-def _entry(name: str, given: Any, profiles: dict[str, Any], faults: list[str]) -> dict[str, Any]:
-    where = f"parameters.{name}"
-    if not isinstance(given, dict):
-        faults.append(f'{where}: must be a table like {{ region = "mouth", profile = "mouth" }}')
-        return {}
-    profile = given.get("profile")
-    if profile is not None and profile not in profiles:
-        faults.append(f"{where}.profile: unknown profile {profile!r}{did_you_mean(str(profile), profiles)}")
-        return {}
-    merged = {**profiles.get(str(profile), {}), **given}
-    faults += [f"{where}.{key}: unknown key" for key in sorted(set(merged) - _KEYS)]
-    return _numbers(where, merged, faults)
+class _Entry(Settings, validate_default=True):
+    """One parameter of the file, with the keys of its profile; the motion limits of an angle are in degrees."""
+
+    region: Region
+    profile: str | None = None
+    range: Annotated[tuple[Number, Number], AfterValidator(_rising)]
+    response_s: Positive
+    full_scale_deg: Positive | None = None
+    max_speed: Positive | None = None
+    max_acceleration: Positive | None = None
+    max_jerk: Positive | None = None
+    max_speed_deg_s: Positive | None = None
+    max_acceleration_deg_s2: Positive | None = None
+    max_jerk_deg_s3: Positive | None = None
+
+    @field_validator("max_speed", "max_acceleration", "max_speed_deg_s", "max_acceleration_deg_s2")
+    @classmethod
+    def _given(cls, value: float | None, info: ValidationInfo) -> float | None:
+        in_degrees = info.data.get("full_scale_deg") is not None
+        if value is None and in_degrees == ("deg" in str(info.field_name)):
+            raise ValueError("missing, must be a positive number")
+        return value
+
+    def numbers(self) -> tuple[float, ...]:
+        """Values for :data:`_ARRAYS`: those in degrees are divided by the full scale."""
+        if self.full_scale_deg is None:
+            scale, full, limits = 1.0, math.nan, (self.max_speed, self.max_acceleration, self.max_jerk)
+        else:
+            scale = full = self.full_scale_deg
+            limits = self.max_speed_deg_s, self.max_acceleration_deg_s2, self.max_jerk_deg_s3
+        scaled = (math.inf if limit is None else limit / scale for limit in limits)
+        return (*self.range, math.radians(full), *scaled, self.response_s)
 
 
-def _numbers(where: str, merged: dict[str, Any], faults: list[str]) -> dict[str, Any]:
-    """The entry in normalised units: degrees divided by the full scale."""
-    if merged.get("region") not in REGIONS:
-        faults.append(f"{where}.region: must be one of {', '.join(REGIONS)} (is {merged.get('region')!r})")
-    full = _positive(where, "full_scale_deg", merged, faults) if "full_scale_deg" in merged else math.nan
-    angular = not math.isnan(full)
-    names = ("max_speed_deg_s", "max_acceleration_deg_s2") if angular else ("max_speed", "max_acceleration")
-    jerk = "max_jerk_deg_s3" if angular else "max_jerk"
-    speed, acceleration = (_positive(where, key, merged, faults) for key in names)
-    low, high = _range(where, merged, faults)
-    scale = full if angular else 1.0
-    return {
-        "region": merged.get("region"),
-        "low": low,
-        "high": high,
-        "full_scale_rad": math.radians(full),
-        "max_speed": speed / scale,
-        "max_acceleration": acceleration / scale,
-        "max_jerk": _positive(where, jerk, merged, faults) / scale if jerk in merged else math.inf,
-        "response_s": _positive(where, "response_s", merged, faults),
-    }
+def _with_profile(given: Any, info: ValidationInfo) -> Any:
+    """The table of a parameter on top of that of its profile."""
+    if not isinstance(given, dict) or "profile" not in given:
+        return given
+    profiles, name = info.data.get("profile", {}), str(given["profile"])
+    if name not in profiles:
+        raise ValueError(f"unknown profile {name!r}{did_you_mean(name, profiles)}")
+    return profiles[name] | given
 
 
-def _positive(where: str, key: str, merged: dict[str, Any], faults: list[str]) -> float:
-    value: Any = merged.get(key)
-    if not (_finite(value) and value > 0):
-        faults.append(f"{where}.{key}: must be a positive number (is {value!r})")
-        return 1.0
-    return float(value)
+class _File(Settings):
+    profile: dict[str, dict[str, Any]] = {}
+    parameters: Annotated[dict[str, Annotated[_Entry, BeforeValidator(_with_profile)]], Field(min_length=1)]
+    aliases: dict[str, str] = {}
 
 
-def _range(where: str, merged: dict[str, Any], faults: list[str]) -> tuple[float, float]:
-    value = merged.get("range")
-    if not (isinstance(value, list) and len(value) == 2 and all(map(_finite, value)) and value[0] < value[1]):
-        faults.append(f"{where}.range: must be [lowest, highest] (is {value!r})")
-        return 0.0, 1.0
-    return float(value[0]), float(value[1])
+def _unknown_aliases(file: _File) -> list[str]:
+    return [
+        f"aliases.{alias}: unknown parameter {name!r}{did_you_mean(name, file.parameters)}"
+        for alias, name in file.aliases.items()
+        if name not in file.parameters
+    ]
 
 
-def _finite(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _build(file: _File) -> Parameters:
+    columns = np.array([entry.numbers() for entry in file.parameters.values()]).T.copy()
+    columns.flags.writeable = False
+    regions = tuple(entry.region for entry in file.parameters.values())
+    aliases = {fold(alias): name for alias, name in file.aliases.items()}
+    return Parameters(tuple(file.parameters), regions, **dict(zip(_ARRAYS, columns, strict=True)), aliases=aliases)

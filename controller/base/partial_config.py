@@ -1,8 +1,6 @@
-"""What is left of a configuration file beside its faults, so that the rest can be checked at the same time.
+"""Validates the part of a configuration table that is left when its faults are removed, to find further faults in it.
 
-A value that does not fit its key is taken out; where the table around it cannot be read without it, so is that table.
-What is said of the rest then leaves out everything that names something in those tables, for it may be at fault only
-because they are gone.
+A value that does not fit its key is removed; where the table around it cannot be read without it, so is that table.
 """
 
 from __future__ import annotations
@@ -19,72 +17,57 @@ Loc = tuple[str | int, ...]
 
 
 class PartialConfig(Generic[Model]):
-    """What can still be read of a ``table`` that does not fit ``model``.
+    """The part of a ``table`` that fits ``model`` although the whole does not.
 
     Attributes
     ----------
-    read : the rest as ``model``; None where too little is left.
+    read : that part as ``model``; None where too little is left.
     """
 
     def __init__(self, table: dict[str, Any], model: type[Model], error: ValidationError) -> None:
-        self._table, self._kept, self._gone = copy.deepcopy(table), dict[str, list[int]](), set[str]()
+        self._kept, self._removed = dict[str, list[int]](), set[str]()
         self.read: Model | None = None
-        self._take_values(_locations(error))
-        for _ in range(2):
+        rest = copy.deepcopy(table)
+        while self.read is None and self._remove(rest, error):
             try:
-                self.read = model.model_validate(self._table)
-                return
+                self.read = model.model_validate(rest)
             except ValidationError as left:
-                self._take_tables(_locations(left))
+                error = left
 
-    def tell(self, faults: Iterable[str]) -> list[str]:
-        """Faults of :attr:`read` by their places in the whole file, without those that may be due to what is gone."""
-        return [self._placed(fault) for fault in faults if not any(repr(name) in fault for name in self._gone)]
+    def relocate(self, faults: Iterable[str]) -> list[str]:
+        """Faults of :attr:`read` by their places in the whole file, without those that name something removed."""
+        return [self._placed(fault) for fault in faults if not any(repr(name) in fault for name in self._removed)]
 
-    def _take_values(self, locations: list[Loc]) -> None:
-        for loc in locations:
-            at = _at(self._table, loc[:-1])
-            if isinstance(at, dict) and loc:
-                self._gone |= set(_texts(at.pop(loc[-1], None)))
-
-    def _take_tables(self, locations: list[Loc]) -> None:
-        """Take out the entries of lists that still do not fit, or whole keys of the file."""
-        entries: dict[Loc, set[int]] = {}
-        for loc in locations:
-            depth = max((i for i, part in enumerate(loc) if isinstance(part, int)), default=None)
-            if depth is None:
-                self._take_values([loc[:1]])
-            else:
-                entries.setdefault(loc[:depth], set()).add(int(loc[depth]))
-        for where, numbers in entries.items():
-            rows = _at(self._table, where)
-            if isinstance(rows, list):
-                self._gone |= set(_texts([rows[i] for i in numbers if i < len(rows)]))
-                name = ".".join(map(str, where))
-                before = self._kept.get(name, list(range(len(rows))))
-                self._kept[name] = [n for i, n in enumerate(before) if i not in numbers]
-                rows[:] = [row for i, row in enumerate(rows) if i not in numbers]
+    def _remove(self, table: dict[str, Any], error: ValidationError) -> bool:
+        """Remove what is at the places of the faults, or the tables around them; False where nothing is left."""
+        found = {_existing(table, fault["loc"]) for fault in error.errors()} - {()}
+        for *parents, last in sorted(found, reverse=True):  # the last entries of a list first
+            around: Any = table
+            for part in parents:
+                around = around[part]
+            if isinstance(around, list):
+                name = ".".join(map(str, parents))
+                del self._kept.setdefault(name, list(range(len(around))))[int(last)]
+            value = around.pop(last)
+            self._removed |= {*_texts(value), *([str(last)] if isinstance(value, dict) else [])}
+        return bool(found)
 
     def _placed(self, fault: str) -> str:
         for name, kept in self._kept.items():
-            parts = re.split(rf"({re.escape(name)}\[\d+\])", fault)
-            parts[1::2] = [f"{name}[{kept[int(part[len(name) + 1 : -1])]}]" for part in parts[1::2]]
+            parts = re.split(rf"(?<={re.escape(name)}\[)(\d+)(?=\])", fault)
+            parts[1::2] = [str(kept[int(part)]) for part in parts[1::2]]
             fault = "".join(parts)
         return fault
 
 
-def _locations(error: ValidationError) -> list[Loc]:
-    return [fault["loc"] for fault in error.errors()]
-
-
-def _at(table: Any, loc: Loc) -> Any:
-    """What stands at ``loc``; None where nothing does, or where pydantic names a variant instead of a key."""
-    for part in loc:
-        try:
-            table = table[part]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return table
+def _existing(table: Any, loc: Loc) -> Loc:
+    """The longest part of ``loc`` that exists; pydantic adds names of its own, and keys that are missing."""
+    for depth, part in enumerate(loc):
+        keys: Any = table if isinstance(table, dict) else range(len(table)) if isinstance(table, list) else ()
+        if part not in keys:
+            return loc[:depth]
+        table = table[part]
+    return loc
 
 
 def _texts(value: Any) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Where the configuration files are: beside the code in a checkout, under share/ when installed.
+"""Finds configuration files: beside the code in a checkout, under share/ when installed.
 
 An installer puts ``share/`` under the environment, under the user's own folder, or beside the code (``pip install
 --target``), and writes down where. What lies beside the code goes first, then what was written down.
@@ -22,12 +22,7 @@ _SHARE = Path("share/omote/configs")
 
 
 def config_dir() -> Path:
-    """Folder that holds heads, vocabularies, robots and stages.
-
-    Raises
-    ------
-    ConfigError : no such folder is found.
-    """
+    """Folder that holds heads, vocabularies, robots and stages. Raises ConfigError: no such folder is found."""
     looked: list[Path] = []
     for folder in _candidates():
         if (folder / "vocabularies").is_dir():
@@ -46,11 +41,9 @@ def find_config(kind: str, name: str, *, beside: Path | None = None) -> Path:
     ----------
     kind : ``"heads"``, ``"robots"``, ``"stages"``, ``"vocabularies"`` or ``"scripts"``.
     name : a path (also relative to the folder of ``beside``), or a name from ``configs/<kind>``.
-    beside : the file that says ``name``.
+    beside : the file that contains ``name``.
 
-    Raises
-    ------
-    ConfigError : nothing of that name; the message lists what there is.
+    Raises ConfigError: nothing of that name; the message lists what there is.
     """
     folder = config_dir() / kind
     places = [Path(name), folder / name, folder / f"{name}.toml"]
@@ -78,7 +71,7 @@ def _unknown(kind: str, name: str, folder: Path) -> ConfigError:
 
 
 def _candidates() -> Iterator[Path]:
-    """Where it can be, the likeliest first; the folder of the environment variable alone where that is set."""
+    """Possible folders, the likeliest first; the folder of the environment variable alone where that is set."""
     override = os.environ.get(VARIABLE)
     if override:
         yield Path(override)
@@ -86,14 +79,14 @@ def _candidates() -> Iterator[Path]:
     code = Path(__file__).resolve().parents[2]
     yield code / "configs"
     yield code / _SHARE
-    yield from _written_down()
+    yield from _installed_files()
     yield Path(sys.prefix) / _SHARE
     yield Path(site.getuserbase()) / _SHARE
 
 
 @cache
-def _written_down() -> tuple[Path, ...]:
-    """Where the installer put the configuration, by its own list of files; nothing where it kept none."""
+def _installed_files() -> tuple[Path, ...]:
+    """The folder in the installer's list of files; none where there is no such list."""
     from importlib import metadata  # takes a while, and a checkout does without
 
     try:

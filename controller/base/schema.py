@@ -1,4 +1,4 @@
-"""Dataclasses of options (:mod:`drivers.base.options`) as fields of a checked table, and tables that name a plug-in."""
+"""Makes pydantic models of dataclasses of options (:mod:`drivers.base.options`), and of tables that name a plug-in."""
 
 from __future__ import annotations
 
@@ -24,35 +24,28 @@ def fields_of(options: type) -> dict[str, tuple[Any, Any]]:
     }
 
 
-def given_in(table: BaseModel, options: type) -> Any:
-    """An instance of a dataclass of options with what a table of :func:`fields_of` it was given."""
+def to_options(table: BaseModel, options: type) -> Any:
+    """An instance of a dataclass of options, from the keys given in a table made by :func:`fields_of`."""
     names = table.model_fields_set & {entry.name for entry in entries(options)}
     return options(**{name: getattr(table, name) for name in names})
 
 
-def from_words(options: type, given: dict[str, Any]) -> Any:
+def from_command_line(options: type, given: dict[str, Any]) -> Any:
     """An instance of a dataclass of options from what a command line gave.
 
-    Raises
-    ------
-    ConfigError : a value is beyond its limits; names every such option.
+    Raises ConfigError: a value is beyond its limits; names every such option.
     """
     make: Any = create_model
     try:
         table = make(options.__name__, **fields_of(options)).model_validate(given)
     except ValidationError as error:
         faults = [f"--{str(fault['loc'][0]).replace('_', '-')}: {fault['msg']}" for fault in error.errors()]
-        raise ConfigError("; ".join(faults), hint="add --help to see what it takes") from error
+        raise ConfigError("; ".join(faults), hint="add --help to see the options") from error
     return options(**{entry.name: getattr(table, entry.name) for entry in entries(options)})
 
 
-def known_kind(registry: Registry[Any], kind: str) -> str:
-    """A kind that is installed.
-
-    Raises
-    ------
-    ValueError : it is not, or it cannot be loaded; says which there are.
-    """
+def check_kind(registry: Registry[Any], kind: str) -> str:
+    """A kind that is installed. Raises ValueError: it is not installed, or cannot be loaded; lists those that are."""
     try:
         registry.get(kind)
     except PluginError as error:
@@ -60,7 +53,7 @@ def known_kind(registry: Registry[Any], kind: str) -> str:
     return kind
 
 
-def read_by(read: Callable[[dict[str, Any]], Model]) -> WrapValidator:
+def parse_with(read: Callable[[dict[str, Any]], Model]) -> WrapValidator:
     """For an entry of a list in a file: a table is read by ``read``, which knows the model of its kind."""
 
     def check(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:

@@ -1,4 +1,4 @@
-"""SIGINT, SIGTERM and SIGHUP as a flag, so that every way out is the ordinary one."""
+"""Turns SIGINT, SIGTERM and SIGHUP into a flag, so that programs end in the ordinary way."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 
-ENDINGS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+TERMINATION_SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals that ask a process to end: from a service manager, and from a terminal that was closed."""
 
 
-def endings() -> tuple[signal.Signals, ...]:
-    """Those of :data:`ENDINGS` that end this process: under nohup it does not mind that its terminal was closed."""
-    return tuple(n for n in ENDINGS if n == signal.SIGTERM or signal.getsignal(n) is not signal.SIG_IGN)
+def termination_signals() -> tuple[signal.Signals, ...]:
+    """Those of :data:`TERMINATION_SIGNALS` that end this process; under nohup SIGHUP is ignored."""
+    return tuple(n for n in TERMINATION_SIGNALS if n == signal.SIGTERM or signal.getsignal(n) is not signal.SIG_IGN)
 
 
 @contextmanager
-def interrupts_held() -> Iterator[None]:
-    """Keep SIGINT waiting, also for a process started meanwhile, which lets it through when it is ready."""
+def interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT, also in a process started meanwhile, until that calls :func:`unblock_interrupts`."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # else it starts with the first process, and lets SIGINT through as it does
+    resource_tracker.ensure_running()  # else it starts with the first process, and unblocks SIGINT then
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -31,25 +31,28 @@ def interrupts_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def let_interrupts_through() -> None:
-    """End what :func:`interrupts_held` left a new process with."""
+def unblock_interrupts() -> None:
+    """Unblock SIGINT in a process that was started inside :func:`interrupts_blocked`."""
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 @contextmanager
 def stop_flag() -> Iterator[threading.Event]:
-    """An event that SIGINT or any of :func:`endings` sets; a second SIGINT interrupts at once. Main thread only."""
-    flag = threading.Event()
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *endings())}
+    """An event that SIGINT or a signal of :func:`termination_signals` sets; a second SIGINT raises KeyboardInterrupt.
 
-    def note(number: int, _frame: object) -> None:
+    Main thread only.
+    """
+    flag = threading.Event()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *termination_signals())}
+
+    def set_flag(number: int, _frame: object) -> None:
         if flag.is_set() and number == signal.SIGINT:
             raise KeyboardInterrupt
         flag.set()
 
     for number in before:
-        signal.signal(number, note)
+        signal.signal(number, set_flag)
     try:
         yield flag
     finally:

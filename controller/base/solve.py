@@ -1,12 +1,12 @@
-"""Bounded least squares with sparsity: the way back from what is shown to the values that show it.
+"""Solves bounded, sparse least squares problems: from what a face shows back to the values that show it.
 
 Minimises over ``low <= x <= high``
 
     1/2 |W (A x - b)|^2 + ridge/2 |x|^2 + sparsity |x|_1
 
 by coordinate descent on the normal equations, which is exact for this problem (Tseng 2001), with Newton steps of
-the values inside their bounds in between, which settle what is nearly alike. Started from the last solution it takes
-a few rounds: it can follow a tracker.
+the values inside their bounds in between, for columns that are nearly collinear. Started from the last solution it
+takes a few rounds, fast enough to follow a tracker.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _reach(x: float, step: float, low: float, high: float) -> float:
 
 @njit(cache=True, nogil=True)
 def _solve(matrix: Floats, right: Floats) -> None:
-    """Gauss elimination with pivots: leaves in ``right (n,)`` the solution, in ``matrix (n, n)`` nothing of use.
+    """Gauss elimination with pivots: ``right (n,)`` becomes the solution; ``matrix (n, n)`` is overwritten.
 
     numba's own products and solutions would import scipy, which takes longer than all else of this module.
     """
@@ -80,7 +80,7 @@ def _solve(matrix: Floats, right: Floats) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _leap(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> None:
+def _newton_step(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> None:
     """Newton step of all values inside their bounds at once, as far as the first bound; in place."""
     free = np.flatnonzero((x > low) & (x < high) & (x != 0.0))
     if len(free) == 0:
@@ -108,7 +108,7 @@ def _leap(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: f
 def _descend(
     gram: Floats, wanted: Floats, low: Floats, high: Floats, sparsity: float, tolerance: float, x: Floats
 ) -> int:
-    """Minimise for ``gram`` : (n, n) and ``wanted`` : (n,), in place on ``x``; returns the rounds it took."""
+    """Minimise for ``gram`` : (n, n) and ``wanted`` : (n,), in place on ``x``; returns the number of rounds."""
     gradient = np.empty(len(x))
     for round_ in range(_ROUNDS):
         for i in range(len(x)):
@@ -118,7 +118,7 @@ def _descend(
         if _sweep(gram, gradient, low, high, sparsity, x) < tolerance:
             return round_ + 1
         _sweep(gram, gradient, low, high, sparsity, x)
-        _leap(gram, gradient, low, high, sparsity, x)
+        _newton_step(gram, gradient, low, high, sparsity, x)
     return _ROUNDS
 
 
@@ -129,12 +129,10 @@ class BoundedSolver:
     ----------
     matrix : (m, n) float64. low, high : (n,) bounds.
     weights : (m,) how much each row counts; all alike without.
-    ridge : pulls towards 0 and settles what the rows leave open. sparsity : prefers few values that are not 0.
+    ridge : L2 penalty, which decides what the rows leave open. sparsity : L1 penalty.
     tolerance : largest change of a value at which it stops.
 
-    Raises
-    ------
-    ValueError : shapes do not fit, a number is not finite, or bounds are inside out.
+    Raises ValueError: shapes do not fit, a number is not finite, or bounds are inside out.
     """
 
     def __init__(
@@ -169,13 +167,9 @@ class BoundedSolver:
     def solve(self, wanted: Floats, start: Floats | None = None) -> Floats:
         """The best (n,) values for ``wanted`` : (m,).
 
-        Parameters
-        ----------
-        start : (n,) where to begin; the last solution of something that moves. Zero without.
+        ``start`` : (n,) where to begin; the last solution of something that moves. Zero without.
 
-        Raises
-        ------
-        ValueError : ``wanted`` is not finite.
+        Raises ValueError: ``wanted`` is not finite.
         """
         if not np.isfinite(wanted).all():
             raise ValueError("wanted must be finite")
@@ -184,7 +178,3 @@ class BoundedSolver:
         right = wanted @ self._weighted
         self.rounds = int(_descend(self._gram, right, self._low, self._high, self._sparsity, self._tolerance, x))
         return x
-
-    def residual(self, x: Floats, wanted: Floats) -> Floats:
-        """(m,) what ``x`` does not reach of ``wanted``."""
-        return wanted - self._matrix @ x

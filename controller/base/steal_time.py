@@ -1,4 +1,4 @@
-"""Processor time that the host of a virtual machine gave to others: what a measurement cannot help."""
+"""Measures steal time: processor time that the host of a virtual machine gave to others."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ _STEAL = 8  # of "cpu user nice system idle iowait irq softirq steal ...", proc(
 
 
 class StealTime:
-    """Counts from when it is made."""
+    """Counts from its creation."""
 
     def __init__(self) -> None:
         self._began, self._before_s = time.monotonic(), steal_time_s()
 
     def share(self) -> float | None:
-        """Of all processors' time since then, 0 to 1; None where the system does not tell."""
+        """Share of all processors' time since then, 0 to 1; None where the system does not report it."""
         now_s, passed_s = steal_time_s(), time.monotonic() - self._began
         if now_s is None or self._before_s is None or passed_s <= 0.0:
             return None
@@ -25,7 +25,7 @@ class StealTime:
 
 
 def steal_time_s() -> float | None:
-    """Seconds since the start of the system, summed over its processors; None where it does not tell."""
+    """Seconds since the start of the system, summed over its processors; None where it does not report it."""
     try:
         fields = STAT.read_text(encoding="ascii").split("\n", 1)[0].split()
         return int(fields[_STEAL]) / os.sysconf("SC_CLK_TCK")

@@ -20,12 +20,12 @@ from controller.base.clock import Clock
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS, Floats, Parameters
-from controller.base.signals import endings, let_interrupts_through
+from controller.base.signals import termination_signals, unblock_interrupts
 from controller.body.messages import Begin, BodyOrders, Failed, Finished, Hold, Neutral, Ready, Report, Show
 from controller.body.panel_state import PanelStateWriter, panel_state_size
 from controller.body.sources import Sources, Voice
-from controller.links.kind import Around, Link
-from controller.links.line.host import load_script
+from controller.links.kind import Link, LinkContext
+from controller.links.line.script import load_script
 from controller.links.line.show import Shows
 from controller.links.links import open_links
 from controller.robot.busloop import BusLoop
@@ -33,8 +33,8 @@ from controller.robot.following import FollowMode, MeasuredFace
 from controller.robot.settings import RobotSettings
 from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import Take, TakePlayer
-from controller.takes.reader import layer_of, load_take
-from controller.takes.recording import SUFFIX, Face, Recorder, Replay
+from controller.takes.reader import load_take, reader_of
+from controller.takes.recording import SUFFIX, Replay, recorded
 from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.base.shutdown import Closers, combine_with_context
 
@@ -70,17 +70,17 @@ class Body:
     ) -> None:
         self.stage = stage
         self._closers = Closers()
-        self.state: Face = stage.state(parameters)
+        self.state = stage.state(parameters)
         if record is not None:
-            recorder = Recorder(self.state, record, seed=stage.settings.seed, period_s=stage.period_s)
-            self.state = self._closers.enter_context(recorder)
+            seed, period_s = stage.settings.seed, stage.period_s
+            self._closers.enter_context(recorded(self.state, record, seed=seed, period_s=period_s))
         self.clock = Clock(stage.settings.control_hz)
         self.state.live(0.0 if mirror else stage.settings.liveliness, 0)  # no command: it has no time of arrival
         self.replay = replay
         self.links: list[Link] = []
         self.buses = [loop for robot in stage.robots for loop in self._loops(robot, parameters, mirror)]
         self.reflection = self._measured_face(parameters)
-        self.state.watch = self.reflection
+        self.state.servo_monitor = self.reflection
         self.state.shows = Shows(
             lambda name: load_script(name, parameters, stage.vocabulary, beside=stage.path), self.state
         )
@@ -154,7 +154,8 @@ class Body:
         """
         if self.live:
             links = [link for link in self.stage.settings.links if self.puppet is None or link.simulated is None]
-            self.links = open_links(links, Around(self.state, self._closers, self.stage.vocabularies, self.stage.path))
+            context = LinkContext(self.state, self._closers, self.stage.vocabularies, self.stage.path)
+            self.links = open_links(links, context)
             self._closers.callback(self.sources.stop)
             self.sources.begin()
         for bus in self.buses:
@@ -210,7 +211,7 @@ def _own(stage: Stage, parameters: Parameters, voice: Voice | None) -> tuple[Tak
     settings, take, layer = stage.settings, None, "capture"
     if settings.take is not None:
         path = stage.file(settings.take)
-        take, layer = load_take(path, parameters), layer_of(path)
+        take, layer = load_take(path, parameters), reader_of(path).layer
     if voice is None and settings.voice is not None:
         voice = Voice(str(stage.file(settings.voice)), settings.voice_hz)
     return take, layer, voice
@@ -227,8 +228,8 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
     """
     stop = threading.Event()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
-    let_interrupts_through()
-    for ending in endings():
+    unblock_interrupts()
+    for ending in termination_signals():
         signal.signal(ending, lambda *_: stop.set())
     try:
         _serve(orders, pipe, stop)
@@ -260,7 +261,7 @@ def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
 def _reached(path: str, count: int) -> Mailbox:
     """A mailbox of main's, which nobody else has to find from now on."""
     mailbox = Mailbox(path, count)
-    mailbox.unname()
+    mailbox.unlink()
     return mailbox
 
 
@@ -271,7 +272,7 @@ def _body(orders: BodyOrders, stage: Stage, mailbox: Mailbox, parameters: Parame
     path = Path(orders.take)
     if path.suffix == SUFFIX:
         return Body(stage, parameters, mailbox, replay=Replay(path, parameters, stage.state))
-    return Body(stage, parameters, mailbox, load_take(path, parameters), layer_of(path), record=record)
+    return Body(stage, parameters, mailbox, load_take(path, parameters), reader_of(path).layer, record=record)
 
 
 def _panel_state(insights: Mailbox | None, body: Body) -> Callable[[], None]:

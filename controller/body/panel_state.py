@@ -11,8 +11,8 @@ import numpy as np
 
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import REGIONS, Parameters
+from controller.layers.commands import CommandState
 from controller.robot.following import MeasuredFace
-from controller.takes.recording import Face
 
 
 def panel_state_size(parameters: Parameters) -> int:
@@ -28,7 +28,7 @@ class PanelStateWriter:
     mailbox : of :func:`panel_state_size`. state : the layers. reflection : reads the servos; None without any.
     """
 
-    def __init__(self, mailbox: Mailbox, state: Face, reflection: MeasuredFace | None) -> None:
+    def __init__(self, mailbox: Mailbox, state: CommandState, reflection: MeasuredFace | None) -> None:
         self._mailbox, self._state, self._measured_face = mailbox, state, reflection
         p = len(state.parameters)
         self._all = np.full(panel_state_size(state.parameters), np.nan)

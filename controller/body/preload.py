@@ -17,7 +17,7 @@ from multiprocessing.context import SpawnProcess
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from controller.base.signals import interrupts_held
+from controller.base.signals import interrupts_blocked
 
 if TYPE_CHECKING:
     from controller.body.messages import BodyOrders  # start-up: it loads numpy
@@ -41,7 +41,7 @@ class PreloadedBody:
         self.pipe, theirs = context.Pipe()
         heard, self.voice = context.Pipe(duplex=False)
         self.process: SpawnProcess = context.Process(target=_wait, args=(theirs, heard), name="omote body")
-        with interrupts_held(), _main_left_out():
+        with interrupts_blocked(), _main_left_out():
             self.process.start()
         theirs.close()
         heard.close()

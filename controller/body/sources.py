@@ -12,9 +12,9 @@ from multiprocessing.connection import Connection
 from typing import IO, TYPE_CHECKING
 
 from controller.base.errors import TakeError
+from controller.layers.commands import CommandState
 from controller.robot.following import FollowMode
 from controller.takes.livelink import TakePlayer
-from controller.takes.recording import Face
 from controller.takes.voice import HOP_S, VoiceListener
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ class Sources:
 
     def __init__(
         self,
-        state: Face,
+        state: CommandState,
         player: TakePlayer | None = None,
         puppet: FollowMode | None = None,
         voice: Voice | None = None,

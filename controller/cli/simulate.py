@@ -127,7 +127,7 @@ def _options(command: Callable[..., Any]) -> list[inspect.Parameter]:
 
 def _simulate_family(kind: str) -> Callable[..., None]:
     """The command that serves what stands in for a family."""
-    from controller.base.schema import from_words  # start-up: the command line shows its help without it
+    from controller.base.schema import from_command_line  # start-up: the command line shows its help without it
     from controller.tools.simulate import serve_alone
     from drivers.core.registry import FAMILIES
     from drivers.sim.wire.simulator import simulator_of
@@ -135,7 +135,7 @@ def _simulate_family(kind: str) -> Callable[..., None]:
     simulator = simulator_of(kind)
 
     def command(how: Serving, **given: Any) -> None:
-        serve_alone(kind, from_words(simulator.options, given), how, console)
+        serve_alone(kind, from_command_line(simulator.options, given), how, console)
 
     command.__doc__ = simulator.help
     usual = {"baud": FAMILIES.get(kind).baud}

@@ -1,4 +1,4 @@
-"""Sources of values and how they are mixed: layers, acting, gaze, idle life, and the commands that steer them.
+"""Mixes sources of values in layers: expressions, gaze, idle motion, and the commands that control them.
 
 In: commands and time. Out: one vector of parameters. Imports base to motion.
 """

@@ -1,4 +1,4 @@
-"""What commands do to the face: the layers, the expressions and the gaze behind one small interface.
+"""Applies commands to the face: layers, expressions, gaze and idle motion behind the interface that links call.
 
 Links call the methods of :class:`CommandSink` from their own threads; the control loop calls
 :meth:`CommandState.tick`. Each holds one short lock.
@@ -7,14 +7,13 @@ Links call the methods of :class:`CommandSink` from their own threads; the contr
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.base.errors import ParameterError
-from controller.base.parameters import Floats, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
 from controller.layers.idle import IdleMotion, IdleSettings
@@ -24,19 +23,21 @@ from controller.motion.motion import MotionLimiter
 from controller.vocabulary.vocabulary import Vocabulary
 
 StatusValue = str | int | float
+Journal = Callable[..., None]
+"""Gets the name of a method and its arguments, in the order in which calls took effect."""
 
 
 class Player(Protocol):
-    """What plays shows on the clock of the control loop; see :class:`controller.links.line.show.Shows`."""
+    """Plays shows on the clock of the control loop; see :class:`controller.links.line.show.Shows`."""
 
     def start(self, name: str) -> None:
         """Play a script from its beginning. Raises ConfigError."""
 
-    def act(self, what: str, to: str | float = 0.0) -> None:
+    def control(self, what: str, to: str | float = 0.0) -> None:
         """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s). Raises ParameterError."""
 
     def tick(self, now_ns: int) -> None:
-        """Say what is due."""
+        """Send the lines that are due."""
 
     def status(self) -> str:
         """Which show plays and where it is, in one word."""
@@ -76,13 +77,13 @@ class CommandSink(Protocol):
         """Release everything that was commanded and return to neutral."""
 
     def live(self, amount: float, stamp_ns: int) -> None:
-        """Set how lively the face is when nobody tells it anything, 0..1."""
+        """Set the amount of idle motion, 0..1."""
 
     def snapshot(self, out: Floats) -> None:
         """Copy the present parameters to ``out`` : (P,)."""
 
     def measured(self, out: Floats) -> bool:
-        """Copy the parameters that the servos show to ``out`` : (P,); False when no servo says where it stands."""
+        """Copy the parameters that the servos show to ``out`` : (P,); False when no servo reports its position."""
 
     def holder(self, index: int) -> str | None:
         """The layer that holds a parameter."""
@@ -91,37 +92,35 @@ class CommandSink(Protocol):
         """Layers, lowest priority first."""
 
     def status(self) -> dict[str, StatusValue]:
-        """How the face is, as short words and numbers."""
+        """The state of the face, as short words and numbers."""
 
 
-class Watch(Protocol):
-    """What looks at the servos; see :class:`controller.robot.following.MeasuredFace`."""
+class ServoMonitor(Protocol):
+    """Measures the servos; see :class:`controller.robot.following.MeasuredFace`."""
 
     def measured(self, out: Floats) -> bool:
         """Copy the parameters that the servos show to ``out`` : (P,); False when none is known."""
 
     def status(self) -> Mapping[str, StatusValue]:
-        """How the servos are, as short words and numbers."""
+        """The state of the servos, as short words and numbers."""
 
 
 class CommandState:
-    """The face's intentions: layers mixed, eased and clipped, once per tick.
+    """The :class:`CommandSink` of a face: its layers, mixed, limited and clipped once per tick.
 
     Parameters
     ----------
     parameters : the registry.
     vocabulary : the named expressions; the shipped ones without.
     layers : the layers; the shipped ones without. Must have those of :data:`controller.layers.settings.NEEDED`.
-    life : the figures of idle life; the natural ones without. seed : the same seed lives the same life.
+    life : settings of idle motion; the natural ones without. seed : the same seed gives the same idle motion.
     period_s : length of a tick.
 
     Attributes
     ----------
-    watch : looks at the servos; None without any. shows : plays scripts; None where none can be.
+    servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
 
-    Raises
-    ------
-    ConfigError : the shipped expressions or figures cannot be read.
+    Raises ConfigError: the shipped expressions or figures cannot be read.
     """
 
     def __init__(
@@ -146,9 +145,10 @@ class CommandState:
         self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
         self._speech = self.mixer["speech"]
         self._everything = np.ones(len(parameters), dtype=bool)
-        self.watch: Watch | None = None
+        self.servo_monitor: ServoMonitor | None = None
         self.shows: Player | None = None
         self._lock = threading.Lock()
+        self._journal: Journal | None = None
         self._stamp_ns = 0
         self._now_s = 0.0
         self._ticks = 0
@@ -159,7 +159,7 @@ class CommandState:
         Writes the parameters to ``out`` : (P,) and returns the arrival time (ns) of the newest command in them,
         0 before the first.
         """
-        with self._lock:
+        with self._journaled("tick", now_ns, dt, out):
             now_s = self._now_s = now_ns * 1e-9
             self._write_layers(now_s)
             self.mixer.mix(now_s, dt, self._mixed)
@@ -168,147 +168,113 @@ class CommandState:
             out[:] = self._present
             return self._stamp_ns
 
+    def record(self, journal: Journal | None) -> None:
+        """Call ``journal`` for every tick and every command from now on; None ends it."""
+        with self._lock:
+            self._journal = journal
+
+    @contextmanager
+    def _journaled(self, name: str, *arguments: Any, stamp_ns: int = 0) -> Iterator[None]:
+        """Hold the lock; at the end note when the command arrived, and pass it to the journal."""
+        with self._lock:
+            yield
+            self._stamp_ns = max(self._stamp_ns, stamp_ns)
+            if self._journal is not None:
+                self._journal(name, *arguments)
+
     def _write_layers(self, now_s: float) -> None:
         self._expression.write_masked(self._player.update(now_s), self._everything, now_s)
-        self._live(now_s)
-        self._looking.hold_back(self._player.gaze_block)
-        self._speech.hold_back(self._player.mouth_block)
+        self._update_idle(now_s)
+        _, gaze_block, mouth_block = self._player.blocks
+        self._looking.attenuate(gaze_block)
+        self._speech.attenuate(mouth_block)
         if self._gaze.active:
-            self._looking.write(self._gaze.indices, self._gaze.update(self._present, self._life), now_s)
+            eyes_rad = self._life.eye_yaw_rad, self._life.eye_pitch_rad
+            values = self._gaze.update(self._present, eyes_rad, self._life.head_rad[:2])
+            self._looking.write(self._gaze.indices, values, now_s)
 
-    def _live(self, now_s: float) -> None:
-        life, actor = self._life, self._player
+    def _update_idle(self, now_s: float) -> None:
+        life, (blink_block, gaze_block, _) = self._life, self._player.blocks
         if life.liveliness > 0.0:
-            life.update(now_s, looking=self._gaze.active, blink_block=actor.blink_block, gaze_block=actor.gaze_block)
+            life.update(now_s, looking=self._gaze.active, blink_block=blink_block, gaze_block=gaze_block)
             self._idle.write_masked(life.values, self._everything, now_s)
         elif self._idle.holding:
             life.update(now_s, looking=False)
             self._idle.release()
 
-    # What links call
-
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
-        """See :class:`CommandSink`."""
-        with self._lock:
+        with self._journaled("set_parameters", indices, values, stamp_ns, stamp_ns=stamp_ns):
             self._manual.write(list(indices), values, stamp_ns * 1e-9)
-            self._note(stamp_ns)
 
     def release(self, indices: Sequence[int], stamp_ns: int) -> None:
-        """See :class:`CommandSink`."""
-        with self._lock:
+        with self._journaled("release", indices, stamp_ns, stamp_ns=stamp_ns):
             self._manual.release(list(indices))
-            self._note(stamp_ns)
 
     def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
-        """See :class:`CommandSink`. Raises ParameterError for an unknown name."""
         expression = self.vocabulary[name]
-        with self._lock:
+        with self._journaled("expression", name, intensity, duration_s, stamp_ns, stamp_ns=stamp_ns):
             self._player.play(expression, intensity, duration_s, self._time(stamp_ns))
-            self._note(stamp_ns)
 
     def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
-        """See :class:`CommandSink`."""
-        with self._lock:
+        with self._journaled("gaze", yaw_rad, pitch_rad, stamp_ns, stamp_ns=stamp_ns):
             self._gaze.look(yaw_rad, pitch_rad)
             self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
-            self._note(stamp_ns)
 
     def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
-        """See :class:`CommandSink`."""
-        with self._lock:
+        with self._journaled("gaze_at", x_mm, y_mm, z_mm, stamp_ns, stamp_ns=stamp_ns):
             self._gaze.look_at(x_mm, y_mm, z_mm)
             self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
-            self._note(stamp_ns)
 
     def gaze_off(self, stamp_ns: int) -> None:
-        """See :class:`CommandSink`."""
-        with self._lock:
+        with self._journaled("gaze_off", stamp_ns, stamp_ns=stamp_ns):
             self._stop_looking()
-            self._note(stamp_ns)
 
     def neutral(self, seconds: float, stamp_ns: int) -> None:
-        """See :class:`CommandSink`."""
-        with self._lock:
+        with self._journaled("neutral", seconds, stamp_ns, stamp_ns=stamp_ns):
             self._manual.release(fade_s=seconds)
             self._stop_looking(seconds)
             self._player.rest(seconds, self._time(stamp_ns))
-            self._note(stamp_ns)
 
     def live(self, amount: float, stamp_ns: int) -> None:
-        """See :class:`CommandSink`."""
-        with self._lock:
+        with self._journaled("live", amount, stamp_ns, stamp_ns=stamp_ns):
             self._life.liveliness = min(max(amount, 0.0), 1.0)
-            self._note(stamp_ns)
 
-    def capture(self, values: Floats, mask: NDArray[np.bool_], now_ns: int, stamp_ns: int = 0) -> None:
+    def capture(self, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
         """Give the live-capture layer ``values`` : (P,) where ``mask`` : (P,) bool; released after 1 s of silence."""
         self.write_layer("capture", values, mask, now_ns, stamp_ns)
 
     def write_layer(
-        self,
-        name: str,
-        values: Floats,
-        mask: NDArray[np.bool_],
-        now_ns: int,
-        stamp_ns: int = 0,
-        *,
-        through: Floats | None = None,
+        self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0, *, through: Floats | None = None
     ) -> None:
         """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest.
 
-        Parameters
-        ----------
-        through : (P,) how much of the layers below shows through, 0..1; nothing without.
+        ``through`` : (P,) how much of the layers below shows through, 0..1; nothing without.
 
-        Raises
-        ------
-        KeyError : no layer of that name.
+        Raises KeyError: no layer of that name.
         """
-        with self._lock:
+        with self._journaled("write_layer", name, values, mask, now_ns, stamp_ns, through, stamp_ns=stamp_ns):
             layer = self.mixer[name]
             layer.write_masked(values, mask, now_ns * 1e-9)
             if through is None:
                 layer.share.fill(1.0)
             else:
                 np.subtract(1.0, through, out=layer.share)
-            self._note(stamp_ns)
-
-    def set_gains(self, name: str, gains: Mapping[str, float]) -> None:
-        """Scale what a layer gives, by region: ``{"brows": 0.6}``; regions not named stay at 1.
-
-        Raises
-        ------
-        KeyError : no layer of that name. ParameterError : no such region, or a gain that is not 0 to 4.
-        """
-        layer = self.mixer[name]
-        gain = np.ones(len(self.parameters))
-        for region, factor in gains.items():
-            if not 0.0 <= factor <= 4.0:
-                raise ParameterError(f"gain of {region} must be 0 to 4, not {factor}", hint="1 leaves it as it is")
-            gain[self.parameters.region(region)] = factor
-        with self._lock:
-            layer.gain[:] = gain
 
     def snapshot(self, out: Floats) -> None:
-        """See :class:`CommandSink`."""
         with self._lock:
             out[:] = self._present
 
     def measured(self, out: Floats) -> bool:
-        """See :class:`CommandSink`."""
-        return self.watch is not None and self.watch.measured(out)
+        return self.servo_monitor is not None and self.servo_monitor.measured(out)
 
     def holder(self, index: int) -> str | None:
-        """See :class:`CommandSink`."""
         with self._lock:
             return self.mixer.holder(index)
 
     def layer_names(self) -> tuple[str, ...]:
-        """See :class:`CommandSink`."""
         return self.mixer.names
 
     def status(self) -> dict[str, StatusValue]:
-        """See :class:`CommandSink`."""
         with self._lock:
             yaw, pitch = self._gaze.direction_deg
             return {
@@ -321,15 +287,12 @@ class CommandState:
                 "limited": int(np.count_nonzero(self.limiter.limited)),
                 "ticks": self._ticks,
                 "layers": ",".join(self.mixer.active) or "none",
-                **(self.watch.status() if self.watch is not None else {}),
+                **(self.servo_monitor.status() if self.servo_monitor is not None else {}),
             }
 
     def _stop_looking(self, fade_s: float | None = None) -> None:
         self._gaze.off()
         self._looking.release(fade_s=fade_s)
-
-    def _note(self, stamp_ns: int) -> None:
-        self._stamp_ns = max(self._stamp_ns, stamp_ns)
 
     def _time(self, stamp_ns: int) -> float:
         """When a command takes effect: when it came, but not before the last tick."""

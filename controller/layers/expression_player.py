@@ -1,8 +1,7 @@
-"""Acting named expressions: rising, holding and falling, from whatever the face shows at that moment.
+"""Plays named expressions: they rise, hold and fall, starting at the present face, so that interrupting never jumps.
 
 There is one mood, held until the next, and at most one timed expression over it; when its time is over the face
-returns to the mood. A timed gesture moves only what it names, so a wink keeps the smile it is given with. Every
-change starts at the present face, so interrupting never makes it jump.
+returns to the mood. A timed gesture moves only what it names, so a wink keeps the smile it is given with.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from controller.base.parameters import Floats
 from controller.motion.motion import minimum_jerk
 from controller.vocabulary.expression import Expression
 
-_BLINK, _GAZE, _MOUTH = -3, -2, -1
 _OVERRIDES = 3
 
 
@@ -30,12 +28,7 @@ class _Pose:
 
 
 class ExpressionPlayer:
-    """Moves between expressions.
-
-    Parameters
-    ----------
-    neutral : the expression to begin with and to return to.
-    """
+    """Moves between expressions, from and back to ``neutral``."""
 
     def __init__(self, neutral: Expression) -> None:
         self._neutral = neutral
@@ -44,11 +37,6 @@ class ExpressionPlayer:
         self._mood = self._target = self._pose(neutral, 1.0)
         self._start_s, self._length_s = -np.inf, 0.0
         self._fall_at_s = np.inf
-
-    @property
-    def values(self) -> Floats:
-        """(P,) float64, the face at the last update; a view."""
-        return self._now[:-_OVERRIDES]
 
     @property
     def name(self) -> str:
@@ -61,19 +49,10 @@ class ExpressionPlayer:
         return self._target.intensity
 
     @property
-    def blink_block(self) -> float:
-        """How much blinking is held back, 0..1."""
-        return float(self._now[_BLINK])
-
-    @property
-    def gaze_block(self) -> float:
-        """How much the gaze is held back, 0..1."""
-        return float(self._now[_GAZE])
-
-    @property
-    def mouth_block(self) -> float:
-        """How much speech is held back, 0..1."""
-        return float(self._now[_MOUTH])
+    def blocks(self) -> tuple[float, float, float]:
+        """How much blinks, gaze and speech are held back, 0..1 each."""
+        blink, gaze, mouth = self._now[-_OVERRIDES:].tolist()
+        return blink, gaze, mouth
 
     def play(self, expression: Expression, intensity: float, duration_s: float | None, now_s: float) -> None:
         """Show an expression for ``duration_s`` from now until it falls, or as the new mood without one."""
@@ -98,13 +77,13 @@ class ExpressionPlayer:
         self._go(self._mood, seconds, now_s)
 
     def update(self, now_s: float) -> Floats:
-        """Move to ``now_s``; returns :attr:`values`."""
+        """(P,) float64, the face at ``now_s``; a view."""
         if now_s >= self._fall_at_s:
             self._blend(self._fall_at_s)
             fall_at, self._fall_at_s = self._fall_at_s, np.inf
             self._go(self._mood, self._target.offset_s, fall_at)
         self._blend(now_s)
-        return self.values
+        return self._now[:-_OVERRIDES]
 
     def _go(self, pose: _Pose, length_s: float, now_s: float) -> None:
         self._from[:] = self._now

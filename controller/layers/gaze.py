@@ -1,4 +1,4 @@
-"""Gaze: one direction or point, shared between eyes and head.
+"""Splits the direction of the gaze, or a point to look at, between eyes and head.
 
 The head takes what lies beyond a comfortable eye angle; the eyes make up the difference to where the head is
 *now*. So on a large shift the eyes arrive first and turn back while the head follows, as people's do.
@@ -7,7 +7,7 @@ The head takes what lies beyond a comfortable eye angle; the eyes make up the di
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,31 +16,16 @@ from controller.base.parameters import Floats, Parameters
 EYE_OFFSET_MM = 32.0
 """Distance of an eye's centre from the middle between the eyes."""
 
+Pair = Sequence[float] | Floats
+
 _NAMES = ("headYaw", "headPitch", "leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
 _HEAD_SHARE = 0.75
 _COMFORT_YAW_RAD = math.radians(8.0)
 _COMFORT_PITCH_RAD = math.radians(6.0)
 
 
-class Stir(Protocol):
-    """Small movements around a direction; idle life has them."""
-
-    eye_yaw_rad: float
-    eye_pitch_rad: float
-    head_rad: Floats
-
-
-class _Still:
-    eye_yaw_rad = eye_pitch_rad = 0.0
-    head_rad = np.zeros(3)
-
-
-STILL: Stir = _Still()
-"""No movement at all."""
-
-
 class Gaze:
-    """Splits a direction or a point into head and eye parameters.
+    """Turns a direction or a point into head and eye parameters.
 
     Directions are relative to the head's zero pose: yaw + to the subject's left, pitch + down.
 
@@ -61,7 +46,6 @@ class Gaze:
         self._scale = parameters.full_scale_rad[self.indices]
         self._yaw = np.zeros(2)
         self._pitch = 0.0
-        self._values = np.zeros(6)
 
     def look(self, yaw_rad: float, pitch_rad: float) -> None:
         """Look in a direction, with parallel eyes."""
@@ -88,22 +72,19 @@ class Gaze:
         self.shift_rad = math.hypot(float(self._yaw.mean()) - before[0], pitch_rad - before[1])
         self.active = True
 
-    def update(self, present: Floats, stir: Stir = STILL) -> Floats:
-        """Values (6,) for :attr:`indices`; a view.
+    def update(self, present: Floats, eyes_rad: Pair = (0.0, 0.0), head_rad: Pair = (0.0, 0.0)) -> Floats:
+        """Values (6,) for :attr:`indices`.
 
         Parameters
         ----------
-        present : (P,) parameters the face shows now. stir : small movements of eyes and head around the direction.
+        present : (P,) parameters the face shows now.
+        eyes_rad, head_rad : yaw and pitch of idle motion, added to the direction of the eyes and to the head.
         """
-        values, scale = self._values, self._scale
-        values[0] = (_head_part(float(self._yaw.mean()), _COMFORT_YAW_RAD) + stir.head_rad[0]) / scale[0]
-        values[1] = (_head_part(self._pitch, _COMFORT_PITCH_RAD) + stir.head_rad[1]) / scale[1]
-        head_yaw = present[self.indices[0]] * scale[0]
-        head_pitch = present[self.indices[1]] * scale[1]
-        values[2] = (self._yaw[0] + stir.eye_yaw_rad - head_yaw) / scale[2]
-        values[4] = (self._yaw[1] + stir.eye_yaw_rad - head_yaw) / scale[4]
-        values[3] = values[5] = (self._pitch + stir.eye_pitch_rad - head_pitch) / scale[3]
-        return np.clip(values, -1.0, 1.0, out=values)
+        yaw, pitch, scale = float(self._yaw.mean()), self._pitch, self._scale
+        head = np.array([_head_part(yaw, _COMFORT_YAW_RAD), _head_part(pitch, _COMFORT_PITCH_RAD)]) + head_rad[:2]
+        directions = np.array([self._yaw[0], pitch, self._yaw[1], pitch]).reshape(2, 2) + eyes_rad
+        eyes = directions - present[self.indices[:2]] * scale[:2]
+        return np.clip(np.concatenate([head, eyes.ravel()]) / scale, -1.0, 1.0)
 
 
 def _head_part(angle: float, comfort: float) -> float:

@@ -1,43 +1,36 @@
-"""Idle life: blinks, glances, micro-saccades, breathing, sway and small fidgets; seeded, so it can be repeated.
+"""Generates idle motion: blinks, glances, micro-saccades, breathing, sway and small fidgets.
 
-Everything is a function of the seed and of the times it is asked for; the figures are in ``configs/life``.
+It depends on nothing but the seed and the times it is updated to; the settings are in ``configs/life``.
 """
 
 from __future__ import annotations
 
 import math
 import random
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field
 
-from controller.base.config import Settings, config_error, load
+from controller.base.config import Number, Settings, Share, load
 from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import find_config
 from controller.motion.motion import Envelope, minimum_jerk
 
-Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
-Degrees = Annotated[float, Field(ge=0, le=45, allow_inf_nan=False)]
-Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
-Span = tuple[Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)], Seconds]
+Seconds = Annotated[Number, Field(gt=0, le=3600)]
+Degrees = Annotated[Number, Field(ge=0, le=45)]
 
 
-class _Table(Settings):
-    """A table whose spans must not be inside out."""
-
-    @model_validator(mode="after")
-    def _spans_rise(self) -> _Table:
-        for key, value in self:
-            if isinstance(value, tuple) and len(value) == 2 and value[0] > value[1]:
-                raise ValueError(f"{key} must be [shortest, longest]")
-        return self
+def _in_order(span: tuple[float, float]) -> tuple[float, float]:
+    if span[0] > span[1]:
+        raise ValueError(f"must be [shortest, longest], not {list(span)}")
+    return span
 
 
-class BlinkSettings(_Table):
-    """When and how it blinks."""
+Span = Annotated[tuple[Annotated[Number, Field(ge=0, le=3600)], Seconds], AfterValidator(_in_order)]
 
+
+class BlinkSettings(Settings):
     interval_s: Span
     double_share: Share
     double_gap_s: Span
@@ -48,9 +41,7 @@ class BlinkSettings(_Table):
     shift_share: Share
 
 
-class EyeSettings(_Table):
-    """Where the eyes go by themselves."""
-
+class EyeSettings(Settings):
     interval_s: Span
     yaw_deg: Degrees
     pitch_deg: Degrees
@@ -59,18 +50,14 @@ class EyeSettings(_Table):
     micro_deg: Degrees
 
 
-class HeadSettings(_Table):
-    """How the head sways."""
-
+class HeadSettings(Settings):
     yaw_deg: Degrees
     pitch_deg: Degrees
     roll_deg: Degrees
     period_s: Span
 
 
-class BreathSettings(_Table):
-    """How it breathes."""
-
+class BreathSettings(Settings):
     inhale_s: Seconds
     hold_s: Seconds
     exhale_s: Seconds
@@ -78,9 +65,7 @@ class BreathSettings(_Table):
     pitch_deg: Degrees
 
 
-class FidgetSettings(_Table):
-    """What small things it does."""
-
+class FidgetSettings(Settings):
     interval_s: Span
     rise_s: Seconds
     hold_s: Span
@@ -90,7 +75,7 @@ class FidgetSettings(_Table):
 
 
 class IdleSettings(Settings):
-    """Everything about idle life."""
+    """All settings of idle motion."""
 
     blink: BlinkSettings
     eyes: EyeSettings
@@ -101,25 +86,20 @@ class IdleSettings(Settings):
     @classmethod
     def named(cls, name: str, parameters: Parameters) -> IdleSettings:
         """The settings at a path or of a name in ``configs/life``. Raises ConfigError."""
-        path: Path = find_config("life", name)
-        settings = load(path, cls)
-        names = settings.fidget.parameters
-        faults = [
-            f"fidget.parameters[{i}]: unknown parameter {name!r}{did_you_mean(name, parameters.names)}"
-            for i, name in enumerate(names)
-            if name not in parameters.names
-        ]
-        if faults:
-            raise config_error(path, faults)
-        return settings
+
+        def faults(settings: IdleSettings) -> list[str]:
+            return [f"fidget.parameters[{i}]: unknown parameter {name!r}{did_you_mean(name, parameters.names)}"
+                    for i, name in enumerate(settings.fidget.parameters) if name not in parameters.names]  # fmt: skip
+
+        return load(find_config("life", name), cls, faults)
 
 
 class IdleMotion:
-    """Idle life of one face.
+    """Idle motion of one face.
 
     Parameters
     ----------
-    parameters : the registry. settings : the figures. seed : the same seed lives the same life.
+    parameters : the registry. settings : rates and sizes. seed : the same seed gives the same motion.
 
     Attributes
     ----------
@@ -152,7 +132,7 @@ class IdleMotion:
             self._next_blink_s = min(self._next_blink_s, now_s)
 
     def update(self, now_s: float, *, looking: bool, blink_block: float = 0.0, gaze_block: float = 0.0) -> Floats:
-        """Live until ``now_s``; returns :attr:`values`.
+        """Move to ``now_s``; returns :attr:`values`.
 
         Parameters
         ----------
@@ -204,8 +184,8 @@ class IdleMotion:
         home = not looking and self._random.random() < eyes.home_share
         yaw, pitch = (eyes.micro_deg, eyes.micro_deg) if looking else (eyes.yaw_deg, eyes.pitch_deg)
         spread = 0.0 if home else 0.5  # two standard deviations reach the figure in the file
-        self.eye_yaw_rad = math.radians(_held(self._random.gauss(0.0, spread), 1.0) * yaw)
-        self.eye_pitch_rad = math.radians(_held(self._random.gauss(0.0, spread), 1.0) * pitch)
+        yaw_share, pitch_share = (min(max(self._random.gauss(0.0, spread), -1.0), 1.0) for _ in range(2))
+        self.eye_yaw_rad, self.eye_pitch_rad = math.radians(yaw_share * yaw), math.radians(pitch_share * pitch)
 
     def _move_head(self, now_s: float) -> None:
         head, breath = self._settings.head, self._settings.breath
@@ -233,7 +213,3 @@ def _breath(breath: BreathSettings, now_s: float) -> float:
     if t < breath.inhale_s + breath.hold_s:
         return minimum_jerk(t / breath.inhale_s)
     return 1.0 - minimum_jerk((t - breath.inhale_s - breath.hold_s) / breath.exhale_s)
-
-
-def _held(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)

@@ -1,4 +1,4 @@
-"""Layers: many sources, one parameter vector, and for every parameter the name of the layer that holds it.
+"""Mixes layers, the values of many sources, into one parameter vector, and says which layer holds each parameter.
 
 A layer keeps the latest value of each parameter it was given; nothing queues. From the lowest priority to the
 highest, with s the layer's share of a parameter (weight x fade) and v its value:
@@ -25,7 +25,7 @@ _SHORTEST_S = 1e-9
 
 @dataclass(frozen=True)
 class LayerSettings:
-    """What a layer is.
+    """Name, priority and timing of a layer; :class:`controller.layers.settings.LayerTable` checks those of files.
 
     Attributes
     ----------
@@ -44,24 +44,16 @@ class LayerSettings:
     timeout_s: float = math.inf
     gains: Mapping[str, float] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        if self.mode not in ("set", "add", "max"):
-            raise ValueError(f"mode must be 'set', 'add' or 'max', not {self.mode!r}")
-        if not 0.0 <= self.weight <= 1.0:
-            raise ValueError(f"weight must be 0 to 1, not {self.weight}")
-        if not (self.fade_in_s >= 0 and self.fade_out_s >= 0 and self.timeout_s > 0):
-            raise ValueError("fade_in_s and fade_out_s must not be negative, timeout_s must be positive")
-
 
 class Layer:
-    """One source's place in a :class:`Mixer`; all arrays are rows of the mixer's, (P,) each.
+    """The values of one source in a :class:`Mixer`; all arrays are rows of the mixer's, (P,) each.
 
     Attributes
     ----------
     values : latest values. held : which parameters the source has given and not released.
     gain : factor on the values, for instance per region.
     share : factor on the weight, for what blocks or fades the layer.
-    applied : share it had in the last mix. settings : what it was made from.
+    applied : share it had in the last mix.
     """
 
     def __init__(self, settings: LayerSettings, table: _Table, row: int) -> None:
@@ -70,16 +62,17 @@ class Layer:
         self.values, self.gain, self.share = table.values[row], table.gain[row], table.share[row]
         self.applied, self.held, self._stamp = table.applied[row], table.held[row], table.stamp[row]
         self._fade_out, self._block = table.fade_out_s[row], table.block[row]
-        self._fresh = np.zeros(len(self.values), dtype=bool)
+        self._fresh, self._positions = np.zeros(len(self.values), dtype=bool), np.arange(len(self.values))
 
     def write(self, indices: Which, values: Floats | Sequence[float] | float, now_s: float) -> None:
         """Hold some parameters at ``values`` from ``now_s`` on; what is not finite changes nothing."""
-        given = np.asarray(values, dtype=np.float64)
-        if not np.isfinite(given).all():
-            indices, given = _only_finite(indices, given, len(self.values))
-        self.values[indices] = given
-        self._stamp[indices] = now_s
-        self.held[indices] = True
+        positions = self._positions[indices]
+        given = np.broadcast_to(np.asarray(values, dtype=np.float64), positions.shape)
+        finite = np.isfinite(given)
+        positions = positions[finite]
+        self.values[positions] = given[finite]
+        self._stamp[positions] = now_s
+        self.held[positions] = True
 
     def write_masked(self, values: Floats, mask: Flags, now_s: float) -> None:
         """Hold the parameters of ``mask`` : (P,) bool at ``values`` : (P,); all others are released."""
@@ -94,8 +87,8 @@ class Layer:
         self.held[indices] = False
         self._fade_out[:] = self.settings.fade_out_s if fade_s is None else fade_s
 
-    def hold_back(self, amount: float) -> None:
-        """Take away ``amount`` 0..1 of its say, as an expression does that blocks it."""
+    def attenuate(self, amount: float) -> None:
+        """Reduce the layer's weight by ``amount`` 0..1, for an expression that blocks it."""
         self._block[:] = 1.0 - amount
 
     @property
@@ -105,7 +98,7 @@ class Layer:
 
 
 class _Table:
-    """What ``n`` layers hold of ``p`` parameters, and how they come and go; (n, p) or (n, 1) each."""
+    """What ``n`` layers hold of ``p`` parameters, and how they fade; (n, p) or (n, 1) each."""
 
     def __init__(self, settings: Sequence[LayerSettings], p: int) -> None:
         shape = (len(settings), p)
@@ -119,7 +112,7 @@ class _Table:
         self._rate, self.block = np.zeros(shape), np.ones((len(settings), 1))
 
     def advance(self, now_s: float, dt: float) -> Flags:
-        """Let fades and time-outs pass; (n,) which layers have any say."""
+        """Advance fades and time-outs; (n,) which layers have any effect."""
         np.greater(self.stamp, now_s - self._timeout_s, out=self._fresh)
         self.held &= self._fresh
         rise, fall = (dt / np.maximum(fade, max(dt, _SHORTEST_S)) for fade in (self._fade_in_s, self.fade_out_s))
@@ -142,9 +135,7 @@ class Mixer:
     ----------
     parameters : the registry. layers : what layers there are; order in priority, not in the list.
 
-    Raises
-    ------
-    ValueError : two layers of one name. ParameterError : gains of a region that is none.
+    Raises ValueError: two layers of one name. ParameterError: gains of a region that is none.
     """
 
     def __init__(self, parameters: Parameters, layers: Sequence[LayerSettings]) -> None:
@@ -182,7 +173,7 @@ class Mixer:
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Layers that had any say in the last mix, lowest priority first."""
+        """Layers that had any effect in the last mix, lowest priority first."""
         return tuple(layer.name for layer in self.layers if layer.applied.any())
 
     def holder(self, index: int) -> str | None:
@@ -197,10 +188,6 @@ class Mixer:
                     return layer.name
                 adding = adding or layer.name
         return adding
-
-    def holders(self) -> list[str | None]:
-        """:meth:`holder` of every parameter."""
-        return [self.holder(i) for i in range(len(self._work))]
 
     def _apply(self, mode: Mode, given: Floats, share: Floats, out: Floats) -> None:
         work = self._work
@@ -221,11 +208,3 @@ class Mixer:
 def by_priority(layers: Sequence[LayerSettings]) -> list[LayerSettings]:
     """Layers in the order in which they are mixed, lowest priority first."""
     return sorted(layers, key=lambda layer: layer.priority)
-
-
-def _only_finite(indices: Which, values: Floats, count: int) -> tuple[Indices, Floats]:
-    """The finite part of ``values`` and the positions it belongs to."""
-    positions = np.arange(count)[indices]
-    spread = np.broadcast_to(values, positions.shape)
-    good = np.isfinite(spread)
-    return positions[good], spread[good]

@@ -1,4 +1,4 @@
-"""The layers as a file says them, and as a stage changes them."""
+"""Reads the settings of layers from their file, with the changes of a stage."""
 
 from __future__ import annotations
 
@@ -10,25 +10,22 @@ from typing import Annotated, Any
 
 from pydantic import Field, field_validator
 
-from controller.base.config import Settings, check, config_error
-from controller.base.parameters import REGIONS, did_you_mean, read_toml
+from controller.base.config import Number, Settings, Share, check, read_toml
+from controller.base.parameters import REGIONS, did_you_mean
 from controller.base.paths import config_dir
 from controller.layers.mixer import LayerSettings, Mode
 
 NEEDED = ("expression", "idle", "gaze", "speech", "capture", "manual")
 """Layers that are always there: omote writes them by name."""
 
-_Share = Annotated[float, Field(ge=0, le=1)]
-_Seconds = Annotated[float, Field(ge=0, le=3600)]
-_Gain = Annotated[float, Field(ge=0, le=4)]
+_Seconds = Annotated[Number, Field(ge=0, le=3600)]
+_Gain = Annotated[Number, Field(ge=0, le=4)]
 
 
 class LayerTable(Settings):
-    """One layer of a file."""
-
     priority: int
     mode: Mode = "set"
-    weight: _Share = 1.0
+    weight: Share = 1.0
     fade_in_s: _Seconds = 0.0
     fade_out_s: _Seconds = 0.4
     timeout_s: Annotated[float, Field(gt=0)] = math.inf
@@ -44,8 +41,6 @@ class LayerTable(Settings):
 
 
 class LayersTable(Settings):
-    """All layers of a file, by name."""
-
     layers: dict[str, LayerTable]
 
 
@@ -54,21 +49,16 @@ def load_layers(
 ) -> tuple[LayerSettings, ...]:
     """The shipped layers, with the ``changes`` of a stage: single keys of them, or layers of its own.
 
-    Parameters
-    ----------
-    where : the file the changes are from, for messages.
+    ``where`` : the file the changes are from, for messages.
 
-    Raises
-    ------
-    ConfigError : a wrong key or value; two layers of one priority. Every fault with its key.
+    Raises ConfigError: a wrong key or value; two layers of one priority. Every fault with its key.
     """
     path = config_dir() / "vocabularies" / "layers.toml"
     base = read_toml(path)
     merged = {
         name: {**base.get(name, {}), **dict((changes or {}).get(name, {}))} for name in {**base, **(changes or {})}
     }
-    tables = check({"layers": merged}, LayersTable, where or path).layers
-    _check(tables, where or path)
+    tables = check({"layers": merged}, LayersTable, where or path, _faults).layers
     return tuple(LayerSettings(name, **dict(table)) for name, table in tables.items())
 
 
@@ -78,12 +68,11 @@ def default_layers() -> tuple[LayerSettings, ...]:
     return load_layers()
 
 
-def _check(tables: Mapping[str, LayerTable], where: Path) -> None:
-    faults = [f"layers.{name}: missing" for name in NEEDED if name not in tables]
+def _faults(file: LayersTable) -> list[str]:
+    faults = [f"layers.{name}: missing" for name in NEEDED if name not in file.layers]
     first: dict[int, str] = {}
-    for name, table in tables.items():
+    for name, table in file.layers.items():
         other = first.setdefault(table.priority, name)
         if other != name:
-            faults.append(f"layers.{name}.priority: {table.priority} is that of {other}; who wins must be clear")
-    if faults:
-        raise config_error(where, faults)
+            faults.append(f"layers.{name}.priority: {table.priority} is that of {other}; every layer needs its own")
+    return faults

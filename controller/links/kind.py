@@ -1,6 +1,6 @@
-"""What a kind of link says of itself, and every kind there is.
+"""Defines what a kind of link is, and registers all kinds.
 
-A link is a folder of ``controller/links`` with a module ``kind`` that holds ``LINK``, or a package of somebody else
+A link is a folder of ``controller/links`` with a module ``kind`` that holds ``LINK``, or another package
 with an entry point in the group ``omote.links`` that names a :class:`LinkKind`; see docs/extending.md.
 """
 
@@ -20,8 +20,8 @@ API = 1
 
 
 @dataclass(frozen=True)
-class Around:
-    """What a link is opened into.
+class LinkContext:
+    """Where the commands of a link go, and what it may use.
 
     Attributes
     ----------
@@ -40,22 +40,22 @@ class Link(Protocol):
     """A link that is open; it takes commands in a thread of its own until it is closed."""
 
     def report(self) -> dict[str, object]:
-        """What was counted: ``port`` (what people call its far end), ``accepted``, ``refused`` (counts by reason)."""
+        """Counts: ``port`` (the name of its far end), ``accepted``, ``refused`` (counts by reason)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinkKind:
-    """One way in.
+    """A kind of link.
 
     Attributes
     ----------
     api : version of the registry it is made for; see :data:`API`.
-    kind : what stages call it. title : what people call it.
-    settings : dataclass of what a stage can say of it (:mod:`drivers.base.options`). It may have a method ``check()``
+    kind : its name in stages. title : its name for people.
+    settings : dataclass of its options in a stage (:mod:`drivers.base.options`). It may have a method ``check()``
         that raises ValueError, a property ``address`` (where it listens, for people), and a property ``simulated``
         (the script that a simulated far end plays, or None).
-    open : ``"module:name"`` of a function that takes such settings and an :class:`Around` and gives a :class:`Link`;
-        it raises LinkError or PortError.
+    open : ``"module:name"`` of a function that takes such settings and a :class:`LinkContext`, and returns a
+        :class:`Link`; it raises LinkError or PortError.
     install : what ``pip install`` takes where a package is missing.
     """
 

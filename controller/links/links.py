@@ -1,4 +1,4 @@
-"""The links of a stage: read from their tables, and opened."""
+"""Reads the links of a stage from their tables, and opens them."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Annotated, Any
 from pydantic import create_model, field_validator, model_validator
 
 from controller.base.config import Settings
-from controller.base.schema import fields_of, given_in, known_kind, read_by
-from controller.links.kind import LINKS, Around, Link, LinkKind
+from controller.base.schema import check_kind, fields_of, parse_with, to_options
+from controller.links.kind import LINKS, Link, LinkContext, LinkKind
 from drivers.base.errors import PluginError
 
 
 class LinkSettings(Settings):
-    """One way in, as a stage has it; the fields of its kind's own options come besides (:func:`read_link`)."""
+    """A link of a stage; :func:`read_link` adds the options of its kind."""
 
     kind: str = "line"
 
@@ -27,8 +27,8 @@ class LinkSettings(Settings):
 
     @property
     def own(self) -> Any:
-        """What the kind itself is told: an instance of its settings."""
-        return given_in(self, LINKS.get(self.kind).settings)
+        """The options of its kind: an instance of its settings."""
+        return to_options(self, LINKS.get(self.kind).settings)
 
     @property
     def simulated(self) -> str | None:
@@ -42,7 +42,7 @@ class LinkSettings(Settings):
     @field_validator("kind")
     @classmethod
     def _is_known(cls, value: str) -> str:
-        return known_kind(LINKS, value)
+        return check_kind(LINKS, value)
 
     @model_validator(mode="after")
     def _fits(self) -> LinkSettings:
@@ -56,30 +56,26 @@ class LinkSettings(Settings):
 def read_link(table: dict[str, Any]) -> LinkSettings:
     """A link from its table in a stage, with the options of its kind.
 
-    Raises
-    ------
-    pydantic.ValidationError : every fault with its key.
+    Raises pydantic.ValidationError: every fault with its key.
     """
     try:
         kind = LINKS.get(str(table.get("kind", "line")))
     except PluginError:
-        return _Unknown.model_validate(table)  # which says what is wrong with the kind
+        return _Unknown.model_validate(table)  # whose error names the kind
     return _model_of(kind).model_validate(table)
 
 
-def open_links(choices: Sequence[LinkSettings], around: Around) -> list[Link]:
-    """Open every link of a stage; ``around.closers`` gets what closes them.
+def open_links(choices: Sequence[LinkSettings], context: LinkContext) -> list[Link]:
+    """Open every link of a stage; ``context.closers`` gets what closes them.
 
-    Raises
-    ------
-    LinkError, PortError : one does not come up. PluginError : a package that it needs is not installed.
+    Raises LinkError, PortError: one does not come up. PluginError: a package that it needs is not installed.
     """
     found = []
     for choice in choices:
         kind = LINKS.get(choice.kind)
         start = LINKS.load(kind, kind.open)
         with LINKS.blaming(kind.kind):
-            link: Link = start(choice.own, around)
+            link: Link = start(choice.own, context)
         found.append(link)
     return found
 
@@ -95,5 +91,5 @@ def _model_of(kind: LinkKind) -> type[LinkSettings]:
     return made
 
 
-LinkTable = Annotated[LinkSettings, read_by(read_link)]
+LinkTable = Annotated[LinkSettings, parse_with(read_link)]
 """An entry of ``[[links]]``: read by its kind's own options."""

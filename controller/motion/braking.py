@@ -1,6 +1,6 @@
-"""One step along the braking curve of :mod:`controller.motion.motion`, compiled: it runs for every value in every tick.
+"""Moves values one step along the braking curve of :mod:`controller.motion.motion`; compiled.
 
-The types stand with each function so that it is compiled on import, which is before servos are under torque: compiled
+Each function has explicit types so that it is compiled on import, which is before servos are under torque: compiled
 at the first tick, on a new machine, it would hold up the bus for longer than the servos' watchdog waits.
 """
 

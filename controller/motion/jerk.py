@@ -1,8 +1,8 @@
-"""Limits of jerk: a moving mean over just the time that keeps them.
+"""Limits jerk by a moving mean.
 
 Motion whose acceleration never exceeds A, averaged over a window of T seconds, changes its acceleration by no more
-than 2 A / T a second: what it had T ago leaves the mean while what it has now comes in. So T = 2 A / J keeps a limit J
-strictly, and as a mean it keeps range, speed and acceleration as well. The price is a delay of T / 2.
+than 2 A / T a second: the oldest value leaves the mean while the newest comes in. So T = 2 A / J keeps a limit J
+strictly, and a mean keeps range, speed and acceleration as well. It delays by T / 2.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from controller.base.parameters import Floats
 
 
 class JerkFilter:
-    """Averages (n,) values over a window of their own each.
+    """Averages (n,) values, each over its own window.
 
     Parameters
     ----------
@@ -28,10 +28,10 @@ class JerkFilter:
     def __init__(self, max_acceleration: Floats, max_jerk: Floats) -> None:
         self.window_s = 2.0 * max_acceleration / max_jerk
         self._longest_s = float(self.window_s.max(initial=0.0))
-        self._kept = np.zeros((2, len(self.window_s)))  # newest first
-        self._took = np.full(2, np.inf)  # how long it took from the row behind
-        self._share, self._work = np.zeros_like(self._kept), np.zeros_like(self._kept)
-        self._even = False
+        self._history = np.zeros((2, len(self.window_s)))  # newest first
+        self._steps_s = np.full(2, np.inf)  # from the row behind
+        self._share, self._work = np.zeros_like(self._history), np.zeros_like(self._history)
+        self._uniform = False
 
     @property
     def active(self) -> bool:
@@ -40,42 +40,42 @@ class JerkFilter:
 
     def reset(self, values: Floats) -> None:
         """Be at rest at ``values`` : (n,)."""
-        self._kept[:] = values
-        self._took.fill(np.inf)
-        self._even = False
+        self._history[:] = values
+        self._steps_s.fill(np.inf)
+        self._uniform = False
 
     def step(self, dt: float, values: Floats, out: Floats) -> Floats:
         """Take ``values`` : (n,) that were reached in ``dt`` s; write their mean to ``out`` : (n,)."""
-        steady = self._even and self._took[0] == dt
-        if not steady and self._took[:-2].sum() < self._longest_s - dt:
+        steady = self._uniform and self._steps_s[0] == dt
+        if not steady and self._steps_s[:-2].sum() < self._longest_s - dt:
             self._grow()
-        self._kept[1:] = self._kept[:-1]
-        self._kept[0] = values
+        self._history[1:] = self._history[:-1]
+        self._history[0] = values
         if not steady:
-            self._took[1:] = self._took[:-1]
-            self._took[0] = dt
-            self._even = bool((self._took == dt).all())  # while steps keep their length, so do the shares
+            self._steps_s[1:] = self._steps_s[:-1]
+            self._steps_s[0] = dt
+            self._uniform = bool((self._steps_s == dt).all())  # while steps keep their length, so do the shares
             self._weigh()
-        np.multiply(self._share, self._kept, out=self._work)
+        np.multiply(self._share, self._history, out=self._work)
         return np.add.reduce(self._work, axis=0, out=out)
 
     def _weigh(self) -> None:
         """Share of each kept row in the mean of the straight lines between them, over the window; the last fills up."""
         share, before = self._share, 0.0
         share.fill(0.0)
-        for i, took in enumerate(self._took[:-1].tolist()):
-            part = np.clip(self.window_s - before, 0.0, took)  # of the window that lies between this row and the next
-            next_ = part * part / (2.0 * took)
+        for i, step_s in enumerate(self._steps_s[:-1].tolist()):
+            part = np.clip(self.window_s - before, 0.0, step_s)  # of the window that lies between this row and the next
+            next_ = part * part / (2.0 * step_s)
             share[i] += part - next_
             share[i + 1] += next_
-            before += took
+            before += step_s
         share[-1] += np.maximum(self.window_s - before, 0.0)
         share /= np.where(self.window_s > 0.0, self.window_s, 1.0)
         share[0, self.window_s == 0.0] = 1.0
 
     def _grow(self) -> None:
         """Keep more rows; happens while the length of the steps settles, never afterwards."""
-        more = len(self._took)
-        self._kept = np.concatenate([self._kept, np.repeat(self._kept[-1:], more, axis=0)])
-        self._took = np.concatenate([self._took, np.full(more, self._took[-1])])
-        self._share, self._work = np.zeros_like(self._kept), np.zeros_like(self._kept)
+        more = len(self._steps_s)
+        self._history = np.concatenate([self._history, np.repeat(self._history[-1:], more, axis=0)])
+        self._steps_s = np.concatenate([self._steps_s, np.full(more, self._steps_s[-1])])
+        self._share, self._work = np.zeros_like(self._history), np.zeros_like(self._history)

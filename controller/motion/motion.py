@@ -1,4 +1,4 @@
-"""Motion in time: minimum-jerk curves, envelopes, and the limiter every parameter and servo passes.
+"""Limits the motion of parameters and servos, and computes minimum-jerk curves and envelopes.
 
 The limiter follows its target along the square-root braking curve with a linear end,
 
@@ -77,9 +77,7 @@ class MotionLimiter:
     ----------
     limited : (n,) bool, whether the last step was held back by a speed or acceleration limit.
 
-    Raises
-    ------
-    ValueError : a limit or ``response_s`` is not positive, or ``low`` is above ``high``.
+    Raises ValueError: a limit or ``response_s`` is not positive, or ``low`` is above ``high``.
     """
 
     def __init__(
@@ -113,15 +111,9 @@ class MotionLimiter:
     @classmethod
     def of(cls, parameters: Parameters, period_s: float = 0.01) -> MotionLimiter:
         """A limiter with the limits of ``parameters``."""
-        return cls(
-            parameters.max_speed,
-            parameters.max_acceleration,
-            parameters.low,
-            parameters.high,
-            response_s=parameters.response_s,
-            max_jerk=parameters.max_jerk,
-            period_s=period_s,
-        )
+        p = parameters
+        return cls(p.max_speed, p.max_acceleration, p.low, p.high, response_s=p.response_s, max_jerk=p.max_jerk,
+                   period_s=period_s)  # fmt: skip
 
     @property
     def velocity(self) -> Floats:

@@ -14,7 +14,7 @@ from pydantic import (
 )
 
 from controller.base.config import Settings
-from controller.base.schema import fields_of, given_in, known_kind, read_by
+from controller.base.schema import check_kind, fields_of, parse_with, to_options
 from drivers.base.errors import PluginError
 from drivers.core.families import SERVO_BAUD, Family
 from drivers.core.registry import FAMILIES, SIMULATED, no_simulator_error
@@ -69,7 +69,7 @@ class BusSettings(Settings):
             return value
         if info.field_name == "simulates" and value in FAMILIES.kinds() and not FAMILIES.get(value).simulator:
             raise ValueError(f"{no_simulator_error(value)}; use a real one")
-        return known_kind(FAMILIES, value)
+        return check_kind(FAMILIES, value)
 
     @model_validator(mode="after")
     def _fits(self) -> BusSettings:
@@ -81,7 +81,7 @@ class BusSettings(Settings):
         check = getattr(settings, "check", None)
         if check is not None:
             with FAMILIES.blaming(self.family):
-                check(given_in(self, settings), self.rate_hz)
+                check(to_options(self, settings), self.rate_hz)
         return self
 
     def _check_port(self) -> None:
@@ -142,5 +142,5 @@ def _model_of(family: Family) -> type[BusSettings]:
     return made
 
 
-Bus = Annotated[BusSettings, read_by(read_bus)]
+Bus = Annotated[BusSettings, parse_with(read_bus)]
 """An entry of ``[[buses]]``: read by its family's own options."""

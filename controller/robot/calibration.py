@@ -13,8 +13,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from controller.base.config import Settings, config_error, load
-from controller.base.files import replacing
-from controller.base.formats import format_fault
+from controller.base.files import format_fault, replacing
 from controller.base.parameters import did_you_mean
 from controller.robot.settings import Calibration, ChannelSettings, RobotSettings
 

@@ -8,10 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from controller.base.parameters import REGIONS, Flags, Floats, Parameters
-from controller.layers.commands import StatusValue
+from controller.layers.commands import CommandState, StatusValue
 from controller.robot.channels import ChannelTable
 from controller.robot.mirror import Mirror
-from controller.takes.recording import Face
 from drivers.base.bus import BusState
 
 
@@ -145,7 +144,7 @@ class FollowMode:
         self._measured_face = reflection
         self._values, self._mask = parameters.neutral(), np.zeros(len(parameters), dtype=bool)
 
-    def tick(self, state: Face, now_ns: int) -> None:
+    def tick(self, state: CommandState, now_ns: int) -> None:
         """Write the face that the servos make now."""
         if self._measured_face.read(self._values, self._mask):
             state.capture(self._values, self._mask, now_ns, now_ns)

@@ -9,8 +9,7 @@ import numpy as np
 
 from controller.base.parameters import Parameters
 from controller.layers.commands import CommandState
-from controller.links.line.host import load_script
-from controller.links.line.script import Script
+from controller.links.line.script import Script, load_script
 from controller.links.line.show import Show
 from controller.robot.anchors import AnchorMap, load_anchors
 from controller.robot.channels import build_table
@@ -18,7 +17,7 @@ from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.stage.offline import Feed, OfflineRun
 from controller.stage.stage import Stage
 from controller.takes.livelink import TakePlayer
-from controller.takes.reader import layer_of, load_take
+from controller.takes.reader import load_take, reader_of
 from controller.takes.recording import SUFFIX, replay
 
 _LONGEST_S = 30.0
@@ -65,7 +64,7 @@ def _feed(stage: Stage, take: Path | None, state: CommandState) -> tuple[Feed, f
     ]
     shows = [Show(script, state) for script in scripts]
     for show in shows:
-        show.play()
+        show.playing = True
     return _all([show.tick for show in shows]), max(script.loop_s or _last_s(script) for script in scripts)
 
 
@@ -73,7 +72,7 @@ def _of_take(stage: Stage, take: Path, state: CommandState) -> tuple[Feed, float
     if take.suffix == SUFFIX:
         return _of_recording(stage, take, state)
     loaded = load_take(take, state.parameters)
-    return TakePlayer(loaded, state, layer_of(take)).tick, loaded.duration_s
+    return TakePlayer(loaded, state, reader_of(take).layer).tick, loaded.duration_s
 
 
 def _of_recording(stage: Stage, path: Path, state: CommandState) -> tuple[Feed, float]:

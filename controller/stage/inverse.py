@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.errors import ConfigError
-from controller.base.files import replacing
-from controller.base.formats import format_fault
+from controller.base.files import format_fault, replacing
 from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.robot.anchors import Skin, head_order, sample_skin, shapes_of

@@ -17,7 +17,7 @@ from controller.layers.commands import CommandState
 from controller.layers.idle import IdleSettings
 from controller.layers.mixer import LayerSettings
 from controller.layers.settings import load_layers
-from controller.links.line.host import load_script
+from controller.links.line.script import load_script
 from controller.links.links import LinkTable
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings

@@ -1,4 +1,4 @@
-"""Recorded faces and voices: Live Link Face takes, speech, recordings of one's own.
+"""Reads recorded faces and voices: takes of Live Link Face, speech, recordings of omote.
 
 In: files and sound. Out: values of parameters over time. Imports base to links.
 """

@@ -1,4 +1,4 @@
-"""Takes of Live Link Face: the CSV file, its traps, and playing it at its own rate.
+"""Reads takes of Live Link Face from CSV files, and plays takes at their own rate.
 
 What the format hides (measured on public takes): the timecode counts frames of 1/60 s even in takes of 30 Hz; rows
 are missing; values may exceed 1; head angles that are zero throughout mean "not recorded"; eye angles repeat what the
@@ -10,16 +10,14 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.base.errors import ParameterError, TakeError
-from controller.base.parameters import Floats, Parameters, fold
+from controller.base.parameters import Flags, Floats, Parameters, fold
+from controller.layers.commands import CommandState
 
 _FRAMES_PER_S = 60.0
 _DAY_S = 86_400.0
@@ -46,7 +44,7 @@ class Take:
     name: str
     times_s: Floats
     values: Floats
-    mask: NDArray[np.bool_]
+    mask: Flags
     low: Floats
     high: Floats
     through: Floats | None = None
@@ -60,13 +58,10 @@ class Take:
         Parameters
         ----------
         path : the file. parameters : the registry.
-        swap_jaw_mouth_lr : take the labels jaw and mouth left and right for each other, as the evidence has it.
-        use_eye_angles : drive the eyes by the eye angle columns even when eyeLook columns carry data; these are
-            left out then, for the eyes must not turn twice.
+        swap_jaw_mouth_lr : swap the labels left and right of jaw and mouth, which the format has the wrong way round.
+        use_eye_angles : take the eyes from the eye angle columns, not from the eyeLook columns, where both carry data.
 
-        Raises
-        ------
-        TakeError : the file cannot be read or a cell is wrong; names file, line and column.
+        Raises TakeError: the file cannot be read or a cell is wrong; names file, line and column.
         """
         columns, times, table = _read(Path(path))
         values, present = _by_parameter(columns, table, parameters, swap_jaw_mouth_lr)
@@ -109,22 +104,6 @@ class Take:
         return np.clip(out, self.low, self.high, out=out)
 
 
-class LayerSink(Protocol):
-    """Whatever a take can be played into: a command state, or a recorder of one."""
-
-    def write_layer(
-        self,
-        name: str,
-        values: Floats,
-        mask: NDArray[np.bool_],
-        now_ns: int,
-        stamp_ns: int = 0,
-        *,
-        through: Floats | None = None,
-    ) -> None:
-        """Give a layer the values of the mask and release the rest."""
-
-
 class TakePlayer:
     """Plays a take into a layer at its own rate.
 
@@ -134,33 +113,27 @@ class TakePlayer:
 
     Attributes
     ----------
-    finished : the last row has been given.
+    position_s : how far it has played. finished : the last row has been given.
     """
 
-    def __init__(self, take: Take, state: LayerSink, layer: str = "capture") -> None:
+    def __init__(self, take: Take, state: CommandState, layer: str = "capture") -> None:
         self.take = take
         self._layer = layer
         self.finished = False
         self._state = state
         self._values = np.zeros(take.values.shape[1])
         self._start_ns: int | None = None
-
-    @property
-    def position_s(self) -> float:
-        """How far it has played."""
-        return self._position_s
-
-    _position_s = 0.0
+        self.position_s = 0.0
 
     def tick(self, now_ns: int) -> None:
         """Give the layer the values of ``now_ns`` (monotonic clock); the first call is the take's beginning."""
         if self._start_ns is None:
             self._start_ns = now_ns
-        self._position_s = (now_ns - self._start_ns) * 1e-9
+        self.position_s = (now_ns - self._start_ns) * 1e-9
         if self.finished:
             return
-        self.finished = self._position_s >= self.take.duration_s
-        values = self.take.sample(self._position_s, self._values)
+        self.finished = self.position_s >= self.take.duration_s
+        values = self.take.sample(self.position_s, self._values)
         self._state.write_layer(self._layer, values, self.take.mask, now_ns, now_ns, through=self.take.through)
 
 
@@ -182,73 +155,50 @@ def _read(path: Path) -> tuple[list[str], Floats, Floats]:
     lines = [(number, row) for number, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
     if not lines:
         raise TakeError(f"{path}: a header but no rows", hint="record the take again, or export it again")
-    return _cells(path, header, folded, lines)
-
-
-def _cells(
-    path: Path, header: list[str], folded: list[str], lines: list[tuple[int, list[str]]]
-) -> tuple[list[str], Floats, Floats]:
     for number, row in lines:
         if len(row) != len(header):
             raise TakeError(
                 f"{path}, line {number}: {len(row)} cells where the header has {len(header)}",
                 hint="the file may be cut off; export the take again",
             )
-    clock = folded.index("timecode")
+    times = _times(path, [(number, row[folded.index("timecode")]) for number, row in lines])
     keep = [i for i, name in enumerate(folded) if name not in ("timecode", "blendshapecount", "framerate")]
-    times = _unwrap(np.array([_timecode(path, number, row[clock]) for number, row in lines]))
-    back = np.flatnonzero(np.diff(times) < 0)
-    if len(back):
-        raise TakeError(
-            f"{path}, line {lines[back[0] + 1][0]}, column Timecode: goes back in time",
-            hint="two takes in one file? split it there",
-        )
-    try:
-        table = np.array([[row[i] for i in keep] for _, row in lines], dtype=np.float64)
-    except ValueError:
-        table = np.full((1, 1), math.nan)
-    if not np.isfinite(table).all():
-        raise _bad_cell(path, header, keep, lines)
+    table = np.array([[_number(path, number, header[i], row[i]) for i in keep] for number, row in lines])
     return [folded[i] for i in keep], times, table
 
 
-def _bad_cell(path: Path, header: list[str], keep: Sequence[int], lines: list[tuple[int, list[str]]]) -> TakeError:
-    """Look for the cell that is not a finite number, now that there is one."""
-    for number, row in lines:
-        for i in keep:
-            try:
-                good = math.isfinite(float(row[i]))
-            except ValueError:
-                good = False
-            if not good:
-                return TakeError(
-                    f"{path}, line {number}, column {header[i]}: {row[i]!r} is not a finite number",
-                    hint="mend or remove that line",
-                )
-    return TakeError(f"{path}: a cell is not a finite number", hint="export the take again")
-
-
-def _timecode(path: Path, number: int, text: str) -> float:
-    """Seconds since midnight; the frame counts 1/60 s."""
-    match = _TIMECODE.fullmatch(text)
-    if match is None:
+def _number(path: Path, line: int, column: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
         raise TakeError(
-            f"{path}, line {number}, column Timecode: {text!r} is not HH:MM:SS:FF.fff", hint="mend or remove that line"
+            f"{path}, line {line}, column {column}: {text!r} is not a finite number", hint="mend or remove that line"
         )
-    hours, minutes, seconds = (int(group) for group in match.groups()[:3])
-    return 3600 * hours + 60 * minutes + seconds + float(match[4]) / _FRAMES_PER_S
+    return value
 
 
-def _unwrap(times: Floats) -> Floats:
-    """Seconds from the first row; a fall by more than half a day is midnight."""
-    days = np.cumsum(np.diff(times, prepend=times[0]) < -_DAY_S / 2)
-    seconds: Floats = times + _DAY_S * days - times[0]
-    return seconds
+def _times(path: Path, lines: list[tuple[int, str]]) -> Floats:
+    """Seconds from the first line, of line numbers and timecodes; a fall by more than half a day is midnight."""
+    seconds = np.empty(len(lines))
+    for i, (number, text) in enumerate(lines):
+        match = _TIMECODE.fullmatch(text)
+        if match is None:
+            message = f"{path}, line {number}, column Timecode: {text!r} is not HH:MM:SS:FF.fff"
+            raise TakeError(message, hint="mend or remove that line")
+        hours, minutes, whole = map(int, match.groups()[:3])
+        seconds[i] = 3600 * hours + 60 * minutes + whole + float(match[4]) / _FRAMES_PER_S
+    seconds += _DAY_S * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -_DAY_S / 2)
+    for (number, _), step in zip(lines[1:], np.diff(seconds), strict=True):
+        if step < 0:
+            message = f"{path}, line {number}, column Timecode: goes back in time"
+            raise TakeError(message, hint="two takes in one file? split it there")
+    since_first: Floats = seconds - seconds[0]
+    return since_first
 
 
-def _by_parameter(
-    columns: list[str], table: Floats, parameters: Parameters, swap: bool
-) -> tuple[Floats, NDArray[np.bool_]]:
+def _by_parameter(columns: list[str], table: Floats, parameters: Parameters, swap: bool) -> tuple[Floats, Flags]:
     """Cells (n, P) under their parameters, angles normalised, and which parameters there are columns for."""
     values = np.zeros((len(table), len(parameters)))
     present = np.zeros(len(parameters), dtype=bool)
@@ -266,7 +216,7 @@ def _by_parameter(
     return values, present
 
 
-def _leave_out(values: Floats, present: NDArray[np.bool_], parameters: Parameters, use_eye_angles: bool) -> None:
+def _leave_out(values: Floats, present: Flags, parameters: Parameters, use_eye_angles: bool) -> None:
     """Drop columns that carry nothing or say the same as others; changes both arrays."""
     head, eyes = parameters.indices(_HEAD), parameters.indices(_EYES)
     looks = np.array([i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")])

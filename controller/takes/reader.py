@@ -1,6 +1,6 @@
-"""What a reader of takes says of itself, every one there is, and reading a take of any kind.
+"""Defines what a reader of takes is, registers all readers, and reads a take of any kind.
 
-A reader is a module in ``controller/takes/readers`` that holds ``TAKE``, or a package of somebody else with an entry
+A reader is a module in ``controller/takes/readers`` that holds ``TAKE``, or another package with an entry
 point in the group ``omote.takes`` that names a :class:`TakeReader`; see docs/extending.md.
 """
 
@@ -25,7 +25,7 @@ class TakeReader:
     Attributes
     ----------
     api : version of the registry it is made for; see :data:`API`.
-    kind : a short name. title : what people call such files.
+    kind : a short name. title : the name of such files for people.
     suffixes : how their names end, in small letters; no two readers share one.
     read : ``"module:name"`` of a function that takes a path and the parameters and gives a
         :class:`controller.takes.livelink.Take`, or raises TakeError.
@@ -63,17 +63,12 @@ TAKES: Registry[TakeReader] = Registry(TakeReader, "take", "omote.takes", API, _
 
 
 def suffixes() -> list[str]:
-    """How the names of all takes end."""
+    """The endings of the names of all takes."""
     return [suffix for reader in TAKES.all() for suffix in reader.suffixes]
 
 
 def reader_of(path: Path) -> TakeReader:
-    """Who reads a file, told apart by the ending of its name.
-
-    Raises
-    ------
-    TakeError : nobody does.
-    """
+    """The reader of a file, by the ending of its name. Raises TakeError: there is none."""
     kind = path.suffix.lower()
     for reader in TAKES.all():
         if kind in reader.suffixes:
@@ -86,9 +81,7 @@ def reader_of(path: Path) -> TakeReader:
 def load_take(path: Path, parameters: Parameters) -> Take:
     """A take of any kind omote reads.
 
-    Raises
-    ------
-    TakeError : the file cannot be read or is wrong. PluginError : a package that it needs is not installed.
+    Raises TakeError: the file cannot be read or is wrong. PluginError: a package that it needs is not installed.
     """
     reader = reader_of(path)
     read = TAKES.load(reader, reader.read)
@@ -97,8 +90,3 @@ def load_take(path: Path, parameters: Parameters) -> Take:
     if not isinstance(take, Take):
         raise TakeError(f"{path}: take kind {reader.kind!r} gave no take, but {take!r}", hint="update its package")
     return take
-
-
-def layer_of(path: Path) -> str:
-    """The layer a take plays into."""
-    return reader_of(path).layer

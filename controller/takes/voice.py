@@ -1,7 +1,7 @@
-"""A mouth that follows a voice while it is heard: WAV from a pipe, a socket or any file-like object.
+"""Moves a mouth by the sound of a voice: of a WAV file as a take, of a stream while it plays.
 
-The same jaw and lips as :func:`controller.takes.speech.wav_take`, but loudness is compared with the loudest of the
-last few seconds, for the end is not known yet.
+The jaw follows the loudness of the voice, the lips that of hissing. A file is compared with its own loud parts, a
+stream with the loudest of the last few seconds.
 """
 
 from __future__ import annotations
@@ -10,23 +10,55 @@ import math
 import threading
 import time
 import wave
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import IO
 
 import numpy as np
 
 from controller.base.errors import TakeError
-from controller.base.parameters import Floats, Parameters
-from controller.takes.recording import Face
-from controller.takes.speech import voice_shapes
+from controller.base.parameters import Flags, Floats, Parameters
+from controller.layers.commands import CommandState
+from controller.takes.livelink import Take
+from controller.vocabulary.sides import spread
 from controller.vocabulary.visemes import Visemes
 
-HOP_S = 0.01
+_RATE_HZ = 100
+HOP_S = 1.0 / _RATE_HZ
 _WINDOW_S = 0.03
 _GATE = 0.06
 _RISE_S, _FALL_S = 0.03, 0.09
 _MEMORY_S = 4.0
 _QUIET = 0.003  # rms of what counts as silence whatever came before
-_KINDS = {1: "u1", 2: "<i2", 4: "<i4"}
+_LOUD_PERCENTILE = 95.0
+_FORMATS = {1: "u1", 2: "<i2", 4: "<i4"}
+_HINT = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le -"
+
+
+def wav_take(path: Path, parameters: Parameters) -> Take:
+    """A take of a WAV file, a row every 10 ms. Raises TakeError: not a WAV file of PCM, or an empty one."""
+    try:
+        with path.open("rb") as stream:
+            file = _open(stream, str(path))
+            rate = file.getframerate()
+            sound = samples(file.readframes(file.getnframes()), file.getsampwidth(), file.getnchannels())
+    except OSError as error:
+        raise TakeError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+    if not len(sound):
+        raise TakeError(f"{path}: no sound in it", hint=_HINT)
+    size = int(_WINDOW_S * rate)
+    starts = np.arange(max(len(sound) * _RATE_HZ // rate, 1)) * rate // _RATE_HZ
+    loudness = _loudness(np.concatenate([sound, np.zeros(size)])[starts[:, None] + np.arange(size)], rate)
+    loud = np.percentile(loudness, _LOUD_PERCENTILE, axis=0)
+    goals = np.clip(loudness / np.where(loud > 0.0, loud, 1.0) - _GATE, 0.0, 1.0)
+    levels, level = np.empty_like(goals), np.zeros(2)
+    for i, goal in enumerate(goals):
+        levels[i] = level = _follow(level, goal)
+    shapes, through = _mouth_shapes(parameters), Visemes.load(parameters).through
+    times: Floats = np.arange(len(levels)) / _RATE_HZ
+    mask = shapes.sum(axis=0) > 0
+    return Take(path.name, times, _mouth(levels, shapes), mask, parameters.low, parameters.high, through)
 
 
 class VoiceEnvelope:
@@ -45,32 +77,26 @@ class VoiceEnvelope:
         if rate_hz < 1000:
             raise ValueError(f"rate_hz must be 1000 or more, not {rate_hz}")
         self.hop = round(rate_hz * HOP_S)
-        self._jaw, self._lips = voice_shapes(parameters)
-        self.mask = (self._jaw + self._lips) > 0
-        self._heard = np.zeros(round(rate_hz * _WINDOW_S))
-        self._shape = np.hanning(len(self._heard))
-        pitch = np.fft.rfftfreq(len(self._heard), 1 / rate_hz)
-        self._bands = (pitch > 60) & (pitch < 2500), pitch > 4000
+        self._shapes = _mouth_shapes(parameters)
+        self.mask = self._shapes.sum(axis=0) > 0
+        self._rate_hz, self._window = rate_hz, np.zeros(round(rate_hz * _WINDOW_S))
         # a sine of rms r gives a band of this times r
-        self._least = _QUIET * math.sqrt(float((self._shape**2).sum()) * len(self._heard) / 2)
+        self._least = _QUIET * math.sqrt(float((np.hanning(len(self._window)) ** 2).sum()) * len(self._window) / 2)
         self._loudest, self._level = np.full(2, self._least), np.zeros(2)
 
-    def hear(self, sound: Floats) -> Floats:
+    def process(self, sound: Floats) -> Floats:
         """(P,) the mouth after one hop of samples -1..1, (hop,) float64; shorter at the end of a stream."""
-        self._heard = np.concatenate([self._heard, sound])[-len(self._shape) :]
-        power = np.abs(np.fft.rfft(self._heard * self._shape)) ** 2
-        loud = np.array([np.sqrt(power[band].sum()) for band in self._bands])
+        self._window = np.concatenate([self._window, sound])[-len(self._window) :]
+        loudness = _loudness(self._window, self._rate_hz)
         keep = math.exp(-HOP_S / _MEMORY_S)
-        self._loudest = np.maximum(np.maximum(self._loudest * keep, loud), self._least)
-        goal = np.where(loud > self._least, np.clip(loud / self._loudest - _GATE, 0.0, 1.0), 0.0)
-        tau = np.where(goal > self._level, _RISE_S, _FALL_S)
-        self._level += (goal - self._level) * (1.0 - np.exp(-HOP_S / tau))
-        voice, hiss = self._level
-        return np.minimum(voice * self._jaw + hiss * (1.0 - 0.7 * voice) * self._lips, 1.0)
+        self._loudest = np.maximum(np.maximum(self._loudest * keep, loudness), self._least)
+        goal = np.where(loudness > self._least, np.clip(loudness / self._loudest - _GATE, 0.0, 1.0), 0.0)
+        self._level = _follow(self._level, goal)
+        return _mouth(self._level, self._shapes)
 
 
 class VoiceListener:
-    """Hears a WAV stream in a thread of its own and writes the speech layer; the layer lets go when it ends.
+    """Writes the speech layer from a WAV stream; the layer's time-out releases it when the stream ends.
 
     A stream that comes faster than sound, such as a file, is taken at the pace of its rate.
 
@@ -81,93 +107,91 @@ class VoiceListener:
 
     Attributes
     ----------
-    hops : how many pieces of 10 ms were heard.
+    hops : how many pieces of 10 ms were processed.
 
-    Raises
-    ------
-    TakeError : the stream does not begin as WAV of 8, 16 or 32 bit PCM.
+    Raises TakeError: the stream does not begin as WAV of 8, 16 or 32 bit PCM.
     """
 
-    def __init__(self, stream: IO[bytes], state: Face, *, raw_hz: int | None = None) -> None:
-        self._file = _open(stream) if raw_hz is None else RawPcm(stream, raw_hz)
-        self._channels, self._width = self._file.getnchannels(), self._file.getsampwidth()
-        self._rate = self._file.getframerate()
-        self._state, self._envelope = state, VoiceEnvelope(state.parameters, self._rate)
+    def __init__(self, stream: IO[bytes], state: CommandState, *, raw_hz: int | None = None) -> None:
+        self._read: Callable[[int], bytes]
+        if raw_hz is None:
+            file = _open(stream, "the stream")
+            self._read, rate_hz = file.readframes, file.getframerate()
+            self._width, self._channels = file.getsampwidth(), file.getnchannels()
+        else:
+            self._read, rate_hz = lambda count: stream.read(2 * count), raw_hz
+            self._width, self._channels = 2, 1
+        self._state, self._envelope = state, VoiceEnvelope(state.parameters, rate_hz)
         self._through = Visemes.load(state.parameters).through
         self._stopping = threading.Event()
         self.hops = 0
-        self._thread = threading.Thread(target=self.run, name="voice", daemon=True)
-
-    def start(self) -> VoiceListener:
-        """Begin to listen."""
-        self._thread.start()
-        return self
 
     def stop(self) -> None:
-        """Stop listening; a stream that is silent is left to end by itself."""
+        """Stop listening; a blocked read ends when the stream does."""
         self._stopping.set()
-
-    def join(self, timeout_s: float | None = None) -> bool:
-        """Wait until the stream has ended; False if it has not after ``timeout_s``."""
-        self._thread.join(timeout_s)
-        return not self._thread.is_alive()
 
     def run(self) -> None:
         """Listen until the stream ends."""
         began = time.monotonic()
-        while not self._stopping.is_set():
-            data = self._file.readframes(self._envelope.hop)
-            if not data:
-                return
+        while not self._stopping.is_set() and (data := self._read(self._envelope.hop)):
             self.hops += 1
             ahead = self.hops * HOP_S - (time.monotonic() - began)
             if ahead > 0:
                 self._stopping.wait(ahead)
             now = time.monotonic_ns()
-            values = self._envelope.hear(samples(data, self._width, self._channels))
+            values = self._envelope.process(samples(data, self._width, self._channels))
             self._state.write_layer("speech", values, self._envelope.mask, now, now, through=self._through)
 
 
-class RawPcm:
-    """PCM without a header, read as :class:`wave.Wave_read` reads WAV: signed 16 bit, little end first, mono."""
-
-    def __init__(self, stream: IO[bytes], rate_hz: int) -> None:
-        self._stream, self._rate_hz = stream, rate_hz
-
-    def getnchannels(self) -> int:
-        """One."""
-        return 1
-
-    def getsampwidth(self) -> int:
-        """Two bytes."""
-        return 2
-
-    def getframerate(self) -> int:
-        """Samples per second."""
-        return self._rate_hz
-
-    def readframes(self, count: int) -> bytes:
-        """Up to ``count`` samples; none at the end."""
-        return self._stream.read(2 * count)
-
-
 def samples(data: bytes, width: int, channels: int) -> Floats:
-    """(k,) mono samples -1..1 of PCM frames; a frame that is cut short is left out."""
+    """(k,) mono samples -1..1 of PCM frames of ``width`` bytes a sample; a frame that is cut short is left out."""
     whole = len(data) // (width * channels) * width * channels
-    raw = np.frombuffer(data[:whole], dtype=np.dtype(_KINDS[width])).astype(np.float64)
+    raw = np.frombuffer(data[:whole], dtype=np.dtype(_FORMATS[width])).astype(np.float64)
     if width == 1:
         raw -= 128.0
     mixed: Floats = raw.reshape(-1, channels).mean(axis=1) / 2.0 ** (8 * width - 1)
     return mixed
 
 
-def _open(stream: IO[bytes]) -> wave.Wave_read:
-    hint = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le -"
+def _open(stream: IO[bytes], name: str) -> wave.Wave_read:
     try:
         file = wave.Wave_read(stream)
     except (OSError, wave.Error, EOFError) as error:
-        raise TakeError(f"the stream is not WAV of PCM: {str(error) or 'it ends too early'}", hint=hint) from error
-    if file.getsampwidth() not in _KINDS or file.getframerate() < 1000:
+        raise TakeError(f"{name}: not WAV of PCM: {str(error) or 'it ends too early'}", hint=_HINT) from error
+    if file.getsampwidth() not in _FORMATS or file.getframerate() < 1000:
         found = f"{8 * file.getsampwidth()} bit at {file.getframerate()} Hz"
-        raise TakeError(f"the stream has {found}; 8, 16 or 32 bit PCM is heard", hint=hint)
+        raise TakeError(f"{name}: {found}; 8, 16 or 32 bit PCM of 1000 Hz or more is read", hint=_HINT)
     return file
+
+
+@cache
+def _window(size: int, rate_hz: int) -> tuple[Floats, tuple[Flags, Flags]]:
+    """A Hann window, and which frequencies of its spectrum are of the voice and of hissing."""
+    pitch = np.fft.rfftfreq(size, 1 / rate_hz)
+    return np.hanning(size), ((pitch > 60) & (pitch < 2500), pitch > 4000)
+
+
+def _loudness(frames: Floats, rate_hz: int) -> Floats:
+    """(..., 2) loudness of the voice and of hissing in frames (..., n) of samples."""
+    shape, bands = _window(frames.shape[-1], rate_hz)
+    power = np.abs(np.fft.rfft(frames * shape)) ** 2
+    return np.stack([np.sqrt(power[..., band].sum(axis=-1)) for band in bands], axis=-1)
+
+
+def _follow(level: Floats, goal: Floats) -> Floats:
+    """(2,) levels a hop later: they rise fast and fall slowly, as a jaw does."""
+    tau = np.where(goal > level, _RISE_S, _FALL_S)
+    return level + (goal - level) * (1.0 - np.exp(-HOP_S / tau))
+
+
+def _mouth_shapes(parameters: Parameters) -> Floats:
+    """(2, P) the mouth at full voice, and at full hiss."""
+    jaw = spread(parameters, {"jawOpen": 0.55, "mouthLowerDown": 0.2, "mouthUpperUp": 0.1})
+    return np.stack([jaw, spread(parameters, {"mouthStretch": 0.3, "mouthLowerDown": 0.25, "jawOpen": 0.06})])
+
+
+def _mouth(levels: Floats, shapes: Floats) -> Floats:
+    """(..., P) the mouth at levels (..., 2) of voice and hiss."""
+    voice, hiss = levels[..., :1], levels[..., 1:]
+    mouth: Floats = np.minimum(voice * shapes[0] + hiss * (1.0 - 0.7 * voice) * shapes[1], 1.0)
+    return mouth

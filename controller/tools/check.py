@@ -12,7 +12,7 @@ from controller.base.config import load
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.paths import config_dir, find_config
-from controller.links.line.host import load_script
+from controller.links.line.script import load_script
 from controller.robot.calibration import CalibrationFile
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings

@@ -18,8 +18,9 @@ from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.base.signals import stop_flag
-from controller.links.line.host import RobotHost, load_script
+from controller.links.line.host import RobotHost
 from controller.links.line.hostport import HostPort
+from controller.links.line.script import load_script
 from controller.robot.buses import SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.robot import load_robot

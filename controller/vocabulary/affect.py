@@ -1,4 +1,4 @@
-"""Moods as points: valence, arousal and dominance to a blend of named expressions, and back.
+"""Converts moods, points of valence, arousal and dominance, to blends of named expressions, and back.
 
 The blend is Shepard's (1968): weights fall with the distance to each anchor, and an anchor is met exactly. Neutral
 is an anchor at the origin.
@@ -6,18 +6,29 @@ is an anchor at the origin.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
-from controller.base.parameters import Floats, did_you_mean, file_error, read_toml
+from controller.base.config import Number, Settings, load
+from controller.base.parameters import Floats, did_you_mean
 from controller.base.paths import config_dir
 from controller.vocabulary.expression import Expressions
 
 _POWER = 3.0
 _NEAR = 1e-6
+_Signed = Annotated[Number, Field(ge=-1, le=1)]
+
+
+class _Anchor(Settings):
+    at: tuple[_Signed, _Signed, _Signed]
+    source: str = ""
+
+
+class _File(Settings):
+    anchors: Annotated[dict[str, _Anchor], Field(min_length=1)]
 
 
 class Affect:
@@ -38,26 +49,15 @@ class Affect:
     def load(cls, expressions: Expressions, path: Path | None = None) -> Affect:
         """Read a space of moods; the shipped one without ``path``.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
-        path = path or config_dir() / "vocabularies" / "affect.toml"
-        table = read_toml(path)
-        faults = [f"{key}: unknown key" for key in table if key != "anchors"]
-        points = {"neutral": (0.0, 0.0, 0.0)}
-        for name, given in table.get("anchors", {}).items():
-            at: Any = given.get("at") if isinstance(given, dict) else None
-            if name not in expressions.names:
-                faults.append(f"anchors.{name}: unknown expression{did_you_mean(name, expressions.names)}")
-            if not _is_point(at):
-                faults.append(f"anchors.{name}.at: must be [valence, arousal, dominance], each -1 to 1 (is {at!r})")
-            else:
-                points[name] = tuple(at)
-        if len(points) < 2 and not faults:
-            faults.append("anchors: missing")
-        if faults:
-            raise file_error(path, faults)
+
+        def faults(file: _File) -> list[str]:
+            return [f"anchors.{name}: unknown expression{did_you_mean(name, expressions.names)}"
+                    for name in file.anchors if name not in expressions.names]  # fmt: skip
+
+        anchors = load(path or config_dir() / "vocabularies" / "affect.toml", _File, faults).anchors
+        points = {"neutral": (0.0, 0.0, 0.0)} | {name: anchor.at for name, anchor in anchors.items()}
         faces = np.stack([expressions[name].weights for name in points])
         return cls(tuple(points), np.array(list(points.values())), faces)
 
@@ -83,11 +83,3 @@ class Affect:
         total = max(shown.sum(), 1.0)
         read: Floats = shown @ self.points / total
         return read
-
-
-def _is_point(at: object) -> bool:
-    return (
-        isinstance(at, list)
-        and len(at) == 3
-        and all(isinstance(v, int | float) and math.isfinite(v) and abs(v) <= 1 for v in at)
-    )

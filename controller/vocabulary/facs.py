@@ -1,4 +1,4 @@
-"""FACS action units: formulas such as ``1+2+5B+26`` to parameters, and back from any face to units and emotions."""
+"""Converts FACS action units, in formulas such as ``1+2+5B+26``, to parameters, and faces to units and emotions."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
 
+from controller.base.config import Settings, Share, load
 from controller.base.errors import ParameterError
-from controller.base.parameters import Floats, Parameters, did_you_mean, file_error, read_toml
+from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import config_dir
-from controller.vocabulary.sides import sides
+from controller.vocabulary.sides import sides, spread, unknown_names
 
 if TYPE_CHECKING:
     from controller.base.solve import BoundedSolver  # start-up: numba and scipy, only for reading back
@@ -22,17 +24,41 @@ LETTERS = "ABCDE"
 """Intensities of FACS, 0.2 to 1.0."""
 
 _TERM = re.compile(r"([LR]?)(?:AU|AD)?(\d{1,2})([LR]?)([A-E]?)", re.IGNORECASE)
-_KEYS = {"name", "source", "choice", "weights", "left", "right", "aliases", "read"}
 _SPARSITY = 2e-3
-_SHOWN = 0.05
 _LEAST_INTENSITY = 0.1
 _LEAST_LIKENESS = 0.35  # cosine to the nearest emotion below which a face shows none
 _TOLERANCE = 1e-5
 
 
+_Level = Annotated[Share, Field(gt=0)]
+
+
+class _Unit(Settings):
+    name: str = ""
+    source: str = ""
+    choice: str = ""
+    left: dict[str, _Level] = {}
+    right: dict[str, _Level] = {}
+    weights: Annotated[dict[str, _Level], Field(validate_default=True)] = {}
+    aliases: list[str] = []
+    read: bool = True
+
+    @field_validator("weights")
+    @classmethod
+    def _given(cls, weights: dict[str, float], info: ValidationInfo) -> dict[str, float]:
+        if not (weights or info.data.get("left", True) or info.data.get("right", True)):
+            raise ValueError("missing")
+        return weights
+
+
+class _File(Settings):
+    units: Annotated[dict[str, _Unit], Field(min_length=1)]
+    emotions: dict[str, str] = {}
+
+
 @dataclass(frozen=True)
 class _Column:
-    """One thing to solve for: a unit, or one side of it."""
+    """One unknown of the solver: a unit, or one side of it."""
 
     unit: str
     side: str
@@ -69,34 +95,40 @@ class Facs:
     def load(cls, parameters: Parameters, path: Path | None = None) -> Facs:
         """Read action units; the shipped ones without ``path``.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
         path = path or config_dir() / "vocabularies" / "facs.toml"
-        table = read_toml(path)
-        faults = [f"{key}: unknown key" for key in table if key not in ("units", "emotions")]
-        columns: list[_Column] = []
-        aliases: dict[str, str] = {}
-        for unit, given in table.get("units", {}).items():
-            columns += _columns(parameters, unit, given, faults)
-            aliases |= {str(alias): unit for alias in given.get("aliases", [])}
-        if not columns:
-            raise file_error(path, [*faults, "units: missing"])
-        facs = cls(columns, aliases, table.get("emotions", {}))
-        faults += [f"emotions.{name}: {fault}" for name, fault in facs._emotion_faults()]
-        if faults:
-            raise file_error(path, faults)
-        return facs
+        return cls._build(parameters, load(path, _File, lambda file: cls._faults(parameters, file)))
+
+    @classmethod
+    def _build(cls, parameters: Parameters, file: _File) -> Facs:
+        columns = [column for name, unit in file.units.items() for column in _columns(parameters, name, unit)]
+        aliases = {alias: name for name, unit in file.units.items() for alias in unit.aliases}
+        return cls(columns, aliases, file.emotions)
+
+    @classmethod
+    def _faults(cls, parameters: Parameters, file: _File) -> list[str]:
+        """Unknown parameters, and formulas of emotions that are wrong."""
+        faults = [
+            fault
+            for name, unit in file.units.items()
+            for table in ("weights", "left", "right")
+            for fault in unknown_names(parameters, f"units.{name}.{table}", getattr(unit, table))
+        ]
+        facs = cls._build(parameters, file)
+        for name, formula in file.emotions.items():
+            try:
+                facs.levels(formula)
+            except ParameterError as error:
+                faults.append(f"emotions.{name}: {error}")
+        return faults
 
     def levels(self, formula: str, intensity: float = 1.0) -> Floats:
         """(n,) levels of a formula: units with optional side and letter, joined by ``+``.
 
         ``12`` is both sides at full intensity, ``L12B`` the face's own left side at 0.4.
 
-        Raises
-        ------
-        ParameterError : a term is not understood or no unit has its number.
+        Raises ParameterError: a term is not understood or no unit has its number.
         """
         levels = np.zeros(len(self.names))
         for term in filter(None, formula.replace(" ", "").split("+")):
@@ -106,27 +138,12 @@ class Facs:
 
     def expand(self, formula: str, intensity: float = 1.0) -> Floats:
         """(P,) parameters of a formula, clipped to 1. Raises ParameterError."""
-        return self.parameters_of(self.levels(formula, intensity))
-
-    def parameters_of(self, levels: Floats) -> Floats:
-        """(P,) parameters of ``levels`` : (n,), clipped to 1."""
-        return np.minimum(self.matrix @ levels, 1.0)
+        return np.minimum(self.matrix @ self.levels(formula, intensity), 1.0)
 
     def read(self, values: Floats) -> Floats:
         """(n,) levels 0..1 that show ``values`` : (P,) best, with few units."""
         levels: Floats = self._solver.solve(np.asarray(values, dtype=np.float64)) * self._read
         return levels
-
-    def formula(self, levels: Floats) -> str:
-        """Levels (n,) as a formula with letters; both sides as one where they agree, nothing below 0.05."""
-        terms = []
-        for unit, indices in self._of_unit.items():
-            shown = {self.names[i].removesuffix(unit): _letter(levels[i]) for i in indices if levels[i] >= _SHOWN}
-            if len(set(shown.values())) == 1 and len(shown) == len(indices):
-                terms.append(unit + next(iter(shown.values())))
-            else:
-                terms += [side + unit + letter for side, letter in shown.items()]
-        return "+".join(terms)
 
     def read_emotion(self, values: Floats) -> tuple[str, float]:
         """The emotion whose units ``values`` : (P,) show most, and its intensity 0..1; neutral when little shows."""
@@ -172,51 +189,21 @@ class Facs:
                 raise ParameterError(f"action unit {unit} has no sides", hint=f"write it as {unit}")
         return indices, (LETTERS.index(letter) + 1) / 5 if letter else 1.0
 
-    def _emotion_faults(self) -> list[tuple[str, str]]:
-        faults = []
-        for name, formula in self.emotions.items():
-            try:
-                self.levels(formula)
-            except (ParameterError, AttributeError) as error:
-                faults.append((name, str(error)))
-        return faults
 
-
-def _letter(level: float) -> str:
-    return LETTERS[min(max(round(float(level) * 5), 1), 5) - 1]
-
-
-def _columns(parameters: Parameters, unit: str, given: dict[str, Any], faults: list[str]) -> list[_Column]:
-    """The columns of a unit: one, or two when it has sides."""
-    where = f"units.{unit}"
-    faults += [f"{where}.{key}: unknown key{did_you_mean(key, _KEYS)}" for key in given if key not in _KEYS]
-    if "left" in given or "right" in given:
-        halves = {"L": given.get("left", {}), "R": given.get("right", {})}
-        found = {side: _weights(parameters, where, table, "", faults) for side, table in halves.items()}
+def _columns(parameters: Parameters, name: str, unit: _Unit) -> list[_Column]:
+    """The columns of a unit: one, or two where it has sides."""
+    if unit.left or unit.right:
+        halves = {"L": spread(parameters, unit.left), "R": spread(parameters, unit.right)}
     else:
-        both = given.get("weights", {})
-        if not both:
-            faults.append(f"{where}.weights: missing")
-        plain = {key: value for key, value in both.items() if len(sides(parameters, key)) == 1}
-        sided = {key: value for key, value in both.items() if key not in plain}
-        if sided and not plain:
-            found = {side: _weights(parameters, where, sided, side, faults) for side in "LR"}
-        else:
-            found = {"": _weights(parameters, where, both, "", faults)}
-    return [_Column(unit, side, weights, given.get("read", True)) for side, weights in found.items()]
+        halves = {"": spread(parameters, unit.weights)}
+        found = [sides(parameters, key) for key in unit.weights]
+        if all(len(positions) == 2 for positions in found):
+            halves = {side: _only(halves[""], [each[i] for each in found]) for i, side in enumerate("LR")}
+    return [_Column(name, side, weights, unit.read) for side, weights in halves.items()]
 
 
-def _weights(parameters: Parameters, where: str, table: dict[str, Any], side: str, faults: list[str]) -> Floats:
-    """(P,) weights of a table, of one side only where ``side`` is given; faults are noted."""
-    weights = parameters.neutral()
-    for key, value in table.items():
-        positions = sides(parameters, key)
-        if not positions:
-            faults.append(f"{where}.weights.{key}: unknown parameter{did_you_mean(key, parameters.names)}")
-            continue
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= 1:
-            faults.append(f"{where}.weights.{key}: must be a number above 0, up to 1 (is {value!r})")
-            continue
-        chosen = {"": positions, "L": positions[:1], "R": positions[1:]}[side]
-        weights[chosen] = value
-    return weights
+def _only(weights: Floats, positions: list[int]) -> Floats:
+    """(P,) weights at some positions, 0 elsewhere."""
+    kept = np.zeros_like(weights)
+    kept[positions] = weights[positions]
+    return kept

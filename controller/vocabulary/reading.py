@@ -1,8 +1,9 @@
-"""Reading a face back in other vocabularies, so that a receiver that speaks one of them can be driven."""
+"""Reads a face in other vocabularies: action units, emotions, visemes, moods."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -10,58 +11,47 @@ import numpy as np
 from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.vocabulary.affect import Affect
-from controller.vocabulary.expression import Expressions
 from controller.vocabulary.facs import Facs
 from controller.vocabulary.visemes import Visemes
+from controller.vocabulary.vocabulary import Vocabulary
 
 _SHOWN = 0.05
 _RIDGE, _SPARSITY = 1e-4, 2e-3
 
 
 class Readings:
-    """Says what a face shows; may be asked from any thread.
+    """Says what a face shows; can be called from any thread.
 
     Parameters
     ----------
-    parameters : the registry. expressions : the named ones, which moods are blended from.
+    parameters : the registry. expressions : the named ones.
     """
 
-    def __init__(self, parameters: Parameters, expressions: Expressions) -> None:
+    def __init__(self, parameters: Parameters, expressions: Vocabulary) -> None:
         self._parameters, self._expressions = parameters, expressions
         self._lock = threading.Lock()
 
     def read(self, what: str, values: Floats) -> list[tuple[str, float]]:
         """Names and values 0..1 (moods -1..1) of what the face ``values`` : (P,) shows.
 
-        Parameters
-        ----------
-        what : one of :data:`controller.links.line.words.READINGS`.
+        ``what`` : ``UNITS``, ``EMOTION``, ``VISEMES`` or ``MOOD``.
 
-        Raises
-        ------
-        KeyError : another word. ConfigError : a vocabulary's file is wrong.
+        Raises KeyError: another word. ConfigError: a vocabulary's file is wrong.
         """
         with self._lock:
-            return {"UNITS": self._units, "EMOTION": self._emotion, "VISEMES": self._shapes, "MOOD": self._mood}[what](
-                values
-            )
-
-    def _units(self, values: Floats) -> list[tuple[str, float]]:
-        levels = self._facs.read(values)
-        return [(name, float(levels[i])) for i, name in enumerate(self._facs.names) if levels[i] >= _SHOWN]
-
-    def _emotion(self, values: Floats) -> list[tuple[str, float]]:
-        return [self._facs.read_emotion(values)]
-
-    def _shapes(self, values: Floats) -> list[tuple[str, float]]:
-        visemes, solver = self._visemes
-        levels = solver.solve(values * visemes.mask)
-        return [(name, float(levels[i])) for i, name in enumerate(visemes.names) if levels[i] >= _SHOWN]
-
-    def _mood(self, values: Floats) -> list[tuple[str, float]]:
-        affect, solver = self._affect
-        levels = dict(zip(affect.names[1:], solver.solve(values).tolist(), strict=True))
-        return list(zip(("valence", "arousal", "dominance"), affect.read(levels).tolist(), strict=True))
+            match what:
+                case "UNITS":
+                    return _shown(self._facs.names, self._facs.read(values))
+                case "EMOTION":
+                    return [self._facs.read_emotion(values)]
+                case "VISEMES":
+                    visemes, solver = self._visemes
+                    return _shown(visemes.names, solver.solve(values * visemes.mask))
+                case "MOOD":
+                    affect, solver = self._affect
+                    levels = dict(zip(affect.names[1:], solver.solve(values).tolist(), strict=True))
+                    return list(zip(("valence", "arousal", "dominance"), affect.read(levels).tolist(), strict=True))
+            raise KeyError(what)
 
     @cached_property
     def _facs(self) -> Facs:
@@ -77,6 +67,10 @@ class Readings:
         affect = Affect.load(self._expressions)
         faces = np.stack([self._expressions[name].weights for name in affect.names[1:]], axis=1)
         return affect, _Levels(faces)
+
+
+def _shown(names: Sequence[str], levels: Floats) -> list[tuple[str, float]]:
+    return [(name, level) for name, level in zip(names, levels.tolist(), strict=True) if level >= _SHOWN]
 
 
 class _Levels:

@@ -1,8 +1,8 @@
-"""Names of parameters in vocabularies: one that has sides may be written without them and then means both."""
+"""Finds the parameters that a name in a vocabulary means: a name without a side means left and right."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -23,15 +23,18 @@ def sides(parameters: Parameters, name: str) -> list[int]:
     return found
 
 
-def spread(parameters: Parameters, where: str, table: dict[str, Any], rest: float, faults: list[str]) -> Floats:
-    """(P,) values of a table of names, ``rest`` elsewhere; a name without a side means both. Faults are noted."""
+def unknown_names(parameters: Parameters, where: str, names: Iterable[str]) -> list[str]:
+    """A fault for each of the ``names`` in the table ``where`` that means no parameter."""
+    return [
+        f"{where}.{name}: unknown parameter{did_you_mean(name, parameters.names)}"
+        for name in names
+        if not sides(parameters, name)
+    ]
+
+
+def spread(parameters: Parameters, table: Mapping[str, float], rest: float = 0.0) -> Floats:
+    """(P,) values of a table of names, ``rest`` elsewhere; names that mean no parameter are left out."""
     values = np.full(len(parameters), rest)
-    for key, value in table.items():
-        positions = sides(parameters, key)
-        if not positions:
-            faults.append(f"{where}.{key}: unknown parameter{did_you_mean(key, parameters.names)}")
-        elif isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
-            faults.append(f"{where}.{key}: must be a number from 0 to 1 (is {value!r})")
-        else:
-            values[positions] = value
+    for name, value in table.items():
+        values[sides(parameters, name)] = value
     return values

@@ -1,20 +1,35 @@
-"""Visemes: what the mouth does for a sound, as data; and the tables from phonemes and Rhubarb's shapes to them."""
+"""Reads visemes, what the mouth does for a sound, and the tables from phonemes and Rhubarb's shapes to them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
+from controller.base.config import Number, Settings, Share, load
 from controller.base.errors import ParameterError
-from controller.base.parameters import Floats, Parameters, did_you_mean, file_error, read_toml
+from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import config_dir
-from controller.vocabulary.sides import spread
+from controller.vocabulary.sides import spread, unknown_names
 
-_KEYS = {"sounds", "duration", "hold", "aliases", "weights"}
-_TABLES = {"visemes", "rhubarb", "phonemes", "through"}
+
+class _Viseme(Settings):
+    sounds: str = ""
+    duration: Annotated[Number, Field(ge=0, le=10)] = 0.5
+    hold: Share = 0.5
+    aliases: list[str] = []
+    weights: dict[str, Share] = {}
+
+
+class _File(Settings):
+    visemes: Annotated[dict[str, _Viseme], Field(min_length=1)]
+    rhubarb: dict[str, dict[str, Number]] = {}
+    phonemes: dict[str, str] = {}
+    through: dict[str, Share] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +41,7 @@ class Visemes:
     names : of the n visemes. matrix : (P, n) float64, parameters of each at full weight.
     hold : (n,) how firmly each keeps its shape, 0..1. duration : (n,) relative lengths.
     through : (P,) how much of the face below shows through speech; 1 where no viseme moves a parameter.
-    rhubarb : mouth shape to weights (n,). phonemes : phoneme to weights (n,).
+    rhubarb : mouth shape to weights (n,). phonemes : phoneme to weights (n,). aliases : other names of visemes.
     """
 
     names: tuple[str, ...]
@@ -42,20 +57,10 @@ class Visemes:
     def load(cls, parameters: Parameters, path: Path | None = None) -> Visemes:
         """Read visemes; the shipped ones without ``path``.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
         """
         path = path or config_dir() / "vocabularies" / "visemes.toml"
-        table = read_toml(path)
-        faults = [f"{key}: unknown key{did_you_mean(key, _TABLES)}" for key in table if key not in _TABLES]
-        given: dict[str, Any] = table.get("visemes", {})
-        if not given:
-            raise file_error(path, [*faults, "visemes: missing"])
-        visemes = _read(parameters, given, table, faults)
-        if faults:
-            raise file_error(path, faults)
-        return visemes
+        return _build(parameters, load(path, _File, lambda file: _faults(parameters, file)))
 
     @property
     def mask(self) -> np.ndarray:
@@ -66,9 +71,7 @@ class Visemes:
     def weights(self, name: str) -> Floats:
         """(n,) weights of a viseme by name, or of a phoneme with or without stress digit.
 
-        Raises
-        ------
-        ParameterError : neither is known.
+        Raises ParameterError: neither is known.
         """
         name = self.aliases.get(name, name)
         if name in self.names:
@@ -84,54 +87,40 @@ class Visemes:
         return found
 
 
-def _read(parameters: Parameters, given: dict[str, Any], table: dict[str, Any], faults: list[str]) -> Visemes:
-    names = tuple(given)
-    columns: list[Floats] = []
-    aliases: dict[str, str] = {}
-    for name, entry in given.items():
-        where = f"visemes.{name}"
-        faults += [f"{where}.{key}: unknown key{did_you_mean(key, _KEYS)}" for key in entry if key not in _KEYS]
-        columns.append(spread(parameters, f"{where}.weights", entry.get("weights", {}), 0.0, faults))
-        aliases |= dict.fromkeys(entry.get("aliases", []), name)
-    matrix = np.stack(columns, axis=1)
-    through = spread(parameters, "through", table.get("through", {}), np.nan, faults)
-    moved = (matrix != 0.0).any(axis=1)
-    through = np.where(np.isnan(through), np.where(moved, 0.0, 1.0), through)
-    phonemes = {key: {str(value): 1.0} for key, value in table.get("phonemes", {}).items()}
-    visemes = Visemes(
-        names,
-        matrix,
-        _numbers(given, "hold", 1.0, faults),
-        _numbers(given, "duration", 10.0, faults),
-        through,
-        _mixes("rhubarb", table.get("rhubarb", {}), names, faults),
-        _mixes("phonemes", phonemes, names, faults),
-        aliases,
-    )
-    for array in (visemes.matrix, visemes.hold, visemes.duration, visemes.through):
+def _faults(parameters: Parameters, file: _File) -> list[str]:
+    """Unknown parameters, and shapes and phonemes that mean an unknown viseme."""
+    faults = unknown_names(parameters, "through", file.through)
+    for name, viseme in file.visemes.items():
+        faults += unknown_names(parameters, f"visemes.{name}.weights", viseme.weights)
+    used = {f"rhubarb.{shape}": name for shape, mix in file.rhubarb.items() for name in mix}
+    used |= {f"phonemes.{phoneme}": name for phoneme, name in file.phonemes.items()}
+    return faults + [
+        f"{where}: unknown viseme {name!r}{did_you_mean(name, file.visemes)}"
+        for where, name in used.items()
+        if name not in file.visemes
+    ]
+
+
+def _build(parameters: Parameters, file: _File) -> Visemes:
+    given = file.visemes
+    matrix = np.stack([spread(parameters, viseme.weights) for viseme in given.values()], axis=1)
+    hold, duration = (np.array([getattr(viseme, key) for viseme in given.values()]) for key in ("hold", "duration"))
+    through = np.where((matrix != 0.0).any(axis=1), 0.0, 1.0)
+    listed = spread(parameters, file.through, np.nan)
+    through = np.where(np.isnan(listed), through, listed)
+    for array in (matrix, hold, duration, through):
         array.flags.writeable = False
-    return visemes
+    return Visemes(
+        tuple(given),
+        matrix,
+        hold,
+        duration,
+        through,
+        {shape: _weights(mix, given) for shape, mix in file.rhubarb.items()},
+        {phoneme: _weights({name: 1.0}, given) for phoneme, name in file.phonemes.items()},
+        {alias: name for name, viseme in given.items() for alias in viseme.aliases},
+    )
 
 
-def _numbers(given: dict[str, Any], key: str, most: float, faults: list[str]) -> Floats:
-    values = np.zeros(len(given))
-    for i, (name, entry) in enumerate(given.items()):
-        value = entry.get(key, 0.5)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= most:
-            faults.append(f"visemes.{name}.{key}: must be a number from 0 to {most:g} (is {value!r})")
-            continue
-        values[i] = value
-    return values
-
-
-def _mixes(where: str, table: dict[str, Any], names: tuple[str, ...], faults: list[str]) -> dict[str, Floats]:
-    mixes = {}
-    for key, mix in table.items():
-        weights = np.zeros(len(names))
-        for name, value in mix.items():
-            if name not in names:
-                faults.append(f"{where}.{key}: unknown viseme {name!r}{did_you_mean(name, names)}")
-            else:
-                weights[names.index(name)] = value
-        mixes[key] = weights
-    return mixes
+def _weights(mix: Mapping[str, float], names: Iterable[str]) -> Floats:
+    return np.array([mix.get(name, 0.0) for name in names])

@@ -1,8 +1,11 @@
-"""The vocabulary of a face: every expression that has a name or can be written as a formula."""
+"""Looks up expressions: by name, or by a formula of action units or of a mood."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -10,45 +13,39 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean, fold
 from controller.base.paths import config_dir
+from controller.vocabulary.affect import Affect
 from controller.vocabulary.expression import Expression, read_expressions
-from controller.vocabulary.formulas import Formulas
+from controller.vocabulary.facs import Facs
+
+_UNITS = re.compile(r"(AU|AD)[LR]?\d", re.IGNORECASE)
+_MOOD = re.compile(r"(VAD?):(.*)", re.IGNORECASE)
 
 
 class Vocabulary:
-    """Expressions by name or formula.
+    """Expressions by name, or by a formula: ``AU1+2+5B``, ``VA:0.6,-0.2`` or ``VAD:-0.5,0.6,0.3``.
 
     Parameters
     ----------
-    expressions : the expressions, in file order.
+    parameters : the registry. expressions : the named expressions, in file order; moods are blended from them.
     aliases : folded other names to canonical ones.
-    formulas : makes an expression of a formula, None of anything else; names alone without.
     """
 
     def __init__(
-        self,
-        expressions: dict[str, Expression],
-        aliases: dict[str, str] | None = None,
-        formulas: Formulas | None = None,
+        self, parameters: Parameters, expressions: dict[str, Expression], aliases: dict[str, str] | None = None
     ) -> None:
-        self._expressions = expressions
-        self._formulas = formulas
+        self._parameters, self._expressions = parameters, expressions
         self._lookup = {fold(name): name for name in expressions} | (aliases or {})
 
     @classmethod
     def load(cls, parameters: Parameters, path: Path | None = None, more: Sequence[Path] = ()) -> Vocabulary:
         """Read a vocabulary of expressions; the shipped one without ``path``.
 
-        Parameters
-        ----------
-        more : further files whose expressions are added, such as a user's own; they may mix those before them.
+        ``more`` : further files whose expressions are added, such as a user's own; they may mix those before them.
 
-        Raises
-        ------
-        ConfigError : a file cannot be read or is wrong; every fault of every file with its key.
+        Raises ConfigError: a file cannot be read or is wrong; every fault of every file with its key.
         """
         files = (path or config_dir() / "vocabularies" / "expressions.toml", *more)
-        expressions, aliases = read_expressions(parameters, files)
-        return cls(expressions, aliases, Formulas(parameters, cls(expressions, aliases)))
+        return cls(parameters, *read_expressions(parameters, files))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -56,15 +53,17 @@ class Vocabulary:
         return tuple(self._expressions)
 
     def __getitem__(self, name: str) -> Expression:
-        """The expression called ``name``, any case, or of a formula such as ``AU1+2+5B`` or ``VA:0.6,-0.2``.
+        """The expression called ``name``, any case, or of a formula.
 
-        Raises
-        ------
-        ParameterError : unknown name, with the nearest ones, or a wrong formula.
+        Raises ParameterError: unknown name, with the nearest ones, or a wrong formula. ConfigError: a file is wrong.
         """
-        made = self._formulas(name) if self._formulas is not None else None
-        if made is not None:
-            return made
+        if _UNITS.match(name):
+            return Expression(name.upper(), self._facs.expand(name), source="FACS")
+        if mood := _MOOD.fullmatch(name):
+            kind = mood[1].upper()
+            point = _point(kind, mood[2])
+            shown = ",".join(f"{value:g}" for value in point)
+            return Expression(f"{kind}:{shown}", self._affect.expand(*point), source="affect")
         found = self._lookup.get(name) or self._lookup.get(fold(name))
         if found is None:
             raise ParameterError(
@@ -79,3 +78,26 @@ class Vocabulary:
         if not 0.0 <= intensity <= 1.0:
             raise ParameterError(f"intensity must be 0 to 1, not {intensity}", hint="0.5 is half of the expression")
         return {int(i): float(weights[i] * intensity) for i in np.flatnonzero(weights)}
+
+    @cached_property
+    def _facs(self) -> Facs:
+        return Facs.load(self._parameters)
+
+    @cached_property
+    def _affect(self) -> Affect:
+        return Affect.load(self)
+
+
+def _point(kind: str, text: str) -> list[float]:
+    """The numbers of a mood, each -1..1. Raises ParameterError."""
+    hint = f"like {kind}:{','.join(['0.5', '-0.2', '0.1'][: len(kind)])}"
+    cells = text.split(",")
+    if len(cells) != len(kind):
+        raise ParameterError(f"{kind}: needs {len(kind)} numbers with commas between", hint=hint)
+    try:
+        values = [float(cell) for cell in cells]
+    except ValueError:
+        values = [math.nan]
+    if not all(abs(value) <= 1.0 for value in values):
+        raise ParameterError(f"{kind}: takes numbers from -1 to 1, not {text!r}", hint=hint)
+    return values

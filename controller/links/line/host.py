@@ -1,40 +1,42 @@
-"""A simulated robot host: it sends a script over a pseudo-terminal and checks every answer.
+"""Simulates a robot host: it sends a script over a pseudo-terminal and checks every answer.
 
 ``python -m controller.links.line.host --script tour`` makes the port, prints ``ready PATH``, serves until its standard
-input ends, and prints what it counted as one line of JSON. It so ends with whoever started it.
+input ends, and prints what it counted as one line of JSON. So it ends with the process that started it.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
+import math
 import os
 import select
 import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from controller.base.clock import Samples
 from controller.base.errors import OMOTE_ERRORS
-from controller.base.parameters import Parameters, standard
-from controller.base.paths import find_config
-from controller.base.signals import ENDINGS
+from controller.base.parameters import PARAMETERS, Parameters
+from controller.base.signals import TERMINATION_SIGNALS
 from controller.links.line.hostport import HostPort
 from controller.links.line.protocol import MAX_REPLY, LineDecoder, LineError, Reply, format_words, number, parse_reply
-from controller.links.line.script import Script, Wave
+from controller.links.line.script import Script, Wave, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
 _ANSWER_LIMIT_S = 1.0
 _HELLO_EVERY_S = 0.1
 _POLL_S = 0.02
 _KEPT_REFUSALS = 20
+_NO_STEP = (math.inf, "")
 
 
 class RobotHost:
-    """Plays a script to whoever opens the port.
+    """Plays a script to the program that opens the port.
 
     Parameters
     ----------
@@ -45,22 +47,15 @@ class RobotHost:
     ----------
     sent, accepted, refused, unanswered, damaged, streamed : lines counted.
     refusals : the first refused lines with their answers. round_trip_ms : from a line to its answer.
-    newest : the newest streamed line.
     """
 
     def __init__(
-        self,
-        port: HostPort,
-        script: Script,
-        parameters: Parameters,
-        *,
-        now_s: Callable[[], float] = time.monotonic,
+        self, port: HostPort, script: Script, parameters: Parameters, *, now_s: Callable[[], float] = time.monotonic
     ) -> None:
         self.port = port
         self.script = script
         self.refusals: list[str] = []
         self.round_trip_ms = Samples(8192)
-        self.newest: Reply | None = None
         self.counts: Counter[str] = Counter()
         self._wave = Wave(parameters)
         self._decoder = LineDecoder(MAX_REPLY)
@@ -70,19 +65,29 @@ class RobotHost:
         self._greeted = False
 
     def run(self, keep_going: Callable[[], bool]) -> None:
-        """Greet until somebody answers, then play the script, until ``keep_going()`` is false."""
+        """Greet until there is an answer, then play the script, until ``keep_going()`` is false."""
         while keep_going() and not self._greeted:
             self._waiting.clear()
             self.send("HELLO")
             self._listen(self._now_s() + _HELLO_EVERY_S)
-        start_s, rounds, step, frame = self._now_s(), 0, 0, 0
+        start_s, frame, steps = self._now_s(), 0, self._steps()
+        step_s, line = next(steps, _NO_STEP)
         while keep_going():
             at_s = self._now_s() - start_s
-            if self.script.loop_s and at_s >= (rounds + 1) * self.script.loop_s:
-                rounds, step = rounds + 1, 0
-            step = self._send_steps(step, at_s - rounds * self.script.loop_s)
+            while step_s <= at_s:
+                self.send(line)
+                step_s, line = next(steps, _NO_STEP)
             frame = self._send_frame(frame, at_s)
-            self._listen(start_s + self._next_s(step, rounds, frame, at_s))
+            frame_s = frame / self.script.frames_hz if self.script.frames_hz else math.inf
+            self._listen(start_s + min(at_s + _POLL_S, step_s, frame_s))
+
+    def _steps(self) -> Iterator[tuple[float, str]]:
+        """Times since the start and lines, without end where the script loops."""
+        yield from self.script.steps
+        if self.script.loop_s and self.script.steps:
+            for rounds in itertools.count(1):
+                for at_s, line in self.script.steps:
+                    yield rounds * self.script.loop_s + at_s, line
 
     def send(self, line: str) -> int:
         """Send a line with a tag and a checksum; returns the tag."""
@@ -103,13 +108,6 @@ class RobotHost:
             "round_trip_ms": self.round_trip_ms.summary(),
         }
 
-    def _send_steps(self, step: int, at_s: float) -> int:
-        steps = self.script.steps
-        while step < len(steps) and steps[step][0] <= at_s:
-            self.send(steps[step][1])
-            step += 1
-        return step
-
     def _send_frame(self, frame: int, at_s: float) -> int:
         """Send every parameter when it is time; frames that were missed are left out."""
         due = int(at_s * self.script.frames_hz) + 1
@@ -117,15 +115,6 @@ class RobotHost:
             self.send("FRAME " + " ".join(map(number, self._wave.at(at_s).tolist())))
             return due
         return frame
-
-    def _next_s(self, step: int, rounds: int, frame: int, at_s: float) -> float:
-        """When there is something to send next, since the start; soon when there is nothing."""
-        times = [at_s + _POLL_S]
-        if step < len(self.script.steps):
-            times.append(rounds * self.script.loop_s + self.script.steps[step][0])
-        if self.script.frames_hz:
-            times.append(frame / self.script.frames_hz)
-        return min(times)
 
     def _listen(self, until_s: float) -> None:
         while True:
@@ -146,7 +135,6 @@ class RobotHost:
             return
         if reply.kind in ("P", "F"):
             self.counts["streamed"] += 1
-            self.newest = reply
             return
         self._answered(reply)
 
@@ -167,24 +155,6 @@ class RobotHost:
             self.counts["unanswered"] += self._greeted
 
 
-def load_script(
-    name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
-) -> Script:
-    """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
-
-    Parameters
-    ----------
-    beside : the file that names it; its folder is looked through first.
-
-    Raises
-    ------
-    ConfigError : it is not there, or wrong; every fault with its key.
-    """
-    return Script.load(
-        find_config("scripts", name, beside=beside), parameters, vocabulary or Vocabulary.load(parameters)
-    )
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Serve a script in a process of its own; see the module's text."""
     parser = argparse.ArgumentParser(prog="controller.links.line.host", description="simulated robot host")
@@ -192,14 +162,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--vocabulary", type=Path, action="append", default=[], help="file of further expressions")
     parser.add_argument("--link", type=Path, default=None, help="make this path a link to the port")
     options = parser.parse_args(arguments)
-    for ending in (signal.SIGINT, *ENDINGS):  # they reach the whole group; the end of stdin ends this
+    for ending in (signal.SIGINT, *TERMINATION_SIGNALS):  # they reach the whole group; the end of stdin ends this
         signal.signal(ending, signal.SIG_IGN)
     try:
-        parameters = standard()
-        script = load_script(options.script, parameters, Vocabulary.load(parameters, more=options.vocabulary))
+        script = load_script(options.script, PARAMETERS, Vocabulary.load(PARAMETERS, more=options.vocabulary))
         with HostPort(options.link) as port:
             _say(f"ready {port.path}")
-            host = RobotHost(port, script, parameters)
+            host = RobotHost(port, script, PARAMETERS)
             host.run(_stdin_open)
             _say(json.dumps(host.report()))
     except OMOTE_ERRORS as error:
@@ -213,7 +182,7 @@ def _say(line: str) -> None:
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
     except BrokenPipeError:
-        pass  # whoever started it is gone
+        pass  # the process that started it is gone
 
 
 def _stdin_open() -> bool:

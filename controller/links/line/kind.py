@@ -1,4 +1,4 @@
-"""The link that speaks the omote line protocol over a serial port."""
+"""Defines the kind of link that speaks the omote line protocol on a serial port."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ SIMULATED = "simulated"
 
 @dataclass(frozen=True, kw_only=True)
 class LineSettings:
-    """What a stage says about such a link."""
+    """Its options in a stage."""
 
     port: str = option("Device path; simulated starts a simulated robot host.", REQUIRED)
     baud: int = option("Rate of the port.", 115_200, at_least=300, at_most=12_000_000)
     script: str | None = option("What a simulated host plays: a name in configs/scripts, or a path.")
 
     def check(self) -> None:
-        """Raises ValueError for a script that nobody would play."""
+        """Raises ValueError for a script without a simulated host."""
         if self.script is not None and self.port != SIMULATED:
             raise ValueError('script needs port = "simulated"')
 

@@ -1,8 +1,8 @@
-"""A serial port that speaks the line protocol, in a thread of its own.
+"""Serves the line protocol on a serial port, in a thread of its own.
 
 Replies and streamed lines are written without waiting: a peer that does not read loses lines, and never holds up the
-face. A port that vanishes is looked for until it is there again; a subscription goes on then, for whoever asked for it
-is most likely still there. Nothing ends the thread but its owner: what goes wrong is told and counted.
+face. A port that vanishes is opened again when it comes back, and a subscription goes on then. Only its owner ends the
+thread: faults are logged and counted.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from types import TracebackType
 
 from controller.layers.commands import CommandSink
 from controller.links.line.session import LineSession
@@ -37,7 +36,7 @@ class LineLink:
     Attributes
     ----------
     connected : whether the port is there. reconnects : how often it came back.
-    faults : how often something went wrong that was not the port; last_fault : what it was.
+    faults : how many errors there were besides those of the port; last_fault : the last of them.
     """
 
     def __init__(self, port: str, baud: int, sink: CommandSink, *, retry_s: float = _RETRY_S) -> None:
@@ -55,12 +54,7 @@ class LineLink:
         self._thread = threading.Thread(target=self._run, name=f"link {port}", daemon=True)
 
     def start(self) -> LineLink:
-        """Open the port and begin to listen.
-
-        Raises
-        ------
-        PortError : the port cannot be opened; its subclasses say why.
-        """
+        """Open the port and begin to listen. Raises PortError: the port cannot be opened; its subclasses say why."""
         self._serial.open()
         self.connected = True
         self._thread.start()
@@ -75,7 +69,7 @@ class LineLink:
         self.connected = False
 
     def report(self) -> dict[str, object]:
-        """What was counted: lines taken and refused (by code), bytes, streamed and dropped lines, reconnects."""
+        """Counts: lines taken and refused (by code), bytes, streamed and dropped lines, reconnects."""
         return {
             "port": self.port,
             "connected": self.connected,
@@ -90,9 +84,7 @@ class LineLink:
     def __enter__(self) -> LineLink:
         return self.start()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def _run(self) -> None:
@@ -100,12 +92,12 @@ class LineLink:
             try:
                 self._serve()
             except PortError:
-                self._lost()
-            except Exception as error:  # noqa: BLE001  a face must not go deaf over one line
-                self._failed(error)
+                self._reconnect()
+            except Exception as error:  # noqa: BLE001  one line must not end the link
+                self._log_fault(error)
 
-    def _failed(self, error: Exception) -> None:
-        """Tell what went wrong, once for each kind, and begin with the next line."""
+    def _log_fault(self, error: Exception) -> None:
+        """Log an error, once for each kind, and begin with the next line."""
         text = f"{type(error).__name__}: {error}"
         if text != self.last_fault:
             log.exception("link %s: %s; it goes on with the next line", self.port, text)
@@ -125,7 +117,7 @@ class LineLink:
             self._flush()
 
     def _wake_s(self) -> float:
-        """When to look up from the port next, on the monotonic clock."""
+        """When to stop reading from the port next, on the monotonic clock."""
         now_s = time.monotonic()
         due_ns = self._session.due_ns()
         return now_s + _POLL_S if due_ns is None else min(now_s + _POLL_S, due_ns * 1e-9)
@@ -153,8 +145,8 @@ class LineLink:
         self._counts["bytes_out"] += sent
         del self._out[:sent]
 
-    def _lost(self) -> None:
-        """Wait for the port to come back; the face keeps what it was told last."""
+    def _reconnect(self) -> None:
+        """Wait for the port to come back; the face keeps its last commands."""
         self.connected = False
         self._session.drop()
         self._out.clear()

@@ -1,4 +1,4 @@
-"""Opening a link that speaks the line protocol, with a simulated robot host where the stage wants one."""
+"""Opens a link that speaks the line protocol, and starts a simulated robot host where the stage wants one."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import json
 import subprocess
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from controller.base.errors import LinkError
 from controller.base.paths import find_config
-from controller.links.kind import Around
+from controller.links.kind import LinkContext
 from controller.links.line.kind import LineSettings
 from controller.links.line.link import LineLink
 from drivers.base.children import command as module_command
@@ -21,21 +22,19 @@ _START_LIMIT_S = 20.0
 _END_LIMIT_S = 3.0
 
 
-def open_line(settings: LineSettings, around: Around) -> LineLink:
+def open_line(settings: LineSettings, context: LinkContext) -> LineLink:
     """Open the port and listen.
 
-    Raises
-    ------
-    LinkError : the simulated host does not start. PortError : the port cannot be opened.
+    Raises LinkError: the simulated host does not start. PortError: the port cannot be opened.
     """
     port = settings.port
     if settings.simulated is not None:
-        script = find_config("scripts", settings.simulated, beside=around.beside)
-        host = HostProcess(str(script), around.vocabularies)
-        around.closers.callback(host.stop)
+        script = find_config("scripts", settings.simulated, beside=context.beside)
+        host = HostProcess(str(script), context.vocabularies)
+        context.closers.callback(host.stop)
         port = host.path
-    link = LineLink(port, settings.baud, around.sink).start()
-    around.closers.callback(link.stop)
+    link = LineLink(port, settings.baud, context.sink).start()
+    context.closers.callback(link.stop)
     return link
 
 
@@ -50,9 +49,7 @@ class HostProcess:
     ----------
     path : the port it serves. counts : what it counted, once stopped.
 
-    Raises
-    ------
-    LinkError : it does not start.
+    Raises LinkError: it does not start.
     """
 
     def __init__(self, script: str, vocabularies: Sequence[Path] = ()) -> None:
@@ -62,44 +59,27 @@ class HostProcess:
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment(_HOST)
         )
-        patience = threading.Timer(_START_LIMIT_S, self._process.kill)
-        patience.start()
-        word, _, rest = self._line().partition(" ")
-        patience.cancel()
-        if word != "ready":
-            self.stop()
-            raise _failure(word, rest, script)
-        self.path = rest
+        timer = threading.Timer(_START_LIMIT_S, self._process.kill)
+        timer.start()
+        line = self._process.stdout.readline() if self._process.stdout is not None else ""
+        timer.cancel()
+        word, _, self.path = line.strip().partition(" ")
+        if word == "ready":
+            return
+        self.stop()
+        if word != "failed":
+            raise LinkError(f"the simulated robot host for script {script!r} did not start")
+        message, hint = json.loads(self.path)
+        raise LinkError(message, hint=hint)
 
     def stop(self) -> None:
-        """End it and take its counts; may be called again."""
-        process = self._process
-        if process.stdin is None or process.stdin.closed:
-            return
-        process.stdin.close()
+        """End it and read its counts; may be called again."""
         try:
-            process.wait(_END_LIMIT_S)
-            self.counts = _table(self._line())
+            output, _ = self._process.communicate(timeout=_END_LIMIT_S)
         except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
-
-    def _line(self) -> str:
-        return self._process.stdout.readline().strip() if self._process.stdout is not None else ""
-
-
-def _failure(word: str, rest: str, script: str) -> LinkError:
-    if word != "failed":
-        return LinkError(f"the simulated robot host for script {script!r} did not start")
-    message, hint = json.loads(rest)
-    return LinkError(message, hint=hint)
-
-
-def _table(line: str) -> dict[str, object]:
-    try:
-        table = json.loads(line)
-    except json.JSONDecodeError:
-        return {}
-    return table if isinstance(table, dict) else {}
+            self._process.kill()
+            output, _ = self._process.communicate()
+        except ValueError:
+            return  # stopped before
+        with suppress(ValueError):
+            self.counts = json.loads(output)

@@ -1,7 +1,6 @@
-"""The omote line protocol, bytes to words and back: framing, checksums, tags, replies. No I/O here.
+"""Encodes and decodes lines of the omote line protocol: framing, checksums, tags, replies; no I/O here.
 
-The rules are written down for other programmers in docs/line-protocol.md; what the words of a command mean
-is in :mod:`controller.links.line.commands`.
+docs/line-protocol.md specifies it; :mod:`controller.links.line.commands` parses the commands.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 from controller.base.errors import LinkError
 
 VERSION = 1
-"""Version of the protocol, as HELLO tells it."""
+"""Version of the protocol that HELLO reports."""
 
 MAX_LINE = 1024
 """Longest line to omote, in bytes, with tag and checksum but without the line end."""
@@ -25,6 +24,7 @@ MAX_REPLY = 2048
 """Longest line from omote, in bytes, without the line end."""
 
 _TAG = re.compile(r"#(\d{1,9})")
+_REPLY = re.compile(r"(?:#(\d{1,9}) )?(?:(OK|P|F)|ERR ([0-9]+))(?: (.*))?", re.DOTALL)
 _CHECKSUM = re.compile(rb"\*([0-9A-Fa-f]{2})[ \t]*\Z")
 _PRINTABLE = re.compile(rb"[\x20-\x7e\t]*\Z")
 
@@ -62,7 +62,7 @@ class LineError(LinkError):
 
 @dataclass(frozen=True)
 class Words:
-    """A line taken apart: its tag, its words, and whether it came with a (right) checksum."""
+    """A parsed line: its tag, its words, and whether it had a checksum."""
 
     words: tuple[str, ...]
     tag: int | None = None
@@ -71,7 +71,7 @@ class Words:
 
 @dataclass(frozen=True)
 class Reply:
-    """A line from omote, taken apart.
+    """A parsed line from omote.
 
     Attributes
     ----------
@@ -91,16 +91,13 @@ class Reply:
         return self.kind == "OK"
 
 
-def _crc_table() -> tuple[int, ...]:
-    table = []
-    for byte in range(256):
-        for _ in range(8):
-            byte = (byte << 1) ^ (0x07 if byte & 0x80 else 0)
-        table.append(byte & 0xFF)
-    return tuple(table)
+def _crc(byte: int) -> int:
+    for _ in range(8):
+        byte = (byte << 1 ^ (0x07 if byte & 0x80 else 0)) & 0xFF
+    return byte
 
 
-_CRC = _crc_table()
+_CRC = tuple(map(_crc, range(256)))
 
 
 def checksum(data: bytes) -> int:
@@ -115,11 +112,9 @@ def checksum(data: bytes) -> int:
 
 
 def parse_words(line: bytes) -> Words | None:
-    """Take a line (without its line end) apart; None for one with nothing in it.
+    """Parse a line without its line end; None for an empty one.
 
-    Raises
-    ------
-    LineError : not printable ASCII, too long, reserved for binary frames, wrong checksum or tag.
+    Raises LineError: not printable ASCII, too long, reserved for binary frames, wrong checksum or tag.
     """
     if not line.strip(b" \t"):
         return None
@@ -183,29 +178,20 @@ def _finish(text: str, checked: bool) -> bytes:
 
 
 def parse_reply(line: bytes) -> Reply | None:
-    """Take a line from omote apart; None for an empty one. Raises LineError when it is damaged."""
+    """Parse a line from omote; None for an empty one. Raises LineError when it is damaged."""
     if not line.strip(b" \t"):
         return None
     body, checked = _strip_checksum(line)
-    words = body.decode("ascii", "replace").split(" ", 1)
-    tag = None
-    match = _TAG.fullmatch(words[0])
-    if match is not None:
-        tag = int(match[1])
-        words = words[1].split(" ", 1) if len(words) > 1 else [""]
-    kind, text = words[0], words[1] if len(words) > 1 else ""
-    if kind == "ERR":
-        number, _, text = text.partition(" ")
-        if not number.isascii() or not number.isdigit():
-            raise LineError(Code.NUMBER, "ERR without a code")
-        return Reply(kind, text, tag, int(number), checked)
-    if kind not in ("OK", "P", "F"):
-        raise LineError(Code.COMMAND, f"not a reply: {kind!r}")
-    return Reply(kind, text, tag, None, checked)
+    match = _REPLY.fullmatch(body.decode("ascii", "replace"))
+    if match is None:
+        raise LineError(Code.COMMAND, f"not a reply: {body[:32]!r}")
+    tag, kind, code, text = match.groups()
+    number = None if code is None else int(code)
+    return Reply(kind or "ERR", text or "", None if tag is None else int(tag), number, checked)
 
 
 class LineDecoder:
-    """Cuts a byte stream into lines, whatever the stream brings.
+    """Splits a byte stream into lines.
 
     CR and LF both end a line. A line that grows past ``limit`` is dropped up to its end and reported once,
     as the bytes kept so far, which are one longer than ``limit``.
@@ -228,7 +214,7 @@ class LineDecoder:
         return lines
 
     def clear(self) -> None:
-        """Forget a line that has begun, as after the port was lost."""
+        """Discard a line that is not complete, as after the port was lost."""
         self._buffer.clear()
 
     def _take(self, piece: bytes) -> None:
@@ -241,14 +227,14 @@ def format_frame(time_ms: int, values: np.ndarray, *, checked: bool = False) -> 
     return _finish(f"F {time_ms} " + " ".join(map(number, values.tolist())), checked)
 
 
-def format_parameters(time_ms: int, names: Iterable[str], values: Iterable[float], *, checked: bool = False) -> bytes:
-    """Some parameters, by name: ``P t name=value ...``."""
-    return _finish(f"P {time_ms} {pairs(names, values)}", checked)
+def format_pairs(time_ms: int, items: Iterable[tuple[str, float]], *, checked: bool = False) -> bytes:
+    """Some values, by name: ``P t name=value ...``."""
+    return _finish(f"P {time_ms} {pairs(items)}", checked)
 
 
-def pairs(names: Iterable[str], values: Iterable[float]) -> str:
+def pairs(items: Iterable[tuple[str, float]]) -> str:
     """``name=value name=value ...``."""
-    return " ".join(f"{name}={number(value)}" for name, value in zip(names, values, strict=True))
+    return " ".join(f"{name}={number(value)}" for name, value in items)
 
 
 def number(value: float) -> str:

@@ -1,21 +1,32 @@
-"""Scripts: lines of the line protocol and when they are said, by a simulated robot host or in a show."""
+"""Reads scripts: timed lines of the line protocol, sent by a simulated robot host or played as a show."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
-from controller.base.parameters import Floats, Parameters, did_you_mean, file_error, read_toml
+from controller.base.config import Number, Settings, load
+from controller.base.parameters import Floats, Parameters
+from controller.base.paths import find_config
 from controller.links.line.commands import Grammar
 from controller.links.line.protocol import LineError
 from controller.vocabulary.vocabulary import Vocabulary
 
-_KEYS = ("name", "description", "loop_s", "frames_hz", "marks", "steps")
-_MAX_FRAMES_HZ = 200.0
+_Seconds = Annotated[Number, Field(ge=0, le=86_400)]
+
+
+class _File(Settings):
+    name: str | None = None
+    description: str = ""
+    loop_s: _Seconds = 0.0
+    frames_hz: Annotated[Number, Field(ge=0, le=200)] = 0.0
+    marks: dict[str, _Seconds] = {}
+    steps: list[str] = []
 
 
 @dataclass(frozen=True)
@@ -36,43 +47,23 @@ class Script:
     name: str = ""
     marks: dict[str, float] = field(default_factory=dict)
 
-    @classmethod
-    def load(cls, path: Path, parameters: Parameters, vocabulary: Vocabulary) -> Script:
-        """Read a script and check every line of it.
 
-        Raises
-        ------
-        ConfigError : the file cannot be read or is wrong; every fault with its key.
-        """
-        table = read_toml(path)
-        faults = [f"{key}: unknown key{did_you_mean(key, _KEYS)}" for key in table if key not in _KEYS]
-        grammar = Grammar(parameters, lambda name: vocabulary[name].name)
-        steps = _steps(table.get("steps", []), grammar, faults)
-        loop_s = _number(table, "loop_s", 86_400.0, faults)
-        frames_hz = _number(table, "frames_hz", _MAX_FRAMES_HZ, faults)
-        marks = _marks(table.get("marks", {}), faults)
-        if loop_s and steps and steps[-1][0] > loop_s:
-            faults.append(f"loop_s: {loop_s:g} is before the last step at {steps[-1][0]:g}")
-        if faults:
-            raise file_error(path, faults)
-        return cls(tuple(steps), loop_s, frames_hz, str(table.get("name", path.stem)), marks)
-
-
-def _steps(given: Any, grammar: Grammar, faults: list[str]) -> list[tuple[float, str]]:
-    if not isinstance(given, list):
-        faults.append('steps: must be a list of strings like "1.5 EXPR smile"')
-        return []
+def _read_steps(file: _File, grammar: Grammar) -> tuple[list[tuple[float, str]], list[str]]:
+    """The steps of a file, and what is wrong with the others."""
     steps: list[tuple[float, str]] = []
-    for i, text in enumerate(given):
+    faults = []
+    for i, text in enumerate(file.steps):
         try:
-            steps.append(_step(text, grammar, steps[-1][0] if steps else 0.0))
+            steps.append(_read_step(text, grammar, steps[-1][0] if steps else 0.0))
         except (LineError, ValueError) as error:
             faults.append(f"steps[{i}]: {error} (is {text!r})")
-    return steps
+    if file.loop_s and steps and steps[-1][0] > file.loop_s:
+        faults.append(f"loop_s: {file.loop_s:g} is before the last step at {steps[-1][0]:g}")
+    return steps, faults
 
 
-def _step(text: Any, grammar: Grammar, earliest_s: float) -> tuple[float, str]:
-    time_text, _, line = str(text).strip().partition(" ")
+def _read_step(text: str, grammar: Grammar, earliest_s: float) -> tuple[float, str]:
+    time_text, _, line = text.strip().partition(" ")
     try:
         at_s = float(time_text)
     except ValueError:
@@ -84,33 +75,25 @@ def _step(text: Any, grammar: Grammar, earliest_s: float) -> tuple[float, str]:
     return at_s, line.strip()
 
 
-def _marks(given: Any, faults: list[str]) -> dict[str, float]:
-    if not isinstance(given, dict):
-        faults.append("marks: must be a table of times, like { chorus = 12.5 }")
-        return {}
-    marks = {}
-    for name in given:
-        inner: list[str] = []
-        marks[name] = _number(given, name, 86_400.0, inner)
-        faults += [f"marks.{fault}" for fault in inner]
-    return marks
+def load_script(
+    name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
+) -> Script:
+    """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
 
+    ``beside`` : the file that names it; its folder is searched first.
 
-def _number(table: dict[str, Any], key: str, most: float, faults: list[str]) -> float:
-    value = table.get(key, 0.0)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= most:
-        faults.append(f"{key}: must be a number from 0 to {most:g} (is {value!r})")
-        return 0.0
-    return float(value)
+    Raises ConfigError: it is not there, or wrong; every fault with its key.
+    """
+    path = find_config("scripts", name, beside=beside)
+    vocabulary = vocabulary or Vocabulary.load(parameters)
+    grammar = Grammar(parameters, lambda name: vocabulary[name].name)
+    file = load(path, _File, lambda file: _read_steps(file, grammar)[1])
+    steps, _ = _read_steps(file, grammar)
+    return Script(tuple(steps), file.loop_s, file.frames_hz, path.stem if file.name is None else file.name, file.marks)
 
 
 class Wave:
-    """Every parameter in motion, each at its own pace, for measuring under load.
-
-    Parameters
-    ----------
-    parameters : gives number and ranges.
-    """
+    """Every parameter in motion, each at its own rate inside its range, for measurements under load."""
 
     def __init__(self, parameters: Parameters) -> None:
         index = np.arange(len(parameters))

@@ -1,7 +1,4 @@
-"""One conversation in the line protocol: bytes in, replies out, a stream of parameters on request.
-
-No ports here: :class:`LineSession` is fed bytes and a time, so every rule of the protocol can be tested without one.
-"""
+"""Runs one conversation in the line protocol: bytes in, replies out, a stream of parameters on request; no I/O here."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from importlib import metadata
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.layers.commands import CommandSink, Player
-from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Grammar
+from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Command, Grammar, Request
 from controller.links.line.protocol import (
     MAX_LINE,
     VERSION,
@@ -22,38 +19,15 @@ from controller.links.line.protocol import (
     format_error,
     format_frame,
     format_ok,
-    format_parameters,
+    format_pairs,
     number,
     pairs,
-)
-from controller.links.line.words import (
-    Command,
-    Expr,
-    Gaze,
-    GazeAt,
-    GazeOff,
-    Get,
-    Hello,
-    Info,
-    List,
-    Live,
-    Measured,
-    Neutral,
-    Ping,
-    Play,
-    Read,
-    Release,
-    Request,
-    Set,
-    Status,
-    Subscribe,
-    Unsubscribe,
 )
 from controller.vocabulary.reading import Readings
 
 
 class LineSession:
-    """The state of one link: what was half received, what is streamed, what was counted.
+    """The state of one link: its incomplete line, its stream, its counts.
 
     Parameters
     ----------
@@ -88,36 +62,30 @@ class LineSession:
     def stream(self, now_ns: int) -> bytes:
         """The streamed line that is due, with the newest values; empty when none is. Missed ones are left out."""
         request = self._stream
-        if request is None or now_ns < self._due_ns or not isinstance(request.command, Subscribe):
+        if request is None or request.command.question is None or now_ns < self._due_ns:
             return b""
-        period = round(1e9 / request.command.rate_hz)
+        period = round(1e9 / request.command.values[0])
         self._due_ns += period * (1 + (now_ns - self._due_ns) // period)
-        return self._streamed(request.command, (now_ns - self._start_ns) // 1_000_000, request.checked)
+        return self._streamed(request.command.question, (now_ns - self._start_ns) // 1_000_000, request.checked)
 
-    def _streamed(self, command: Subscribe, time_ms: int, checked: bool) -> bytes:
-        question, indices = command.question, command.indices
-        if isinstance(question, Read):
-            if not self._look(question.measured):
-                return b""
-            shown = self._readings.read(question.what, self._values)
-            return format_parameters(time_ms, *_unzip(shown), checked=checked)
-        if not self._look(question is not None):
+    def _streamed(self, question: Command, time_ms: int, checked: bool) -> bytes:
+        if not self._look(question.measured):
             return b""
-        indices = indices if question is None else question.indices
-        if len(indices) == len(self._values):
+        if question.name == "READ":
+            return format_pairs(time_ms, self._readings.read(question.words[0], self._values), checked=checked)
+        if len(question.indices) == len(self._values):
             return format_frame(time_ms, self._values, checked=checked)
-        names = [self._parameters.names[i] for i in indices]
-        return format_parameters(time_ms, names, self._values[list(indices)], checked=checked)
+        return format_pairs(time_ms, self._named(question.indices), checked=checked)
 
     def _look(self, measured: bool) -> bool:
-        """Take the face that is shown, or that the servos make; False when that is not known."""
+        """Read the face that is shown, or that the servos make; False when that is not known."""
         if measured:
             return self._sink.measured(self._values)
         self._sink.snapshot(self._values)
         return True
 
     def drop(self) -> None:
-        """The other side is gone for a while: forget its half line; its subscription goes on when it is back."""
+        """Discard a line that is not complete, after the port was lost; a subscription goes on."""
         self._decoder.clear()
 
     def _line(self, line: bytes, now_ns: int) -> bytes:
@@ -134,71 +102,62 @@ class LineSession:
 
     def _do(self, request: Request, now_ns: int) -> str:
         """Act on a request; returns the text of the reply."""
+        command = request.command
         try:
-            if isinstance(request.command, Subscribe):
-                self._stream, self._due_ns = request, now_ns
-            elif isinstance(request.command, Unsubscribe):
-                self._stream = None
-            elif not self._act(request.command, now_ns):
-                return self._answer(request.command)
-            return _receipt(request.command)
+            if command.name in ("SUB", "UNSUB"):
+                self._stream, self._due_ns = (request if command.question else None), now_ns
+            elif not self._act(command, now_ns):
+                return self._answer(command)
+            return _receipt(command)
         except OMOTE_ERRORS as error:
             raise LineError(Code.BUSY, str(error), tag=request.tag, checked=request.checked) from error
 
     def _act(self, command: Command, now_ns: int) -> bool:
-        """Hand a command that changes the face to the sink; False when it is a question."""
-        sink = self._sink
-        match command:
-            case Set(indices, values):
-                sink.set_parameters(indices, values, now_ns)
-            case Release(indices):
-                sink.release(indices, now_ns)
-            case Expr(name, intensity, duration_s):
-                sink.expression(name, intensity, duration_s, now_ns)
-            case Gaze(yaw, pitch):
-                sink.gaze(math.radians(yaw), math.radians(pitch), now_ns)
-            case GazeAt(x, y, z):
-                sink.gaze_at(x, y, z, now_ns)
-            case GazeOff():
+        """Pass a command that changes the face to the sink; False when it is a question."""
+        sink, values = self._sink, command.values
+        match command.name:
+            case "SET":
+                sink.set_parameters(command.indices, values, now_ns)
+            case "RELEASE":
+                sink.release(command.indices, now_ns)
+            case "EXPR":
+                sink.expression(command.words[0], values[0], values[1] if values[1:] else None, now_ns)
+            case "GAZE":
+                sink.gaze(math.radians(values[0]), math.radians(values[1]), now_ns)
+            case "GAZE AT":
+                sink.gaze_at(values[0], values[1], values[2], now_ns)
+            case "GAZE OFF":
                 sink.gaze_off(now_ns)
-            case Neutral(seconds):
-                sink.neutral(seconds, now_ns)
-            case Live(amount):
-                sink.live(amount, now_ns)
-            case Play(what, to):
-                _play(sink.shows, what, to)
+            case "NEUTRAL":
+                sink.neutral(values[0], now_ns)
+            case "LIFE":
+                sink.live(values[0], now_ns)
+            case "SHOW":
+                _play(sink.shows, *command.words)
             case _:
                 return False
         return True
 
     def _answer(self, command: Command) -> str:
         """Text of the reply to a question."""
-        match command:
-            case Get(indices):
-                self._look(measured=False)
-                return "GET " + self._get(indices)
-            case Measured(indices):
-                self._look_at_servos()
-                return "MEASURED " + self._get(indices)
-            case Read(what, measured):
-                self._look_at_servos() if measured else self._look(measured=False)
-                return f"READ {what} " + pairs(*_unzip(self._readings.read(what, self._values)))
-            case Info(index):
-                return "INFO " + self._info(index)
-            case Status():
+        name, words = command.name, command.words
+        if name in ("GET", "MEASURED", "READ", "INFO") and not self._look(command.measured):
+            raise LineError(Code.BUSY, "no servo reports its position")
+        match name:
+            case "GET" | "MEASURED":
+                return f"{name} {self._get(command.indices)}"
+            case "READ":
+                return f"READ {words[0]} " + pairs(self._readings.read(words[0], self._values))
+            case "INFO":
+                return "INFO " + self._info(command.indices[0])
+            case "STATUS":
                 return "STATUS " + " ".join(f"{key}={_word(value)}" for key, value in self._status().items())
-            case List(what):
-                return f"LIST {what} " + " ".join(self._list(what))
-            case Hello():
+            case "LIST":
+                return f"LIST {words[0]} " + " ".join(self._list(words[0]))
+            case "HELLO":
                 limits = f"parameters={len(self._parameters)} max_line={MAX_LINE} max_rate_hz={MAX_RATE_HZ:g}"
                 return f"HELLO omote {package_version()} protocol={VERSION} {limits}"
-            case Ping(text):
-                return f"PONG {text}".rstrip()
-        raise TypeError(f"no answer to {command!r}")
-
-    def _look_at_servos(self) -> None:
-        if not self._look(measured=True):
-            raise LineError(Code.BUSY, "no servo says where it stands")
+        return " ".join(["PONG", *words])
 
     @cached_property
     def _readings(self) -> Readings:
@@ -207,11 +166,13 @@ class LineSession:
     def _get(self, indices: tuple[int, ...]) -> str:
         if len(indices) == len(self._values):
             return "ALL " + " ".join(map(number, self._values.tolist()))
-        return pairs((self._parameters.names[i] for i in indices), (self._values[i] for i in indices))
+        return pairs(self._named(indices))
+
+    def _named(self, indices: tuple[int, ...]) -> list[tuple[str, float]]:
+        return [(self._parameters.names[i], float(self._values[i])) for i in indices]
 
     def _info(self, index: int) -> str:
         p = self._parameters
-        self._sink.snapshot(self._values)
         text = f"{p.names[index]} value={number(self._values[index])} low={p.low[index]:g} high={p.high[index]:g}"
         text += f" region={p.regions[index]} layer={self._sink.holder(index) or 'none'}"
         full = math.degrees(p.full_scale_rad[index])
@@ -233,30 +194,19 @@ class LineSession:
 
 
 def _receipt(command: Command) -> str:
-    """What an accepted command is acknowledged with."""
-    match command:
-        case Set(indices, _) | Release(indices):
-            return f"{type(command).__name__.upper()} {len(indices)}"
-        case Expr(name, intensity, _):
-            return f"EXPR {name} {number(intensity)}"
-        case Subscribe(rate, _, Read(what, measured)):
-            return f"SUB {number(rate)} READ {what}" + (" MEASURED" if measured else "")
-        case Subscribe(rate, _, Measured(indices)):
-            return f"SUB {number(rate)} MEASURED {len(indices)}"
-        case Subscribe(rate, indices):
-            return f"SUB {number(rate)} {len(indices)}"
-        case Unsubscribe():
-            return "UNSUB"
-        case Gaze() | GazeAt() | GazeOff():
-            return "GAZE"
-        case Play(what, to):
-            return f"SHOW {what} {to}".rstrip()
-        case Live(amount):
-            return f"LIFE {number(amount)}"
-    return "NEUTRAL"
+    """Text of the reply to a command that was carried out."""
+    name, question = command.name, command.question
+    if question is not None:
+        kind = [] if question.name == "GET" else [question.name]
+        return " ".join([name, number(command.values[0]), *kind, *(question.words or (str(len(question.indices)),))])
+    if name in ("SET", "RELEASE"):
+        return f"{name} {len(command.indices)}"
+    if name in ("EXPR", "LIFE"):
+        return " ".join([name, *command.words, number(command.values[0])])
+    return " ".join([name.partition(" ")[0], *command.words])
 
 
-def _play(shows: Player | None, what: str, to: str) -> None:
+def _play(shows: Player | None, what: str, to: str = "0") -> None:
     """Raises ConfigError or ParameterError: no shows here, no such script, mark or time."""
     if shows is None:
         raise ParameterError("no shows can be played here", hint="omote run plays them")
@@ -264,13 +214,10 @@ def _play(shows: Player | None, what: str, to: str) -> None:
         shows.start(what)
         return
     try:
-        shows.act(what, float(to) if to else 0.0)
+        seek: str | float = float(to)
     except ValueError:
-        shows.act(what, to)
-
-
-def _unzip(shown: list[tuple[str, float]]) -> tuple[list[str], list[float]]:
-    return [name for name, _ in shown], [value for _, value in shown]
+        seek = to
+    shows.control(what, seek)
 
 
 def _word(value: str | int | float) -> str:

@@ -1,4 +1,4 @@
-"""Shows: a script played straight into the face, with marks, pause, seek and loop."""
+"""Plays scripts as shows, straight into the face, with marks, pause, seek and loop."""
 
 from __future__ import annotations
 
@@ -23,14 +23,13 @@ class Show:
 
     Attributes
     ----------
-    playing : whether time passes. position_s : where it is. loops : how often it began again.
+    playing : whether time passes; the face stays as it is otherwise. position_s : where it is.
     """
 
     def __init__(self, script: Script, sink: CommandSink) -> None:
         self.script = script
         self.playing = False
         self.position_s = 0.0
-        self.loops = 0
         self._session = LineSession(sink, 0)
         self._times = [at_s for at_s, _ in script.steps]
         self._next = 0
@@ -41,27 +40,10 @@ class Show:
         """The last step has been played and nothing begins again."""
         return not self.script.loop_s and self._next >= len(self._times)
 
-    @property
-    def mark(self) -> str | None:
-        """The last mark that was passed."""
-        passed = [(at_s, name) for name, at_s in self.script.marks.items() if at_s <= self.position_s]
-        return max(passed)[1] if passed else None
-
-    def play(self) -> None:
-        """Let time pass."""
-        self.playing = True
-        self._last_ns = None
-
-    def pause(self) -> None:
-        """Stop time; the face stays as it is."""
-        self.playing = False
-
     def seek(self, to: str | float) -> None:
-        """Go to a mark or a time (s). What was said before is not said again: begin such a place with NEUTRAL.
+        """Go to a mark or a time (s). Earlier lines are not sent: begin such a place with NEUTRAL.
 
-        Raises
-        ------
-        ParameterError : no such mark, or not a time from 0 on.
+        Raises ParameterError: no such mark, or not a time from 0 on.
         """
         if isinstance(to, str):
             if to not in self.script.marks:
@@ -75,31 +57,28 @@ class Show:
         self._last_ns = None
 
     def tick(self, now_ns: int) -> list[str]:
-        """Say what is due at ``now_ns`` (monotonic clock); returns the lines that were said."""
+        """Send the lines that are due at ``now_ns`` (monotonic clock) to the face; returns them."""
         if not self.playing:
+            self._last_ns = None
             return []
         if self._last_ns is not None:
             self.position_s += (now_ns - self._last_ns) * 1e-9
         self._last_ns = now_ns
-        said = self._say_due(now_ns)
+        sent = self._send_due(now_ns)
         if self.script.loop_s and self.position_s >= self.script.loop_s:
             self.position_s %= self.script.loop_s
             self._next = 0
-            self.loops += 1
-            said += self._say_due(now_ns)
-        return said
+            sent += self._send_due(now_ns)
+        return sent
 
-    def _say_due(self, now_ns: int) -> list[str]:
-        said = []
+    def _send_due(self, now_ns: int) -> list[str]:
+        sent = []
         while self._next < len(self._times) and self._times[self._next] <= self.position_s:
             line = self.script.steps[self._next][1]
             self._session.feed(line.encode("ascii") + b"\n", now_ns)
-            said.append(line)
+            sent.append(line)
             self._next += 1
-        return said
-
-
-Find = Callable[[str], Script]
+        return sent
 
 
 class Shows:
@@ -110,7 +89,7 @@ class Shows:
     find : the script of a name; raises ConfigError. sink : the face.
     """
 
-    def __init__(self, find: Find, sink: CommandSink) -> None:
+    def __init__(self, find: Callable[[str], Script], sink: CommandSink) -> None:
         self._find, self._sink = find, sink
         self._show: Show | None = None
         self._lock = threading.RLock()  # a show may start another
@@ -118,16 +97,14 @@ class Shows:
     def start(self, name: str) -> None:
         """Play a script from its beginning. Raises ConfigError."""
         show = Show(self._find(name), self._sink)
-        show.play()
+        show.playing = True
         with self._lock:
             self._show = show
 
-    def act(self, what: str, to: str | float = 0.0) -> None:
+    def control(self, what: str, to: str | float = 0.0) -> None:
         """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s).
 
-        Raises
-        ------
-        ParameterError : there is no show, or no such mark or time.
+        Raises ParameterError: there is no show, or no such mark or time.
         """
         with self._lock:
             show = self._show
@@ -138,10 +115,10 @@ class Shows:
             elif what == "STOP":
                 self._show = None
             else:
-                show.play() if what == "PLAY" else show.pause()
+                show.playing = what == "PLAY"
 
     def tick(self, now_ns: int) -> None:
-        """Say what is due."""
+        """Send the lines that are due."""
         with self._lock:
             if self._show is not None:
                 self._show.tick(now_ns)

@@ -1,4 +1,4 @@
-"""Every kind of file that is read as a take: one module each, found by being here.
+"""Defines the kinds of files that are read as takes, one module each.
 
 In: a path. Out: a take, and the layer that it plays into. Imports base to vocabulary, and controller.takes.
 """

@@ -1,4 +1,4 @@
-"""Takes of Live Link Face."""
+"""Defines the reader of takes of Live Link Face."""
 
 from controller.takes.reader import TakeReader
 

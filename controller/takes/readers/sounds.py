@@ -1,4 +1,4 @@
-"""Timed sounds, one a line, and what Rhubarb Lip Sync writes."""
+"""Defines the reader of timed sounds and of the output of Rhubarb Lip Sync."""
 
 from controller.takes.reader import TakeReader
 

@@ -1,4 +1,4 @@
-"""Voices."""
+"""Defines the reader of WAV files of voices."""
 
 from controller.takes.reader import TakeReader
 
@@ -7,6 +7,6 @@ TAKE = TakeReader(
     kind="wav",
     title="a voice",
     suffixes=(".wav",),
-    read="controller.takes.speech:wav_take",
+    read="controller.takes.voice:wav_take",
     layer="speech",
 )

@@ -79,3 +79,22 @@ def test_samples_keep_the_newest_and_do_not_grow() -> None:
     assert summary["max"] == 9.0
     assert summary["mean"] == pytest.approx(4.5)
     assert Samples().summary() == {}
+
+
+def test_summary_of_known_measurements() -> None:
+    samples = Samples()
+    for value in range(101):
+        samples.add(value / 10)
+    assert samples.summary() == pytest.approx({"mean": 5.0, "p50": 5.0, "p95": 9.5, "p99": 9.9, "max": 10.0})
+    assert list(samples.summary()) == ["mean", "p50", "p95", "p99", "max"]
+
+
+def test_report_of_a_clock_that_never_ran_and_of_one_that_skipped() -> None:
+    clock = Clock(100.0)
+    assert clock.report() == {"rate_hz": 0.0, "wanted_hz": 100.0, "ticks": 0, "skipped": 0, "jitter_ms": {}}
+    time = Time()
+    clock = Clock(100.0, now_ns=time.now, sleep_s=time.sleep)
+    run(clock, time, [10_000_000, 25_000_000, 0])
+    report = clock.report()
+    assert (report["ticks"], report["skipped"], report["wanted_hz"]) == (3, 3, 100.0)
+    assert report["rate_hz"] == pytest.approx(3 / 0.05)

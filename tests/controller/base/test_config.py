@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from pydantic import Field
+from pydantic import Field, RootModel, ValidationError
 
-from controller.base.config import Settings, load
+from controller.base.config import Positive, Settings, Share, key_path, load
 from controller.base.errors import ConfigError
+from controller.base.files import NEWER
 
 
 class Wheel(Settings):
@@ -56,3 +57,62 @@ def test_a_missing_file_and_a_folder_are_one_message(tmp_path: Path) -> None:
         with pytest.raises(ConfigError, match="cannot be read") as caught:
             load(path, Cart)
         assert caught.value.hint
+
+
+class Part(Settings):
+    share: Share = 0.5
+    size: Positive = 1.0
+
+
+class Store(RootModel[dict[str, Part]]):
+    """Parts by name, at the top of the file."""
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("[a]\nshar = 1", "a.shar: unknown key, did you mean 'share'?"),
+        ("[a]\nxyz = 1", "a.xyz: unknown key\n"),
+        ("[share]\nsiz = 1", "share.siz: unknown key, did you mean 'size'?"),
+        ("a = 3", "a: must be a table (is 3)"),
+        ("[a]\nshare = 1.01", "a.share: input should be less than or equal to 1 (is 1.01)"),
+        ("[a]\nshare = -0.01", "a.share: input should be greater than or equal to 0 (is -0.01)"),
+        ("[a]\nshare = true", "a.share: input should be a valid number (is True)"),
+        ("[a]\nshare = '1'", "a.share: input should be a valid number (is '1')"),
+        ("[a]\nsize = 0", "a.size: input should be greater than 0 (is 0)"),
+        ("[a]\nsize = inf", "a.size: input should be a finite number (is inf)"),
+    ],
+)
+def test_numbers_and_tables_of_tables(tmp_path: Path, text: str, fault: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load(write(tmp_path, text), Store)
+    assert "cart.toml: 1 fault\n" in str(caught.value) and fault in str(caught.value) + "\n"
+
+
+def test_values_at_the_ends_and_whole_numbers_are_taken(tmp_path: Path) -> None:
+    read = load(write(tmp_path, "[a]\nshare = 0\n[b]\nshare = 1\nsize = 3"), Store).root
+    assert (read["a"].share, read["b"].share, read["b"].size) == (0.0, 1.0, 3.0)
+    with pytest.raises(ValidationError):
+        read["a"].share = 0.2
+
+
+def test_faults_between_values_are_found_beside_others(tmp_path: Path) -> None:
+    def no_twos(store: Store) -> list[str]:
+        return [f"{name}.size: is {part.size:g}" for name, part in store.root.items() if part.size == 2]
+
+    with pytest.raises(ConfigError, match=r"2 faults\n  a\.share: .*\n  b\.size: is 2$") as caught:
+        load(write(tmp_path, "[a]\nshare = 7\n[b]\nsize = 2"), Store, no_twos)
+    assert caught.value.hint.startswith("mend the file")
+    with pytest.raises(ConfigError, match=r"1 fault\n  b\.size: is 2$"):
+        load(write(tmp_path, "[b]\nsize = 2"), Store, no_twos)
+
+
+def test_a_file_of_a_newer_omote_says_how_to_update(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load(write(tmp_path, "[a]\n"), Store, lambda _: [f"format: is 9, {NEWER}"])
+    assert "pip install" in caught.value.hint
+
+
+def test_key_paths() -> None:
+    assert key_path(("links", 0, "port")) == "links[0].port"
+    assert key_path(()) == "file" and key_path((1,)) == "[1]"

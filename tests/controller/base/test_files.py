@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
 from controller.base.errors import ControllerError
-from controller.base.files import replacing
+from controller.base.files import format_fault, replacing
 
 
 def test_replaces_and_leaves_nothing_else(tmp_path: Path) -> None:
@@ -35,3 +36,28 @@ def test_a_folder_that_is_a_file_is_one_message(tmp_path: Path) -> None:
     with pytest.raises(ControllerError, match="cannot be written") as caught, replacing(tmp_path / "taken" / "x"):
         pass
     assert caught.value.hint
+
+
+@pytest.mark.parametrize("found", [1, 2, 3])
+def test_versions_up_to_the_newest_are_read(found: int) -> None:
+    assert format_fault(found, 3) is None
+
+
+@pytest.mark.parametrize(
+    ("found", "says"), [(4, "newer omote"), (0, "from 1"), (None, "from 1"), ("1", "from 1"), (True, "from 1")]
+)
+def test_others_are_refused_with_what_they_are(found: object, says: str) -> None:
+    fault = format_fault(found, 3)
+    assert fault is not None and says in fault and repr(found) in fault
+
+
+def test_a_new_file_has_the_permissions_that_programs_usually_give(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        with replacing(tmp_path / "a.json") as path:
+            path.write_text("1")
+            assert path.parent == tmp_path and path.suffix == ".json" and path.name.startswith(".a-")
+        assert os.umask(0o027) == 0o027  # and leaves the mask as it was
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a.json").stat().st_mode & 0o777 == 0o640

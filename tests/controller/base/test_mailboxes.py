@@ -45,7 +45,7 @@ def test_the_file_goes_with_its_maker() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="a file in use cannot be removed there")
 def test_without_a_name_the_memory_is_shared_as_before() -> None:
     with Mailbox.create(3) as box, Mailbox(box.path, 3) as other:
-        other.unname()
+        other.unlink()
         assert not Path(box.path).exists()
         other.publish(np.array([1.0, 2.0, 3.0]), 42)
         out = np.zeros(3)
@@ -67,3 +67,12 @@ def test_no_torn_vector_from_another_process() -> None:
             seen = sequence
         writer.join()
         assert seen == last
+
+
+def test_a_vector_without_a_stamp_has_none() -> None:
+    with Mailbox.create(2) as box:
+        out = np.zeros(2)
+        box.publish(np.ones(2), 7)
+        box.publish(np.array([3.0, 4.0]))
+        assert box.read(out) == (2, 0) and out.tolist() == [3.0, 4.0]
+        assert box.sequence == 2

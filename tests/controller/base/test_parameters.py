@@ -134,8 +134,8 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
     text = str(caught.value)
     for part in (
         str(path), "8 faults", "colour: unknown key", "parameters.wide.region", "parameters.wide.range",
-        "parameters.slow.max_speed", "parameters.slow.sped: unknown key", "parameters.lost.profile",
-        "parameters.bare", "aliases.other: unknown parameter 'god', did you mean 'good'",
+        "parameters.slow.max_speed", "parameters.slow.sped: unknown key", "parameters.lost: unknown profile 'b'",
+        "parameters.bare: must be a table (is 3)", "aliases.other: unknown parameter 'god', did you mean 'good'",
     ):  # fmt: skip
         assert part in text
 
@@ -146,3 +146,85 @@ def test_a_missing_or_broken_file(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("[parameters\n")
     with pytest.raises(ConfigError, match="not valid TOML"):
         Parameters.load(tmp_path / "bad.toml")
+
+
+FILE = """
+[profile.turn]
+range = [-1.0, 1.0]
+full_scale_deg = 60.0
+max_speed_deg_s = 300.0
+max_acceleration_deg_s2 = 1500.0
+response_s = 0.05
+[profile.skin]
+range = [0.0, 1.0]
+max_speed = 8.0
+max_acceleration = 120.0
+response_s = 0.03
+[parameters]
+headYaw = { region = "head", profile = "turn" }
+headRoll = { region = "head", profile = "turn", max_jerk_deg_s3 = 6000.0, range = [-0.5, 1] }
+smile = { region = "mouth", profile = "skin", max_jerk = 9000, response_s = 1 }
+bare = { region = "jaw", range = [0, 2], max_speed = 1, max_acceleration = 2, response_s = 3 }
+[aliases]
+Grin_L = "smile"
+"""
+
+
+def test_a_file_of_ones_own_in_units_and_degrees(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(FILE)
+    p = Parameters.load(path)
+    assert p.names == ("headYaw", "headRoll", "smile", "bare") and p.regions == ("head", "head", "mouth", "jaw")
+    assert p.low.tolist() == [-1, -0.5, 0, 0] and p.high.tolist() == [1, 1, 1, 2]
+    np.testing.assert_allclose(p.max_speed, [5, 5, 8, 1])
+    np.testing.assert_allclose(p.max_acceleration, [25, 25, 120, 2])
+    np.testing.assert_allclose(p.max_jerk, [math.inf, 100, 9000, math.inf])
+    np.testing.assert_allclose(p.response_s, [0.05, 0.05, 1, 3])
+    np.testing.assert_allclose(p.full_scale_rad, [math.pi / 3, math.pi / 3, math.nan, math.nan])
+    assert p.index("grin-left") == 2 and len(p) == 4
+    assert p.region("head").tolist() == [0, 1] and p.region("tongue").tolist() == []
+    assert p.indices(["bare", "headYaw"]).tolist() == [3, 0]
+
+
+@pytest.mark.parametrize(
+    ("found", "put", "fault"),
+    [
+        ("max_speed_deg_s = 300.0", "", "parameters.headYaw.max_speed_deg_s: missing, must be a positive number"),
+        ("max_speed = 8.0", "", "parameters.smile.max_speed: missing, must be a positive number"),
+        (
+            "max_acceleration = 2,",
+            "max_acceleration = -2,",
+            "bare.max_acceleration: input should be greater",
+        ),
+        (
+            "max_acceleration = 2,",
+            "max_acceleration = inf,",
+            "bare.max_acceleration: input should be a finite",
+        ),
+        ("max_speed = 1,", "max_speed = true,", "parameters.bare.max_speed: input should be a valid number (is True)"),
+        ("range = [0, 2]", "range = [2, 2]", "parameters.bare.range: must be [lowest, highest], not [2.0, 2.0]"),
+        ("range = [0, 2]", "range = [2]", "parameters.bare.range[1]: missing"),
+        ('region = "jaw", ', "", "parameters.bare.region: missing"),
+        ('profile = "skin"', "profile = [1]", "parameters.smile: unknown profile '[1]'"),
+        ('profile = "skin"', 'profile = "skn"', "parameters.smile: unknown profile 'skn', did you mean 'skin'?"),
+        ('"smile"\n', '"smle"\n', "aliases.Grin_L: unknown parameter 'smle', did you mean 'smile'?"),
+    ],
+)
+def test_one_fault_is_named_with_its_place(tmp_path: Path, found: str, put: str, fault: str) -> None:
+    path = tmp_path / "own.toml"
+    assert found in FILE
+    path.write_text(FILE.replace(found, put))
+    with pytest.raises(ConfigError) as caught:
+        Parameters.load(path)
+    assert fault in str(caught.value)
+
+
+def test_a_file_without_parameters_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    for text, fault in (
+        ("", "parameters: missing"),
+        ("[parameters]\n", "parameters: dictionary should have at least 1"),
+    ):
+        path.write_text(text)
+        with pytest.raises(ConfigError, match=fault):
+            Parameters.load(path)

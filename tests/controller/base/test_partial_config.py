@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pydantic import BaseModel, Field, ValidationError
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
+from controller.base.partial_config import PartialConfig
 from controller.robot.robot import load_robot
 from controller.stage.stage import load_stage
 
@@ -71,3 +74,46 @@ def test_a_stage_tells_its_own_faults_and_those_of_what_it_names(tmp_path: Path)
     told = str(caught.value)
     for key in ("seed: ", "face.fps: ", "robots[0]: no robot 'head25'", "head: no head 'icy'", "take: none.csv"):
         assert f"\n  {key}" in told
+
+
+class Item(BaseModel, extra="forbid"):
+    name: str
+    size: int = Field(1, gt=0)
+
+
+class Box(BaseModel, extra="forbid"):
+    items: list[Item] = []
+    lids: dict[str, Item] = {}
+    label: str = ""
+
+
+def rest_of(table: dict[str, Any]) -> PartialConfig[Box]:
+    with pytest.raises(ValidationError) as caught:
+        Box.model_validate(table)
+    return PartialConfig(table, Box, caught.value)
+
+
+def test_a_value_that_does_not_fit_is_removed_and_the_table_stays_where_it_can() -> None:
+    table = {"items": [{"name": "a", "size": 0}, {"name": "b", "sise": 2}], "label": "x"}
+    rest = rest_of(table)
+    assert rest.read == Box(items=[Item(name="a"), Item(name="b")], label="x")
+    assert table["items"][0]["size"] == 0  # type: ignore[index]  the table itself is not changed
+
+
+def test_entries_that_cannot_be_read_are_removed_and_places_are_those_of_the_file() -> None:
+    rest = rest_of({"items": [{"size": 1}, {"name": "b"}, {"name": 3}, {"name": "d"}, 5]})
+    assert rest.read is not None and [item.name for item in rest.read.items] == ["b", "d"]
+    assert rest.relocate(["items[0].x: and items[1]", "lids[0]"]) == ["items[1].x: and items[3]", "lids[0]"]
+
+
+def test_tables_by_name_are_removed_and_faults_that_name_them_with_them() -> None:
+    rest = rest_of({"lids": {"p": {"name": "q"}, "r": {"size": 2}, "s": {"name": "t", "size": "many"}}, "label": 3})
+    assert rest.read == Box(lids={"p": Item(name="q"), "s": Item(name="t")})
+    told = ["no 'r'", "no 'many'", "no 'p'", "no 'q'"]
+    assert rest.relocate(told) == ["no 'p'", "no 'q'"]
+
+
+def test_nothing_is_left_of_a_table_that_lacks_a_key_at_its_top() -> None:
+    with pytest.raises(ValidationError) as caught:
+        Item.model_validate({"size": 2})
+    assert PartialConfig({"size": 2}, Item, caught.value).read is None

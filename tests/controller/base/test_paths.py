@@ -52,7 +52,7 @@ def test_folders_of_installers_are_looked_through_after_the_checkout(
     monkeypatch.setattr(paths, "__file__", str(code / "controller" / "base" / "paths.py"))
     monkeypatch.setattr(paths.sys, "prefix", str(tmp_path / "environment"))
     monkeypatch.setattr(paths.site, "getuserbase", lambda: str(tmp_path / "user"))
-    monkeypatch.setattr(paths, "_written_down", lambda: ())  # an installer may have installed this very checkout
+    monkeypatch.setattr(paths, "_installed_files", lambda: ())  # an installer may have installed this very checkout
     with pytest.raises(ConfigError, match="configuration folder is missing") as caught:
         config_dir()
     for base in (tmp_path / "user", tmp_path / "environment", code):

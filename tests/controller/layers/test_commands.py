@@ -192,25 +192,11 @@ def test_the_same_seed_lives_the_same_life() -> None:
     assert np.abs(lived(3) - lived(4)).max() > 0.01
 
 
-def test_gains_scale_a_layer_by_region(face: Face) -> None:
-    face.state.set_gains("capture", {"jaw": 0.5, "brows": 0.0})
-    brow = P.index("browInnerUp")
-    for _ in range(100):
-        face.state.capture(np.full(59, 0.6), np.ones(59, dtype=bool), face.now)
-        face.run(0.01)
-    assert face.values[[JAW, brow, SMILE]] == pytest.approx([0.3, 0.0, 0.6], abs=1e-3)
-    for wrong in ({"mouht": 1.0}, {"mouth": -1.0}, {"mouth": math.nan}):
-        with pytest.raises(ParameterError):
-            face.state.set_gains("capture", wrong)
-    with pytest.raises(KeyError):
-        face.state.set_gains("cature", {})
-
-
 @pytest.mark.parametrize(("rule", "share"), [("keep", 1.0), ("blend", 0.5), ("block", 0.0)])
 def test_an_expression_holds_speech_and_gaze_back(rule: str, share: float) -> None:
     plain, silent = Vocabulary.load(P), P.neutral()
     shown = Expression("stern", silent, mouth=rule, gaze=rule)
-    state = CommandState(P, Vocabulary({"neutral": plain["neutral"], "stern": shown}))
+    state = CommandState(P, Vocabulary(P, {"neutral": plain["neutral"], "stern": shown}))
     now, values = 10**9, P.neutral()
     state.expression("stern", 0.5, None, now)
     state.gaze(0.8, 0.0, now)

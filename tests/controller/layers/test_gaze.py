@@ -81,3 +81,56 @@ def test_behind_the_head_stays_in_range() -> None:
     gaze = Gaze(P)
     gaze.look_at(-10.0, 0.0, -500.0)
     assert np.all(np.abs(settled(gaze)) <= np.degrees(SCALE) + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("point", "yaw", "pitch"),
+    [
+        ((300.0, -500.0, 400.0), math.degrees(math.atan2(300, 400)), 45.0),  # 500 mm away, 500 mm down
+        ((-300.0, 500.0, 400.0), math.degrees(math.atan2(-300, 400)), -45.0),
+        ((0.0, 100.0, 100.0), 0.0, -45.0),
+        ((400.0, -300.0, 0.0), 90.0, math.degrees(math.asin(0.6))),
+    ],
+)
+def test_the_pitch_of_a_point_is_taken_from_its_distance_in_the_level(
+    point: tuple[float, float, float], yaw: float, pitch: float
+) -> None:
+    gaze = Gaze(P)
+    gaze.look_at(*point)
+    found_yaw, found_pitch = gaze.direction_deg
+    assert found_pitch == pytest.approx(pitch, abs=1e-9)
+    assert found_yaw == pytest.approx(yaw, abs=0.5)  # the mean of two eyes, 64 mm apart
+    head_yaw, head_pitch, left, left_pitch, right, right_pitch = settled(gaze)
+    assert head_pitch + left_pitch == pytest.approx(pitch, abs=1e-9) and left_pitch == right_pitch
+    x, _, z = point
+    if abs(yaw) < 60:
+        assert head_yaw + left == pytest.approx(math.degrees(math.atan2(x - 32, z)), abs=1e-9)
+        assert head_yaw + right == pytest.approx(math.degrees(math.atan2(x + 32, z)), abs=1e-9)
+
+
+def test_the_head_takes_three_quarters_beyond_a_comfortable_angle() -> None:
+    gaze = Gaze(P)
+    gaze.look(math.radians(28), math.radians(-26))
+    assert settled(gaze)[:2] == pytest.approx([15.0, -15.0])
+    gaze.look(math.radians(8.001), math.radians(-6.001))
+    assert settled(gaze)[:2] == pytest.approx([0.00075, -0.00075])
+
+
+def test_idle_motion_is_added_to_eyes_and_head() -> None:
+    gaze = Gaze(P)
+    gaze.look(0.02, -0.03)
+    still = gaze.update(P.neutral()) * SCALE
+    moved = gaze.update(P.neutral(), (0.01, 0.02), (0.003, 0.004)) * SCALE
+    np.testing.assert_allclose(moved - still, [0.003, 0.004, 0.01, 0.02, 0.01, 0.02], atol=1e-12)
+
+
+def test_how_far_a_command_moves_the_gaze() -> None:
+    gaze = Gaze(P)
+    assert gaze.shift_rad == 0.0
+    gaze.look(0.3, 0.4)
+    assert gaze.shift_rad == pytest.approx(0.5)
+    gaze.look(0.3, 0.1)
+    assert gaze.shift_rad == pytest.approx(0.3)
+    gaze.look(-0.1, 0.1)
+    assert gaze.shift_rad == pytest.approx(0.4)
+    assert gaze.direction_deg == pytest.approx((math.degrees(-0.1), math.degrees(0.1)))

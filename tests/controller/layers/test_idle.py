@@ -106,8 +106,27 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path, root: Path) -> None:
     path.write_text(text.replace("interval_s = [2.0, 6.0]", "interval_s = [6.0, 2.0]").replace("roll_deg", "rol_deg"))
     with pytest.raises(ConfigError) as caught:
         IdleSettings.named(str(path), P)
-    for part in ("blink: interval_s must be", "head.roll_deg: missing", "head.rol_deg: unknown key"):
+    for part in (
+        "blink.interval_s: must be [shortest, longest], not [6.0, 2.0]",
+        "head.roll_deg: missing",
+        "head.rol_deg: unknown key",
+    ):
         assert part in str(caught.value)
     path.write_text(text.replace('"mouthPucker"', '"mouthPuker"'))
     with pytest.raises(ConfigError, match="did you mean 'mouthPucker'"):
         IdleSettings.named(str(path), P)
+
+
+def test_it_goes_on_after_it_was_switched_off(settings: IdleSettings) -> None:
+    life = IdleMotion(P, settings, 1)
+    life.liveliness = 1.0
+    life.update(0.0, looking=False)
+    life.liveliness = 0.0
+    assert not life.update(1.0, looking=False).any() and not life.head_rad.any()
+    assert (life.eye_yaw_rad, life.eye_pitch_rad) == (0.0, 0.0)
+    life.liveliness = 1.0
+    path = np.array([life.update(2.0 + i * 0.01, looking=False).copy() for i in range(6000)])
+    assert 8 <= len(blinks(path)) <= 24  # in a minute
+    assert not path[: int(settings.blink.interval_s[0] * 100), LID].any()  # and not at once
+    assert len(np.unique(path[:, P.index("leftEyeYaw")])) > 5
+    assert (path[:, P.indices(settings.fidget.parameters)].max(axis=0) > 0.05).any()

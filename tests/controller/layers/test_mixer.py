@@ -8,6 +8,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.mixer import LayerSettings, Mixer
 from controller.layers.settings import default_layers
@@ -30,7 +31,6 @@ def test_the_higher_layer_wins_parameter_by_parameter() -> None:
     out = mix(mixer)
     assert out[[JAW, SMILE, BROW]] == pytest.approx([0.9, 0.3, 0.0])
     assert (mixer.holder(JAW), mixer.holder(SMILE), mixer.holder(BROW)) == ("top", "base", None)
-    assert mixer.holders()[JAW] == "top"
 
 
 def test_weight_set_add_and_max() -> None:
@@ -137,11 +137,49 @@ def test_mixing_does_not_allocate() -> None:
 def test_wrong_layers_are_refused() -> None:
     with pytest.raises(ValueError, match="different names"):
         Mixer(P, [*default_layers(), LayerSettings("gaze", 99)])
-    with pytest.raises(ValueError, match="mode"):
-        LayerSettings("a", 1, "mul")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="weight"):
-        LayerSettings("a", 1, weight=2.0)
-    with pytest.raises(ValueError, match="timeout_s"):
-        LayerSettings("a", 1, timeout_s=0.0)
     with pytest.raises(KeyError, match="did you mean 'manual'"):
         Mixer(P, default_layers())["manuel"]
+
+
+def test_a_layer_held_back_mixes_less_of_it() -> None:
+    mixer = Mixer(P, [LayerSettings("base", 1), LayerSettings("top", 2)])
+    mixer["base"].write([JAW], [0.2], 0.0)
+    mixer["top"].write([JAW], [1.0], 0.0)
+    for amount, shown in ((0.25, 0.8), (1.0, 0.2), (0.0, 1.0)):
+        mixer["top"].attenuate(amount)
+        assert mix(mixer)[JAW] == pytest.approx(shown)
+
+
+def test_a_fade_in_is_as_long_as_it_says_whatever_the_step() -> None:
+    mixer = Mixer(P, [LayerSettings("a", 1, fade_in_s=0.4, fade_out_s=0.2)])
+    mixer["a"].write([JAW], 1.0, 0.0)
+    assert [mix(mixer, 0.0, 0.1)[JAW] for _ in range(5)] == pytest.approx([0.25, 0.5, 0.75, 1.0, 1.0])
+    mixer["a"].release([JAW])
+    assert [mix(mixer, 0.0, 0.05)[JAW] for _ in range(5)] == pytest.approx([0.75, 0.5, 0.25, 0.0, 0.0])
+
+
+def test_writing_all_by_a_slice_and_one_value() -> None:
+    mixer = Mixer(P, [LayerSettings("a", 1)])
+    mixer["a"].write(slice(3, 6), 0.5, 0.0)
+    assert np.flatnonzero(mix(mixer)).tolist() == [3, 4, 5] and mixer["a"].holding == 3
+    assert mixer.active == ("a",)
+    mixer["a"].release(fade_s=0.0)
+    mix(mixer)
+    assert mixer.active == () and mixer["a"].holding == 0
+
+
+def test_gains_of_a_layer_scale_its_regions() -> None:
+    mixer = Mixer(P, [LayerSettings("a", 1, gains={"jaw": 0.5, "brows": 2.0})])
+    mixer["a"].write([JAW, SMILE, BROW], [0.4, 0.4, 0.4], 0.0)
+    assert mix(mixer)[[JAW, SMILE, BROW]] == pytest.approx([0.2, 0.4, 0.8])
+    with pytest.raises(ParameterError, match="did you mean 'brows'"):
+        Mixer(P, [LayerSettings("a", 1, gains={"brow": 1.0})])
+
+
+def test_an_adding_layer_does_not_hide_the_holder_below() -> None:
+    mixer = Mixer(P, [LayerSettings("base", 1), LayerSettings("low", 2, "add"), LayerSettings("high", 3, "add")])
+    for name in ("low", "high"):
+        mixer[name].write([JAW, SMILE], [0.1, 0.1], 0.0)
+    mixer["base"].write([JAW], [0.1], 0.0)
+    mix(mixer)
+    assert (mixer.holder(JAW), mixer.holder(SMILE), mixer.holder(BROW)) == ("base", "high", None)

@@ -48,3 +48,39 @@ def test_nothing_is_compiled_at_its_first_call() -> None:
     kernels = [value for value in vars(braking).values() if hasattr(value, "signatures")]
     assert len(kernels) == 2
     assert all(len(kernel.signatures) == 1 and not kernel._can_compile for kernel in kernels)
+
+
+def free(target: float, velocity: float, dt: float, speed: float, accel: float, response: float) -> tuple[float, bool]:
+    """Velocity after one step from 0 within wide limits, and whether one held it back."""
+    place, now, limited = np.zeros(1), np.array([velocity]), np.zeros(1, dtype=bool)
+    limits = (np.array([x]) for x in (speed, accel, response, -10.0, 10.0))
+    move(dt, np.array([target]), place, now, limited, *limits)
+    return float(now[0]), bool(limited[0])
+
+
+@pytest.mark.parametrize(("beyond", "held"), [(1e-6, True), (1e-10, False), (-1e-6, False)])
+def test_a_limit_holds_back_only_what_is_more_than_rounding(beyond: float, held: bool) -> None:
+    dt, response = 0.01, 0.1
+    target = (1.0 + beyond) * (response + dt / 2)  # the linear end: just the speed limit of 1, and a little beyond
+    assert free(target, 0.0, dt, 1.0, 1e6, response) == (pytest.approx(1.0, rel=2e-6), held)
+
+
+@pytest.mark.parametrize(("short", "stops"), [(1e-13, True), (-1e-4, True), (1e-6, False), (1e-9, False)])
+def test_it_stops_in_one_step_only_within_its_acceleration(short: float, stops: bool) -> None:
+    now, accel = 0.5, 100.0  # needs 0.5 now^2 / accel to stop, and passes 0.5 now dt in one even step
+    speed, _ = free(0.5 * now**2 / accel - short, now, 0.01, 10.0, accel, 0.02)
+    assert (speed == 0.0) == stops
+
+
+def test_it_does_not_stop_where_the_target_is_further_than_one_even_step() -> None:
+    now, dt = 0.5, 0.01
+    assert free(0.5 * now * dt + 1e-6, now, dt, 10.0, 100.0, 0.02)[0] != 0.0
+    assert free(0.5 * now * dt - 1e-9, now, dt, 10.0, 100.0, 0.02)[0] == 0.0
+
+
+def test_the_position_stays_in_range() -> None:
+    place, speed, limited = np.array([0.999, -0.999]), np.array([3.0, -3.0]), np.zeros(2, dtype=bool)
+    low, high = np.array([-1.0, -1.0]), np.array([1.0, 1.0])
+    limits = (np.full(2, x) for x in (SPEED, ACCEL, RESPONSE))
+    move(DT, np.array([1.0, -1.0]), place, speed, limited, *limits, low, high)
+    assert place.tolist() == [1.0, -1.0]

@@ -167,3 +167,60 @@ def test_envelope() -> None:
     assert envelope.end_s == pytest.approx(12.0)
     sudden = Envelope(0.0, 0.0, 1.0, 0.0)
     assert sudden.level(0.5) == 1 and sudden.level(1.5) == 0
+
+
+def one(speed: float, accel: float, **more: float) -> MotionLimiter:
+    """A limiter of one value from -10 to 10."""
+    return MotionLimiter(*(np.array([x]) for x in (speed, accel, -10.0, 10.0)), **more)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rest_is_a_step_at_the_present_speed_and_then_the_braking_distance(sign: float) -> None:
+    limiter, out, dt, accel = one(3.0, 20.0), np.zeros(1), 0.01, 20.0
+    for _ in range(12):
+        limiter.step(dt, np.array([9.0 * sign]), out)
+    speed = float(limiter.velocity[0])
+    assert abs(speed) == pytest.approx(2.4)
+    place, small = float(out[0]) + speed * dt, 1e-6
+    while speed * sign > 0.0:
+        place += speed * small
+        speed -= sign * accel * small
+    assert limiter.rest(dt)[0] == pytest.approx(place, abs=1e-5)
+
+
+def test_at_rest_it_would_rest_where_it_is() -> None:
+    limiter = one(3.0, 20.0)
+    limiter.reset(np.array([0.7]))
+    assert limiter.rest(0.01)[0] == 0.7 and limiter.rest(1.0)[0] == 0.7
+
+
+def test_it_comes_to_an_exact_rest_at_its_target() -> None:
+    limiter, out = one(3.0, 20.0, response_s=0.02), np.zeros(1)
+    for _ in range(300):
+        limiter.step(0.01, np.array([1.0]), out)
+    assert out[0] == pytest.approx(1.0, abs=1e-9) and abs(limiter.velocity[0]) < 1e-7
+    assert not limiter.limited[0]
+
+
+def test_a_step_of_a_tenth_of_a_second_is_the_longest() -> None:
+    for seconds, moved in ((0.05, 0.05), (0.1, 0.1), (0.2, 0.1), (9.0, 0.1)):
+        limiter, out = one(1.0, 1e6, response_s=1e-6), np.zeros(1)
+        limiter.step(1e-3, np.array([9.0]), out)
+        before = float(out[0])
+        limiter.step(seconds, np.array([9.0]), out)
+        assert out[0] - before == pytest.approx(moved, rel=1e-6)
+
+
+def test_a_limiter_starts_at_zero_or_at_the_end_of_its_range_that_is_nearest() -> None:
+    limiter = MotionLimiter(np.ones(3), np.ones(3), np.array([-1.0, 0.5, -2.0]), np.array([1.0, 2.0, -1.0]))
+    out = limiter.step(0.0, np.full(3, np.nan), np.empty(3))
+    assert out.tolist() == [0.0, 0.5, -1.0]
+    limiter.reset(np.array([5.0, 0.0, 0.0]))
+    assert limiter.step(0.0, np.full(3, np.nan), np.empty(3)).tolist() == [1.0, 0.5, -1.0]
+
+
+def test_envelope_without_a_plateau_and_with_ends_that_are_exact() -> None:
+    envelope = Envelope(start_s=1.0, onset_s=0.5, hold_s=0.0, offset_s=0.25)
+    assert envelope.end_s == 1.75
+    assert [envelope.level(t) for t in (1.5, 1.625, 1.75)] == pytest.approx([1.0, 0.5, 0.0])
+    assert 0.0 < envelope.level(1.0 + 1e-3) < 1e-5

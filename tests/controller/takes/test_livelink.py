@@ -53,7 +53,7 @@ def test_sampling_at_a_row_gives_the_row_and_between_the_mean(take: Take) -> Non
     np.testing.assert_allclose(take.sample((t[row] + t[row + 1]) / 2, out), middle, atol=1e-9)
 
 
-def test_jaw_and_mouth_sides_are_swapped_unless_told_otherwise(tmp_path: Path) -> None:
+def test_jaw_and_mouth_sides_are_swapped_unless_asked_otherwise(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", "Timecode,BlendshapeCount,JawLeft,JawRight,MouthLeft", "0:0:0:0,61,0.1,0.2,0.3")
     out = P.neutral()
     indices = P.indices(["jawLeft", "jawRight", "mouthLeft", "mouthRight"])
@@ -86,15 +86,22 @@ def test_head_angles_are_radians_to_the_subjects_right(tmp_path: Path) -> None:
     assert take.values[0, P.index("leftEyeYaw")] == 0.0 and take.mask[P.index("leftEyeYaw")]
 
 
-def test_eye_angles_on_request_or_where_there_is_nothing_else(tmp_path: Path) -> None:
+def test_eye_angles_on_request_replace_the_look_columns(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", HEADER, "0:0:0:0,61,0.5,0,-0.3,0.1")
     take = Take.load(path, P, use_eye_angles=True)
     assert take.values[0, P.index("leftEyeYaw")] == pytest.approx(0.3 / math.radians(35))
+    assert take.values[0, P.index("eyeLookOutLeft")] == 0.0 and take.mask[P.index("eyeLookOutLeft")]
+
+
+def test_eye_angles_only_where_no_look_column_carries_anything(tmp_path: Path) -> None:
+    take = Take.load(write(tmp_path / "a.csv", HEADER, "0:0:0:0,61,0,0,-0.3,0.1"), P)
+    assert take.values[0, P.index("leftEyeYaw")] == pytest.approx(0.3 / math.radians(35))
     assert take.values[0, P.index("leftEyePitch")] == pytest.approx(0.1 / math.radians(30))
-    assert take.values[0, P.index("eyeLookOutLeft")] == 0.0
     assert not take.mask[P.index("headYaw")]  # all zero: no data
-    path = write(tmp_path / "b.csv", HEADER, "0:0:0:0,61,0,0,-0.3,0.1")
-    assert Take.load(path, P).values[0, P.index("leftEyeYaw")] > 0.4
+    take = Take.load(write(tmp_path / "b.csv", HEADER, "0:0:0:0,61,0.5,0,-0.3,0.1"), P)
+    eyes = P.indices(["leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch"])
+    assert not take.values[:, eyes].any() and take.mask[eyes].all()
+    assert take.values[0, P.index("eyeLookOutLeft")] == 0.5
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ def test_phonemes_a_line(tmp_path: Path) -> None:
         ("a.tsv", "", "at least one sound"),
         ("a.json", "{}", "not the output of rhubarb"),
         ("a.json", "[", "not the output of rhubarb"),
-        ("a.wav", "RIFF", "not a WAV file"),
+        ("a.wav", "RIFF", "not WAV of PCM"),
         ("a.mp3", "", "its name ends in .mp3"),
     ],
 )

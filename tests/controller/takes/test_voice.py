@@ -26,7 +26,7 @@ def tone(hz: float, seconds: float, loud: float = 0.5) -> np.ndarray:
 
 def heard(ear: VoiceEnvelope, sound: np.ndarray) -> np.ndarray:
     hops = len(sound) // ear.hop
-    return np.array([ear.hear(hop) for hop in sound[: hops * ear.hop].reshape(hops, ear.hop)])
+    return np.array([ear.process(hop) for hop in sound[: hops * ear.hop].reshape(hops, ear.hop)])
 
 
 def wav(sound: np.ndarray, width: int = 2) -> bytes:
@@ -65,8 +65,8 @@ def test_noise_of_a_silent_room_moves_nothing() -> None:
 
 def test_a_stream_moves_the_speech_layer_until_it_ends() -> None:
     state, out = CommandState(P), P.neutral()
-    listener = VoiceListener(io.BytesIO(wav(tone(200, 0.3))), state).start()
-    assert listener.join(30.0)
+    listener = VoiceListener(io.BytesIO(wav(tone(200, 0.3))), state)
+    listener.run()
     assert listener.hops == 30
     now = int(1e18)  # long after
     assert state.mixer["speech"].holding > 0
@@ -92,8 +92,8 @@ def test_a_pipe_of_unknown_length_is_heard_as_it_comes() -> None:
     sender = threading.Thread(target=send)
     sender.start()
     with os.fdopen(reading, "rb") as stream:
-        listener = VoiceListener(stream, CommandState(P)).start()
-        assert listener.join(30.0)
+        listener = VoiceListener(stream, CommandState(P))
+        listener.run()
     sender.join()
     assert listener.hops == 20
 
@@ -114,3 +114,28 @@ def test_what_is_no_wav_is_refused(data: bytes) -> None:
 def test_three_byte_samples_are_refused() -> None:
     with pytest.raises(TakeError, match="24 bit"):
         VoiceListener(io.BytesIO(wav(tone(200, 0.3), 3)), CommandState(P))
+
+
+def test_sound_without_a_header_is_signed_16_bit_mono() -> None:
+    raw = (tone(200, 0.2) * 32767).astype("<i2").tobytes()
+    state = CommandState(P)
+    listener = VoiceListener(io.BytesIO(raw), state, raw_hz=RATE)
+    listener.run()
+    assert listener.hops == 20  # 160 samples of 2 bytes each
+    layer = state.mixer["speech"]
+    assert layer.values[JAW] > 0.3 and layer.holding == np.count_nonzero(VoiceEnvelope(P, RATE).mask)
+
+
+def test_a_listener_that_was_stopped_hears_nothing() -> None:
+    state = CommandState(P)
+    listener = VoiceListener(io.BytesIO(wav(tone(200, 5.0))), state)
+    listener.stop()
+    listener.run()
+    assert listener.hops == 0 and state.mixer["speech"].holding == 0
+
+
+@pytest.mark.parametrize("rate", [999, 0])
+def test_rates_that_are_no_sound_are_refused(rate: int) -> None:
+    with pytest.raises(ValueError, match="rate_hz must be 1000 or more"):
+        VoiceEnvelope(P, rate)
+    assert VoiceEnvelope(P, 1000).hop == 10

@@ -12,7 +12,7 @@ from controller.base.errors import ControllerError, TakeError
 from controller.base.parameters import PARAMETERS
 from controller.cli.app import make_app
 from controller.layers.commands import CommandState
-from controller.takes.recording import Recorder
+from controller.takes.recording import recorded
 from controller.tools.check import check_anything
 from surface import DCPSurface, Domain, Slit, SurfaceFileError
 from surface.readers import NamedSurface, write_surfaces
@@ -65,7 +65,7 @@ def test_the_command_prints_it(tmp_path: Path) -> None:
 def test_every_kind_of_file_is_told_apart(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text("[smirk]\nweights = { mouthSmileLeft = 0.7 }\n[both]\nof = { smirk = 0.5 }")
     (tmp_path / "script.toml").write_text('steps = ["0 EXPR smile", "1 NEUTRAL"]\nmarks = { end = 1 }')
-    with Recorder(CommandState(PARAMETERS), tmp_path / "a.rec") as state:
+    with recorded(CommandState(PARAMETERS), tmp_path / "a.rec") as state:
         for i in range(50):
             state.tick(10**9 + i * 10_000_000, 0.01, PARAMETERS.neutral())
     assert check_anything(str(tmp_path / "own.toml")) == ["expressions own.toml: 2: good"]

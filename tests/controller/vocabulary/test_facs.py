@@ -49,7 +49,7 @@ def test_every_unit_reads_back_as_itself() -> None:
             continue  # these share all their shapes: 23 with 24 and 28, 27 with 26
         levels = np.zeros(len(FACS.names))
         levels[i] = 0.8
-        read = FACS.read(FACS.parameters_of(levels))
+        read = FACS.read(FACS.matrix @ levels)
         assert int(np.argmax(read)) == i and read[i] == pytest.approx(0.8, abs=0.05), name
 
 
@@ -74,11 +74,6 @@ def test_faces_that_show_no_emotion_read_as_neutral() -> None:
         assert FACS.read_emotion(vocabulary[name].weights)[0] == "neutral", name
 
 
-def test_read_out_as_a_formula() -> None:
-    assert FACS.formula(FACS.read(FACS.expand("1+4B+R12C"))) == "1E+4B+R12C"
-    assert FACS.formula(np.zeros(len(FACS.names))) == ""
-
-
 def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
     path = tmp_path / "own.toml"
     path.write_text(
@@ -101,7 +96,60 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
     text = str(caught.value)
     for part in (
         "extra: unknown key", "units.1.weights.browInerUp: unknown parameter, did you mean 'browInnerUp'",
-        "units.2.weights.browOuterUp: must be", "units.2.wieghts: unknown key, did you mean 'weights'",
+        "units.2.weights.browOuterUp: input should be less than or equal to 1 (is 2.0)",
+        "units.2.wieghts: unknown key, did you mean 'weights'",
         "units.3.weights: missing", "emotions.joy: unknown action unit '12'", "emotions.rage",
     ):  # fmt: skip
         assert part in text
+
+
+@pytest.mark.parametrize("name", ["happiness", "surprise"])
+def test_the_least_intensity_that_reads_as_an_emotion(name: str) -> None:
+    assert FACS.read_emotion(FACS.expand(FACS.emotions[name], 0.125))[0] == name
+    assert FACS.read_emotion(FACS.expand(FACS.emotions[name], 0.08)) == ("neutral", 1.0)
+
+
+def own(tmp_path: Path, text: str) -> Facs:
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    return Facs.load(P, path)
+
+
+def test_units_of_ones_own(tmp_path: Path) -> None:
+    facs = own(tmp_path, """
+        units.1 = { weights = { mouthSmile = 0.5, mouthFrown = 1.0 }, aliases = ["7"] }
+        units.2 = { weights = { mouthSmile = 0.5, jawOpen = 0.25 }, read = false }
+        units.3 = { left = { jawLeft = 1.0 }, right = { jawRight = 0.5 } }
+        units.4 = { right = { jawForward = 1.0 } }
+    """)  # fmt: skip
+    assert facs.names == ("L1", "R1", "2", "L3", "R3", "L4", "R4")
+    left, frown = P.index("mouthSmileLeft"), P.index("mouthFrownRight")
+    assert facs.matrix[left].tolist() == [0.5, 0.0, 0.5, 0, 0, 0, 0]
+    assert facs.matrix[frown].tolist() == [0.0, 1.0, 0, 0, 0, 0, 0]
+    assert facs.matrix[P.index("jawRight")].tolist() == [0, 0, 0, 0, 0.5, 0, 0]
+    assert facs.matrix[P.index("jawForward")].tolist() == [0, 0, 0, 0, 0, 0, 1.0]
+    assert facs.levels("7B+R1C+L3D+2A").tolist() == pytest.approx([0.4, 0.6, 0.2, 0.8, 0, 0, 0])
+    assert facs.levels("1+1B", 0.5).tolist() == pytest.approx([0.5, 0.5, 0, 0, 0, 0, 0])
+    assert facs.read(facs.expand("2"))[2] == 0.0  # not read back
+    assert facs.read(facs.expand("L3"))[3] == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("units.1 = { weights = { jawOpen = 0 } }", "units.1.weights.jawOpen: input should be greater than 0"),
+        ("units.1 = { left = { jawOpn = 1 } }", "units.1.left.jawOpn: unknown parameter, did you mean 'jawOpen'"),
+        ("units.1 = { weights = {} }", "units.1.weights: missing"),
+        (
+            "units.1 = { weights = { jawOpen = 1 }, aliases = [3] }",
+            "units.1.aliases[0]: input should be a valid str",
+        ),
+        ("units.1 = { weights = { jawOpen = 1 } }\nemotions.joy = '1F'", "emotions.joy: '1F' is not an action unit"),
+        ("units = {}", "units: dictionary should have at least 1 item"),
+        ("", "units: missing"),
+    ],
+)
+def test_one_fault_is_named_with_its_place(tmp_path: Path, text: str, fault: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        own(tmp_path, text)
+    assert fault in str(caught.value) and ": 1 fault" in str(caught.value)

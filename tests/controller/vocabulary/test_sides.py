@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from controller.base.parameters import PARAMETERS as P
-from controller.vocabulary.sides import sides, spread
+from controller.vocabulary.sides import sides, spread, unknown_names
 
 
 def test_sides() -> None:
@@ -14,9 +14,16 @@ def test_sides() -> None:
     assert sides(P, "nothing") == []
 
 
-def test_a_table_is_spread_over_both_sides_and_says_what_is_wrong() -> None:
-    faults: list[str] = []
-    values = spread(P, "here", {"mouthSmile": 0.5, "nothing": 1.0, "jawOpen": 2.0}, -1.0, faults)
+def test_a_table_is_spread_over_both_sides() -> None:
+    values = spread(P, {"mouthSmile": 0.5, "jawOpen": 0.25, "nothing": 1.0}, -1.0)
     assert np.flatnonzero(values == 0.5).tolist() == sides(P, "mouthSmile")
-    assert (np.delete(values, sides(P, "mouthSmile")) == -1.0).all()
-    assert [fault.split(":")[0] for fault in faults] == ["here.nothing", "here.jawOpen"]
+    assert values[P.index("jawOpen")] == 0.25 and (values == -1.0).sum() == len(P) - 3
+    assert (spread(P, {}) == 0.0).all()
+
+
+def test_unknown_names_are_faults_with_their_place() -> None:
+    assert unknown_names(P, "here", ["mouthSmile", "jawOpen"]) == []
+    assert unknown_names(P, "here", ["jawOpn", "xyz"]) == [
+        "here.jawOpn: unknown parameter, did you mean 'jawOpen'?",
+        "here.xyz: unknown parameter",
+    ]

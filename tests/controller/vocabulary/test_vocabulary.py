@@ -9,6 +9,8 @@ import pytest
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS as P
+from controller.vocabulary.affect import Affect
+from controller.vocabulary.facs import Facs
 from controller.vocabulary.vocabulary import Vocabulary
 
 
@@ -69,7 +71,7 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         plain = 1
         [grin]
         kind = "mood"
-        aliases = ["sneer"]
+        aliases = ["frown"]
         onset_s = -1
         blnk = "keep"
         [grin.weights]
@@ -77,13 +79,15 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         jawOpen = 1.5
         [sneer]
         aliases = 3
+        [frown]
+        weights = {}
         """
     )
     with pytest.raises(ConfigError) as caught:
         Vocabulary.load(P, path)
     text = str(caught.value)
     for part in (
-        "plain: must be a table", "grin.kind", "grin.aliases: 'sneer' is already a name of 'sneer'", "grin.onset_s",
+        "plain: must be a table", "grin.kind", "grin.aliases: 'frown' is already a name of 'frown'", "grin.onset_s",
         "grin.blnk: unknown key, did you mean 'blink'", "grin.weights.mouthSmil: unknown parameter, did you mean",
         "grin.weights.jawOpen: must be a number from 0 to 1 (is 1.5)", "sneer.weights: missing", "sneer.aliases",
     ):  # fmt: skip
@@ -133,18 +137,56 @@ def test_faults_of_all_files_come_together_circles_too(tmp_path: Path) -> None:
         aliases = ["joy"]
         """,
     )
-    second = own(tmp_path, "[d]\nof = 3", "second.toml")
+    second = own(tmp_path, "[d]\nof = 3\n[e]\nof = { e = 1, x = 1 }", "second.toml")
     with pytest.raises(ConfigError) as caught:
         Vocabulary.load(P, more=[first, second])
     text = str(caught.value)
     for part in (
         "own.toml: 5 faults",
-        "smile: is already an expression of a file before this one",
-        "b.of.a: goes in a circle: a -> b -> a",
-        "c.of.happines: unknown expression, did you mean 'happiness'",
-        "c.of.sadness: must be a number from 0 to 1",
+        "smile: is already in an earlier file; choose another name",
+        "a.of.b: goes in a circle: a -> b -> a",
+        "c.of.happines: unknown expression 'happines', did you mean 'happiness'",
+        "c.of.sadness: input should be less than or equal to 1 (is 2.0)",
         "c.aliases: 'joy' is already a name of 'happiness'",
-        "second.toml: 1 fault",
-        "d.of: must be a table of expressions",
+        "second.toml: 2 faults",
+        "d.of: must be a table (is 3)",
+        "e.of.e: goes in a circle: e -> e",
     ):
         assert part in text
+
+
+def test_formulas_of_action_units(vocabulary: Vocabulary) -> None:
+    made = vocabulary["au6+12"]
+    assert (made.name, made.source, made.kind) == ("AU6+12", "FACS", "user")
+    np.testing.assert_array_equal(made.weights, Facs.load(P).expand("6+12"))
+    assert vocabulary.expand("AU26", 0.5) == {P.index("jawOpen"): 0.25}
+
+
+def test_formulas_of_moods(vocabulary: Vocabulary) -> None:
+    affect = Affect.load(vocabulary)
+    for text, point in (
+        ("va:0.5,-.25", (0.5, -0.25)),
+        ("VAD:-0.5,0.6,0.3", (-0.5, 0.6, 0.3)),
+        ("VA:1,-1", (1.0, -1.0)),
+    ):
+        made = vocabulary[text]
+        np.testing.assert_allclose(made.weights, affect.expand(*point))
+        assert vocabulary[made.name].name == made.name  # its name is a formula, too
+    assert vocabulary["VA:0.80,0.4"].name == "VA:0.8,0.4"
+
+
+@pytest.mark.parametrize("text", ["AUTUMN", "VALUE", "", "VA", "XAU1"])
+def test_anything_else_is_a_name(vocabulary: Vocabulary, text: str) -> None:
+    with pytest.raises(ParameterError, match="unknown expression"):
+        vocabulary[text]
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [("AU99", "facs.toml"), ("AU1-2", "12B"), ("VA:1", "VA:0.5,-0.2"), ("VA:1,2", "VA:0.5,-0.2"), ("VA:a,b", "VA:"),
+     ("VA:nan,0", "VA:"), ("VA:-1.01,0", "VA:"), ("VAD:0,0", "VAD:0.5,-0.2,0.1")],
+)  # fmt: skip
+def test_wrong_formulas_are_refused(vocabulary: Vocabulary, text: str, hint: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        vocabulary[text]
+    assert hint in caught.value.hint

@@ -12,11 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.links.line import host as host_module
-from controller.links.line.host import RobotHost, load_script, main
+from controller.links.line.host import RobotHost, main
 from controller.links.line.hostport import HostPort
 from controller.links.line.link import LineLink
 from controller.links.line.script import Script
@@ -45,7 +44,6 @@ def test_it_greets_sends_its_steps_and_counts_the_answers(port: HostPort) -> Non
     report = host.report()
     assert (report["accepted"], report["refused"], report["damaged"], report["unanswered"]) == (4, 1, 0, 0)
     assert host.refusals == ["SET jawOpn 1 -> ERR 23 unknown parameter 'jawOpn', did you mean 'jawOpen'?"]
-    assert host.newest is not None and host.newest.kind == "P" and host.newest.checked
     assert state.status()["manual"] == 1 and state.status()["expression"] == "anger"
     assert host.round_trip_ms.count == 5
     json.dumps(report)
@@ -80,15 +78,6 @@ def test_answers_that_are_late_damaged_or_unasked_are_counted(port: HostPort) ->
     assert {kind: host.counts[kind] for kind in ("damaged", "unasked", "unanswered")} == {
         "damaged": 2, "unasked": 1, "unanswered": 1,
     }  # fmt: skip
-
-
-def test_scripts_by_name_and_path(tmp_path: Path) -> None:
-    assert load_script("tour", P).steps
-    path = tmp_path / "own.toml"
-    path.write_text('steps = ["0 PING"]')
-    assert load_script(str(path), P).name == "own"
-    with pytest.raises(ConfigError, match="did you mean 'tour'"):
-        load_script("tuor", P)
 
 
 def test_main_serves_until_its_input_ends(tmp_path: Path, capsys: pytest.CaptureFixture[str],

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from controller.base.errors import LinkError
 from controller.links.line.hostport import HostPort
+from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
 
 
@@ -45,6 +45,6 @@ def test_link_is_made_replaced_and_removed(tmp_path: Path) -> None:
 def test_a_link_over_a_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "robot"
     path.write_text("mine")
-    with pytest.raises(LinkError, match="cannot make the link"):
+    with pytest.raises(PortError, match="cannot make the link"):
         HostPort(path)
     assert path.read_text() == "mine"

@@ -135,6 +135,10 @@ def test_a_port_that_vanishes_is_found_again(tmp_path: Path, state: CommandState
     with LineLink(str(path), 115200, state, retry_s=0.02) as link:
         peer = Peer(first)
         assert peer.ask("SET jawOpen 0.5").ok and peer.ask("SUB 50 jawOpen").ok
+        taken = link.report()["bytes_in"]
+        assert isinstance(taken, int)
+        peer.send(b"SET ja")  # never ends
+        eventually(lambda: link.report()["bytes_in"] == taken + 6)
         first.close()
         eventually(lambda: not link.connected)
         assert state.status()["manual"] == 1  # the face keeps what it was told
@@ -143,7 +147,7 @@ def test_a_port_that_vanishes_is_found_again(tmp_path: Path, state: CommandState
             peer = Peer(second)
             assert peer.next("P").text.endswith("jawOpen=0")  # the stream goes on
             assert peer.ask("PING").ok
-            assert link.report()["reconnects"] == 1
+            assert link.report()["reconnects"] == 1 and link.report()["refused"] == {}
             link.stop()
     assert not link.connected
 
@@ -182,3 +186,17 @@ def test_a_fault_of_its_own_is_told_once_and_the_link_goes_on(
     assert peer.ask("PING").ok
     assert link.report()["last_fault"] == "ZeroDivisionError: life is short"
     assert caplog.text.count("goes on with the next line") == 1
+
+
+def test_replies_beyond_the_buffer_are_dropped_whole_and_counted(port: HostPort, link: LineLink) -> None:
+    count = 120
+    for i in range(count):  # one after the other: what arrives at once is dropped at once
+        port.write(b"LIST PARAMETERS\n")
+        eventually(lambda i=i: link.report()["accepted"] == i + 1)
+    dropped = link.report()["dropped"]
+    assert isinstance(dropped, int) and 0 < dropped < count - 15  # 16 kB hold more than 15 of them
+    peer = Peer(port)
+    answers = {peer.next("OK").text for _ in range(count - dropped)}
+    assert len(answers) == 1 and answers.pop().split()[2:] == list(P.names)
+    assert peer.ask("PING").text == "PONG"
+    assert link.report()["bytes_in"] == count * 16 + len(format_words(["PING"], tag=7, checked=True))

@@ -22,7 +22,7 @@ from controller.links.line.protocol import (
     format_error,
     format_frame,
     format_ok,
-    format_parameters,
+    format_pairs,
     format_words,
     number,
     parse_reply,
@@ -129,7 +129,7 @@ def test_damaged_replies_are_refused() -> None:
 
 def test_streams() -> None:
     assert format_frame(1500, np.array([0.0, 0.5, -0.25])) == b"F 1500 0 0.5 -0.25\n"
-    assert format_parameters(20, ["jawOpen"], [0.8]) == b"P 20 jawOpen=0.8\n"
+    assert format_pairs(20, [("jawOpen", 0.8)]) == b"P 20 jawOpen=0.8\n"
     everything = format_frame(10**9, np.full(59, -0.1234), checked=True)
     assert len(everything) <= MAX_REPLY
     assert parse_reply(everything[:-1]) is not None

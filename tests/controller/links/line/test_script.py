@@ -9,7 +9,7 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.links.line.script import Script, Wave
+from controller.links.line.script import Wave, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
@@ -17,7 +17,7 @@ VOCABULARY = Vocabulary.load(P)
 
 def test_the_shipped_scripts_are_right(root: Path) -> None:
     paths = sorted((root / "configs" / "scripts").glob("*.toml"))
-    scripts = {path.stem: Script.load(path, P, VOCABULARY) for path in paths}
+    scripts = {path.stem: load_script(str(path), P, VOCABULARY) for path in paths}
     assert {"tour", "everything"} <= set(scripts)
     tour = scripts["tour"]
     said = " ".join(line for _, line in tour.steps)
@@ -35,17 +35,27 @@ def test_a_wrong_script_lists_every_fault(tmp_path: Path) -> None:
         'steps = ["0 PING", "x PING", "2 SET jawOpn 1", "2.5", "3 GAZE 0 0", "1 PING"]\n'
     )
     with pytest.raises(ConfigError) as caught:
-        Script.load(path, P, VOCABULARY)
+        load_script(str(path), P, VOCABULARY)
     text = str(caught.value)
     for part in (
-        "8 faults", "marks.b: must be", "loop: unknown key, did you mean 'loop_s'", "steps[1]: begins with a time",
+        "8 faults", "marks.b: input should be greater than or equal to 0 (is -1)",
+        "loop: unknown key, did you mean 'loop_s'", "steps[1]: begins with a time",
         "steps[2]: unknown parameter 'jawOpn', did you mean 'jawOpen'", "steps[3]: no command",
-        "steps[5]: times must rise", "frames_hz: must be", "loop_s: 1 is before the last step at 3",
+        "steps[5]: times must rise", "frames_hz: input should be", "loop_s: 1 is before the last step at 3",
     ):  # fmt: skip
         assert part in text
     path.write_text('steps = "0 PING"')
-    with pytest.raises(ConfigError, match="steps: must be a list"):
-        Script.load(path, P, VOCABULARY)
+    with pytest.raises(ConfigError, match="steps: input should be a valid list"):
+        load_script(str(path), P, VOCABULARY)
+
+
+def test_scripts_by_name_and_path(tmp_path: Path) -> None:
+    assert load_script("tour", P).steps
+    path = tmp_path / "own.toml"
+    path.write_text('steps = ["0 PING"]')
+    assert load_script(str(path), P).name == "own"
+    with pytest.raises(ConfigError, match="did you mean 'tour'"):
+        load_script("tuor", P)
 
 
 def test_in_a_wave_every_parameter_moves_every_frame_and_stays_in_range() -> None:
@@ -55,3 +65,55 @@ def test_in_a_wave_every_parameter_moves_every_frame_and_stays_in_range() -> Non
     assert np.all(np.abs(np.diff(path, axis=0)).max(axis=0) > 0.003)
     assert np.mean(np.round(path[1:], 4) != np.round(path[:-1], 4)) > 0.98
     assert np.all(np.ptp(path, axis=0) > 0.45)
+
+
+def test_a_wave_at_known_times() -> None:
+    wave, yaw = Wave(P), P.index("headYaw")
+    assert wave.at(0.0)[0] == 0.0  # every unit wave goes from 0 to 0.5
+    assert wave.at(1.0)[0] == pytest.approx(0.25) and wave.at(2.0)[0] == pytest.approx(0.5)
+    path = np.array([wave.at(i / 50) for i in range(4000)])
+    assert path[:, 0].max() == pytest.approx(0.5, abs=1e-3) and path[:, 0].min() == pytest.approx(0.0, abs=1e-3)
+    assert path[:, yaw].max() == pytest.approx(0.4, abs=1e-3) and path[:, yaw].min() == pytest.approx(-0.4, abs=1e-3)
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(path, axis=0)), axis=0), axis=0) / 2 / 80
+    assert turns[0] == pytest.approx(0.25, abs=0.02)  # Hz
+    assert turns[1] == pytest.approx(0.25 + 0.5 * 0.618, abs=0.02)
+    assert np.all((turns > 0.23) & (turns < 0.77)) and len(set(np.round(turns, 2))) > 20
+    assert wave.at(0.0)[1] == pytest.approx(0.25 - 0.25 * np.cos(2 * np.pi * 0.7548776662))
+
+
+def test_a_script_of_ones_own(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(
+        "loop_s = 2\nframes_hz = 200\nmarks = { end = 2 }\ndescription = 'd'\n"
+        "steps = ['0 PING', ' 1.5  SET jawOpen 1 ', '1.5 EXPR smirk', '2 NEUTRAL']\n"
+    )
+    more = tmp_path / "more.toml"
+    more.write_text("[smirk]\nweights = { mouthSmileLeft = 0.7 }\n")
+    script = load_script("own.toml", P, Vocabulary.load(P, more=[more]), beside=tmp_path / "stage.toml")
+    assert script.steps == ((0.0, "PING"), (1.5, "SET jawOpen 1"), (1.5, "EXPR smirk"), (2.0, "NEUTRAL"))
+    assert (script.loop_s, script.frames_hz, script.marks, script.name) == (2.0, 200.0, {"end": 2.0}, "own")
+    path.write_text("name = 'other'\nsteps = ['0 PING']")
+    script = load_script(str(path), P)
+    assert (script.name, script.loop_s, script.frames_hz, script.marks) == ("other", 0.0, 0.0, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("steps = ['inf PING']", "steps[0]: times must rise from 0"),
+        ("steps = ['-1 PING']", "steps[0]: times must rise from 0"),
+        ("steps = ['0 EXPR smirk']", "steps[0]: unknown expression 'smirk'"),
+        ("steps = [1]", "steps[0]: input should be a valid string (is 1)"),
+        ("frames_hz = 201", "frames_hz: input should be less than or equal to 200 (is 201)"),
+        ("loop_s = 86401", "loop_s: input should be less than or equal to 86400"),
+        ("marks.a = 'x'", "marks.a: input should be a valid number (is 'x')"),
+        ("marks = 3", "marks: must be a table (is 3)"),
+        ("loop_s = 1\nsteps = ['1.01 PING']", "loop_s: 1 is before the last step at 1.01"),
+    ],
+)
+def test_one_fault_is_named_with_its_place(tmp_path: Path, text: str, fault: str) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_script(str(path), P, VOCABULARY)
+    assert fault in str(caught.value) and ": 1 fault" in str(caught.value)

@@ -194,8 +194,8 @@ def test_a_face_is_told_and_streamed_in_other_vocabularies(talk: Talk) -> None:
 
 def test_what_the_servos_show_is_told_and_streamed(talk: Talk) -> None:
     for line in ("MEASURED jawOpen", "READ UNITS MEASURED"):
-        assert (talk.say(line).code, talk.say(line).text) == (30, "no servo says where it stands")
-    servos = talk.state.watch = Servos()
+        assert (talk.say(line).code, talk.say(line).text) == (30, "no servo reports its position")
+    servos = talk.state.servo_monitor = Servos()
     assert talk.say("MEASURED jawOpen tongueOut").text == "MEASURED jawOpen=0.5 tongueOut=0"
     assert "26=" in talk.say("READ UNITS MEASURED").text
     assert "away_deg=1.5" in talk.say("STATUS").text

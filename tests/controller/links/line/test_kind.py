@@ -1,0 +1,43 @@
+"""Options of a link that speaks the line protocol."""
+
+from __future__ import annotations
+
+import pytest
+
+from controller.links.line.kind import LINK, LineSettings
+from controller.links.links import read_link
+
+
+def test_a_real_port() -> None:
+    settings = LineSettings(port="/dev/ttyUSB0")
+    settings.check()
+    assert (settings.baud, settings.simulated, settings.address) == (115_200, None, "/dev/ttyUSB0")
+
+
+@pytest.mark.parametrize(("script", "played"), [(None, "tour"), ("everything", "everything")])
+def test_a_simulated_host_plays_a_script(script: str | None, played: str) -> None:
+    settings = LineSettings(port="simulated", script=script)
+    settings.check()
+    assert settings.simulated == played
+
+
+def test_a_script_needs_a_simulated_host() -> None:
+    with pytest.raises(ValueError, match='script needs port = "simulated"'):
+        LineSettings(port="/dev/ttyUSB0", script="tour").check()
+    with pytest.raises(ValueError, match='script needs port = "simulated"'):
+        read_link({"port": "/dev/ttyUSB0", "script": "tour"})
+
+
+@pytest.mark.parametrize(("baud", "good"), [(299, False), (300, True), (12_000_000, True), (12_000_001, False)])
+def test_limits_of_the_baud_rate(baud: int, good: bool) -> None:
+    table = {"port": "/dev/ttyUSB0", "baud": baud}
+    if good:
+        assert read_link(table).own == LineSettings(port="/dev/ttyUSB0", baud=baud)
+    else:
+        with pytest.raises(ValueError, match="baud"):
+            read_link(table)
+
+
+def test_its_definition() -> None:
+    assert (LINK.api, LINK.kind, LINK.settings) == (1, "line", LineSettings)
+    assert str(read_link({"port": "simulated"})) == "line on simulated"

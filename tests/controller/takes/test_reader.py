@@ -1,0 +1,107 @@
+"""Readers of takes: which there are, and who reads what."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import TakeError
+from controller.base.parameters import PARAMETERS as P
+from controller.takes.reader import API, TAKES, TakeReader, load_take, reader_of, suffixes
+from drivers.base.errors import PluginError
+
+MODULE = """
+import numpy as np
+from controller.takes.livelink import Take
+from controller.takes.reader import TakeReader
+PLUGIN = TakeReader(api={api}, kind="{kind}", title="trial", suffixes={suffixes}, read="plugin_{kind}:{read}")
+
+def rest(path, parameters):
+    n = len(parameters)
+    return Take(path.name, np.arange(2.0), np.zeros((2, n)), np.ones(n, dtype=bool), parameters.low, parameters.high)
+
+def nothing(path, parameters):
+    return 3
+
+def broken(path, parameters):
+    return 1 / 0
+"""
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    """Adds a reader of another package."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def add(kind: str, *taken: str, read: str = "rest", api: int = API) -> None:
+        info = tmp_path / f"{kind}_package-1.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {kind}-package\nVersion: 1\n")
+        (info / "entry_points.txt").write_text(f"[omote.takes]\n{kind} = plugin_{kind}:PLUGIN\n")
+        (tmp_path / f"plugin_{kind}.py").write_text(MODULE.format(kind=kind, suffixes=taken, read=read, api=api))
+
+    yield add
+    for name in [name for name in sys.modules if name.startswith("plugin_")]:
+        del sys.modules[name]
+    TAKES.forget()
+
+
+def test_the_built_in_readers() -> None:
+    assert {(reader.kind, reader.suffixes, reader.layer) for reader in TAKES.all()} == {
+        ("livelink", (".csv",), "capture"),
+        ("sounds", (".tsv", ".json"), "speech"),
+        ("wav", (".wav",), "speech"),
+    }
+    assert sorted(suffixes()) == [".csv", ".json", ".tsv", ".wav"]
+    assert all(isinstance(reader, TakeReader) and reader.api == API for reader in TAKES.all())
+
+
+@pytest.mark.parametrize(("name", "kind"), [("a.csv", "livelink"), ("A.CSV", "livelink"), ("b.x.json", "sounds")])
+def test_a_reader_is_found_by_the_ending_in_any_case(name: str, kind: str) -> None:
+    assert reader_of(Path(name)).kind == kind
+
+
+@pytest.mark.parametrize(("name", "ending"), [("a.mp3", ".mp3"), ("take", "nothing")])
+def test_a_file_that_nobody_reads_names_what_there_is(name: str, ending: str) -> None:
+    with pytest.raises(TakeError, match=f"{name}: no take: its name ends in {ending}") as caught:
+        reader_of(Path(name))
+    assert caught.value.hint.startswith("use .") and " or ." in caught.value.hint
+    assert all(suffix in caught.value.hint for suffix in suffixes())
+
+
+def test_a_reader_of_another_package_reads(install: Callable[..., None]) -> None:
+    install("track", ".track", ".trk")
+    take = load_take(Path("a.TRK"), P)
+    assert take.frames == 2 and not np.any(take.values) and ".track" in suffixes()
+    assert reader_of(Path("a.track")).layer == "capture"
+
+
+@pytest.mark.parametrize(
+    ("suffix", "why"),
+    [("track", "begin with a dot"), (".Track", "small letters"), (".wav", "is read by the built-in kind 'wav'")],
+)
+def test_wrong_suffixes_are_refused(install: Callable[..., None], suffix: str, why: str) -> None:
+    install("track", suffix)
+    with pytest.raises(PluginError, match=why):
+        TAKES.get("track")
+
+
+def test_a_reader_for_another_version_is_refused(install: Callable[..., None]) -> None:
+    install("track", ".track", api=API + 1)
+    with pytest.raises(PluginError, match="track-package"):
+        TAKES.get("track")
+
+
+def test_what_is_no_take_is_refused_and_errors_name_the_package(install: Callable[..., None]) -> None:
+    install("three", ".three", read="nothing")
+    with pytest.raises(TakeError, match="take kind 'three' gave no take, but 3") as caught:
+        load_take(Path("a.three"), P)
+    assert caught.value.hint
+    install("zero", ".zero", read="broken")
+    TAKES.forget()
+    with pytest.raises(PluginError, match="zero"):
+        load_take(Path("a.zero"), P)
