@@ -1,6 +1,6 @@
-"""What the panel shows besides the values: who holds each parameter, what the servos show, how far they are away.
+"""State for the panel besides the values: the layer that holds each parameter, and what the servos show of it.
 
-The body writes it ten times a second into a mailbox of its own; main reads it when it draws.
+The body writes it ten times a second to a mailbox; main reads it when it draws.
 """
 
 from __future__ import annotations
@@ -21,22 +21,17 @@ def panel_state_size(parameters: Parameters) -> int:
 
 
 class PanelStateWriter:
-    """The body's side.
+    """Writes the state in the body; the mailbox has :func:`panel_state_size` numbers."""
 
-    Parameters
-    ----------
-    mailbox : of :func:`panel_state_size`. state : the layers. reflection : reads the servos; None without any.
-    """
-
-    def __init__(self, mailbox: Mailbox, state: Face, reflection: MeasuredFace | None) -> None:
-        self._mailbox, self._state, self._measured_face = mailbox, state, reflection
+    def __init__(self, mailbox: Mailbox, state: Face, measured_face: MeasuredFace | None) -> None:
+        self._mailbox, self._state, self._measured_face = mailbox, state, measured_face
         p = len(state.parameters)
         self._all = np.full(panel_state_size(state.parameters), np.nan)
         self._holders, self._measured, self._away = self._all[:p], self._all[p : 2 * p], self._all[2 * p :]
         self._mask = np.zeros(p, dtype=bool)
 
     def publish(self) -> None:
-        """Write how things are now."""
+        """Write the state of this moment."""
         layers = {name: i for i, name in enumerate(self._state.layer_names())}
         self._holders[:] = [layers.get(self._state.holder(i) or "", -1) for i in range(len(self._holders))]
         if self._measured_face is not None:
@@ -48,19 +43,14 @@ class PanelStateWriter:
 
 
 class PanelState:
-    """Main's side; call :meth:`refresh` once a frame.
-
-    Parameters
-    ----------
-    mailbox : what the body writes. layers : names of the layers, lowest first.
-    """
+    """Reads the state in main, where :meth:`refresh` is called once a frame; ``layers`` : their names, lowest first."""
 
     def __init__(self, mailbox: Mailbox, layers: Sequence[str], parameters: Parameters) -> None:
         self._mailbox, self._layers, self._p = mailbox, tuple(layers), len(parameters)
         self._all = np.full(panel_state_size(parameters), np.nan)
 
     def refresh(self) -> None:
-        """Read what was written last; nothing is known before the first."""
+        """Read what was written last; nothing is known before the first time."""
         if self._mailbox.sequence:
             self._mailbox.read(self._all)
 
@@ -71,10 +61,12 @@ class PanelState:
 
     def measured(self, index: int) -> float | None:
         """What the servos show of a parameter; None where that is not known."""
-        value = self._all[self._p + index]
-        return float(value) if np.isfinite(value) else None
+        return self._known(self._p + index)
 
     def away_deg(self, region: str) -> float | None:
-        """How far the servos of a region are from where they were wanted (rms, degrees); None where not known."""
-        value = self._all[2 * self._p + REGIONS.index(region)]
+        """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""
+        return self._known(2 * self._p + REGIONS.index(region))
+
+    def _known(self, index: int) -> float | None:
+        value = self._all[index]
         return float(value) if np.isfinite(value) else None

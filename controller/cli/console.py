@@ -1,4 +1,4 @@
-"""Where the commands write: a terminal's tricks only on a terminal, also where colours are forced."""
+"""The console that commands print to: codes that move the cursor only on a terminal, even where colours are forced."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from rich.console import Console
 
 
 class Screen(Console):
-    """Standard output; what is written into a file or a pipe has no codes that move a cursor.
-
-    rich takes ``FORCE_COLOR`` for a terminal and would draw its progress bars anywhere. Here it means colours.
+    """Standard output. rich takes ``FORCE_COLOR`` for a terminal and would draw its progress bars into files and pipes;
+    here it means colours only.
     """
 
     def __init__(self) -> None:
@@ -20,7 +19,7 @@ class Screen(Console):
 
     @property
     def is_terminal(self) -> bool:
-        """Whether somebody watches."""
+        """Whether standard output is a terminal."""
         try:
             return self.file.isatty()
         except ValueError:  # it is closed

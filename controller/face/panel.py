@@ -1,6 +1,6 @@
-"""The panel over the picture: expressions, sliders for every parameter, and how fast everything runs.
+"""The panel over the picture: expressions, sliders for every parameter, and the frame rate.
 
-It shows the newest parameters and tells the body what the user wants; it never writes parameters itself.
+It shows the newest parameters and sends the user's requests to the body; it never writes parameters itself.
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.parameters import REGIONS, Parameters
-from controller.body.messages import Hold, Neutral, Show
+from controller.body.messages import Hold, Neutral, PanelRequest, Show
 from controller.body.panel_state import PanelState
 from controller.vocabulary.vocabulary import Vocabulary
-
-PanelRequest = Hold | Show | Neutral
 
 _BUTTONS_A_ROW = 3
 _CALM_S = 0.6
@@ -27,23 +25,20 @@ class Panel:
 
     Parameters
     ----------
-    parameters : the vocabulary.
-    newest : gives the newest parameters, (p,) float64.
-    tell : passes a request to the body.
-    insight : who holds each parameter and what the servos show; nothing is said of it without.
+    parameters : all of them, p. newest : returns the newest ones, (p,) float64. send : sends a request to the body.
+    panel_state : the layer that holds each parameter and what the servos show; without, neither is shown.
     """
 
     def __init__(
         self,
         parameters: Parameters,
         newest: Callable[[], NDArray[np.float64]],
-        tell: Callable[[PanelRequest], None],
-        insight: PanelState | None = None,
+        send: Callable[[PanelRequest], None],
+        panel_state: PanelState | None = None,
     ) -> None:
-        self._panel_state = insight
+        self._panel_state = panel_state
         self._parameters = parameters
-        self._newest = newest
-        self._tell = tell
+        self._newest, self._send = newest, send
         self._expressions = Vocabulary.load(parameters).names
         self._members = {region: parameters.region(region) for region in REGIONS}
         self._held: set[int] = set()
@@ -69,7 +64,7 @@ class Panel:
         imgui.same_line()
         if imgui.small_button("release all"):
             self._held.clear()
-            self._tell(Neutral(_CALM_S))
+            self._send(Neutral(_CALM_S))
         _, self._intensity = imgui.slider_float("intensity", self._intensity, 0.0, 1.0)
         gap = imgui.get_style().item_spacing.x
         width = (imgui.get_content_region_avail().x + gap) / _BUTTONS_A_ROW - gap
@@ -77,10 +72,10 @@ class Panel:
             if i % _BUTTONS_A_ROW:
                 imgui.same_line()
             if imgui.button(name, imgui.ImVec2(width, 0)):
-                self._tell(Show(name, self._intensity))
+                self._send(Show(name, self._intensity))
 
     def _away(self, region: str) -> str:
-        """How far the servos of a region are from where they were wanted, for its title."""
+        """How far the servos of a region are from their wanted angles, for its title."""
         away = None if self._panel_state is None else self._panel_state.away_deg(region)
         return "" if away is None else f"   servos {away:.1f} deg away"
 
@@ -100,10 +95,10 @@ class Panel:
             moved, value = imgui.slider_float(self._parameters.names[index], float(values[index]), low, high)
             if moved:
                 self._held.add(index)
-                self._tell(Hold(index, float(np.clip(value, low, high))))
+                self._send(Hold(index, float(np.clip(value, low, high))))
             if index in self._held:
                 imgui.same_line()
                 if imgui.small_button(f"x##{index}"):
                     self._held.discard(index)
-                    self._tell(Hold(index, None))
+                    self._send(Hold(index, None))
             self._holder(imgui, index)

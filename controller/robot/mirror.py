@@ -1,4 +1,4 @@
-"""The mirror: where the servos are, as parameters, so that the picture follows a head that is moved by hand."""
+"""Solves the channels backwards: from measured servo angles to the parameters that show them."""
 
 from __future__ import annotations
 
@@ -15,18 +15,14 @@ _TOLERANCE = 1e-5
 
 
 class Mirror:
-    """Solves the channels backwards.
+    """Finds parameters whose channels give measured angles.
 
     A servo head shows fewer things than a face, so many faces have one pose; the one with few and small values is
     taken. The eyes are read as eye angles, never as eyeLook shapes.
 
-    Parameters
-    ----------
-    table : the channels. parameters : the registry.
-
     Attributes
     ----------
-    readable : (n,) bool, the channels whose angle says something; one whose map turns back or rests does not.
+    readable : (n,) bool, the channels that can be inverted; one whose map turns back or is flat cannot.
     """
 
     def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
@@ -40,25 +36,16 @@ class Mirror:
         self.readable = np.array([_is_monotonic(row[keep]) for row, keep in zip(steps, real, strict=True)])
         self._solvers: dict[bytes, BoundedSolver] = {}
         self._last = parameters.neutral()
-        self._solver(self.readable)  # what is compiled is compiled now, not while a bus waits
+        self._solver(self.readable)  # compiled now, not while a bus waits
 
     def read(self, angles_rad: Floats, fresh: NDArray[np.bool_] | None = None) -> Floats:
-        """Parameters (P,) that show ``angles_rad`` : (n,) best.
-
-        Parameters
-        ----------
-        fresh : (n,) bool, the angles that were really read; others do not count. All without.
-        """
+        """Parameters (P,) that show ``angles_rad`` : (n,) best; angles that are not ``fresh`` : (n,) do not count."""
         counted = self.readable & np.isfinite(angles_rad)
         if fresh is not None:
             counted &= fresh
         wanted = np.where(counted, self._mixes(angles_rad), 0.0)
         self._last = self._solver(counted).solve(wanted, start=self._last)
         return self._last.copy()
-
-    def difference_rad(self, values: Floats, angles_rad: Floats) -> Floats:
-        """(n,) measured minus wanted angle: what stands between the face ``values`` : (P,) and the head."""
-        return angles_rad - self._table.angles(values)[0]
 
     def _mixes(self, angles_rad: Floats) -> Floats:
         """(n,) mix values that give the angles, inside the calibrated points."""
@@ -70,7 +57,7 @@ class Mirror:
         return mixes
 
     def _solver(self, counted: NDArray[np.bool_]) -> BoundedSolver:
-        """The solver for one set of angles that count; sets repeat, so they are kept."""
+        """The solver for one set of angles that count; sets repeat, so solvers are cached."""
         key = counted.tobytes()
         if key not in self._solvers:
             if len(self._solvers) > 64:
@@ -88,10 +75,11 @@ class Mirror:
 
 def _points(table: ChannelTable) -> tuple[Floats, Floats]:
     """Calibrated points (n, k + 1) of mix and angle (rad); missing pieces repeat the last point."""
-    ends = np.where(table.widths > 0.0, table.knots + table.widths, -np.inf)
-    at = np.maximum.accumulate(np.concatenate([table.knots[:, :1], ends], axis=1), axis=1)
-    rise = np.cumsum(table.widths * table.slopes, axis=1)
-    return at, table.start_rad[:, None] + np.concatenate([np.zeros((len(at), 1)), rise], axis=1)
+    curves = table.curves
+    ends = np.where(curves.widths > 0.0, curves.knots + curves.widths, -np.inf)
+    at = np.maximum.accumulate(np.concatenate([curves.knots[:, :1], ends], axis=1), axis=1)
+    rise = np.cumsum(curves.widths * curves.slopes, axis=1)
+    return at, curves.start[:, None] + np.concatenate([np.zeros((len(at), 1)), rise], axis=1)
 
 
 def _is_monotonic(steps: Floats) -> bool:

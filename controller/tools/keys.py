@@ -1,79 +1,59 @@
-"""Single keys from a terminal, without waiting for any."""
+"""Reads single key presses from a terminal, without waiting for a line."""
 
 from __future__ import annotations
 
 import os
+import re
 import select
 import sys
 import time
-from types import TracebackType
-from typing import Any, Self
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 
 from controller.base.errors import ControllerError
 
-ESCAPES = {"[A": "up", "[B": "down", "[C": "right", "[D": "left", "OA": "up", "OB": "down", "OC": "right", "OD": "left"}
+ARROWS = {"[A": "up", "[B": "down", "[C": "right", "[D": "left", "OA": "up", "OB": "down", "OC": "right", "OD": "left"}
 
 
-class Keyboard:
-    """The keyboard of a terminal as a context manager; the terminal is left as it was found.
+@contextmanager
+def keyboard(descriptor: int | None = None) -> Iterator[Callable[[float], list[str]]]:
+    """A function that returns the keys pressed within a time (s): characters, ``up``, ``down``, ``left``, ``right``.
 
-    Parameters
-    ----------
-    descriptor : of the terminal; None takes standard input.
-
-    Raises
-    ------
-    ControllerError : on entering, where it is no terminal.
+    ``descriptor`` : of a terminal, standard input without; its settings are restored at the end. Raises ControllerError
+    where it is no terminal.
     """
+    fd = sys.stdin.fileno() if descriptor is None else descriptor
+    if not os.isatty(fd):
+        raise ControllerError("keys can only be read from a terminal", hint="start omote in a terminal window")
+    if sys.platform == "win32":
+        yield _windows_keys
+        return
+    import termios  # not on Windows
+    import tty  # not on Windows
 
-    def __init__(self, descriptor: int | None = None) -> None:
-        self._fd = sys.stdin.fileno() if descriptor is None else descriptor
-        self._before: list[Any] | None = None
-
-    def __enter__(self) -> Self:
-        if not os.isatty(self._fd):
-            raise ControllerError("keys can only be read from a terminal", hint="start omote in a terminal window")
-        if sys.platform != "win32":
-            import termios  # not on Windows
-            import tty  # not on Windows
-
-            self._before = termios.tcgetattr(self._fd)
-            tty.setcbreak(self._fd)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._before is not None:
-            import termios  # not on Windows
-
-            termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
-
-    def keys(self, wait_s: float) -> list[str]:
-        """Keys pressed until ``wait_s`` from now: characters, and ``up``, ``down``, ``left``, ``right``."""
-        if sys.platform == "win32":
-            return _windows_keys(wait_s)
-        end, data = time.monotonic() + wait_s, b""
-        while select.select([self._fd], [], [], max(0.0, end - time.monotonic()))[0]:
-            piece = os.read(self._fd, 64)
-            if not piece:
-                break
-            data += piece
-        return split(data.decode("utf-8", "ignore"))
+    before = termios.tcgetattr(fd)
+    tty.setcbreak(fd)
+    try:
+        yield partial(_terminal_keys, fd)
+    finally:
+        termios.tcsetattr(fd, termios.TCSADRAIN, before)
 
 
-def split(text: str) -> list[str]:
-    """What a terminal sent, key by key; sequences of keys that have no name here are left out."""
-    keys = []
-    while text:
-        if text[0] != "\x1b":
-            keys.append(text[0])
-            text = text[1:]
-            continue
-        name = ESCAPES.get(text[1:3])
-        keys += [name] if name else []
-        text = text[3:]
-    return keys
+def _terminal_keys(fd: int, wait_s: float) -> list[str]:
+    end, data = time.monotonic() + wait_s, b""
+    while select.select([fd], [], [], max(0.0, end - time.monotonic()))[0]:
+        piece = os.read(fd, 64)
+        if not piece:
+            break
+        data += piece
+    return split_keys(data.decode("utf-8", "ignore"))
+
+
+def split_keys(text: str) -> list[str]:
+    """The input of a terminal, key by key; escape sequences of other keys are left out."""
+    keys = [ARROWS.get(key[1:], "") if key[0] == "\x1b" else key for key in re.findall("\x1b.{0,2}|.", text, re.DOTALL)]
+    return [key for key in keys if key]
 
 
 def _windows_keys(wait_s: float) -> list[str]:  # pragma: no cover

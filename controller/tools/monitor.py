@@ -1,4 +1,4 @@
-"""Looking at a bus that works: who is on it, how they are, and what passes. Nothing is switched on or moved."""
+"""Monitors a working bus: its servos, their states and the packets that pass. Nothing is switched on or moved."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from controller.tools.monitor_view import Watch
-from controller.tools.scan import Found, scan_port
+from controller.tools.monitor_view import BusView
+from controller.tools.scan import scan_port
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
-from drivers.core.traffic import Decoder, Decoder1, Decoder2, Heard
+from drivers.core.traffic import Decoder, Decoder1, Decoder2
 from drivers.port.serialport import SerialPort, tapped
 from drivers.tables.tables import ControlTable, load_table
 
@@ -27,9 +27,7 @@ WAIT_S = 0.1
 def decoder_of(protocol: int, found: Sequence[ServoInfo] = (), model: str = "") -> Decoder:
     """A decoder that knows the registers of the servos found, and takes all others for ``model``.
 
-    Raises
-    ------
-    DriverError : there is no such model.
+    Raises DriverError when there is no such model.
     """
     default = load_table(model) if model else None
     tables: dict[int, ControlTable] = {}
@@ -41,58 +39,54 @@ def decoder_of(protocol: int, found: Sequence[ServoInfo] = (), model: str = "") 
     return Decoder1(tables, default) if protocol == 1 else Decoder2(tables, default)
 
 
-def listen(port: str, baud: int, protocol: int, console: Console, going: Callable[[], bool], model: str = "") -> None:
-    """Show what passes on a wire without a byte of our own: an adapter that only hears it is enough.
+def listen_to_bus(
+    port: str, baud: int, protocol: int, console: Console, keep_going: Callable[[], bool], model: str = ""
+) -> None:
+    """Show the traffic of a bus without sending a byte: an adapter that only receives is enough.
 
-    Parameters
-    ----------
-    model : of servos that do not tell theirs while it listens, so that registers have names; may be empty.
-
-    Raises
-    ------
-    PortError
-    DriverError : there is no such model.
+    ``model`` : of servos whose model is not seen in the traffic, for the names of registers; may be empty.
+    Raises PortError, or DriverError when there is no such model.
     """
     decoder = decoder_of(protocol, model=model)
-    watch = Watch(f"listening on {port} at {baud} baud", lambda: _heard_rows(decoder), decoder, console)
+    view = BusView(f"listening on {port} at {baud} baud", lambda: _heard_rows(decoder), decoder, console)
     link = SerialPort(port, baud)
     link.open()
-    link.tap = lambda sent, data: watch.tap(None, data)
+    link.tap = lambda sent, data: view.tap(None, data)
     try:
-        watch.run(going, lambda: _take(link))
+        view.run(keep_going, lambda: _read_for_a_moment(link))
     finally:
         link.close()
 
 
-def ask(port: str, baud: int, protocol: int, console: Console, going: Callable[[], bool], rate_hz: float) -> None:
-    """Find the servos on a port, then ask them for their state in turn and show it with all that passes.
+def _read_for_a_moment(link: SerialPort) -> None:
+    link.read(time.monotonic() + WAIT_S)
 
-    Raises
-    ------
-    PortError
-    NoReply : nobody is there.
+
+def poll_servos(
+    port: str, baud: int, protocol: int, console: Console, keep_going: Callable[[], bool], rate_hz: float
+) -> None:
+    """Find the servos on a port, then read their states at a rate and show them with all traffic.
+
+    Raises PortError, or NoReply when no servo answers.
     """
-    found = [item.servo for item in scan_port(port, [(protocol, baud)]) if isinstance(item, Found) and item.servo]
-    known = [info for info in found if _drivable(info)]
+    found = [item.servo for item in scan_port(port, [(protocol, baud)]) if item.servo]
+    known = [info for info in found if _is_known(info)]
     if not known:
         which = f": {', '.join(info.model for info in found)} cannot be asked" if found else ""
         raise NoReply(f"no servo to ask on {port} at {baud} baud{which}", hint=f"omote scan {port}", port=port)
     decoder = decoder_of(protocol, known)
-    watch = Watch(f"{port} at {baud} baud", lambda: (), decoder, console)
+    view = BusView(f"{port} at {baud} baud", lambda: (), decoder, console)
     kind = "feetech" if known[0].model.startswith(FEETECH) else "dynamixel"
-    with tapped(watch.tap):
-        bus = open_bus(kind, [_spec(info) for info in known], port=port, baud=baud)
+    specs = [ServoSpec(info.id, f"servo {info.id}", info.model, -math.pi, math.pi, 1.0, 1.0) for info in known]
+    with tapped(view.tap):
+        bus = open_bus(kind, specs, port=port, baud=baud)
     with bus:
         reader = _Reader(bus, 1.0 / rate_hz)
-        watch.rows = reader.rows
-        watch.run(going, reader.step)
+        view.rows = reader.rows
+        view.run(keep_going, reader.step)
 
 
-def _take(link: SerialPort) -> None:
-    link.read(time.monotonic() + WAIT_S)
-
-
-def _drivable(info: ServoInfo) -> bool:
+def _is_known(info: ServoInfo) -> bool:
     try:
         load_table(info.model_number, info.firmware)
     except DriverError:
@@ -100,13 +94,8 @@ def _drivable(info: ServoInfo) -> bool:
     return True
 
 
-def _spec(info: ServoInfo) -> ServoSpec:
-    """Enough of a servo to read it; nothing is ever written to it."""
-    return ServoSpec(info.id, f"servo {info.id}", info.model, -math.pi, math.pi, 1.0, 1.0)
-
-
 class _Reader:
-    """Reads a bus at a steady rate and keeps the newest state."""
+    """Reads a bus at a fixed rate and keeps the newest state."""
 
     def __init__(self, bus: Bus, period_s: float) -> None:
         self._bus, self._period_s = bus, period_s
@@ -114,7 +103,7 @@ class _Reader:
         self._next_s = time.monotonic()
 
     def step(self) -> None:
-        """One read, when it is due; a port that went away is tried again."""
+        """Wait until a read is due, and read; a lost port is tried again."""
         time.sleep(max(0.0, self._next_s - time.monotonic()))
         self._next_s = max(self._next_s + self._period_s, time.monotonic())
         try:
@@ -138,7 +127,7 @@ class _Reader:
                 "model": servo.model,
                 "position deg": float(degrees[i]),
                 "speed deg/s": float(np.degrees(state.velocity_rad_s[i])),
-                "current A": _rounded(state.current_a[i], 3),
+                "current A": "" if math.isnan(state.current_a[i]) else f"{state.current_a[i]:.3f}",
                 "supply V": float(state.voltage_v[i]),
                 "temp. C": float(state.temperature_c[i]),
                 "torque": bool(state.torque[i]),
@@ -146,10 +135,6 @@ class _Reader:
             }
             for i, servo in enumerate(self._bus.servos)
         ]
-
-
-def _rounded(value: float, digits: int) -> str:
-    return "" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 def _state(state: BusState, i: int) -> str:
@@ -161,9 +146,9 @@ def _state(state: BusState, i: int) -> str:
 
 
 def _heard_rows(decoder: Decoder) -> list[dict[str, Any]]:
-    return [_heard_row(servo, heard) for servo, heard in sorted(decoder.heard.items())]
-
-
-def _heard_row(servo: int, heard: Heard) -> dict[str, Any]:
-    row: dict[str, Any] = {"id": servo, "answers": heard.packets, "error": heard.error}
-    return row | {name: heard.values[name] for name in SHOWN if name in heard.values}
+    """One row a servo whose answers were heard."""
+    return [
+        {"id": servo, "answers": heard.packets, "error": heard.error}
+        | {name: heard.values[name] for name in SHOWN if name in heard.values}
+        for servo, heard in sorted(decoder.heard.items())
+    ]

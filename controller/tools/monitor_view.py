@@ -1,4 +1,4 @@
-"""A live view of a bus: a table of its servos and the last packets, decoded; plain lines where nobody looks."""
+"""A live view of a bus: a table of its servos and the last packets, decoded; plain lines without a terminal."""
 
 from __future__ import annotations
 
@@ -19,21 +19,18 @@ Rows = Callable[[], Iterable[Mapping[str, Any]]]
 
 REFRESH_S = 0.1
 KEPT = 4096
-"""Pieces of traffic kept between two refreshes; a busy bus leaves older ones out, and the view says how many."""
+"""Pieces of traffic kept between two refreshes; older ones of a busy bus are dropped, and the view shows how many."""
 
 
-class Watch:
-    """Shows what passes on a bus and how its servos are.
+class BusView:
+    """Shows the traffic of a bus and the state of its servos.
 
-    ``tap`` may be called from any thread and only notes the bytes; decoding and drawing happen in :meth:`run`.
+    ``tap`` may be called from any thread and only stores the bytes; decoding and drawing happen in :meth:`run`.
 
     Parameters
     ----------
-    title : what is watched.
-    rows : gives one mapping a servo, the columns by name.
-    decoder : of the bus's protocol.
-    console : where to; lines are printed as they come where it is no terminal.
-    lines : how many lines of traffic the view holds.
+    title : of the view. rows : returns one mapping for each servo, values by column. decoder : of the bus's protocol.
+    console : to print to; where it is no terminal, lines are printed as they come. lines : lines of traffic shown.
     """
 
     def __init__(self, title: str, rows: Rows, decoder: Decoder, console: Console, lines: int = 16) -> None:
@@ -44,7 +41,7 @@ class Watch:
         self._taken = self._passed = 0
 
     def tap(self, sent: bool | None, data: bytes) -> None:
-        """Note bytes that passed."""
+        """Store bytes that passed; ``sent`` None where the direction is not known."""
         self._passed += 1
         self._pieces.append((time.monotonic(), sent, bytes(data)))
 
@@ -57,18 +54,18 @@ class Watch:
             new += [f"{time_s - self._begun_s:9.3f}  {line}" for line in self._decoder.feed(sent, data)]
         return new
 
-    def run(self, going: Callable[[], bool], step: Callable[[], None] = lambda: time.sleep(REFRESH_S)) -> None:
-        """Show until ``going`` says no; ``step`` is called again and again, and takes a moment each time."""
+    def run(self, keep_going: Callable[[], bool], step: Callable[[], None] = lambda: time.sleep(REFRESH_S)) -> None:
+        """Show until ``keep_going()`` is false; calls ``step`` in a loop, which waits a moment each time."""
         if self._console.is_terminal:
             with Live(self._picture(), console=self._console, auto_refresh=False, screen=True) as live:
-                self._loop(going, step, lambda: live.update(self._picture(), refresh=True))
+                self._loop(keep_going, step, lambda: live.update(self._picture(), refresh=True))
         else:
-            self._loop(going, step, self._print)
+            self._loop(keep_going, step, self._print)
             self._print()
 
-    def _loop(self, going: Callable[[], bool], step: Callable[[], None], show: Callable[[], None]) -> None:
+    def _loop(self, keep_going: Callable[[], bool], step: Callable[[], None], show: Callable[[], None]) -> None:
         next_s = 0.0
-        while going():
+        while keep_going():
             step()
             if time.monotonic() >= next_s:
                 show()
@@ -87,16 +84,16 @@ class Watch:
 
 
 def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
-    """Mappings as a table; what is not known stays empty."""
+    """Mappings as a table; unknown values stay empty."""
     listed = list(rows)
     names = list(dict.fromkeys(name for row in listed for name in row))
     table = Table(*names)
     for row in listed:
-        table.add_row(*(_word(row.get(name)) for name in names))
+        table.add_row(*(_cell(row.get(name)) for name in names))
     return table
 
 
-def _word(value: Any) -> str:
+def _cell(value: Any) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     if isinstance(value, bool):

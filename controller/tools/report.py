@@ -1,4 +1,4 @@
-"""A run's report as rows a person can read."""
+"""Formats a run's report as rows of a table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def rows(report: dict[str, Any]) -> list[tuple[str, str]]:
-    """Name and value of everything worth showing of a run's report."""
+    """Name and value of the most important entries of a run's report."""
     face = report.get("face")
     return [*(_face(face) if face else []), *_control(report), *_buses(report.get("buses", []))]
 
@@ -57,12 +57,9 @@ def _buses(buses: list[dict[str, Any]]) -> list[tuple[str, str]]:
             found.append((f"{name}: measured face is away from the wanted one by", text))
             by_region = "  ".join(f"{region} {rms:.1f}" for region, rms in away.get("regions_rms_deg", {}).items())
             found.append((f"{name}: by region (rms deg)", by_region))
-        found += [(f"{name}: rule", _rule(rule)) for rule in bus.get("rules", [])]
+        for rule in bus.get("rules", []):
+            found.append((f"{name}: rule", f"{rule['rule']}: {rule['times']} times, {rule['seconds']:.1f} s"))
     return found
-
-
-def _rule(rule: dict[str, Any]) -> str:
-    return f"{rule['rule']}: {rule['times']} times, {rule['seconds']:.1f} s"
 
 
 def _loop(loop: dict[str, Any]) -> str:

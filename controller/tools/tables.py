@@ -1,4 +1,4 @@
-"""Tables that lose nothing, however narrow the terminal is: no word of a cell is cut or left out."""
+"""Prints tables at any width of a terminal without cutting or leaving out a word."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _ANY_WIDTH = 100_000
 
 
 def show_table(table: Table, console: Console) -> None:
-    """Print a table: as wide as it likes into a file or a pipe, with cells broken between words on a terminal.
+    """Print a table: in its natural width into a file or a pipe, with cells broken between words on a terminal.
 
-    Where not even their longest words stand side by side, every row is a paragraph instead.
+    Where even the longest words of a row do not fit side by side, every row is a paragraph instead.
     """
     rows = _texts(table, console)
     natural = Measurement.get(console, console.options.update(width=_ANY_WIDTH), table).maximum
-    # a terminal has a width, and who sets COLUMNS wants one
+    # a terminal has a width, and COLUMNS asks for one
     most = console.width if console.is_terminal or os.environ.get("COLUMNS") else natural
     if natural <= most:
         table.width = natural
@@ -45,7 +45,7 @@ def _narrowed(table: Table, columns: list[list[Text]], spare: int) -> bool:
     if left < 0:
         return False
     order = sorted(range(len(wide)), key=lambda i: wide[i] - least[i])
-    for done, i in enumerate(order):  # who needs little gets all of it, the others share alike
+    for done, i in enumerate(order):  # those that need little get all of it, the others share equally
         more = min(wide[i] - least[i], left // (len(order) - done))
         table.columns[i].width = least[i] + more
         left -= more
@@ -53,7 +53,7 @@ def _narrowed(table: Table, columns: list[list[Text]], spare: int) -> bool:
 
 
 def _print_paragraphs(table: Table, columns: list[list[Text]], console: Console) -> None:
-    """Every row as its first cell and, a little further in, the others with the names of their columns."""
+    """Every row as its first cell and, indented, the others with the names of their columns."""
     if table.title:
         console.print(table.title, style="italic", soft_wrap=True)
     names = [own[0].plain for own in columns]

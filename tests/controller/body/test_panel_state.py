@@ -11,7 +11,7 @@ from controller.base.paths import find_config
 from controller.body.panel_state import PanelState, PanelStateWriter, panel_state_size
 from controller.layers.commands import CommandState
 from controller.robot.channels import build_table
-from controller.robot.following import Following, MeasuredFace, regions_of
+from controller.robot.following import FollowingStatistics, MeasuredFace, regions_of
 from controller.robot.robot import load_robot
 from drivers.base.bus import BusState
 
@@ -29,11 +29,11 @@ def standing(position: np.ndarray) -> BusState:
 def test_holders_measured_values_and_differences_reach_the_other_side() -> None:
     state, out = CommandState(P), P.neutral()
     table = build_table(load_robot(find_config("robots", "head24"), P).channels, P)
-    following = Following(table.names, regions_of(table, P))
+    following = FollowingStatistics(table.names, regions_of(table, P))
     wanted = table.angles(P.neutral())[0]
     there = wanted + np.radians(np.where(np.array(table.names) == "jawOpen", 14.0, 0.0))
     reflection = MeasuredFace([table], [lambda: standing(there)], P, [following])
-    following.note(wanted, standing(there))
+    following.add(wanted, standing(there))
     with Mailbox.create(panel_state_size(P)) as mailbox:
         insight = PanelState(mailbox, state.layer_names(), P)
         insight.refresh()

@@ -11,7 +11,6 @@ from controller.base.errors import ControllerError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS
 from controller.face.face import FrameLog, HeadValues, Recorder
-from controller.face.pictures import write_pictures
 from controller.stage.stage import FaceSettings
 
 
@@ -50,7 +49,7 @@ def test_a_folder_for_pictures_that_cannot_be_made_is_told(tmp_path: Path) -> No
     recorder.keep(np.zeros((4, 4, 3), dtype=np.uint8), 0.0)
     (tmp_path / "file").touch()
     with pytest.raises(ControllerError, match=r"file: cannot be made: File exists") as told:
-        write_pictures(recorder, tmp_path / "file")
+        recorder.write(tmp_path / "file")
     assert told.value.hint
 
 

@@ -55,7 +55,7 @@ def test_a_pixel_and_a_place_are_each_others_inverse() -> None:
 def test_a_corner_of_the_mouth_dragged_up_smiles_on_its_side(handles: PointEditor, camera: Camera) -> None:
     screen, values = Screen(camera, SIZE), P.neutral()
     x, y = pixel(screen, CORNER)
-    assert handles.take((x, y), screen, values) and handles.holding
+    assert handles.take((x, y), screen, values) and handles.dragging
     assert handles.drag((x, y), screen, values) == {}  # a click moves nothing
     for step in range(1, 11):
         for index, value in handles.drag((x + step, y - 3 * step), screen, values).items():
@@ -87,7 +87,7 @@ def test_the_point_follows_the_mouse_on_a_turned_head_with_an_open_jaw(handles: 
 
 def test_beside_the_face_there_is_nothing_to_take(handles: PointEditor) -> None:
     screen = Screen(Camera.front(), SIZE)
-    assert not handles.take((5.0, 5.0), screen, P.neutral()) and not handles.holding
+    assert not handles.take((5.0, 5.0), screen, P.neutral()) and not handles.dragging
 
 
 def test_control_points_go_with_the_mouse_and_are_worn_by_a_stage(
@@ -96,8 +96,8 @@ def test_control_points_go_with_the_mouse_and_are_worn_by_a_stage(
     screen, part = Screen(Camera.front(), SIZE), head.part("face")
     rest, values = part.rig.rest.copy(), P.neutral()
     at = pixel(screen, BROW)
-    assert handles.take(at, screen, values, reshape=True)
-    assert handles.drag((at[0], at[1] - 12), screen, values) == {} and handles.reshaped
+    assert handles.take(at, screen, values, sculpt=True)
+    assert handles.drag((at[0], at[1] - 12), screen, values) == {} and handles.sculpted
     handles.release()
     moved = part.rig.rest - rest
     assert moved[:, 1].max() > 3.0 and np.linalg.norm(moved, axis=1)[rest[:, 1] < -40].max() < 1.0

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.base.parameters import PARAMETERS
-from controller.robot.channels import ChannelTable, build_table, limiter_of, servo_specs
+from controller.robot.channels import ChannelTable, build_table, servo_specs
 from controller.robot.settings import Calibration, ChannelSettings
 
 
@@ -68,7 +68,7 @@ def test_equals_interpolation_between_the_points(mixed: float, at: list[float]) 
 def test_motion_keeps_speed_and_acceleration_for_hostile_targets() -> None:
     table = build_table([channel()], PARAMETERS)
     period = 0.02
-    limiter = limiter_of(table, period)
+    limiter = table.limiter(period)
     rng = np.random.default_rng(1)
     before = out = np.zeros(1)
     speed = 0.0

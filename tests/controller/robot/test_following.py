@@ -13,10 +13,11 @@ from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.body.body import Body
+from controller.body.messages import RunOptions
 from controller.layers.commands import CommandState
 from controller.links.line.session import LineSession
 from controller.robot.channels import build_table
-from controller.robot.following import Following, FollowMode, MeasuredFace, regions_of
+from controller.robot.following import FollowingStatistics, MeasuredFace, regions_of
 from controller.robot.robot import load_robot
 from controller.stage.stage import load_stage
 from controller.tools.stage_run import StageRun
@@ -34,11 +35,11 @@ def measured(position: np.ndarray, fresh: np.ndarray) -> BusState:
 
 
 def test_the_difference_counts_only_what_was_measured() -> None:
-    following = Following(["a", "b", "c"])
+    following = FollowingStatistics(["a", "b", "c"])
     assert following.report() == {}
     away = measured(np.radians([3.0, 50.0, 0.0]), np.array([True, False, True]))
     for _ in range(4):
-        following.note(np.zeros(3), away)
+        following.add(np.zeros(3), away)
     report = following.report()
     assert report["rms_deg"] == pytest.approx(np.sqrt(4.5))
     assert report["worst"][0] == {"channel": "a", "rms_deg": pytest.approx(3.0), "max_deg": pytest.approx(3.0)}
@@ -50,9 +51,9 @@ def test_a_puppet_writes_what_its_channels_show_and_leaves_the_rest() -> None:
     face[P.index("jawOpen")] = 0.7
     state, out = CommandState(P), P.neutral()
     angles = table.angles(face)[0]
-    puppet = FollowMode(MeasuredFace([table], [lambda: measured(angles, np.ones(len(angles), bool))], P), P)
+    face_of_servos = MeasuredFace([table], [lambda: measured(angles, np.ones(len(angles), bool))], P)
     for i in range(100):
-        puppet.tick(state, i * 10_000_000)
+        face_of_servos.capture(state, i * 10_000_000)
         state.tick(i * 10_000_000, 0.01, out)
     assert out[P.index("jawOpen")] == pytest.approx(0.7, abs=0.15)
     assert state.holder(P.index("jawOpen")) == "capture"
@@ -64,7 +65,7 @@ def test_a_head_that_was_not_read_yet_moves_nothing() -> None:
     state, out = CommandState(P), P.neutral()
     silent = measured(np.full(24, np.nan), np.zeros(24, bool))
     for read in (lambda: None, lambda: silent):
-        FollowMode(MeasuredFace([table], [read], P), P).tick(state, 0)
+        MeasuredFace([table], [read], P).capture(state, 0)
         state.tick(10_000_000, 0.01, out)
         assert not out.any()
 
@@ -75,10 +76,10 @@ def test_a_driven_head_says_what_it_shows_and_how_far_each_region_is_away() -> N
     there = wanted.copy()
     there[table.names.index("jawOpen")] += np.radians(8.0)
     state = measured(there, np.ones(24, bool))
-    following = Following(table.names, regions_of(table, P))
+    following = FollowingStatistics(table.names, regions_of(table, P))
     reflection = MeasuredFace([table], [lambda: state], P, [following])
     assert reflection.status() == {"away_deg": "unknown"}
-    following.note(wanted, state)
+    following.add(wanted, state)
     away = reflection.differences()
     assert away["jaw"] == pytest.approx(8.0 / np.sqrt(2)) and away["brows"] == 0.0  # two servos move the jaw
     assert {"brows", "lids", "eyes", "jaw", "mouth", "head"} <= set(away)
@@ -98,7 +99,7 @@ def test_a_limp_head_moved_by_hand_moves_the_face(tmp_path: Path, root: Path) ->
         (tmp_path / "stage.toml").write_text('name = "puppet"\nrobots = ["robot.toml"]\n')
         stage = load_stage(str(tmp_path / "stage.toml"), P)
         with Mailbox.create(len(P.names)) as mailbox:
-            body = Body(stage, P, mailbox, mirror=True)
+            body = Body(stage, P, mailbox, RunOptions(mirror=True))
             body.start()
             body.begin()
             try:
@@ -121,4 +122,4 @@ def test_a_limp_head_moved_by_hand_moves_the_face(tmp_path: Path, root: Path) ->
 
 def test_a_stage_without_a_robot_has_nothing_to_mirror() -> None:
     with pytest.raises(ConfigError, match="nothing to mirror"):
-        StageRun.load("serial", mirror=True)
+        StageRun.load("serial", RunOptions(mirror=True))

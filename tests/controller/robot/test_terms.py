@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.base.errors import ConfigError
@@ -14,7 +14,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.mirror import Mirror
 from controller.robot.robot import load_robot
-from controller.robot.terms import bend
+from controller.robot.terms import curve_corners
 
 ROBOT = """
 name = "r"
@@ -71,10 +71,11 @@ def test_the_mirror_reads_a_channel_of_terms(tmp_path: Path) -> None:
     assert Mirror(table, P).read(table.angles(face)[0])[P.index("jawOpen")] == pytest.approx(0.6, abs=0.01)
 
 
+@settings(deadline=None)  # the first call imports scipy
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=6), st.integers(0, 2**32 - 1))
 def test_a_smooth_curve_meets_its_points_and_overshoots_nowhere(gives: list[float], seed: int) -> None:
     at = np.cumsum(np.random.default_rng(seed).uniform(0.1, 1.0, len(gives)))
-    corners, values = bend(at, np.array(gives), "smooth")
+    corners, values = curve_corners(at, np.array(gives), "smooth")
     assert np.interp(at, corners, values) == pytest.approx(gives)
     for i in range(len(at) - 1):
         inside = values[(corners >= at[i]) & (corners <= at[i + 1])]
@@ -85,7 +86,9 @@ def test_a_smooth_curve_meets_its_points_and_overshoots_nowhere(gives: list[floa
 def test_a_smooth_curve_is_smoother_than_a_straight_one() -> None:
     at = np.linspace(0, np.pi / 2, 5)
     x = np.linspace(0, np.pi / 2, 200)
-    worst = {c: np.abs(np.interp(x, *bend(at, np.sin(at), c)) - np.sin(x)).max() for c in ("straight", "smooth")}
+    worst = {
+        c: np.abs(np.interp(x, *curve_corners(at, np.sin(at), c)) - np.sin(x)).max() for c in ("straight", "smooth")
+    }
     assert worst["smooth"] < 0.5 * worst["straight"]
 
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import sys
 from pathlib import Path
+from types import ModuleType
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
 from controller.cli.app import make_app
+from controller.layers.commands import CommandState
 from controller.robot.robot import load_robot
-from controller.stage.dry_run import dry_run, plan_rows
+from controller.stage.dry_run import OfflineRun, dry_run
 from controller.stage.stage import load_stage
-from controller.tools.stage_run import StageRun
 
 
 def stage_file(tmp_path: Path, text: str = "") -> Path:
@@ -24,7 +29,9 @@ def stage_file(tmp_path: Path, text: str = "") -> Path:
 
 def test_every_channel_has_a_row_with_its_mix(root: Path) -> None:
     robot = load_robot(root / "configs/robots/head24.toml", PARAMETERS)
-    rows = {row["channel"]: row for row in plan_rows(robot, PARAMETERS)}
+    offline = OfflineRun(robot, CommandState(PARAMETERS), lambda now_ns: None)
+    offline.run(0.0)
+    rows = {row["channel"]: row for row in offline.rows()}
     assert list(rows) == [channel.name for channel in robot.channels]
     assert rows["jawOpen"]["servo"] == "head id 4, xl330-m288"
     assert rows["jawOpen"]["mix"] == "1 jawOpen -0.4 mouthClose"
@@ -70,7 +77,7 @@ def test_the_command_opens_no_port_and_writes_every_angle(tmp_path: Path) -> Non
 
 
 def test_a_stage_without_a_robot_sends_nothing() -> None:
-    assert StageRun.load("serial").plan() == ([], [])
+    assert dry_run(load_stage("serial", PARAMETERS), None, None, PARAMETERS) == ([], [])
 
 
 def test_the_show_of_a_stage_lies_beside_it_and_is_played(tmp_path: Path) -> None:
@@ -79,3 +86,52 @@ def test_the_show_of_a_stage_lies_beside_it_and_is_played(tmp_path: Path) -> Non
     sent = dict(zip(report[0]["channels"], zip(*report[0]["sent_deg"], strict=True), strict=True))
     assert sent["neckYaw"][-1] == pytest.approx(30.0, abs=0.1)
     assert max(sent["lipCornerUpLeft"]) < 0.1
+
+
+@pytest.fixture(scope="module")
+def ticks(root: Path) -> ModuleType:
+    """benchmarks/control_tick.py: the chain with 8 layers and what attacks it; a million ticks with --soak."""
+    spec = importlib.util.spec_from_file_location("control_tick", root / "benchmarks/control_tick.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["control_tick"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_no_hostile_layer_breaks_a_limit_at_the_bus(ticks: ModuleType) -> None:
+    chain = ticks.Chain(0)
+    counts = ticks.faults(chain, range(3800))
+    assert counts == dict.fromkeys(("not a number", "position", "speed", "acceleration", "jerk"), 0)
+    assert len(chain.goals.guard.report()) >= 3  # rules came to act
+    assert np.ptp(chain.sent) > 0.0
+
+
+def test_the_check_of_limits_finds_broken_ones(ticks: ModuleType) -> None:
+    chain = ticks.Chain(0)
+    chain.table.max_speed_rad_s[:] /= 4
+    chain.table.max_accel_rad_s2[:] /= 4
+    counts = ticks.faults(chain, range(2000, 2600))
+    assert counts["acceleration"] > 0 and counts["speed"] > 0
+
+
+def test_eight_layers_are_active_and_memory_does_not_grow(ticks: ModuleType) -> None:
+    chain = ticks.Chain(1)
+    assert ticks.growth(chain, 400) < 4096
+    assert len(chain.state.mixer.active) == 8
+
+
+def test_a_command_reaches_the_bus_with_the_next_tick(ticks: ModuleType) -> None:
+    assert ticks.ticks_to_output(ticks.Chain(2)) == 1
+
+
+def test_each_bus_has_its_own_pace() -> None:
+    robot = load_robot(find_config("robots", "head24"), PARAMETERS)
+    state = CommandState(PARAMETERS)
+    jaw = PARAMETERS.index("jawOpen")
+    offline = OfflineRun(robot, state, lambda now_ns: state.set_parameters([jaw], [0.5], now_ns))
+    offline.run(1.0)
+    sent = offline.sent_rad["head"]
+    assert sent.shape == (51, 24)
+    assert np.degrees(sent[-1, 3]) == pytest.approx(14.0, abs=0.05)
+    assert next(iter(offline.rows()))["held by"] == "nothing"

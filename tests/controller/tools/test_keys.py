@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from controller.base.errors import ControllerError
-from controller.tools.keys import Keyboard, split
+from controller.tools.keys import keyboard, split_keys
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 
@@ -18,22 +18,22 @@ def test_keys_arrive_one_by_one_and_the_terminal_is_left_as_it_was() -> None:
 
     master, slave = os.openpty()
     before = termios.tcgetattr(slave)
-    with Keyboard(slave) as keyboard:
-        assert keyboard.keys(0.0) == []
+    with keyboard(slave) as read_keys:
+        assert read_keys(0.0) == []
         os.write(master, b"n\x1b[A\x1b[D[q")
-        assert keyboard.keys(0.2) == ["n", "up", "left", "[", "q"]
+        assert read_keys(0.2) == ["n", "up", "left", "[", "q"]
     assert termios.tcgetattr(slave) == before
     os.close(master)
     os.close(slave)
 
 
 def test_unknown_sequences_are_left_out() -> None:
-    assert split("\x1b[Ha") == ["a"]
+    assert split_keys("\x1b[Ha") == ["a"]
 
 
 def test_something_that_is_no_terminal_is_refused() -> None:
     reading, writing = os.pipe()
     with pytest.raises(ControllerError, match="terminal"):
-        Keyboard(reading).__enter__()
+        keyboard(reading).__enter__()
     os.close(reading)
     os.close(writing)

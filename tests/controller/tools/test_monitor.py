@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 from rich.console import Console
 
-from controller.tools.monitor import ask, listen
+from controller.tools.monitor import listen_to_bus, poll_servos
 from drivers.base.errors import NoReply, PortMissing
 from drivers.packets.packet import encode_instruction, encode_status
 from drivers.sim import SimulatedBus
@@ -30,7 +30,7 @@ def times(count: int) -> Callable[[], bool]:
 def test_servos_are_asked_and_left_alone(model: str, protocol: int, read: str) -> None:
     out = io.StringIO()
     with SimulatedBus([1, 4], model=model) as bus:
-        ask(bus.path, 1_000_000, protocol, Console(file=out, width=200), times(8), 100.0)
+        poll_servos(bus.path, 1_000_000, protocol, Console(file=out, width=200), times(8), 100.0)
         assert all(not bus.servo(i).torque and bus.servo(i).eeprom_writes == {} for i in (1, 4))
     text = out.getvalue()
     assert f"{read} = 2048" in text
@@ -42,13 +42,13 @@ def test_a_terminal_shows_one_row_a_servo() -> None:
     out = io.StringIO()
     with SimulatedBus([1, 4]) as bus:
         bus.servo(4).place(2048 + 1024)
-        ask(bus.path, 1_000_000, 2, Console(file=out, force_terminal=True, width=140), times(40), 100.0)
+        poll_servos(bus.path, 1_000_000, 2, Console(file=out, force_terminal=True, width=140), times(40), 100.0)
     assert "90.0" in out.getvalue()
 
 
 def test_nobody_there_is_told() -> None:
     with SimulatedBus([1], baud=57_600) as bus, pytest.raises(NoReply, match="1000000 baud") as caught:
-        ask(bus.path, 1_000_000, 2, Console(file=io.StringIO()), times(1), 10.0)
+        poll_servos(bus.path, 1_000_000, 2, Console(file=io.StringIO()), times(1), 10.0)
     assert "omote scan" in caught.value.hint
 
 
@@ -67,7 +67,7 @@ def test_listening_says_nothing_and_tells_both_ends_apart(model: str, told: str)
         os.write(master, encode_status(3, 0, struct.pack("<i", 1234)))
         return steps()
 
-    listen(name, 1_000_000, 2, Console(file=out, width=120), going, model)
+    listen_to_bus(name, 1_000_000, 2, Console(file=out, width=120), going, model)
     with pytest.raises(BlockingIOError):
         os.read(master, 1)
     os.close(master)
@@ -78,4 +78,4 @@ def test_listening_says_nothing_and_tells_both_ends_apart(model: str, told: str)
 
 def test_a_missing_port_is_one_error() -> None:
     with pytest.raises(PortMissing):
-        listen("/dev/not-there", 1_000_000, 2, Console(file=io.StringIO()), times(1))
+        listen_to_bus("/dev/not-there", 1_000_000, 2, Console(file=io.StringIO()), times(1))

@@ -7,7 +7,7 @@ import struct
 
 from rich.console import Console
 
-from controller.tools.monitor_view import KEPT, Watch, table_of
+from controller.tools.monitor_view import KEPT, BusView, table_of
 from drivers.core.traffic import Decoder2
 from drivers.packets.packet import encode_instruction
 from drivers.tables.tables import load_table
@@ -15,13 +15,13 @@ from drivers.tables.tables import load_table
 WRITE = encode_instruction(3, 3, struct.pack("<HI", 116, 2048))
 
 
-def watch(console: Console | None = None, lines: int = 16) -> Watch:
+def watch(console: Console | None = None, lines: int = 16) -> BusView:
     decoder = Decoder2({3: load_table("xl330-m288")})
     rows = [{"id": 3, "position": 2047.0, "torque": True, "age": float("nan")}]
-    return Watch("simulated bus", lambda: rows, decoder, console or Console(file=io.StringIO()), lines)
+    return BusView("simulated bus", lambda: rows, decoder, console or Console(file=io.StringIO()), lines)
 
 
-def shown(view: Watch, width: int = 100) -> str:
+def shown(view: BusView, width: int = 100) -> str:
     """One refresh of a terminal."""
     screen = io.StringIO()
     asked = iter([True, False])
