@@ -11,7 +11,6 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 
@@ -20,20 +19,11 @@ from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.signals import endings, let_interrupts_through
-from controller.body.messages import (
-    Begin,
-    BodyOrders,
-    Failed,
-    Finished,
-    Hold,
-    Neutral,
-    Ready,
-    Report,
-    RunOptions,
-    Show,
-)
-from controller.body.panel_state import PanelStateWriter, panel_state_size
+from controller.body import messages
+from controller.body.messages import RunOptions
+from controller.body.panel_state import PanelState
 from controller.body.sources import Sources, Voice
+from controller.layers.mixer import by_priority
 from controller.links.kind import Around, Link
 from controller.links.line.host import load_script
 from controller.links.line.show import Shows
@@ -52,15 +42,14 @@ _POLL_S = 0.1
 
 
 class Body:
-    """Everything between the links and the servos of one stage.
-
-    Parameters
-    ----------
-    stage : what to run. parameters : all of them, p. mailbox : where they are published. options : how to run it.
-    """
+    """Everything between the links and the servos of one stage; publishes the parameters to ``mailbox``."""
 
     def __init__(
-        self, stage: Stage, parameters: Parameters, mailbox: Mailbox, options: RunOptions = RunOptions()
+        self,
+        stage: Stage,
+        parameters: Parameters,
+        mailbox: Mailbox,
+        options: RunOptions = RunOptions(),
     ) -> None:
         self.stage = stage
         self._closers = Closers()
@@ -199,7 +188,7 @@ class Body:
         }
 
 
-def body_main(orders: BodyOrders, pipe: Connection) -> None:
+def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
     """Run the body's process.
 
     Sends to main one :class:`Ready` or :class:`Failed`, perhaps :class:`Finished`, at the end a :class:`Report`.
@@ -214,27 +203,29 @@ def body_main(orders: BodyOrders, pipe: Connection) -> None:
         _serve(orders, pipe, stop)
     except OMOTE_ERRORS as error:
         with_earlier = with_those_before(error)
-        _send(pipe, Failed(str(with_earlier), getattr(with_earlier, "hint", "")))
+        _send(pipe, messages.Failed(str(with_earlier), getattr(with_earlier, "hint", "")))
     except Exception as error:
         if os.environ.get("OMOTE_DEBUG"):
             raise
-        _send(pipe, Failed(f"the body process failed: {type(error).__name__}: {error}"))
+        _send(pipe, messages.Failed(f"the body process failed: {type(error).__name__}: {error}"))
 
 
-def _serve(orders: BodyOrders, pipe: Connection, stop: threading.Event) -> None:
+def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     stage = load_stage(orders.stage, PARAMETERS)
     mailbox = _open_mailbox(orders.mailbox, len(PARAMETERS.names))
-    panel = None if orders.panel_mailbox is None else _open_mailbox(orders.panel_mailbox, panel_state_size(PARAMETERS))
+    panel_state = None
+    if orders.panel_mailbox is not None:
+        panel = _open_mailbox(orders.panel_mailbox, PanelState.size(PARAMETERS))
+        panel_state = PanelState(panel, [layer.name for layer in by_priority(stage.layers)], PARAMETERS)
     body = Body(stage, PARAMETERS, mailbox, orders.options)
     take_turns_quickly()  # before torque: what collects garbage later finds little to look at
     body.start()
     try:
-        _send(pipe, Ready())
-        writer = None if panel is None else PanelStateWriter(panel, body.state, body.measured_face)
-        _wait(body, pipe, stop, (lambda: None) if writer is None else writer.publish)
+        _send(pipe, messages.Ready())
+        _wait(body, pipe, stop, panel_state)
     finally:
         body.stop()
-    _send(pipe, Report(body.report()))
+    _send(pipe, messages.Report(body.report()))
 
 
 def _open_mailbox(path: str, count: int) -> Mailbox:
@@ -244,15 +235,16 @@ def _open_mailbox(path: str, count: int) -> Mailbox:
     return mailbox
 
 
-def _wait(body: Body, pipe: Connection, stop: threading.Event, publish: Callable[[], None]) -> None:
+def _wait(body: Body, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
     """Serve main until it asks to stop or is gone, a signal comes, or a bus gave up."""
     finished = False
     while not stop.is_set():
         if pipe.poll(_POLL_S) and not _handle(body, pipe):
             return
-        publish()
+        if panel_state is not None:
+            panel_state.publish(body.state, body.measured_face)
         if body.finished and not finished:
-            _send(pipe, Finished())
+            _send(pipe, messages.Finished())
             finished = True
         body.check()
 
@@ -265,17 +257,17 @@ def _handle(body: Body, pipe: Connection) -> bool:
         return False
     state, now = body.state, time.monotonic_ns()
     match request:
-        case Begin():
+        case messages.Begin():
             take_turns_quickly()
             take_priority()  # the links' threads too: one put off while it holds the interpreter puts off the servos
             body.begin()
-        case Hold(index, None):
+        case messages.Hold(index, None):
             state.release([index], now)
-        case Hold(index, float(value)):
+        case messages.Hold(index, float(value)):
             state.set_parameters([index], [value], now)
-        case Show(name, intensity):
+        case messages.Show(name, intensity):
             state.expression(name, intensity, None, now)
-        case Neutral(seconds):
+        case messages.Neutral(seconds):
             state.neutral(seconds, now)
         case _:
             return False

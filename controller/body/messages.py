@@ -14,9 +14,8 @@ class RunOptions:
 
     Attributes
     ----------
-    take : a take or recording to play instead of the links.
-    mirror : leave the servos limp; the face shows where somebody moves them.
-    voice : a voice that moves the mouth. record : file to write every command and tick to.
+    take : a take or recording to play instead of the links. voice : a voice that moves the mouth.
+    mirror : leave the servos limp; the face shows where somebody moves them. record : file for every command and tick.
     """
 
     take: Path | None = None
@@ -27,13 +26,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class BodyOrders:
-    """Main to body, first: what to run.
-
-    Attributes
-    ----------
-    stage : path of the stage's file. options : how to run it.
-    mailbox : path of the mailbox for the parameters. panel_mailbox : path of that for the panel's state, if any.
-    """
+    """Main to body, first: the stage's file, the files of the mailboxes for parameters and panel state, options."""
 
     stage: str
     mailbox: str

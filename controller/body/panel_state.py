@@ -15,39 +15,33 @@ from controller.robot.following import MeasuredFace
 from controller.takes.recording import Face
 
 
-def panel_state_size(parameters: Parameters) -> int:
-    """Length of the mailbox's vector: holders (P), measured (P), degrees by region."""
-    return 2 * len(parameters) + len(REGIONS)
-
-
-class PanelStateWriter:
-    """Writes the state in the body; the mailbox has :func:`panel_state_size` numbers."""
-
-    def __init__(self, mailbox: Mailbox, state: Face, measured_face: MeasuredFace | None) -> None:
-        self._mailbox, self._state, self._measured_face = mailbox, state, measured_face
-        p = len(state.parameters)
-        self._all = np.full(panel_state_size(state.parameters), np.nan)
-        self._holders, self._measured, self._away = self._all[:p], self._all[p : 2 * p], self._all[2 * p :]
-        self._mask = np.zeros(p, dtype=bool)
-
-    def publish(self) -> None:
-        """Write the state of this moment."""
-        layers = {name: i for i, name in enumerate(self._state.layer_names())}
-        self._holders[:] = [layers.get(self._state.holder(i) or "", -1) for i in range(len(self._holders))]
-        if self._measured_face is not None:
-            self._measured_face.read(self._measured, self._mask)
-            self._measured[~self._mask] = np.nan
-            away = self._measured_face.differences()
-            self._away[:] = [away.get(region, np.nan) for region in REGIONS]
-        self._mailbox.publish(self._all)
-
-
 class PanelState:
-    """Reads the state in main, where :meth:`refresh` is called once a frame; ``layers`` : their names, lowest first."""
+    """Reads and writes the state through a mailbox; main calls :meth:`refresh` once a frame.
+
+    ``layers`` : names of all layers, lowest first.
+    """
 
     def __init__(self, mailbox: Mailbox, layers: Sequence[str], parameters: Parameters) -> None:
         self._mailbox, self._layers, self._p = mailbox, tuple(layers), len(parameters)
-        self._all = np.full(panel_state_size(parameters), np.nan)
+        self._all = np.full(self.size(parameters), np.nan)
+        self._holders, self._measured, self._away = np.split(self._all, [self._p, 2 * self._p])
+
+    @staticmethod
+    def size(parameters: Parameters) -> int:
+        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region."""
+        return 2 * len(parameters) + len(REGIONS)
+
+    def publish(self, state: Face, measured_face: MeasuredFace | None) -> None:
+        """Write the state of this moment; ``measured_face`` None without servos."""
+        layers = {name: i for i, name in enumerate(self._layers)}
+        self._holders[:] = [layers.get(state.holder(i) or "", -1) for i in range(self._p)]
+        if measured_face is not None:
+            known = np.zeros(self._p, dtype=bool)
+            measured_face.read(self._measured, known)
+            self._measured[~known] = np.nan
+            away = measured_face.differences()
+            self._away[:] = [away.get(region, np.nan) for region in REGIONS]
+        self._mailbox.publish(self._all)
 
     def refresh(self) -> None:
         """Read what was written last; nothing is known before the first time."""
@@ -56,17 +50,14 @@ class PanelState:
 
     def holder(self, index: int) -> str:
         """The layer that holds a parameter; empty when none does or nothing is known."""
-        layer = self._all[index]
+        layer = self._holders[index]
         return self._layers[int(layer)] if layer >= 0 else ""
 
     def measured(self, index: int) -> float | None:
         """What the servos show of a parameter; None where that is not known."""
-        return self._known(self._p + index)
+        return float(self._measured[index]) if np.isfinite(self._measured[index]) else None
 
     def away_deg(self, region: str) -> float | None:
         """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""
-        return self._known(2 * self._p + REGIONS.index(region))
-
-    def _known(self, index: int) -> float | None:
-        value = self._all[index]
+        value = self._away[REGIONS.index(region)]
         return float(value) if np.isfinite(value) else None

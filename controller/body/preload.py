@@ -14,7 +14,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from controller.base.signals import interrupts_held
@@ -29,11 +28,7 @@ class PreloadedBody:
     """A process that waits for :class:`controller.body.messages.BodyOrders`.
 
     A context manager: the process ends with the block unless :meth:`send` has given it orders.
-
-    Attributes
-    ----------
-    pipe : to the process. process : the process.
-    voice : pipe for a voice from standard input, which a child process does not have.
+    ``pipe`` leads to it; ``voice`` carries a voice from standard input, which a child process does not have.
     """
 
     def __init__(self) -> None:
@@ -56,9 +51,7 @@ class PreloadedBody:
     def __enter__(self) -> PreloadedBody:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         if not self._sent:
             self.pipe.close()
             self.voice.close()

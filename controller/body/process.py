@@ -6,23 +6,12 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from types import TracebackType
 
 from controller.base.errors import ControllerError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import Parameters
-from controller.body.messages import (
-    Begin,
-    BodyOrders,
-    Failed,
-    Finished,
-    PanelRequest,
-    Ready,
-    Report,
-    RunOptions,
-    Stop,
-)
-from controller.body.panel_state import PanelState, panel_state_size
+from controller.body import messages
+from controller.body.panel_state import PanelState
 from controller.body.preload import PreloadedBody
 from controller.body.sources import pump
 from controller.layers.mixer import by_priority
@@ -36,17 +25,14 @@ _TERMINATE_TIMEOUT_S = 5.0
 class BodyProcess:
     """The body as main sees it; a context manager that always stops it.
 
-    Parameters
-    ----------
-    stage : what to run. parameters : all of them. options : how to run it.
-    preloaded : a process that waits for orders; without one it is started here.
+    ``preloaded`` : a process that waits for orders; without one it is started here.
     """
 
     def __init__(
         self,
         stage: Stage,
         parameters: Parameters,
-        options: RunOptions = RunOptions(),
+        options: messages.RunOptions = messages.RunOptions(),
         *,
         preloaded: PreloadedBody | None = None,
     ) -> None:
@@ -56,25 +42,25 @@ class BodyProcess:
         else:
             preloaded.voice.close()
         self.mailbox = Mailbox.create(len(parameters.names))
-        self._panel_mailbox = Mailbox.create(panel_state_size(parameters))
+        self._panel_mailbox = Mailbox.create(PanelState.size(parameters))
         self.panel_state = PanelState(
             self._panel_mailbox, [layer.name for layer in by_priority(stage.layers)], parameters
         )
         self.finished = False
         self.report: dict[str, object] = {}
         self._pipe, self._process = preloaded.pipe, preloaded.process
-        preloaded.send(BodyOrders(str(stage.path), self.mailbox.path, self._panel_mailbox.path, options))
+        preloaded.send(messages.BodyOrders(str(stage.path), self.mailbox.path, self._panel_mailbox.path, options))
 
-    def wait_ready(self) -> Ready:
+    def wait_ready(self) -> messages.Ready:
         """Wait until the servos are up; raises ControllerError with the body's message when they do not come up."""
         message = self._receive(_START_TIMEOUT_S)
-        if not isinstance(message, Ready):
+        if not isinstance(message, messages.Ready):
             raise ControllerError(f"the body sent {message!r} before it was ready")
         return message
 
     def begin(self) -> None:
         """Let commands in: open the links, or start the take."""
-        self.send(Begin())
+        self.send(messages.Begin())
 
     def alive(self) -> bool:
         """Receive the body's messages; whether it has something to play. Raises ControllerError when it gave up."""
@@ -82,26 +68,17 @@ class BodyProcess:
             self._handle(self._receive(0.0))
         return not self.finished
 
-    def send(self, request: Begin | PanelRequest) -> None:
+    def send(self, request: messages.Begin | messages.PanelRequest) -> None:
         """Send a request of main or its panel."""
         with suppress(OSError):  # alive() reports a body that is gone
             self._pipe.send(request)
-
-    @property
-    def pid(self) -> int:
-        """Process id of the body; on SIGTERM and SIGHUP it stops its servos by itself."""
-        return self._process.pid or 0
-
-    def kill(self) -> None:
-        """Send the body SIGKILL: only their bus watchdog stops the servos then."""
-        self._process.kill()
 
     def stop(self) -> None:
         """Ask the body to stop, wait for its servos to be safe, and keep its report."""
         if not self._process.is_alive() and not self._pipe.poll():
             return
         try:
-            self._pipe.send(Stop())
+            self._pipe.send(messages.Stop())
             while not self.report:
                 self._handle(self._receive(_STOP_TIMEOUT_S))
         except BrokenPipeError:
@@ -110,9 +87,9 @@ class BodyProcess:
             self._end_process()
 
     def _handle(self, message: object) -> None:
-        if isinstance(message, Report):
+        if isinstance(message, messages.Report):
             self.report = message.content
-        elif isinstance(message, Finished):
+        elif isinstance(message, messages.Finished):
             self.finished = True
 
     def _receive(self, timeout_s: float) -> object:
@@ -120,10 +97,10 @@ class BodyProcess:
             message = self._pipe.recv() if self._pipe.poll(timeout_s) else None
         except (EOFError, OSError):
             self._process.join(1.0)
-            message = Failed(f"the body process ended by itself (exit code {self._process.exitcode})")
+            message = messages.Failed(f"the body process ended by itself (exit code {self._process.exitcode})")
         if message is None:
             raise ControllerError(f"the body did not answer within {timeout_s:g} s")
-        if isinstance(message, Failed):
+        if isinstance(message, messages.Failed):
             self.report = self.report or {"failed": message.message}
             raise ControllerError(message.message, hint=message.hint)
         return message
@@ -140,9 +117,7 @@ class BodyProcess:
     def __enter__(self) -> BodyProcess:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         try:
             if error is None:
                 self.stop()

@@ -57,7 +57,7 @@ class PipeStream(io.RawIOBase):
         self._pipe, self._left = pipe, b""
 
     def readable(self) -> bool:
-        """It is."""
+        """Always true."""
         return True
 
     def readinto(self, buffer: WriteableBuffer) -> int:
@@ -102,10 +102,6 @@ class Sources:
     ----------
     state : the layers. player : plays a take. follow : the face of a limp head. voice : a voice to listen to.
     beside : the take plays beside the links, and its end is not the end of the run.
-
-    Attributes
-    ----------
-    error : the error that ended the voice, if any. voice_ended : whether the voice has ended.
     """
 
     def __init__(
@@ -120,7 +116,7 @@ class Sources:
         self._state, self._player, self._follow, self._voice, self._beside = state, player, follow, voice, beside
         self._voice_listener: VoiceListener | None = None
         self._stopped = False
-        self.error: Exception | None = None
+        self.error: Exception | None = None  # what ended the voice
         self.voice_ended = False
 
     @property

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -15,8 +14,7 @@ from rich.table import Table
 
 from controller.base.errors import ControllerError
 from controller.base.files import replacing
-from controller.cli.console import console
-from controller.tools.tables import show_table
+from controller.cli.console import console, show_table
 
 PICTURES = (".png", ".svg", ".jpg", ".webp")
 _KEPT = {None: "", True: "kept", False: "missed"}
@@ -62,7 +60,10 @@ def bench(
 
     columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
     picture = out if what is Subject.quadtree else growth if what is Subject.surface else None
-    with _picture_file(picture) as file, Progress(*columns, console=console, transient=True) as progress:
+    if picture is not None and picture.suffix.lower() not in PICTURES:
+        raise ControllerError(f"{picture}: no picture is named so", hint=f"let it end in {' or '.join(PICTURES)}")
+    drawing = nullcontext() if picture is None else replacing(picture)  # refused here if it cannot be written
+    with drawing as file, Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("measuring", total=None)
 
         def log(text: str) -> None:
@@ -88,19 +89,7 @@ def bench(
             took = f"{row.milliseconds:.3f}" if row.milliseconds else ""
             ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
             table.add_row(row.name, took, ratio, row.against, row.reach, _KEPT[row.kept])
-        show_table(table, console)
-
-
-@contextmanager
-def _picture_file(picture: Path | None) -> Iterator[Path | None]:
-    """The file to draw to; one that cannot be written is refused before anything is measured."""
-    if picture is None:
-        yield None
-        return
-    if picture.suffix.lower() not in PICTURES:
-        raise ControllerError(f"{picture}: no picture is named so", hint=f"let it end in {' or '.join(PICTURES)}")
-    with replacing(picture) as file:
-        yield file
+        show_table(table)
 
 
 def _bench_bus(seconds: float, face: bool, as_json: bool) -> None:
@@ -115,4 +104,4 @@ def _bench_bus(seconds: float, face: bool, as_json: bool) -> None:
         table = Table("measure", "", "", "reach", "", title=title, title_justify="left")
         for row in figures:
             table.add_row(row.name, f"{row.value:.2f}", row.unit, row.reach, _KEPT[row.kept])
-        show_table(table, console)
+        show_table(table)

@@ -11,8 +11,7 @@ from rich.table import Table
 
 from controller.base.errors import ConfigError
 from controller.base.paths import find_config
-from controller.cli.console import console
-from controller.tools.tables import show_table
+from controller.cli.console import console, show_table
 
 Port = Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")]
 Protocol = Annotated[int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")]
@@ -37,7 +36,7 @@ def ports() -> None:
         latency = "" if record.latency_s is None else f"{record.latency_s * 1000:g} ms"
         usable = "yes" if record.usable else "[red]no[/]"
         table.add_row(record.path, record.vid_pid, record.serial_number, record.description, usable, latency)
-    show_table(table, console)
+    show_table(table)
     for record in found:
         if record.hint:
             console.print(f"{record.device}: {record.hint}", soft_wrap=True)
@@ -67,7 +66,7 @@ def scan(
         for found in scan_port(port, plan, lambda text, step: progress.update(task, description=text, completed=step)):
             table.add_row(*found.row)
     if table.row_count:
-        show_table(table, console)
+        show_table(table)
     else:
         console.print(
             f"No servo answered on {port}. Check its power, the wiring and the adapter's direction switch.",

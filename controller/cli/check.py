@@ -8,8 +8,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from controller.cli.console import console
-from controller.tools.tables import show_table
+from controller.cli.console import console, show_table
 
 
 def check(
@@ -43,6 +42,6 @@ def plugins() -> None:
     for each in listed():
         table.add_row(each.sort, each.kind, escape(each.title) if each.works else "[red]cannot be loaded", each.package)
         broken += [] if each.works else [each]
-    show_table(table, console)
+    show_table(table)
     for each in broken:
         console.print(f"{escape(each.title)}\n[bold]try:[/] {escape(each.hint)}", soft_wrap=True)

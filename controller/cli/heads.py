@@ -10,12 +10,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from controller.base.errors import ConfigError
-from controller.cli.console import console
-from controller.tools.tables import show_table
+from controller.cli.console import console, show_table
 
 if TYPE_CHECKING:
     from surface.fit.points.report import FitReport  # start-up: --help does without it
 
+_NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
 Identity = Annotated[
     str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
 ]
@@ -131,17 +131,14 @@ def fit(
             title = name or out.resolve().name
             found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report)
         shaded = _decimate_and_shade(out)
-        show_table(_error_table(found), console)
-        for line in [face_bounds(found), *found.notes]:
+        show_table(_error_table(found))
+        missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)
+        remarks = [face_bounds(found), *found.notes]
+        remarks += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
+        remarks += [f"left out, not ARKit's: {left_out}"] if left_out else []
+        remarks += [] if shaded else [_NO_SHADE]
+        for line in remarks:
             console.print(line, soft_wrap=True, markup=False)
-        if found.missing:
-            line = f"no shape for {', '.join(found.missing)}: these parameters will not move this head"
-            console.print(line, soft_wrap=True, markup=False)
-        if found.left_out:
-            console.print(f"left out, not ARKit's: {', '.join(found.left_out)}", soft_wrap=True, markup=False)
-        if not shaded:
-            line = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
-            console.print(line, soft_wrap=True)
         console.print(f"wrote {out}", soft_wrap=True)
     if identities is not None:
         with console.status("fitting identities"):

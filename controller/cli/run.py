@@ -10,10 +10,8 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from controller.cli.console import console
+from controller.cli.console import console, show_table
 from controller.cli.heads import Identity
-from controller.tools.report import rows
-from controller.tools.tables import show_table
 
 Seconds = Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write what was measured to this JSON file.")]
@@ -146,7 +144,7 @@ def _run(
         from controller.tools.stage_run import StageRun, has_display, write_report
 
         options = RunOptions(take, mirror, None if voice is None else Voice(voice, voice_hz, alone), record)
-        session = StageRun.load(stage, options, parse_identity(identity), look, status.update, preloaded)
+        session = StageRun(stage, options, parse_identity(identity), look, status.update, preloaded)
         if no_face:
             measured = session.run_without_face(seconds)
         elif headless or not has_display():
@@ -156,7 +154,12 @@ def _run(
         if report is not None:
             write_report(measured, report)
             measured["written"].append(str(report))
-    show_report(measured)
+    table = Table("measured", "value", title=f"omote {measured['stage']}", title_justify="left")
+    for row in report_rows(measured):
+        table.add_row(*row)
+    show_table(table)
+    for path in measured["written"]:
+        console.print(f"wrote {path}", soft_wrap=True)
 
 
 def _dry_run(stage: str, take: Path | None, seconds: float | None, report: Path | None) -> None:
@@ -167,29 +170,81 @@ def _dry_run(stage: str, take: Path | None, seconds: float | None, report: Path 
     from controller.tools.stage_run import write_report
 
     with console.status("computing what would be sent"):
-        rows, sent = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS)
-    show_plan(rows)
+        channels, sent = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS)
+    if channels:
+        table = Table(*channels[0], title="dry run: no port was opened", title_justify="left")
+        for channel in channels:
+            table.add_row(*channel.values())
+        show_table(table)
+    else:
+        console.print("This stage has no robot; nothing would be sent.", soft_wrap=True)
     if report is not None:
         write_report({"stage": stage, "dry_run": True, "buses": sent}, report)
         console.print(f"wrote {report}", soft_wrap=True)
 
 
-def show_report(report: dict[str, Any]) -> None:
-    """Print a run's report as a table."""
-    table = Table("measured", "value", title=f"omote {report['stage']}", title_justify="left")
-    for name, value in rows(report):
-        table.add_row(name, value)
-    show_table(table, console)
-    for path in report.get("written", []):
-        console.print(f"wrote {path}", soft_wrap=True)
+def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """Name and value of the most important entries of a run's report."""
+    face = report.get("face")
+    return [*(_face(face) if face else []), *_control(report), *_buses(report.get("buses", []))]
 
 
-def show_plan(plan: list[dict[str, str]]) -> None:
-    """Print what a stage would send, a row for each channel."""
-    if not plan:
-        console.print("This stage has no robot; nothing would be sent.", soft_wrap=True)
-        return
-    table = Table(*plan[0], title="dry run: no port was opened", title_justify="left")
-    for row in plan:
-        table.add_row(*row.values())
-    show_table(table, console)
+def _face(face: dict[str, Any]) -> list[tuple[str, str]]:
+    width, height = face["size"]
+    found = [
+        ("picture", f"{width} x {height}, {face['quality']}, {face['renderer']}"),
+        ("frames", f"{face['frames']} in {face['seconds']:.1f} s, {face['frames_with_motion']} of them with motion"),
+        ("frames per second", f"{face['frames_per_second']:.1f}"),
+        ("milliseconds a frame", _spread(face["frame_ms"])),
+    ]
+    if report_start := face.get("start_to_first_frame_s"):
+        found.append(("start to first frame", f"{report_start:.2f} s"))
+    return found
+
+
+def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
+    found = []
+    if control := report.get("control"):
+        found.append(("control loop", _loop(control)))
+    if take := report.get("take"):
+        rate = f"{take['rows']} rows at {take['rate_hz']:.0f} Hz"
+        found.append(("take", f"{take['played_s']:.1f} of {take['duration_s']:.1f} s played, {rate}"))
+    if voice := report.get("voice"):
+        found.append(("voice", f"{voice['heard_s']:.1f} s heard"))
+    return found + [
+        (f"link {link['port']}", f"{link['accepted']} lines accepted, {sum(link['refused'].values())} refused")
+        for link in report.get("links", [])
+    ]
+
+
+def _buses(buses: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    found = []
+    for bus in buses:
+        name = f"bus {bus['name']}"
+        errors = ", ".join(f"{count} {kind}" for kind, count in bus["bus"]["errors"].items()) or "none"
+        found += [
+            (f"{name}: {bus['servos']} servos", _loop(bus)),
+            (f"{name}: jitter (ms)", _spread(bus["jitter_ms"])),
+            (f"{name}: command to wire (ms)", _spread(bus["command_to_wire_ms"])),
+            (f"{name}: errors", errors),
+            (f"{name}: targets held at a limit", str(bus["channels_held_at_limit"] + bus["bus"]["limits_hit"])),
+        ]
+        if away := bus.get("face_difference"):
+            worst = away["worst"][0]
+            text = f"rms {away['rms_deg']:.1f} deg, most at {worst['channel']}: rms {worst['rms_deg']:.1f} deg"
+            found.append((f"{name}: measured face is away from the wanted one by", text))
+            by_region = "  ".join(f"{region} {rms:.1f}" for region, rms in away.get("regions_rms_deg", {}).items())
+            found.append((f"{name}: by region (rms deg)", by_region))
+        for rule in bus.get("rules", []):
+            found.append((f"{name}: rule", f"{rule['rule']}: {rule['times']} times, {rule['seconds']:.1f} s"))
+    return found
+
+
+def _loop(loop: dict[str, Any]) -> str:
+    return f"{loop['rate_hz']:.1f} Hz of {loop['wanted_hz']:g} wanted, {loop['skipped']} skipped"
+
+
+def _spread(summary: dict[str, float]) -> str:
+    if not summary:
+        return "nothing measured"
+    return "  ".join(f"{key} {summary[key]:.2f}" for key in ("p50", "p95", "p99", "max"))

@@ -41,18 +41,18 @@ class HeadValues:
 
     Attributes
     ----------
-    full : (p,) float64, the full vector of the last call. stamp_ns : time of its command.
+    full : (p,) float64, the full vector of the last call.
     values : (h,) float64, those of the head.
     """
 
     def __init__(self, mailbox: Mailbox, parameters: Parameters, wanted: Sequence[str]) -> None:
         self._mailbox, self._indices = mailbox, head_indices(parameters, wanted)
         self._padded = np.zeros(len(parameters.names) + 1)
-        self.full, self.values, self.stamp_ns = self._padded[:-1], np.zeros(len(wanted)), 0
+        self.full, self.values = self._padded[:-1], np.zeros(len(wanted))
 
     def __call__(self) -> Floats:
         """The newest values in the head's order, (h,) float64; the same array each time."""
-        _, self.stamp_ns = self._mailbox.read(self.full)
+        self._mailbox.read(self.full)
         return np.take(self._padded, self._indices, out=self.values)
 
 
@@ -81,8 +81,10 @@ class Recorder:
         top, left = (picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2
         step = max(1, picture.shape[0] // self.height)
         n = side // step
-        square = picture[top : top + n * step, left : left + n * step]
-        self.frames.append(square.reshape(n, step, n, step, 3).mean(axis=(1, 3)).astype(np.uint8))
+        square, total = picture[top : top + n * step, left : left + n * step], np.zeros((n, n, 3), np.uint16)
+        for row, column in np.ndindex(step, step):
+            total += square[row::step, column::step]
+        self.frames.append((total // step**2).astype(np.uint8))
         self.times_s.append(time_s)
         if len(self.frames) > self._most:
             self.frames, self.times_s, self.clip_hz = self.frames[::2], self.times_s[::2], self.clip_hz / 2
@@ -112,12 +114,7 @@ class Recorder:
 
 
 class FrameLog:
-    """Statistics of frames: how many, how many moved, and how long each took.
-
-    Attributes
-    ----------
-    frames : frames drawn. moved : frames whose values differed from the frame before. frame_ms : time of each (ms).
-    """
+    """Statistics of frames: how many, how many differed from the one before (``moved``), and the time of each (ms)."""
 
     def __init__(self) -> None:
         self.frames = self.moved = 0
@@ -165,14 +162,9 @@ def process_age_s() -> float:
 
 
 class HeadlessFace:
-    """Draws frame after frame without a display.
+    """Draws frame after frame without a display; raises ViewError when there is no OpenGL.
 
-    Parameters
-    ----------
-    head : the head to draw. settings : size, rate and quality. values : returns the head's newest values, (h,) float64.
-    recorder : keeps pictures; None reads none back.
-
-    Raises ViewError when there is no OpenGL.
+    ``values`` returns the head's newest values, (h,) float64. Without ``recorder``, no picture is read back.
     """
 
     def __init__(

@@ -81,10 +81,6 @@ class PointEditor:
     Parameters
     ----------
     head : the head that is drawn; sculpting moves its control points. copy : loads the same head again.
-
-    Attributes
-    ----------
-    ready : whether points can be taken. dragging : whether a point is held. sculpted : whether control points moved.
     """
 
     def __init__(self, head: Head, copy: Callable[[], Head], parameters: Parameters) -> None:
@@ -115,12 +111,6 @@ class PointEditor:
         """Start to get ready; may be called again."""
         if self._thread.ident is None:
             self._thread.start()
-
-    def wait(self, seconds: float) -> bool:
-        """Wait until points can be taken; False if they cannot by then."""
-        self.prepare()
-        self._thread.join(seconds)
-        return self.ready
 
     def take(self, pixel: tuple[float, float], screen: Screen, values: Floats, *, sculpt: bool = False) -> bool:
         """Take the point of the skin under a pixel; False when there is none.

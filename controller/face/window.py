@@ -14,19 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.errors import ControllerError
-from controller.base.parameters import PARAMETERS, Floats
-from controller.body.messages import Hold, PanelRequest
+from controller.base.parameters import PARAMETERS, REGIONS, Floats
+from controller.body.messages import Hold, Neutral, PanelRequest, Show
 from controller.body.panel_state import PanelState
 from controller.face.face import FrameLog, HeadValues
-from controller.face.panel import Panel
 from controller.face.point_editing import PointEditor, Screen
 from controller.stage.stage import FaceSettings
+from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.view.scene.camera import Camera
 from surface.view.scene.viewpoint import Viewpoint
 from surface.view.window import run_window
 
 _TITLE = "omote"
+_BUTTONS_A_ROW = 3
+_CALM_S = 0.6
 
 
 class WindowFace:
@@ -35,7 +37,7 @@ class WindowFace:
     Parameters
     ----------
     head : the head to draw. settings : size, quality and camera. values : returns the head's newest values.
-    send : sends the panel's requests to the body. panel_state : see :class:`controller.face.panel.Panel`.
+    send : sends the panel's requests to the body. panel_state : see :class:`Panel`.
     copy : loads the head again, for dragging points with the mouse; without, none can be dragged.
     """
 
@@ -50,7 +52,7 @@ class WindowFace:
     ) -> None:
         self._head, self._settings, self._values = head, settings, values
         self._mouse = None if copy is None or settings.kiosk else MouseEditing(head, copy, lambda: values.full, send)
-        self._panel = Panel(PARAMETERS, lambda: values.full, send, panel_state)
+        self._panel = Panel(lambda: values.full, send, panel_state)
         self._log = FrameLog()
 
     def run(self, keep_going: Callable[[], bool]) -> None:
@@ -91,14 +93,82 @@ class WindowFace:
         return self._log.report(self._settings, "window")
 
 
-class MouseEditing:
-    """Drags points of the face with the mouse; called once a frame, between the window's own panels.
+class Panel:
+    """Draws the panel once a frame; arguments as for :class:`WindowFace`.
 
-    Parameters
-    ----------
-    head, copy : see :class:`controller.face.point_editing.PointEditor`.
-    newest : returns the newest parameters, (p,) float64. send : sends the parameters to hold.
+    Without ``panel_state``, neither the layer that holds a parameter nor what the servos show of it is drawn.
     """
+
+    def __init__(
+        self, newest: Callable[[], Floats], send: Callable[[PanelRequest], None], panel_state: PanelState | None = None
+    ) -> None:
+        self._newest, self._send, self._panel_state = newest, send, panel_state
+        self._expressions = Vocabulary.load(PARAMETERS).names
+        self._held: set[int] = set()
+        self._intensity = 1.0
+
+    def __call__(self) -> None:
+        """Draw; called by the window between its frames."""
+        from imgui_bundle import imgui  # optional
+
+        imgui.set_next_window_pos(imgui.ImVec2(12, 12), imgui.Cond_.first_use_ever)
+        imgui.set_next_window_size(imgui.ImVec2(320, 640), imgui.Cond_.first_use_ever)
+        if self._panel_state is not None:
+            self._panel_state.refresh()
+        if imgui.begin("omote")[0]:
+            self._top(imgui)
+            for region in REGIONS:
+                if imgui.collapsing_header(f"{region}{self._away(region)}###{region}"):
+                    self._sliders(imgui, PARAMETERS.region(region))
+        imgui.end()
+
+    def _top(self, imgui: Any) -> None:
+        imgui.text(f"{imgui.get_io().framerate:.0f} frames/s")
+        imgui.same_line()
+        if imgui.small_button("release all"):
+            self._held.clear()
+            self._send(Neutral(_CALM_S))
+        _, self._intensity = imgui.slider_float("intensity", self._intensity, 0.0, 1.0)
+        gap = imgui.get_style().item_spacing.x
+        width = (imgui.get_content_region_avail().x + gap) / _BUTTONS_A_ROW - gap
+        for i, name in enumerate(self._expressions):
+            if i % _BUTTONS_A_ROW:
+                imgui.same_line()
+            if imgui.button(name, imgui.ImVec2(width, 0)):
+                self._send(Show(name, self._intensity))
+
+    def _away(self, region: str) -> str:
+        """How far the servos of a region are from their wanted angles, for its title."""
+        away = None if self._panel_state is None else self._panel_state.away_deg(region)
+        return "" if away is None else f"   servos {away:.1f} deg away"
+
+    def _holder(self, imgui: Any, index: int) -> None:
+        """Which layer holds a parameter, and what the servos show of it."""
+        if self._panel_state is None:
+            return
+        measured = self._panel_state.measured(index)
+        shown = "" if measured is None else f"  servos {measured:.2f}"
+        imgui.same_line()
+        imgui.text_disabled(f"{self._panel_state.holder(index)}{shown}")
+
+    def _sliders(self, imgui: Any, members: NDArray[np.intp]) -> None:
+        values = self._newest()
+        for index in map(int, members):
+            low, high = PARAMETERS.low[index], PARAMETERS.high[index]
+            moved, value = imgui.slider_float(PARAMETERS.names[index], float(values[index]), low, high)
+            if moved:
+                self._held.add(index)
+                self._send(Hold(index, float(np.clip(value, low, high))))
+            if index in self._held:
+                imgui.same_line()
+                if imgui.small_button(f"x##{index}"):
+                    self._held.discard(index)
+                    self._send(Hold(index, None))
+            self._holder(imgui, index)
+
+
+class MouseEditing:
+    """Drags points of the face with the mouse; called once a frame. ``send`` : sends the parameters to hold."""
 
     def __init__(
         self, head: Head, copy: Callable[[], Head], newest: Callable[[], Floats], send: Callable[[Hold], None]

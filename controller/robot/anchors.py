@@ -221,12 +221,9 @@ class AnchorSolver:
         self._last = self._solve(self.shape_values(values), self._last)
         return self._last[self._returned]
 
-    def residual(self, values: Floats) -> tuple[Floats, Floats]:
-        """(m,) mm each: how far the face ``values`` (p,) moves the points, and how far the servos fall short of it."""
-        shapes = self.shape_values(values)
-        wanted = self.skin.displacement(shapes)
-        left = wanted - (self.field @ self._solve(shapes)).reshape(-1, 3)
-        return np.linalg.norm(wanted, axis=1), np.linalg.norm(left, axis=1)
+    def left_over(self, shapes: Floats) -> Floats:
+        """(m, 3) mm that the servos fall short of a face with shapes (s,)."""
+        return self.skin.displacement(shapes) - (self.field @ self._solve(shapes)).reshape(-1, 3)
 
     def _solve(self, shapes: Floats, start: Floats | None = None) -> Floats:
         """Pulls of all anchors in mm for shapes (s,)."""
@@ -245,14 +242,9 @@ def load_anchors(
 ) -> AnchorSolver | None:
     """Match a robot's anchors to a head; None for a robot without any.
 
-    Parameters
-    ----------
-    head : folder of the head, or the head itself, which is left at rest. where : the robot's file, for messages.
-
-    Raises
-    ------
-    ConfigError : lists every anchor that lies on no skin part of the head, or does not move with its ``like``.
-    SurfaceError : the head cannot be read.
+    ``head`` : its folder, or the head itself, which is left at rest. ``where`` : the robot's file, for messages.
+    Raises ConfigError that lists every anchor that lies on no skin part of the head or does not move with its ``like``,
+    SurfaceError when the head cannot be read.
     """
     channels = robot.anchored_channels
     if not channels:
@@ -317,7 +309,8 @@ def residual_rows(
     """What a robot cannot show: region, rms mm wanted, rms mm left over, over some faces (p,)."""
     most = np.linalg.norm(solver.skin.moves.sum(axis=3), axis=1).argmax(axis=1)  # the shape that moves a point most
     regions = np.array([parameters.regions[parameters.index(SHAPES[s])] for s in most])
-    both = np.array([solver.residual(face) for face in faces.values()])
+    shapes = [solver.shape_values(face) for face in faces.values()]
+    moves = np.array([(solver.skin.displacement(each), solver.left_over(each)) for each in shapes])  # (f, 2, m, 3)
     for region in sorted(set(regions)):
-        wanted, left = np.sqrt((both[:, :, regions == region] ** 2).mean(axis=(0, 2)))
+        wanted, left = np.sqrt((moves[:, :, regions == region] ** 2).sum(axis=3).mean(axis=(0, 2)))
         yield region, float(wanted), float(left)

@@ -19,7 +19,7 @@ from controller.base.clock import Clock, Samples
 from controller.base.parameters import Floats, Parameters
 from controller.robot.buses import BusSettings
 from controller.robot.channels import servo_specs
-from controller.robot.following import FollowingStatistics, regions_of
+from controller.robot.following import FollowingStatistics
 from controller.robot.safety import GoalFilter
 from controller.robot.settings import ChannelSettings, RuleSettings
 from drivers import open_bus
@@ -70,7 +70,7 @@ class BusLoop:
         self.bus: Bus = open_bus(settings.kind, specs, **settings.options())
         self.clock = Clock(settings.rate_hz)
         self.latency_ms = Samples()
-        self.following = FollowingStatistics(self.table.names, regions_of(self.table, parameters))
+        self.following = FollowingStatistics(self.table, parameters)
         self.held = 0
         self.limp = limp
         self.realtime = False

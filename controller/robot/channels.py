@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,20 +18,8 @@ from controller.robot.settings import ChannelSettings
 from controller.robot.terms import curve_corners
 from drivers.base.bus import ServoSpec
 
-
-class Anchors(Protocol):
-    """Solves the channels that have an anchor; see :class:`controller.robot.anchors.AnchorSolver`.
-
-    Attributes
-    ----------
-    names : the channels it solves, k of them. linear : (k, p) mm of pull per unit of each parameter, roughly.
-    """
-
-    names: tuple[str, ...]
-    linear: Floats
-
-    def pulls_mm(self, values: Floats) -> Floats:
-        """(k,) mm of pull for parameters (p,)."""
+if TYPE_CHECKING:
+    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
 
 
 @dataclass(frozen=True)
@@ -121,7 +109,7 @@ class ChannelTable:
     dead_band_rad: Floats
     slack_rad: Floats
     terms: Terms | None = None
-    anchors: Anchors | None = None
+    anchors: AnchorSolver | None = None
     anchored: Indices | None = None
 
     @property
@@ -167,7 +155,7 @@ class ChannelTable:
 
 
 def build_table(
-    channels: Sequence[ChannelSettings], parameters: Parameters, anchors: Anchors | None = None
+    channels: Sequence[ChannelSettings], parameters: Parameters, anchors: AnchorSolver | None = None
 ) -> ChannelTable:
     """Convert the settings of ``n`` channels to arrays; without ``anchors``, anchored channels stay at 0 mm."""
     mix = np.zeros((len(channels), len(parameters.names)))

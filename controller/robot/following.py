@@ -1,19 +1,24 @@
-"""Compares the measured positions of the servos with the wanted ones, and shows them as a face."""
+"""Measured positions of the servos: how far they are from the wanted ones, and the face that they show."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.parameters import REGIONS, Flags, Floats, Parameters
+from controller.base.solve import BoundedSolver
 from controller.layers.commands import StatusValue
 from controller.robot.channels import ChannelTable
-from controller.robot.mirror import Mirror
 from controller.takes.recording import Face
 from drivers.base.bus import BusState
+
+_RIDGE = 1e-4
+_SPARSITY = 1e-3
+_TOLERANCE = 1e-5
 
 
 def _rms(squares: Floats, counts: NDArray[np.int64] | int) -> float:
@@ -23,14 +28,15 @@ def _rms(squares: Floats, counts: NDArray[np.int64] | int) -> float:
 class FollowingStatistics:
     """Statistics of the difference between the wanted angles of a bus's channels and the measured ones.
 
-    ``names`` : the channels. ``regions`` : of the face, one for each channel; may be left out.
+    A channel belongs to the region of the face of the parameter that it follows most.
     """
 
-    def __init__(self, names: Sequence[str], regions: Sequence[str] = ()) -> None:
-        self._names, self._regions = tuple(names), tuple(regions)
+    def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
+        self._names = table.names
+        self._regions = np.array([parameters.regions[int(np.argmax(np.abs(row)))] for row in table.linear])
         self._now: Floats | None = None
-        self._squares, self._most = np.zeros(len(names)), np.zeros(len(names))
-        self._count = np.zeros(len(names), dtype=np.int64)
+        self._squares, self._most = np.zeros((2, len(table.names)))
+        self._count = np.zeros(len(table.names), dtype=np.int64)
 
     def add(self, wanted_rad: Floats, state: BusState) -> None:
         """Add one cycle: wanted angles (n,) rad, and the measured ones; stale positions do not count."""
@@ -45,18 +51,17 @@ class FollowingStatistics:
         """Region and difference (deg) of every channel that was measured in the last cycle."""
         if self._now is None:
             return []
-        return [(region, float(x)) for region, x in zip(self._regions, self._now, strict=False) if np.isfinite(x)]
+        return [(str(region), float(x)) for region, x in zip(self._regions, self._now, strict=True) if np.isfinite(x)]
 
     def report(self) -> dict[str, object]:
         """Root mean square (deg) over all channels and by region, and the three channels that were furthest away."""
         if not self._count.any():
             return {}
         rms = np.sqrt(self._squares / np.maximum(self._count, 1))
-        regions = np.array(self._regions)
         return {
             "rms_deg": _rms(self._squares, self._count),
             "regions_rms_deg": {
-                region: _rms(self._squares[regions == region], self._count[regions == region])
+                region: _rms(self._squares[self._regions == region], self._count[self._regions == region])
                 for region in REGIONS
                 if region in self._regions
             },
@@ -67,9 +72,71 @@ class FollowingStatistics:
         }
 
 
-def regions_of(table: ChannelTable, parameters: Parameters) -> list[str]:
-    """(n,) the region of the parameter that each channel follows most."""
-    return [parameters.regions[int(np.argmax(np.abs(row)))] for row in table.linear]
+class Mirror:
+    """Finds parameters whose channels give measured angles.
+
+    A servo head shows fewer things than a face, so many faces have one pose; the one with few and small values is
+    taken. The eyes are read as eye angles, never as eyeLook shapes.
+
+    Attributes
+    ----------
+    readable : (n,) bool, the channels that can be inverted; one whose map turns back or is flat cannot.
+    """
+
+    def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
+        self._table = table
+        high = parameters.high.copy()
+        high[[i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")]] = 0.0
+        self._bounds = parameters.low, high
+        self._at, self._rad = _points(table)
+        steps = np.diff(self._rad, axis=1)
+        real = np.diff(self._at, axis=1) > 0.0
+        self.readable = np.array([_is_monotonic(row[keep]) for row, keep in zip(steps, real, strict=True)])
+        self._solver = lru_cache(64)(self._make_solver)  # the same angles count in most cycles
+        self._last = parameters.neutral()
+        self._solver(self.readable.tobytes())  # compiled now, not while a bus waits
+
+    def read(self, angles_rad: Floats, fresh: Flags | None = None) -> Floats:
+        """Parameters (P,) that show ``angles_rad`` : (n,) best; angles that are not ``fresh`` : (n,) do not count."""
+        counted = self.readable & np.isfinite(angles_rad)
+        if fresh is not None:
+            counted &= fresh
+        wanted = np.where(counted, self._mixes(angles_rad), 0.0)
+        self._last = self._solver(counted.tobytes()).solve(wanted, start=self._last)
+        return self._last.copy()
+
+    def _mixes(self, angles_rad: Floats) -> Floats:
+        """(n,) mix values that give the angles, inside the calibrated points."""
+        mixes = np.zeros(len(angles_rad))
+        for i, angle in enumerate(angles_rad):
+            if self.readable[i] and np.isfinite(angle):
+                rad, at = self._rad[i], self._at[i]
+                mixes[i] = np.interp(angle, rad, at) if rad[-1] > rad[0] else np.interp(-angle, -rad, at)
+        return mixes
+
+    def _make_solver(self, counted: bytes) -> BoundedSolver:
+        """The solver for the angles that count."""
+        return BoundedSolver(
+            self._table.linear,
+            *self._bounds,
+            weights=np.frombuffer(counted, bool).astype(np.float64),
+            ridge=_RIDGE,
+            sparsity=_SPARSITY,
+            tolerance=_TOLERANCE,
+        )
+
+
+def _points(table: ChannelTable) -> tuple[Floats, Floats]:
+    """Calibrated points (n, k + 1) of mix and angle (rad); missing pieces repeat the last point."""
+    curves = table.curves
+    ends = np.where(curves.widths > 0.0, curves.knots + curves.widths, -np.inf)
+    at = np.maximum.accumulate(np.concatenate([curves.knots[:, :1], ends], axis=1), axis=1)
+    rise = np.cumsum(curves.widths * curves.slopes, axis=1)
+    return at, curves.start[:, None] + np.concatenate([np.zeros((len(at), 1)), rise], axis=1)
+
+
+def _is_monotonic(steps: Floats) -> bool:
+    return len(steps) > 0 and bool(np.all(steps > 0.0) or np.all(steps < 0.0))
 
 
 class MeasuredFace:

@@ -43,8 +43,7 @@ def _models(robot: RobotSettings) -> list[str]:
     faults = []
     buses = {bus.name: bus for bus in robot.buses}
     for i, channel in enumerate(robot.channels):
-        bus = buses.get(channel.bus)
-        if bus is None:
+        if (bus := buses.get(channel.bus)) is None:
             continue
         try:
             check_model(bus.family, channel.model)

@@ -9,11 +9,10 @@ does. After the rules of the Hanson motor stack, without its defects; docs/robot
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.base.parameters import Flags, Floats, Indices, Parameters
 from controller.robot.channels import ChannelTable, build_table
@@ -28,23 +27,19 @@ _NEAR_RAD = 1e-3
 
 @dataclass
 class RuleInput:
-    """Inputs of the rules in one cycle.
+    """Inputs of the rules in one cycle, the last of ``dt`` s.
 
     Attributes
     ----------
-    angles : (3, n) rad: the targets, the last goals, and where the servos would come to rest if they braked from the
-    next step on. state : the newest measurement. dt : s.
+    target, position, rest : (n,) rad: the targets, the last goals, and where the servos would come to rest if they
+    braked from the next step on. state : the newest measurement.
     """
 
-    angles: Floats
+    target: Floats
+    position: Floats
+    rest: Floats
     state: BusState | None
     dt: float
-
-    @property
-    def position(self) -> Floats:
-        """(n,) rad, the last goals."""
-        angles: Floats = self.angles[1]
-        return angles
 
 
 @dataclass
@@ -63,30 +58,25 @@ class AllowedRange:
         np.maximum.at(self.low, at[down], bound[down])
 
 
-@dataclass
 class RuleCounter:
-    """How many ``times`` each of k rules began to act, and for how many ``seconds`` it acted, (k,)."""
+    """How many times each of k rules began to act, and for how many seconds it acted."""
 
-    labels: list[str]
-    times: NDArray[np.int64] = field(init=False)
-    seconds: Floats = field(init=False)
-    acting: Flags = field(init=False)
-
-    def __post_init__(self) -> None:
-        k = len(self.labels)
-        self.times, self.seconds, self.acting = np.zeros(k, np.int64), np.zeros(k), np.zeros(k, bool)
+    def __init__(self, labels: list[str]) -> None:
+        self.labels = labels
+        self._times, self._seconds = np.zeros(len(labels), np.int64), np.zeros(len(labels))
+        self._acting = np.zeros(len(labels), bool)
 
     def count(self, acting: Flags, dt: float) -> None:
         """Count one cycle of the rules that act now."""
-        self.times += acting & ~self.acting
-        self.seconds += acting * dt
-        np.copyto(self.acting, acting)
+        self._times += acting & ~self._acting
+        self._seconds += acting * dt
+        self._acting = acting
 
     def report(self) -> list[dict[str, object]]:
         """The rules that acted, with their counts."""
         return [
             {"rule": label, "times": int(times), "seconds": round(float(seconds), 3)}
-            for label, times, seconds in zip(self.labels, self.times, self.seconds, strict=True)
+            for label, times, seconds in zip(self.labels, self._times, self._seconds, strict=True)
             if times
         ]
 
@@ -123,7 +113,8 @@ class AntagonistRules:
 
     def narrow(self, now: RuleInput, allowed: AllowedRange) -> None:
         """Narrow the allowed range for one cycle."""
-        own, other = self._own.past(now.angles), self._other.past(now.angles)
+        angles = np.array((now.target, now.position, now.rest))
+        own, other = self._own.past(angles), self._other.past(angles)
         yields, waits = other[0] | other[1] | other[2], own[1] | own[2]
         for ends, where in ((self._own, yields), (self._other, waits)):
             allowed.narrow(ends.at, ends.sign, ends.bound, where)
@@ -258,20 +249,20 @@ class Guard:
         )
         self._rules = [rule for rule in every if rule.counter.labels]
 
-    def apply(self, target: Floats, position: Floats, stop: Floats, state: BusState | None, dt: float) -> Floats:
+    def apply(self, target: Floats, position: Floats, rest: Floats, state: BusState | None, dt: float) -> Floats:
         """Angles (n,) rad that the servos may be sent, inside the limits and every rule.
 
         Parameters
         ----------
         target : (n,) rad, what the face asks for. position : (n,) rad, the last goals.
-        stop : (n,) rad, where they would come to rest; see :meth:`controller.motion.motion.MotionLimiter.rest`.
+        rest : (n,) rad, where they would come to rest; see :meth:`controller.motion.motion.MotionLimiter.rest`.
         state : the newest measurement. dt : s.
         """
         low, high = self._table.low_rad, self._table.high_rad
         finite = np.where(np.isfinite(target), target, position)  # a servo whose target is no number stays
         wanted = np.clip(self._slack.apply(np.clip(finite, low, high)), low, high)
         allowed = AllowedRange(low.copy(), high.copy())
-        now = RuleInput(np.array((wanted, position, stop)), state, dt)
+        now = RuleInput(wanted, position, rest, state, dt)
         for rule in self._rules:
             rule.narrow(now, allowed)
         return np.maximum(np.minimum(wanted, allowed.high), np.minimum(allowed.low, allowed.high))
@@ -286,11 +277,7 @@ class GoalFilter:
 
     Parameters
     ----------
-    channels : those of the bus. rules : the robot's. period_s : of the bus. anchors : of the robot.
-
-    Attributes
-    ----------
-    table : the channels. guard : the rules. sent : (n,) rad, the last goals.
+    channels : those of the bus. rules, anchors : of the robot. period_s : of the bus.
     """
 
     def __init__(self, channels: Sequence[ChannelSettings], parameters: Parameters, rules: RuleSettings,
@@ -300,7 +287,7 @@ class GoalFilter:
         self.guard = Guard(rules, self.table)
         self.period_s = period_s
         self._limiter = self.table.limiter(period_s)
-        self.sent = np.zeros(len(names))
+        self.sent = np.zeros(len(names))  # rad, the last goals
         self.restart(self.table.neutral_rad)
 
     def restart(self, position_rad: Floats) -> None:

@@ -61,10 +61,6 @@ class OfflineRun:
     ----------
     robot : its channels, on any number of buses. state : the layers. feed : writes to them what is due.
     control_hz : ticks of the layers per second. anchors : solver of the robot's anchored channels.
-
-    Attributes
-    ----------
-    sent_rad : for each bus, the goals of every cycle, (c, n) rad, once it has run.
     """
 
     def __init__(
@@ -82,7 +78,7 @@ class OfflineRun:
         }
         self._neutral = {name: bus.sent.copy() for name, bus in self._buses.items()}
         self._limited = {name: np.zeros(len(bus.sent), dtype=np.int64) for name, bus in self._buses.items()}
-        self.sent_rad: dict[str, Floats] = {}
+        self.sent_rad: dict[str, Floats] = {}  # for each bus, the goals (c, n) of every cycle
 
     def run(self, seconds: float) -> None:
         """Play so many seconds."""

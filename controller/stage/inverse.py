@@ -49,10 +49,6 @@ class PointSolver:
     skin : m points. order : see :func:`controller.robot.anchors.head_order`. parameters : all of them, p.
     sparsity : prefers few parameters; mm^2 per unit. weights : (m,) how much each point counts; 1 without.
     start : (p,) parameters to begin from; neutral without.
-
-    Attributes
-    ----------
-    moved : (s,) indices of the parameters it solves for.
     """
 
     def __init__(
@@ -61,7 +57,7 @@ class PointSolver:
     ) -> None:  # fmt: skip
         self.skin, self._parameters = skin, parameters
         count, levels = skin.moves.shape[2:]
-        self.moved = order[:count]
+        self.moved = order[:count]  # the parameters to solve for
         self._low, self._high = parameters.low[self.moved], parameters.high[self.moved]
         self._sparsity = sparsity
         self._weights = np.repeat(np.ones(len(skin.rest)) if weights is None else weights, 3)

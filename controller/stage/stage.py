@@ -101,8 +101,7 @@ class Stage:
 
     Attributes
     ----------
-    path : the stage's file. settings : its content. head : folder of the head. robots : the robots, in file order.
-    vocabulary : the named expressions, those of the files ``vocabularies`` included.
+    path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
     layers : the layers. life : settings of idle life. groups : group files added to the head, each with its amount.
     """
 

@@ -137,7 +137,7 @@ def bench_bus(seconds: float, log: Log, *, face: bool = False) -> list[tuple[str
         sdk_paced = _run_sdk(bus.path, seconds, PACED_HZ)
     # of each kind of loop the median, as a host that is busy elsewhere may slow down any round
     rates = {kind: float(np.median([each[kind] for each in rounds])) for kind in rounds[0]}
-    figures = _rate_figures(rates) + _cost_figures(paced, sdk_paced) + _jitter_figures(ticks, realtime)
+    figures = _rate_figures(rates) + _loop_figures(paced, sdk_paced, ticks, realtime)
     tables = [(title, figures + _steal_figures(steal))]
     if face:
         give_priority_back()  # programs that are started would inherit it, the one that draws among them
@@ -248,9 +248,9 @@ def _rate_figures(rate: dict[str, float]) -> list[Figure]:
     ]
 
 
-def _cost_figures(paced: Loop, sdk_paced: Loop) -> list[Figure]:
-    share = 100 * paced.processor
-    ratio = sdk_paced.processor / paced.processor
+def _loop_figures(paced: Loop, sdk_paced: Loop, ticks: Loop, realtime: bool) -> list[Figure]:
+    share, ratio = 100 * paced.processor, sdk_paced.processor / paced.processor
+    worst, bound = ticks.late_ms["p99"], 2.0 if realtime else 3.0
     return [
         Figure(f"processor at {PACED_HZ} Hz", share, "% of a core", "<= 12 %", share <= 12.0),
         Figure("bare SDK, the same", 100 * sdk_paced.processor, "% of a core"),
@@ -259,12 +259,6 @@ def _cost_figures(paced: Loop, sdk_paced: Loop) -> list[Figure]:
         Figure("write and read, 99 of 100", paced.cycle_ms["p99"], "ms"),
         Figure("bare SDK, median", sdk_paced.cycle_ms["p50"], "ms"),
         Figure("bare SDK, 99 of 100", sdk_paced.cycle_ms["p99"], "ms"),
-    ]
-
-
-def _jitter_figures(ticks: Loop, realtime: bool) -> list[Figure]:
-    worst, bound = ticks.late_ms["p99"], 2.0 if realtime else 3.0
-    return [
         Figure(f"tick at {JITTER_HZ} Hz late by, median", ticks.late_ms["p50"], "ms"),
         Figure(f"tick at {JITTER_HZ} Hz late by, 99 of 100", worst, "ms", f"<= {bound:g} ms", worst <= bound),
     ]
@@ -306,18 +300,14 @@ def _run_program(frames_per_second: int, seconds: float, ordinary: bool) -> tupl
         settings["buses"][0]["rate_hz"] = JITTER_HZ
         robot.write_text(tomli_w.dumps(settings), encoding="utf-8")
         settings = tomllib.loads(find_config("stages", "everything").read_text(encoding="utf-8"))
-        settings |= {"robots": [str(robot)], "face": {**settings.get("face", {}), "fps": frames_per_second}}
+        settings["robots"], settings["face"]["fps"] = [str(robot)], frames_per_second
         stage.write_text(tomli_w.dumps(settings), encoding="utf-8")
         program = "from controller.cli.app import main; main()"
         command = [sys.executable, "-P", "-c", program, "run", str(stage), "--headless"]
         command += ["--seconds", str(seconds), "--report", str(report)]
-        with subprocess.Popen(
-            [sys.executable, "-P", "-c", _SLEEPER, str(JITTER_HZ), str(round(JITTER_HZ * seconds))],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=environment,
-        ) as sleeper:
+        sleeper_command = [sys.executable, "-P", "-c", _SLEEPER, str(JITTER_HZ), str(round(JITTER_HZ * seconds))]
+        pipe = subprocess.PIPE
+        with subprocess.Popen(sleeper_command, stdin=pipe, stdout=pipe, text=True, env=environment) as sleeper:
             done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
             late_ms, _ = sleeper.communicate()
         if done.returncode:

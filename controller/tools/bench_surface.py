@@ -68,10 +68,8 @@ def bench_growth(seconds: float, log: Log, out: Path, vertices: int = VERTICES) 
     points = tuple(max(25, round(share * count)) for count in growth.POINTS)
     series = growth.growth(sizes, points, seconds, log)
     growth.plot(series, out)
-    title = (
-        f"growth, from {sizes[0]:,} to {sizes[-1]:,} vertices and from {points[0]:,} to {points[-1]:,} control points"
-    )
-    return [(title, growth.slopes(series))]
+    title = f"from {sizes[0]:,} to {sizes[-1]:,} vertices and from {points[0]:,} to {points[-1]:,} control points"
+    return [(f"growth, {title}", growth.slopes(series))]
 
 
 def bench_drift(name: str, updates: int, log: Log) -> Tables:

@@ -43,13 +43,10 @@ class Marks:
 class CalibrationScreen:
     """State of a calibration, from key presses to the captured angles.
 
-    Parameters
+    Attributes
     ----------
     channels : n channels. measures : whether their servos measure their position; others are moved by keys alone.
     margin_deg : kept away from the captured ends, so that nothing is driven into its stop.
-
-    Attributes
-    ----------
     angle_deg : (n,) newest angles, NaN where not known. target_deg : (n,) where the servos shall hold.
     holding : whether the motors shall be on. tracking : whether new angles widen lowest and highest.
     question : one that only y or n answers, or empty. done : whether to leave. saving : whether to save.

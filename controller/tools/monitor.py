@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
 
-from controller.tools.monitor_view import BusView
 from controller.tools.scan import scan_port
 from drivers import open_bus
-from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
+from drivers.base.bus import Bus, BusState, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
 from drivers.port.serialport import SerialPort, tapped
@@ -22,20 +26,16 @@ from drivers.tables.tables import ControlTable, load_table
 FEETECH = ("sts", "scs")
 SHOWN = ("Present Position", "Goal Position")
 WAIT_S = 0.1
+Rows = Callable[[], Iterable[Mapping[str, Any]]]
+
+REFRESH_S = 0.1
+KEPT = 4096
+"""Pieces of traffic kept between two refreshes; older ones of a busy bus are dropped, and the view shows how many."""
 
 
-def decoder_of(protocol: int, found: Sequence[ServoInfo] = (), model: str = "") -> Decoder:
-    """A decoder that knows the registers of the servos found, and takes all others for ``model``.
-
-    Raises DriverError when there is no such model.
-    """
+def make_decoder(protocol: int, tables: Mapping[int, ControlTable], model: str = "") -> Decoder:
+    """A decoder that knows the registers of servos by id, and takes all others for ``model``; raises DriverError."""
     default = load_table(model) if model else None
-    tables: dict[int, ControlTable] = {}
-    for info in found:
-        try:
-            tables[info.id] = load_table(info.model_number, info.firmware)
-        except DriverError:  # an unknown model is shown by addresses
-            continue
     return Decoder1(tables, default) if protocol == 1 else Decoder2(tables, default)
 
 
@@ -47,7 +47,7 @@ def listen_to_bus(
     ``model`` : of servos whose model is not seen in the traffic, for the names of registers; may be empty.
     Raises PortError, or DriverError when there is no such model.
     """
-    decoder = decoder_of(protocol, model=model)
+    decoder = make_decoder(protocol, {}, model)
     view = BusView(f"listening on {port} at {baud} baud", lambda: _heard_rows(decoder), decoder, console)
     link = SerialPort(port, baud)
     link.open()
@@ -70,11 +70,15 @@ def poll_servos(
     Raises PortError, or NoReply when no servo answers.
     """
     found = [item.servo for item in scan_port(port, [(protocol, baud)]) if item.servo]
-    known = [info for info in found if _is_known(info)]
+    tables: dict[int, ControlTable] = {}
+    for info in found:
+        with suppress(DriverError):  # an unknown model is shown by addresses
+            tables[info.id] = load_table(info.model_number, info.firmware)
+    known = [info for info in found if info.id in tables]
     if not known:
         which = f": {', '.join(info.model for info in found)} cannot be asked" if found else ""
         raise NoReply(f"no servo to ask on {port} at {baud} baud{which}", hint=f"omote scan {port}", port=port)
-    decoder = decoder_of(protocol, known)
+    decoder = make_decoder(protocol, tables)
     view = BusView(f"{port} at {baud} baud", lambda: (), decoder, console)
     kind = "feetech" if known[0].model.startswith(FEETECH) else "dynamixel"
     specs = [ServoSpec(info.id, f"servo {info.id}", info.model, -math.pi, math.pi, 1.0, 1.0) for info in known]
@@ -84,14 +88,6 @@ def poll_servos(
         reader = _Reader(bus, 1.0 / rate_hz)
         view.rows = reader.rows
         view.run(keep_going, reader.step)
-
-
-def _is_known(info: ServoInfo) -> bool:
-    try:
-        load_table(info.model_number, info.firmware)
-    except DriverError:
-        return False
-    return True
 
 
 class _Reader:
@@ -152,3 +148,82 @@ def _heard_rows(decoder: Decoder) -> list[dict[str, Any]]:
         | {name: heard.values[name] for name in SHOWN if name in heard.values}
         for servo, heard in sorted(decoder.heard.items())
     ]
+
+
+class BusView:
+    """Shows the traffic of a bus and the state of its servos.
+
+    ``tap`` may be called from any thread and only stores the bytes; decoding and drawing happen in :meth:`run`.
+
+    Parameters
+    ----------
+    title : of the view. rows : returns one mapping for each servo, values by column. decoder : of the bus's protocol.
+    console : to print to; where it is no terminal, lines are printed as they come. lines : lines of traffic shown.
+    """
+
+    def __init__(self, title: str, rows: Rows, decoder: Decoder, console: Console, lines: int = 16) -> None:
+        self.title, self.rows, self._decoder, self._console = title, rows, decoder, console
+        self._pieces: deque[tuple[float, bool | None, bytes]] = deque(maxlen=KEPT)
+        self._log: deque[str] = deque(maxlen=lines)
+        self._begun_s = time.monotonic()
+        self._taken = self._passed = 0
+
+    def tap(self, sent: bool | None, data: bytes) -> None:
+        """Store bytes that passed; ``sent`` None where the direction is not known."""
+        self._passed += 1
+        self._pieces.append((time.monotonic(), sent, bytes(data)))
+
+    def lines(self) -> list[str]:
+        """Lines decoded since the last call, with the time since the beginning."""
+        new = []
+        while self._pieces:
+            time_s, sent, data = self._pieces.popleft()
+            self._taken += 1
+            new += [f"{time_s - self._begun_s:9.3f}  {line}" for line in self._decoder.feed(sent, data)]
+        return new
+
+    def run(self, keep_going: Callable[[], bool], step: Callable[[], None] = lambda: time.sleep(REFRESH_S)) -> None:
+        """Show until ``keep_going()`` is false; calls ``step`` in a loop, which waits a moment each time."""
+        if self._console.is_terminal:
+            with Live(self._picture(), console=self._console, auto_refresh=False, screen=True) as live:
+                self._loop(keep_going, step, lambda: live.update(self._picture(), refresh=True))
+        else:
+            self._loop(keep_going, step, self._print)
+            self._print()
+
+    def _loop(self, keep_going: Callable[[], bool], step: Callable[[], None], show: Callable[[], None]) -> None:
+        next_s = 0.0
+        while keep_going():
+            step()
+            if time.monotonic() >= next_s:
+                show()
+                next_s = time.monotonic() + REFRESH_S
+
+    def _print(self) -> None:
+        for line in self.lines():
+            self._console.print(Text(line), soft_wrap=True)
+
+    def _picture(self) -> Group:
+        self._log.extend(self.lines())
+        left_out = self._passed - self._taken - len(self._pieces)
+        note = f"  ({left_out} pieces left out)" if left_out > 0 else ""
+        traffic = Text("\n".join(self._log), no_wrap=True, overflow="ellipsis")
+        return Group(Text(f"{self.title}   Ctrl-C ends{note}", style="bold"), table_of(self.rows()), traffic)
+
+
+def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
+    """Mappings as a table; unknown values stay empty."""
+    listed = list(rows)
+    names = list(dict.fromkeys(name for row in listed for name in row))
+    table = Table(*names)
+    for row in listed:
+        table.add_row(*(_cell(row.get(name)) for name in names))
+    return table
+
+
+def _cell(value: Any) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:.1f}" if isinstance(value, float) else str(value)

@@ -48,13 +48,7 @@ def added_exporters() -> list[Exporter]:
 
 @dataclass(frozen=True)
 class Listed:
-    """One plug-in.
-
-    Attributes
-    ----------
-    sort, kind : of the plug-in. title : its name for people, or why it cannot be loaded.
-    package : name and version of its package. works : whether it can be loaded. hint : what to type if not.
-    """
+    """One plug-in; where it does not work, ``title`` is the reason and ``hint`` what to type."""
 
     sort: str
     kind: str

@@ -6,8 +6,8 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,8 @@ from controller.robot.buses import SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
-from controller.tools.monitor_view import BusView
+from controller.tools.monitor import BusView
 from drivers import open_bus
-from drivers.core.traffic import Decoder
 from drivers.sim.serving.farend import make_line
 from drivers.sim.serving.serve import PortServer, serve
 from drivers.sim.wire.line import Line
@@ -64,8 +63,21 @@ def serve_alone(kind: str, options: Any, how: Serving, console: Console) -> None
 
 
 def _serve(line: Line, baud: int, how: Serving, console: Console, simulator: Simulator) -> None:
+    def start_view(server: PortServer) -> None:
+        def rows() -> list[dict[str, Any]]:
+            with server.chain.lock:
+                return server.chain.describe(time.monotonic())
+
+        view = BusView(f"simulated bus on {server.port.path}", rows, simulator.decoder(line), console)
+        server.tap = view.tap
+        over = threading.Event()
+        thread = threading.Thread(target=view.run, args=(lambda: not over.is_set(),))
+        stack.callback(thread.join)
+        stack.callback(over.set)
+        thread.start()
+
     line.faults.add(how.faults, time.monotonic())
-    with _viewing(simulator.decoder(line) if how.watch else None, console) as start_view, _stop_socket() as stop:
+    with ExitStack() as stack, _stop_socket() as stop:
         serve(
             line,
             how.link,
@@ -75,35 +87,8 @@ def _serve(line: Line, baud: int, how: Serving, console: Console, simulator: Sim
             latency_s=how.latency_s,
             commands=how.control,
             stop=stop,
-            on_server=start_view,
+            on_server=start_view if how.watch else lambda server: None,
         )
-
-
-@contextmanager
-def _viewing(decoder: Decoder | None, console: Console) -> Iterator[Callable[[PortServer], None]]:
-    """A function that starts a view of a server, which ends with the block; without a decoder it does nothing."""
-    over = threading.Event()
-    threads: list[threading.Thread] = []
-
-    def start(server: PortServer) -> None:
-        if decoder is None:
-            return
-
-        def rows() -> list[dict[str, Any]]:
-            with server.chain.lock:
-                return server.chain.describe(time.monotonic())
-
-        view = BusView(f"simulated bus on {server.port.path}", rows, decoder, console)
-        server.tap = view.tap
-        threads.append(threading.Thread(target=view.run, args=(lambda: not over.is_set(),)))
-        threads[-1].start()
-
-    try:
-        yield start
-    finally:
-        over.set()
-        for thread in threads:
-            thread.join()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,7 @@ from controller.body.messages import RunOptions
 from controller.body.preload import PreloadedBody
 from controller.body.process import BodyProcess, deadline
 from controller.face.face import HeadlessFace, HeadValues, Recorder
-from controller.stage.stage import Stage, check_identity, load_stage, with_picture
+from controller.stage.stage import check_identity, load_stage, with_picture
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
 from drivers.base.priority import yield_to_servos
@@ -43,35 +43,26 @@ def has_display() -> bool:
     return True
 
 
-@dataclass
 class StageRun:
     """One stage, ready to run; every method runs it once and returns the report.
 
-    Attributes
+    Finds and checks the stage and the take of ``options``; raises before anything is opened.
+
+    Parameters
     ----------
-    stage : what to run. options : how to run it. status : called with what is being done, in a few words.
-    preloaded : the body's process, if it has been started already.
+    name : of the stage, or its file. identity : replaces the stage's own. look : command-line options over its picture.
+    status : called with what is being done, in a few words. preloaded : the body's process, if it was started already.
     """
 
-    stage: Stage
-    options: RunOptions
-    status: Callable[[str], object] = lambda _: None
-    preloaded: PreloadedBody | None = None
-
-    @classmethod
-    def load(
-        cls,
+    def __init__(
+        self,
         name: str,
         options: RunOptions = RunOptions(),
         identity: Mapping[str, float] | None = None,
         look: Mapping[str, object] | None = None,
         status: Callable[[str], object] = lambda _: None,
         preloaded: PreloadedBody | None = None,
-    ) -> StageRun:
-        """Find and check a stage and the take of ``options``; raises before anything is opened.
-
-        ``identity`` replaces the stage's own. ``look`` : command-line options over its picture.
-        """
+    ) -> None:
         stage = with_picture(load_stage(name, PARAMETERS), look or {})
         if identity:
             check_identity(stage.head, identity)
@@ -82,7 +73,7 @@ class StageRun:
             load_take(options.take, PARAMETERS)
         if options.mirror and not stage.robots:
             raise ConfigError(f"{stage.path}: robots: a stage without a robot has nothing to mirror")
-        return cls(stage, options, status, preloaded)
+        self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.
@@ -96,7 +87,7 @@ class StageRun:
                 face.run(self._begin(body, flag, seconds))
             report = self._end(body, face.report())
         if recorder is not None and pictures is not None:
-            self.status("writing the pictures")
+            self._status("writing the pictures")
             report["written"] = recorder.write(pictures)
         return report
 
@@ -121,9 +112,9 @@ class StageRun:
     @contextmanager
     def _body(self) -> Iterator[tuple[BodyProcess, threading.Event]]:
         """The body's process and a flag that Ctrl-C sets."""
-        self.status("starting")
-        preloaded, self.preloaded = self.preloaded, None
-        with stop_flag() as flag, BodyProcess(self.stage, PARAMETERS, self.options, preloaded=preloaded) as body:
+        self._status("starting")
+        preloaded, self._preloaded = self._preloaded, None
+        with stop_flag() as flag, BodyProcess(self.stage, PARAMETERS, self._options, preloaded=preloaded) as body:
             yield body, flag
 
     def _load_head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
@@ -138,12 +129,12 @@ class StageRun:
         gc.freeze()  # nothing that was loaded is garbage: no collection has to look at it while pictures are drawn
         body.wait_ready()
         body.begin()
-        self.status("running" + (f" for {seconds:g} s" if seconds else ""))
+        self._status("running" + (f" for {seconds:g} s" if seconds else ""))
         in_time = deadline(seconds)
         return lambda: not flag.is_set() and in_time() and body.alive()
 
     def _end(self, body: BodyProcess, face: dict[str, object] | None) -> dict[str, Any]:
-        self.status("stopping" if self.options.mirror else "bringing the servos to rest")
+        self._status("stopping" if self._options.mirror else "bringing the servos to rest")
         body.stop()
         return {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}
 

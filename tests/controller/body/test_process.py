@@ -102,7 +102,7 @@ def test_a_body_that_is_told_to_end_stops_the_servos_first(
 ) -> None:
     with BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
-        os.kill(body.pid, ending)
+        os.kill(body._process.pid or 0, ending)
         assert until(lambda: powered(servos) == [])
 
 
@@ -110,7 +110,7 @@ def test_a_body_that_is_killed_leaves_the_rest_to_the_bus_watchdog(stage: Stage,
     with pytest.raises(ControllerError, match="ended by itself"), BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
         body.send(Hold(PARAMETERS.index("jawOpen"), 1.0))
-        body.kill()
+        body._process.kill()
         assert until(lambda: all(servos.servo(i).register("Bus Watchdog") == 255 for i in range(1, 25)))
         while body.alive():
             time.sleep(0.02)

@@ -35,7 +35,9 @@ def head(folder: Path) -> Head:
 def handles(head: Head, folder: Path) -> PointEditor:
     found = PointEditor(head, lambda: Head.load(folder), P)
     assert not found.ready and not found.take((0.0, 0.0), Screen(Camera.front(), SIZE), P.neutral())
-    assert found.wait(60.0)
+    found.prepare()
+    found._thread.join(60.0)
+    assert found.ready
     return found
 
 

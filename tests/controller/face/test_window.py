@@ -70,7 +70,9 @@ def send(request):
 with Mailbox.create(len(P)) as mailbox:
     values = HeadValues(mailbox, P, head.parameters)
     face = WindowFace(head, FaceSettings(size=(320, 240), quality="fast"), values, send, None, stage.load_head)
-    assert face._mouse.editor.wait(60.0)
+    face._mouse.editor.prepare()
+    face._mouse.editor._thread.join(60.0)
+    assert face._mouse.editor.ready
     panel = face._panel
 
     def act():

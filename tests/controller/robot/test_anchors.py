@@ -21,7 +21,7 @@ from controller.robot.anchors import (
     servo_field,
 )
 from controller.robot.channels import build_table
-from controller.robot.mirror import Mirror
+from controller.robot.following import Mirror
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
 from controller.tools.check import check_anything

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.robot.channels import ChannelTable, build_table
-from controller.robot.mirror import Mirror
+from controller.robot.following import Mirror
 from controller.robot.robot import load_robot
 from controller.robot.terms import curve_corners
 

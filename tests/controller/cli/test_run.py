@@ -1,8 +1,8 @@
-"""A run's report as rows."""
+"""``omote run``, ``play`` and ``demo``: a report as rows, and runs from the command line."""
 
 from __future__ import annotations
 
-from controller.tools.report import rows
+from controller.cli.run import report_rows
 
 SPREAD = {"mean": 1.0, "p50": 1.0, "p95": 2.0, "p99": 3.25, "max": 4.0}
 FACE = {
@@ -29,7 +29,7 @@ def test_every_part_of_a_run_has_its_rows() -> None:
         "bus": {"errors": {"no_reply": 2}, "limits_hit": 4},
     }
     link = {"port": "/dev/x", "accepted": 7, "refused": {"E_NAME": 1}}
-    found = dict(rows({"stage": "s", "face": FACE, "control": LOOP, "links": [link], "buses": [bus]}))
+    found = dict(report_rows({"stage": "s", "face": FACE, "control": LOOP, "links": [link], "buses": [bus]}))
     assert found["frames per second"] == "30.0"
     assert found["milliseconds a frame"] == "p50 1.00  p95 2.00  p99 3.25  max 4.00"
     assert found["start to first frame"] == "2.50 s"
@@ -41,4 +41,4 @@ def test_every_part_of_a_run_has_its_rows() -> None:
 
 
 def test_a_stage_without_body_or_robots_still_reports_its_face() -> None:
-    assert dict(rows({"stage": "s", "face": FACE}))["frames"] == "300 in 10.0 s, 299 of them with motion"
+    assert dict(report_rows({"stage": "s", "face": FACE}))["frames"] == "300 in 10.0 s, 299 of them with motion"
