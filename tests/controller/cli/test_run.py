@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from controller.cli.app import make_app
+from controller.cli.console import console
 from controller.cli.run import report_rows
 
 SPREAD = {"mean": 1.0, "p50": 1.0, "p95": 2.0, "p99": 3.25, "max": 4.0}
@@ -132,3 +133,10 @@ def test_a_dry_run_says_when_there_is_no_robot(stage: str, tmp_path: Path) -> No
     assert json.loads(report.read_text()) == {"format": 1, "stage": stage, "dry_run": True, "buses": []}
     missing = omote("play", "none.tsv", "--stage", "everything", "--dry-run")
     assert missing.exit_code == 1 and "none.tsv" in str(missing.exception)
+
+
+def test_a_dry_run_lists_every_channel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(console, "width", 250)
+    (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["head24"]\n')
+    text = omote("run", str(tmp_path / "stage.toml"), "--dry-run", "--seconds", "0.1").output
+    assert "dry run: no port was opened" in text and text.count("xl330-m288") == 24 and "neutral (deg)" in text

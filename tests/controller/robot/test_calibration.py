@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,14 @@ import pytest
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
-from controller.robot.calibration import CapturedAngles, calibrated, calibration_path, fit_to_captured, save_calibration
+from controller.robot.calibration import (
+    CapturedAngles,
+    calibrated,
+    calibration_path,
+    fit_to_captured,
+    rest_deg,
+    save_calibration,
+)
 from controller.robot.channels import build_table
 from controller.robot.robot import load_robot
 
@@ -103,3 +111,41 @@ def test_a_newer_file_is_refused_for_that_alone(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="newer omote") as caught:
         calibrated(load_robot(HEAD, PARAMETERS), path)
     assert "1 fault" in str(caught.value)
+
+
+def test_the_neutral_angle_may_be_an_end() -> None:
+    for angles in ((-4, -4, 9), (-4, 9, 9)):
+        low, rest, high = angles
+        found = CapturedAngles(min_deg=low, neutral_deg=rest, max_deg=high)
+        assert (found.min_deg, found.neutral_deg, found.max_deg) == angles
+
+
+def test_the_angle_at_rest_is_that_of_zero_or_of_the_nearest_end() -> None:
+    channel = load_robot(HEAD, PARAMETERS).channels[0]
+    for at, deg, wanted in (([-1, 1], [10, 30], 20.0), ([0.5, 1], [4, 8], 4.0), ([-2, -1], [4, 8], 8.0)):
+        points = channel.map.model_copy(update={"at": at, "deg": deg})
+        assert rest_deg(channel.model_copy(update={"map": points, "trim_deg": 5.0})) == pytest.approx(wanted)
+
+
+def test_a_calibration_is_written_as_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    save_calibration(
+        path, 'my "desk"', "head24", {"jawOpen": CapturedAngles(min_deg=-4, neutral_deg=1.23456, max_deg=19)}
+    )
+    assert tomllib.loads(path.read_text()) == {
+        "format": 1,
+        "name": 'my "desk"',
+        "robot": "head24",
+        "channels": {"jawOpen": {"min_deg": -4.0, "neutral_deg": 1.23, "max_deg": 19.0}},
+    }
+    assert calibration_path("desk", Path("/a/mine.toml")) == Path("/a/mine.desk.calibration.toml")
+    assert calibration_path("other.toml", Path("/a/mine.toml")) == Path("/a/other.toml")
+
+
+def test_faults_of_a_calibration_begin_with_the_robot(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    save_calibration(path, "desk", "other", {"jawOpne": CapturedAngles(min_deg=-4, neutral_deg=3, max_deg=19)})
+    with pytest.raises(ConfigError) as caught:
+        calibrated(load_robot(HEAD, PARAMETERS), path)
+    lines = str(caught.value).splitlines()
+    assert lines[1].startswith("  robot: is a calibration of 'other'") and lines[2].startswith("  channels.jawOpne: ")

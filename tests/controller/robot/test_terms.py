@@ -14,7 +14,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.following import Mirror
 from controller.robot.robot import load_robot
-from controller.robot.terms import curve_corners
+from controller.robot.terms import TermSettings, curve_corners
 
 ROBOT = """
 name = "r"
@@ -110,3 +110,23 @@ def test_a_faulty_term_is_named_with_its_key(tmp_path: Path, mix: str, fault: st
     with pytest.raises(ConfigError) as caught:
         table_of(tmp_path, mix)
     assert fault in str(caught.value)
+
+
+def test_terms_are_described_for_people() -> None:
+    plain, kept = TermSettings(by=-0.4), TermSettings.model_validate({"by": 2, "in": [0.25, 1]})
+    curve = TermSettings(at=[0, 0.5, 1], gives=[0, 0, 1])
+    found = [term.describe("jawOpen") for term in (plain, kept, curve)]
+    assert found == ["-0.4 jawOpen", "+2 jawOpen in 0.25..1", "+jawOpen through 3 points"]
+    assert [term.is_weight for term in (plain, kept, curve)] == [True, False, False]
+
+
+def test_a_smooth_curve_is_the_monotone_cubic_through_its_points() -> None:
+    """By hand (Fritsch and Butland 1984): slopes 0.75, 0 and 1 for points that rise by 1 and rest, then rise by 1."""
+    x, y = curve_corners(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 1.0, 2.0]), "smooth")
+    assert len(x) == 3 * 8 + 1 and x[1] == pytest.approx(1 / 8) and (x[-1], y[-1]) == (3.0, 2.0)
+    assert y[(x > 1.0) & (x < 2.0)] == pytest.approx(1.0)
+    t = 0.5
+    hermite = t * (1 - t) ** 2 * 1.5 + t**2 * (3 - 2 * t)  # the end's slope, three points long, is 1.5
+    assert np.interp(0.5, x, y) == pytest.approx(hermite)
+    two = curve_corners(np.array([0.0, 1.0]), np.array([0.0, 1.0]), "smooth")
+    assert two[0].tolist() == [0.0, 1.0]

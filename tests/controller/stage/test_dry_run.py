@@ -19,6 +19,7 @@ from controller.layers.commands import CommandState
 from controller.robot.robot import load_robot
 from controller.stage.dry_run import OfflineRun, dry_run
 from controller.stage.stage import load_stage
+from controller.takes.recording import Recorder
 
 
 def stage_file(tmp_path: Path, text: str = "") -> Path:
@@ -135,3 +136,57 @@ def test_each_bus_has_its_own_pace() -> None:
     assert sent.shape == (51, 24)
     assert np.degrees(sent[-1, 3]) == pytest.approx(14.0, abs=0.05)
     assert next(iter(offline.rows()))["held by"] == "nothing"
+
+
+def sent_of(report: list[dict[str, object]], name: str) -> list[float]:
+    bus = report[0]
+    return [row[bus["channels"].index(name)] for row in bus["sent_deg"]]  # type: ignore[attr-defined, index, union-attr]
+
+
+def test_a_script_without_a_loop_runs_a_moment_longer_than_its_last_step(tmp_path: Path) -> None:
+    (tmp_path / "act.toml").write_text('steps = ["0 SET jawOpen 0.5", "1 NEUTRAL"]')
+    stage = load_stage(str(stage_file(tmp_path, 'show = "act.toml"\n')), PARAMETERS)
+    _, report = dry_run(stage, None, None, PARAMETERS)
+    assert len(sent_of(report, "jawOpen")) == round(2.5 * 50) + 1
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_time_at_a_limit_of_position_is_told_on_both_sides(tmp_path: Path, side: float) -> None:
+    stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
+    channels = [
+        channel.model_copy(update={"limit_deg": (-10.0, 10.0)}) if channel.name == "neckYaw" else channel
+        for channel in stage.robots[0].channels
+    ]
+    robot, state = stage.robots[0].model_copy(update={"channels": channels}), stage.state(PARAMETERS)
+    yaw = PARAMETERS.index("headYaw")
+    offline = OfflineRun(robot, state, lambda now_ns: state.set_parameters([yaw], [side], now_ns))
+    offline.run(3.0)
+    rows = {row["channel"]: row for row in offline.rows()}
+    kind, seconds, unit = rows["neckYaw"]["held by"].split()
+    assert (kind, unit) == ("limit", "s") and 1.5 < float(seconds) < 3.0
+    assert rows["jawOpen"]["held by"] == "nothing"
+    low, _, high = map(str, rows["neckYaw"]["sent (deg)"].split())
+    assert sorted([abs(float(low)), abs(float(high))]) == [0.0, 10.0]
+
+
+def test_a_recording_is_played_from_its_first_face(tmp_path: Path) -> None:
+    stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
+    with Recorder(stage.state(PARAMETERS), tmp_path / "a.rec") as state:
+        for i in range(150):
+            if i == 50:
+                state.set_parameters([PARAMETERS.index("jawOpen")], [1.0], 10**9 + i * 10_000_000)
+            state.tick(10**9 + i * 10_000_000, 0.01, PARAMETERS.neutral())
+    _, report = dry_run(stage, tmp_path / "a.rec", None, PARAMETERS)
+    jaw = sent_of(report, "jawOpen")
+    assert len(jaw) == pytest.approx(1.5 * 50, abs=2)
+    assert max(jaw[:20]) < 0.1 and jaw[-1] == pytest.approx(28.0, abs=0.5)
+
+
+def test_a_lively_stage_moves_by_itself(tmp_path: Path) -> None:
+    (tmp_path / "act.toml").write_text('steps = ["0 NEUTRAL"]')
+    still = 'show = "act.toml"\n'
+    moved = []
+    for text in (still, f"liveliness = 1.0\n{still}"):
+        _, report = dry_run(load_stage(str(stage_file(tmp_path, text)), PARAMETERS), None, 6.0, PARAMETERS)
+        moved.append(max(np.ptp(np.array(report[0]["sent_deg"]), axis=0)))
+    assert moved[0] < 0.01 < 1.0 < moved[1]
