@@ -194,3 +194,12 @@ def test_an_error_of_a_loop_ends_the_wait(tmp_path: Path, pipe: tuple[Connection
         body._error = LinkError("mine")
         with pytest.raises(LinkError, match="mine"):
             _wait(body, pipe[1], threading.Event(), None)
+
+
+def test_the_show_of_a_stage_begins_with_the_run(tmp_path: Path) -> None:
+    (tmp_path / "act.toml").write_text('steps = ["0 SET jawOpen 1"]')
+    with running(stage_of(tmp_path, 'show = "act.toml"\n')) as (body, _):
+        until(lambda: body.clock.ticks > 10)
+        assert body.newest()[0][JAW] < 0.01
+        body.begin()
+        until(lambda: body.newest()[0][JAW] > 0.9)

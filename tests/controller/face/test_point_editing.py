@@ -59,6 +59,7 @@ def test_a_corner_of_the_mouth_dragged_up_smiles_on_its_side(handles: PointEdito
     x, y = pixel(screen, CORNER)
     assert handles.take((x, y), screen, values) and handles.dragging
     assert handles.drag((x, y), screen, values) == {}  # a click moves nothing
+    assert handles.drag((x, y - 6), screen, values) and handles.drag((x, y - 6), screen, values) == {}  # told once
     for step in range(1, 11):
         for index, value in handles.drag((x + step, y - 3 * step), screen, values).items():
             values[index] = value
@@ -108,7 +109,10 @@ def test_control_points_go_with_the_mouse_and_are_worn_by_a_stage(
     handles.save(tmp_path / "dimple.json", "dimple")
     name, shape = load_group(tmp_path / "dimple.json", head)
     assert name == "dimple"
+    assert len(shape.ids) == np.count_nonzero(np.linalg.norm(moved, axis=1) >= 0.01)
     handles.undo()
+    head.pose(np.zeros(len(head.parameters)))
+    np.testing.assert_allclose(part.control_points, rest, atol=0.1)  # mm; contacts move some at rest
     np.testing.assert_array_equal(part.rig.rest, rest)
     (tmp_path / "stage.toml").write_text('name = "mine"\n[groups]\n"dimple.json" = 0.5\n')
     stage = load_stage(str(tmp_path / "stage.toml"), P)

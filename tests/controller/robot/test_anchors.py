@@ -16,6 +16,7 @@ from controller.robot.anchors import (
     AnchorSolver,
     PullRows,
     load_anchors,
+    pull_range_mm,
     residual_rows,
     sample_skin,
     servo_field,
@@ -213,3 +214,23 @@ def test_the_shipped_robot_differs_from_its_sister_only_in_its_mapping(robot: Ro
     ]
     assert robot.rules == other.rules
     assert len(tomllib.loads(find_config("robots", "head24-anchors").read_text())["landmarks"]) >= 10
+
+
+def test_pulls_end_where_the_trimmed_map_meets_the_limits(tmp_path: Path) -> None:
+    channel = written(tmp_path, ROBOT).channels[0]
+    assert pull_range_mm(channel) == (-5.0, 10.0)
+    assert pull_range_mm(channel.model_copy(update={"trim_deg": 6.0})) == (-5.0, 0.0)  # 46 degrees is too far
+    assert pull_range_mm(channel.model_copy(update={"trim_deg": -6.0})) == (0.0, 10.0)
+    assert pull_range_mm(channel.model_copy(update={"limit_deg": (-20.0, 40.0)})) == (-5.0, 10.0)
+
+
+def test_every_fault_of_the_anchors_is_listed_at_once(tmp_path: Path, head: Head) -> None:
+    second = ROBOT[ROBOT.index("[[channels]]") :].replace('"corner"', '"lip"').replace("id = 1", "id = 2")
+    second = second.replace('point = "lip"', 'point = "corner"')
+    text = ROBOT.replace("[0, 1, 0] }", '[0, 1, 0], like = "headYaw" }')
+    text += second.replace("[0, 1, 0] }", '[0, 1, 0], part = "hair" }')
+    with pytest.raises(ConfigError, match="2 faults") as caught:
+        load_anchors(written(tmp_path, text), head, P, where="mine.toml")
+    message = str(caught.value)
+    assert message.startswith("mine.toml: ") and "omote check mine.toml" in caught.value.hint
+    assert "channels[0].anchor.like: the head has no shape" in message and "channels[1].anchor.part: 'hair'" in message

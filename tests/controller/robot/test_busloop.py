@@ -100,6 +100,7 @@ def test_servos_are_held_where_they_are_until_the_face_begins(servos: SimulatedB
     face.values[JAW] = 1.0
     with running(servos, face) as loop:
         ticked(loop, 5)
+        assert loop._goals.period_s == pytest.approx(0.02) and loop.clock.period_ns == 20_000_000
         assert degrees(servos, 1) == pytest.approx(10.0, abs=0.2)
         until(lambda: abs(degrees(servos, 2) + 40.0) < 0.2)
         assert loop.report()["face_difference"] == {} and loop.held == 0
