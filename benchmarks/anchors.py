@@ -22,7 +22,7 @@ from scipy.optimize import lsq_linear
 
 from controller.base.parameters import PARAMETERS, Floats
 from controller.base.paths import find_config
-from controller.robot.anchors import AnchorMap, Rows, anchored, first, load_anchors, sample_skin, servo_field, travel
+from controller.robot.anchors import AnchorSolver, PullRows, load_anchors, pull_range_mm, sample_skin, servo_field
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
 from controller.vocabulary.vocabulary import Vocabulary
@@ -59,18 +59,18 @@ def naive_pulls(channels: list[ChannelSettings], values: Floats) -> Floats:
 class Unseen:
     """The same servos at points around the anchors that the solve did not have."""
 
-    def __init__(self, head: Head, solved: AnchorMap, channels: list[ChannelSettings]) -> None:
+    def __init__(self, head: Head, solved: AnchorSolver, channels: list[ChannelSettings]) -> None:
         anchors = [channel.anchor for channel in channels if channel.anchor is not None]
         k = len(anchors)
         uv = head.part(solved.skin.part).mesh.uv.astype(np.float64)
         used = {tuple(point) for point in solved.skin.uv}
         fresh = np.array([point for point in uv if tuple(point) not in used])
         self.skin = sample_skin(head, solved.skin.part, np.concatenate([solved.skin.uv[:k], fresh]))
-        own = first(self.skin, k)
+        own = self.skin.subset(slice(k))
         self.field = servo_field(anchors, own, self.skin).reshape(-1, 3, k)
-        around = Rows.around(anchors, own, self.skin, NEAR_MM)
+        around = PullRows.near(anchors, own, self.skin, NEAR_MM)
         new = around.point >= k
-        self.rows = Rows(around.point[new], around.pull[new], around.way[new])
+        self.rows = PullRows(around.point[new], around.anchor[new], around.direction[new])
 
     def left(self, shapes: Floats, pulls: Floats) -> Floats:
         """(m, 3) mm that the servos stay behind."""
@@ -92,7 +92,7 @@ def measures(unseen: Unseen) -> list[Measure]:
     k = unseen.field.shape[2]
     return [
         Measure(
-            f"along the pulls, {len(unseen.rows.point)} anchors", unseen.rows.along(unseen.field), unseen.rows.along
+            f"along the pulls, {len(unseen.rows.point)} anchors", unseen.rows.project(unseen.field), unseen.rows.project
         ),
         Measure(
             f"all directions, {len(near)} points there", unseen.field[near].reshape(-1, k), lambda d: d[near].ravel()
@@ -101,17 +101,19 @@ def measures(unseen: Unseen) -> list[Measure]:
     ]
 
 
-def compare(measure: Measure, solved: AnchorMap, unseen: Unseen, channels: list[ChannelSettings]) -> dict[str, Floats]:
+def compare(
+    measure: Measure, solved: AnchorSolver, unseen: Unseen, channels: list[ChannelSettings]
+) -> dict[str, Floats]:
     """(e,) root sums of squares by mapping, one for each emotion."""
-    vocabulary, ends = Vocabulary.load(PARAMETERS), np.array([travel(channel) for channel in channels]).T
+    vocabulary, ends = Vocabulary.load(PARAMETERS), np.array([pull_range_mm(channel) for channel in channels]).T
     rows: dict[str, list[float]] = {}
     for name in EMOTIONS:
         values = vocabulary[name].weights
-        wanted = measure.pick(unseen.skin.displacement(solved.shapes(values)))
+        wanted = measure.pick(unseen.skin.displacement(solved.shape_values(values)))
         pulls = {
             "moves": np.zeros(len(channels)),
             "naive": naive_pulls(channels, values),
-            "anchors": solved.pulls(values),
+            "anchors": solved.pulls_mm(values),
             "best": lsq_linear(measure.field, wanted, ends).x,
             "free": np.linalg.lstsq(measure.field, wanted, rcond=None)[0],
         }
@@ -141,13 +143,13 @@ def main() -> None:
     solved = load_anchors(robot, head, PARAMETERS)
     if solved is None:
         raise SystemExit("the robot has no anchors")
-    channels = anchored(robot)
+    channels = robot.anchored_channels
     unseen = Unseen(head, solved, channels)
     for measure in measures(unseen):
         console.print(show(measure, compare(measure, solved, unseen, channels)))
     values, began = Vocabulary.load(PARAMETERS)["surprise"].weights.copy(), time.perf_counter()
     for i in range(2000):
-        solved.pulls(values * (0.5 + 0.5 * np.sin(i / 20)))
+        solved.pulls_mm(values * (0.5 + 0.5 * np.sin(i / 20)))
     console.print(f"one solve: {(time.perf_counter() - began) / 2:.3f} ms")
 
 

@@ -25,7 +25,7 @@ from controller.layers.commands import CommandState
 from controller.layers.mixer import LayerSettings
 from controller.layers.settings import default_layers
 from controller.robot.robot import load_robot
-from controller.stage.offline import Line
+from controller.robot.safety import GoalFilter
 
 LAYERS = (*default_layers(), LayerSettings("show", 45, "max"), LayerSettings("twitch", 55, "add", weight=0.2))
 DT = 0.01
@@ -41,8 +41,8 @@ class Chain:
         robot = load_robot(find_config("robots", "head24"), P)
         self.state = CommandState(P, layers=LAYERS)
         self.state.live(1.0, 0)
-        self.line = Line(robot.channels, P, robot.rules, DT)
-        self.table, self.sent, self.values = self.line.table, self.line.sent, P.neutral()
+        self.goals = GoalFilter(robot.channels, P, robot.rules, DT)
+        self.table, self.sent, self.values = self.goals.table, self.goals.sent, P.neutral()
         self.now_ns = 1_000_000_000
         self._random = np.random.default_rng(seed)
 
@@ -82,7 +82,7 @@ class Chain:
         """One tick; (n,) rad that go to the bus."""
         self.now_ns += STEP_NS
         self.state.tick(self.now_ns, DT, self.values)
-        return self.line.step(self.values)
+        return self.goals.step(self.table.angles(self.values)[0])
 
 
 def measure(chain: Chain, ticks: int) -> Floats:
@@ -169,7 +169,7 @@ def soak(ticks: int, console: Console) -> None:
     console.print(f"{ticks} hostile ticks; limits broken at the bus: {broken}")
     console.print(f"resident memory after each tenth of them: {', '.join(str(kb) for kb in held)} kB")
     console.print(f"{took * 1e3:.3f} ms a tick with its checks")
-    acted = [f"{rule['rule']} {rule['times']}" for rule in chain.line.guard.report()]
+    acted = [f"{rule['rule']} {rule['times']}" for rule in chain.goals.guard.report()]
     console.print(f"rules that acted: {', '.join(acted)}")
 
 

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
-from controller.robot.anchors import skin_points
+from controller.robot.anchors import head_order, sample_skin, skin_points
 from controller.stage.inverse import PointSolver, SculptSolver
 from surface.head import Head
 
@@ -27,7 +27,8 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=68, help="points of the skin that are tracked")
     count, console = parser.parse_args().points, Console(highlight=False)
     head = Head.load(find_config("heads", "ict"))
-    dragger = PointSolver(head, skin_points(head, "face", count, 3), P)
+    skin = sample_skin(head, "face", skin_points(head, "face", count, 3))
+    dragger = PointSolver(skin, head_order(head.parameters, P), P)
     at = [head.parameters.index(name) for name in MOVES]
     rng = np.random.default_rng(0)
     took, missed = np.zeros(FRAMES), np.zeros(FRAMES)

@@ -23,15 +23,15 @@ def screen() -> CalibrationScreen:
     low, high = np.array([channel.limit_deg for channel in channels]).T
     state = CalibrationScreen(channels)
     rest = 0.1 * (low + high)
-    state.see(rest)
-    state.press("N")
-    state.press("t")
+    state.set_angles(rest)
+    state.handle_key("N")
+    state.handle_key("t")
     for share in np.linspace(-0.8, 0.7, 7):
         angles = np.where(share < 0, -share * low, share * high)
         angles[CHANNELS // 2 :] = rest[CHANNELS // 2 :]
-        state.see(angles)
+        state.set_angles(angles)
     for _ in range(CHANNELS // 2):
-        state.press("down")
+        state.handle_key("down")
     return state
 
 

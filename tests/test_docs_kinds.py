@@ -11,7 +11,7 @@ import pytest
 
 import drivers
 from controller.links.kind import LINKS
-from controller.robot.buses import BusSettings, takers
+from controller.robot.buses import BusSettings, families_by_option
 from controller.takes.reader import TAKES, suffixes
 from drivers.base.options import entries
 from drivers.base.plugins import Registry
@@ -74,7 +74,7 @@ def test_robots_has_every_key_of_a_bus(page: Page) -> None:
 
 def test_robots_has_every_option_of_every_family(page: Page) -> None:
     written = options_in(rows(page("docs/robots.md"), "family"))
-    assert written == {kind: {key for key, by in takers().items() if kind in by} for kind in own(FAMILIES)}
+    assert written == {kind: {key for key, by in families_by_option().items() if kind in by} for kind in own(FAMILIES)}
 
 
 @pytest.mark.parametrize("kind", drivers.kinds())

@@ -1,38 +1,42 @@
-"""What main and body process say to each other, besides the mailboxes: a few pickled records over a pipe."""
+"""Messages between the main process and the body's process: pickled records that are sent over a pipe."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from controller.body.sources import Voice
 
 
 @dataclass(frozen=True)
-class BodyOrders:
-    """What the body shall do.
+class RunOptions:
+    """Options of a run besides its stage.
 
     Attributes
     ----------
-    stage : path of the stage's file.
-    mailbox : path of the mailbox the parameters are published in.
-    take : a recorded take to play instead of the links; None for none.
-    mirror : leave the servos limp; the face shows where somebody moves them.
-    voice : a voice that moves the mouth. record : file to write every command and tick to.
-    insight : path of the mailbox for what the panel shows besides; None for none.
+    take : a take or recording to play instead of the links. voice : a voice that moves the mouth.
+    mirror : leave the servos limp; the face shows where somebody moves them. record : file for every command and tick.
     """
+
+    take: Path | None = None
+    mirror: bool = False
+    voice: Voice | None = None
+    record: Path | None = None
+
+
+@dataclass(frozen=True)
+class BodyOrders:
+    """Main to body, first: the stage's file, the files of the mailboxes for parameters and panel state, options."""
 
     stage: str
     mailbox: str
-    take: str | None = None
-    mirror: bool = False
-    voice: Voice | None = None
-    record: str | None = None
-    insight: str | None = None
+    panel_mailbox: str | None = None
+    options: RunOptions = RunOptions()
 
 
 @dataclass(frozen=True)
 class Begin:
-    """Main to body: the face is there; open the links, or start the take."""
+    """Main to body: the face is ready; open the links, or start the take."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +46,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Hold:
-    """Main to body, from the panel: hold one parameter at a value, or release it.
-
-    Attributes
-    ----------
-    index : which parameter.
-    value : its value; None gives it back to the layers below.
-    """
+    """Main to body, from the panel: hold parameter ``index`` at a value; None releases it to the layers below."""
 
     index: int
     value: float | None
@@ -69,21 +67,17 @@ class Neutral:
     seconds: float
 
 
+PanelRequest = Hold | Show | Neutral
+
+
 @dataclass(frozen=True)
 class Ready:
-    """The servos stand; the body waits for :class:`Begin`.
-
-    Attributes
-    ----------
-    notes : what a user should know, a line each: ports that were made, servos found.
-    """
-
-    notes: tuple[str, ...] = ()
+    """Body to main: the servos are up; the body waits for :class:`Begin`."""
 
 
 @dataclass(frozen=True)
 class Failed:
-    """The body could not come up, or gave up; carries the error's message and hint."""
+    """Body to main: it could not start, or gave up; the error's message and hint."""
 
     message: str
     hint: str = ""
@@ -91,11 +85,11 @@ class Failed:
 
 @dataclass(frozen=True)
 class Finished:
-    """The body has nothing left to play."""
+    """Body to main: there is nothing left to play."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """What the body measured."""
+    """Body to main, last: what was measured."""
 
     content: dict[str, object] = field(default_factory=dict)

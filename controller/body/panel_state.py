@@ -1,6 +1,6 @@
-"""What the panel shows besides the values: who holds each parameter, what the servos show, how far they are away.
+"""State for the panel besides the values: the layer that holds each parameter, and what the servos show of it.
 
-The body writes it ten times a second into a mailbox of its own; main reads it when it draws.
+The body writes it ten times a second to a mailbox; main reads it when it draws.
 """
 
 from __future__ import annotations
@@ -15,66 +15,49 @@ from controller.layers.commands import CommandState
 from controller.robot.following import MeasuredFace
 
 
-def panel_state_size(parameters: Parameters) -> int:
-    """Length of the mailbox's vector: holders (P), measured (P), degrees by region."""
-    return 2 * len(parameters) + len(REGIONS)
-
-
-class PanelStateWriter:
-    """The body's side.
-
-    Parameters
-    ----------
-    mailbox : of :func:`panel_state_size`. state : the layers. reflection : reads the servos; None without any.
-    """
-
-    def __init__(self, mailbox: Mailbox, state: CommandState, reflection: MeasuredFace | None) -> None:
-        self._mailbox, self._state, self._measured_face = mailbox, state, reflection
-        p = len(state.parameters)
-        self._all = np.full(panel_state_size(state.parameters), np.nan)
-        self._holders, self._measured, self._away = self._all[:p], self._all[p : 2 * p], self._all[2 * p :]
-        self._mask = np.zeros(p, dtype=bool)
-
-    def publish(self) -> None:
-        """Write how things are now."""
-        layers = {name: i for i, name in enumerate(self._state.layer_names())}
-        self._holders[:] = [layers.get(self._state.holder(i) or "", -1) for i in range(len(self._holders))]
-        if self._measured_face is not None:
-            self._measured_face.read(self._measured, self._mask)
-            self._measured[~self._mask] = np.nan
-            away = self._measured_face.differences()
-            self._away[:] = [away.get(region, np.nan) for region in REGIONS]
-        self._mailbox.publish(self._all)
-
-
 class PanelState:
-    """Main's side; call :meth:`refresh` once a frame.
+    """Reads and writes the state through a mailbox; main calls :meth:`refresh` once a frame.
 
-    Parameters
-    ----------
-    mailbox : what the body writes. layers : names of the layers, lowest first.
+    ``layers`` : names of all layers, lowest first.
     """
 
     def __init__(self, mailbox: Mailbox, layers: Sequence[str], parameters: Parameters) -> None:
         self._mailbox, self._layers, self._p = mailbox, tuple(layers), len(parameters)
-        self._all = np.full(panel_state_size(parameters), np.nan)
+        self._all = np.full(self.size(parameters), np.nan)
+        self._holders, self._measured, self._away = np.split(self._all, [self._p, 2 * self._p])
+
+    @staticmethod
+    def size(parameters: Parameters) -> int:
+        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region."""
+        return 2 * len(parameters) + len(REGIONS)
+
+    def publish(self, state: CommandState, measured_face: MeasuredFace | None) -> None:
+        """Write the state of this moment; ``measured_face`` None without servos."""
+        layers = {name: i for i, name in enumerate(self._layers)}
+        self._holders[:] = [layers.get(state.holder(i) or "", -1) for i in range(self._p)]
+        if measured_face is not None:
+            known = np.zeros(self._p, dtype=bool)
+            measured_face.read(self._measured, known)
+            self._measured[~known] = np.nan
+            away = measured_face.differences()
+            self._away[:] = [away.get(region, np.nan) for region in REGIONS]
+        self._mailbox.publish(self._all)
 
     def refresh(self) -> None:
-        """Read what was written last; nothing is known before the first."""
+        """Read what was written last; nothing is known before the first time."""
         if self._mailbox.sequence:
             self._mailbox.read(self._all)
 
     def holder(self, index: int) -> str:
         """The layer that holds a parameter; empty when none does or nothing is known."""
-        layer = self._all[index]
+        layer = self._holders[index]
         return self._layers[int(layer)] if layer >= 0 else ""
 
     def measured(self, index: int) -> float | None:
         """What the servos show of a parameter; None where that is not known."""
-        value = self._all[self._p + index]
-        return float(value) if np.isfinite(value) else None
+        return float(self._measured[index]) if np.isfinite(self._measured[index]) else None
 
     def away_deg(self, region: str) -> float | None:
-        """How far the servos of a region are from where they were wanted (rms, degrees); None where not known."""
-        value = self._all[2 * self._p + REGIONS.index(region)]
+        """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""
+        value = self._away[REGIONS.index(region)]
         return float(value) if np.isfinite(value) else None

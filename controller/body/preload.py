@@ -1,6 +1,6 @@
-"""The body's process before there is anything for it to do: it loads its code while main still reads its orders.
+"""Starts the body's process early: it loads its code while the main process still reads its settings.
 
-Imports nothing that takes long: it is what starts first.
+Imports nothing that takes long, because it is started before everything else.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from controller.base.signals import interrupts_blocked
@@ -28,50 +27,44 @@ _END_S = 5.0
 class PreloadedBody:
     """A process that waits for :class:`controller.body.messages.BodyOrders`.
 
-    A context manager: it ends with the block unless :meth:`send` has sent it to work.
-
-    Attributes
-    ----------
-    pipe : to the process. process : the process.
-    voice : what is written here the body hears where its voice comes from standard input, which a child has not.
+    A context manager: the process ends with the block unless :meth:`send` has given it orders.
+    ``pipe`` leads to it; ``voice`` carries a voice from standard input, which a child process does not have.
     """
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
-        heard, self.voice = context.Pipe(duplex=False)
-        self.process: SpawnProcess = context.Process(target=_wait, args=(theirs, heard), name="omote body")
-        with interrupts_blocked(), _main_left_out():
+        voice, self.voice = context.Pipe(duplex=False)
+        self.process: SpawnProcess = context.Process(target=_wait, args=(theirs, voice), name="omote body")
+        with interrupts_blocked(), _without_main_module():
             self.process.start()
         theirs.close()
-        heard.close()
+        voice.close()
         self._sent = False
 
     def send(self, orders: BodyOrders) -> None:
-        """Give the process its orders; from now on it is the caller's to end."""
+        """Send the process its orders; from now on the caller has to end it."""
         self._sent = True
-        with suppress(OSError):  # a process that is gone is told by whoever waits for its answer
+        with suppress(OSError):  # whoever waits for its answer reports a process that is gone
             self.pipe.send(orders)
 
     def __enter__(self) -> PreloadedBody:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         if not self._sent:
             self.pipe.close()
             self.voice.close()
             self.process.terminate()
             self.process.join(_END_S)
-            if self.process.exitcode is None:  # what is asked of a process while it starts can be lost
+            if self.process.exitcode is None:  # a signal that is sent while it starts can be lost
                 self.process.kill()
                 self.process.join(_END_S)
 
 
 @contextmanager
-def uncollected() -> Iterator[None]:
-    """Collect no garbage: next to nothing of what a start loads is any, and looking takes a tenth of the start."""
+def garbage_collection_off() -> Iterator[None]:
+    """Switch garbage collection off: a start creates hardly any garbage, and collecting takes a tenth of its time."""
     gc.disable()
     try:
         yield
@@ -80,25 +73,26 @@ def uncollected() -> Iterator[None]:
 
 
 @contextmanager
-def _main_left_out() -> Iterator[None]:
-    """A spawned process imports the program it was started from; the body needs no command line."""
+def _without_main_module() -> Iterator[None]:
+    """Keep a spawned process from importing the program that starts it: the body needs no command line."""
     main = sys.modules["__main__"].__dict__
-    left_out = {name: main.pop(name) for name in ("__file__",) if name in main}
+    removed = {name: main.pop(name) for name in ("__file__",) if name in main}
     try:
         yield
     finally:
-        main.update(left_out)
+        main.update(removed)
 
 
-def _wait(pipe: Connection, heard: Connection) -> None:
-    """Load the body's code, then be the body."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main tells the body when
-    with uncollected():
+def _wait(pipe: Connection, voice: Connection) -> None:
+    """Load the body's code, wait for orders, then run the body."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
+    with garbage_collection_off():
         from controller.body.body import body_main  # start-up: in the child, while main reads its orders
     try:
         orders: BodyOrders = pipe.recv()
     except (EOFError, OSError):
         return
-    if orders.voice is not None and orders.voice.path == "-":
-        orders = replace(orders, voice=replace(orders.voice, pipe=heard))
+    options = orders.options
+    if options.voice is not None and options.voice.path == "-":
+        orders = replace(orders, options=replace(options, voice=replace(options.voice, pipe=voice)))
     body_main(orders, pipe)

@@ -1,4 +1,4 @@
-"""What plays into the layers besides the links: a take, a voice, a head that is moved by hand."""
+"""Sources of the layers besides the links: a take, a voice, a limp head that is moved by hand."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING
 
 from controller.base.errors import TakeError
 from controller.layers.commands import CommandState
-from controller.robot.following import FollowMode
+from controller.robot.following import MeasuredFace
 from controller.takes.livelink import TakePlayer
 from controller.takes.voice import HOP_S, VoiceListener
 
@@ -31,8 +31,7 @@ class Voice:
     ----------
     path : file, named pipe or device with WAV of PCM; ``-`` for standard input.
     raw_hz : samples per second of signed 16 bit mono PCM without a header; None for WAV.
-    alone : nothing else plays: its end is the end of the run.
-    pipe : brings standard input to the body's process.
+    alone : nothing else plays: its end is the end of the run. pipe : carries standard input to the body's process.
     """
 
     path: str
@@ -41,12 +40,7 @@ class Voice:
     pipe: Connection | None = None
 
     def open(self) -> IO[bytes]:
-        """The stream.
-
-        Raises
-        ------
-        TakeError : it cannot be opened.
-        """
+        """Open the stream; raises TakeError when that fails."""
         if self.pipe is not None:
             return io.BufferedReader(PipeStream(self.pipe), _CHUNK)
         try:
@@ -63,7 +57,7 @@ class PipeStream(io.RawIOBase):
         self._pipe, self._left = pipe, b""
 
     def readable(self) -> bool:
-        """It is."""
+        """Always true."""
         return True
 
     def readinto(self, buffer: WriteableBuffer) -> int:
@@ -80,11 +74,9 @@ class PipeStream(io.RawIOBase):
 
 
 def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
-    """Send a stream, standard input without one, down a pipe from a thread of its own, and close it at the end.
+    """Copy a stream, by default standard input, to a pipe in a thread, and close the pipe at the end.
 
-    Raises
-    ------
-    TakeError : standard input is closed.
+    Raises TakeError when standard input is closed.
     """
     found = stream or sys.stdin
     if found is None:
@@ -104,69 +96,70 @@ def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
 
 
 class Sources:
-    """Everything that is ticked before the layers are mixed.
+    """Everything that writes to the layers before they are mixed.
 
     Parameters
     ----------
-    state : the layers. player : plays a take. puppet : reads a limp head. voice : a voice to listen to.
+    state : the layers. player : plays a take. follow : the face of a limp head. voice : a voice to listen to.
     beside : the take plays beside the links, and its end is not the end of the run.
-
-    Attributes
-    ----------
-    error : what ended the voice, if anything did. heard : the voice has ended.
     """
 
     def __init__(
         self,
         state: CommandState,
         player: TakePlayer | None = None,
-        puppet: FollowMode | None = None,
+        follow: MeasuredFace | None = None,
         voice: Voice | None = None,
         *,
         beside: bool = False,
     ) -> None:
-        self._beside = beside
-        self._state, self._player, self._follow, self._voice = state, player, puppet, voice
+        self._state, self._player, self._follow, self._voice, self._beside = state, player, follow, voice, beside
         self._voice_listener: VoiceListener | None = None
         self._stopped = False
-        self.error: Exception | None = None
-        self.heard = False
+        self.error: Exception | None = None  # what ended the voice
+        self.voice_ended = False
 
     @property
     def finished(self) -> bool:
         """A take has been played to its end, or a voice that was all there is to play has ended."""
         if self._player is not None:
             return self._player.finished and not self._beside
-        return self.heard and self._voice is not None and self._voice.alone
+        return self.voice_ended and self._voice is not None and self._voice.alone
 
     def begin(self) -> None:
-        """Let a voice in; it may take a while until it says anything."""
+        """Start to listen to the voice."""
         if self._voice is not None:
             threading.Thread(target=self._listen, args=(self._voice,), name="voice", daemon=True).start()
 
     def stop(self) -> None:
-        """Listen no more; a stream that is silent is left to end by itself."""
+        """Stop listening; a thread that waits for a silent stream ends with the process."""
         self._stopped = True
         if self._voice_listener is not None:
             self._voice_listener.stop()
 
     def tick(self, now_ns: int, begun: bool) -> None:
-        """Give the layers what is due; takes wait until ``begun``."""
+        """Write to the layers what is due; takes and shows wait until ``begun``."""
         if self._player is not None and begun:
             self._player.tick(now_ns)
         if self._follow is not None:
-            self._follow.tick(self._state, now_ns)
+            self._follow.capture(self._state, now_ns)
         if self._state.shows is not None and begun:
             self._state.shows.tick(now_ns)
 
     def report(self) -> dict[str, object]:
-        """How far a take was played and a voice was heard (s); None without."""
-        heard = (
-            None
-            if self._voice is None
-            else {"heard_s": self._voice_listener.hops * HOP_S if self._voice_listener else 0.0}
-        )
-        return {"take": self._take(), "voice": heard}
+        """How much of a take was played and of a voice was heard (s); None without."""
+        take, voice = None, None
+        if self._player is not None:
+            played = self._player.take
+            take = {
+                "rows": played.frames,
+                "rate_hz": played.rate_hz,
+                "played_s": min(self._player.position_s, played.duration_s),
+                "duration_s": played.duration_s,
+            }
+        if self._voice is not None:
+            voice = {"heard_s": self._voice_listener.hops * HOP_S if self._voice_listener else 0.0}
+        return {"take": take, "voice": voice}
 
     def _listen(self, voice: Voice) -> None:
         try:
@@ -174,13 +167,6 @@ class Sources:
                 self._voice_listener = VoiceListener(stream, self._state, raw_hz=voice.raw_hz)
                 if not self._stopped:
                     self._voice_listener.run()
-        except Exception as error:  # noqa: BLE001  the body has to hear of it
+        except Exception as error:  # noqa: BLE001  the body raises it
             self.error = error
-        self.heard = True
-
-    def _take(self) -> dict[str, object] | None:
-        if self._player is None:
-            return None
-        take = self._player.take
-        played = min(self._player.position_s, take.duration_s)
-        return {"rows": take.frames, "rate_hz": take.rate_hz, "played_s": played, "duration_s": take.duration_s}
+        self.voice_ended = True

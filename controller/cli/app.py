@@ -1,7 +1,6 @@
-"""The ``omote`` command: one message and exit code 1 for everything that goes wrong, never a traceback.
+"""The ``omote`` command line: registers all commands, and turns every error into one message and an exit code.
 
-Each command lives in a module of this folder and imports what it needs when it runs, so that ``omote --help`` and
-the simulated parts start at once.
+Each command imports the code it needs when it runs, so that ``omote --help`` and the simulated parts start at once.
 """
 
 from __future__ import annotations
@@ -12,8 +11,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    # start-up: main() ends Ctrl-C quietly from its first line on, while all this still loads
-    from typer import Typer
+    from typer import Typer  # start-up: Ctrl-C ends it quietly while all this still loads
 
 
 def make_app() -> Typer:
@@ -22,7 +20,7 @@ def make_app() -> Typer:
     from typer import Typer
 
     # start-up: the same
-    from controller.cli import bench, bus, calibrate, check, fit, picture, plugins, run
+    from controller.cli import bench, bus, check, heads, run, simulate
 
     app = Typer(
         name="omote",
@@ -33,8 +31,12 @@ def make_app() -> Typer:
         rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for module in (run, picture, fit, bus, calibrate, check, plugins, bench):
-        module.register(app)
+    for command in (
+        run.demo, run.run, run.play, heads.render, heads.fit, heads.export,
+        bus.ports, bus.scan, bus.set_id, bus.monitor, bus.calibrate, check.check, check.plugins, bench.bench,
+    ):  # fmt: skip
+        app.command()(command)
+    app.add_typer(simulate.make_app(), name="simulate")
     return app
 
 
@@ -43,16 +45,11 @@ def report_error(error: BaseException, remark: str = "") -> None:
     from rich.console import Console  # start-up: Ctrl-C ends it quietly from main() on
 
     console = Console(stderr=True, highlight=False, soft_wrap=True)
-    console.print(f"[bold red]error:[/] {_plain(error)}")
-    hint = getattr(error, "hint", "")
-    if hint:
+    console.print(f"[bold red]error:[/] {_escape(str(error) or type(error).__name__)}")
+    if hint := getattr(error, "hint", ""):
         console.print(f"[bold]try:[/] {_escape(hint)}")
     if remark:
         console.print(remark, style="dim")
-
-
-def _plain(error: BaseException) -> str:
-    return _escape(str(error) or type(error).__name__)
 
 
 def _escape(text: str) -> str:

@@ -1,25 +1,20 @@
-"""``omote ports``, ``scan``, ``set-id`` and ``monitor``; ``simulate`` is in cli_simulate."""
+"""``omote ports``, ``scan``, ``set-id``, ``monitor`` and ``calibrate``: real buses and their servos."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.progress import Progress
 from rich.table import Table
 
-from controller.cli import simulate as cli_simulate
-from controller.cli.console import console
-from controller.tools.tables import show_table
+from controller.base.errors import ConfigError
+from controller.base.paths import find_config
+from controller.cli.console import console, show_table
 
-
-def register(app: typer.Typer) -> None:
-    """Add this module's commands to ``app``."""
-    app.command()(ports)
-    app.command()(scan)
-    app.command("set-id")(set_id)
-    app.command()(monitor)
-    cli_simulate.register(app)
+Port = Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")]
+Protocol = Annotated[int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")]
 
 
 def ports() -> None:
@@ -41,14 +36,14 @@ def ports() -> None:
         latency = "" if record.latency_s is None else f"{record.latency_s * 1000:g} ms"
         usable = "yes" if record.usable else "[red]no[/]"
         table.add_row(record.path, record.vid_pid, record.serial_number, record.description, usable, latency)
-    show_table(table, console)
+    show_table(table)
     for record in found:
         if record.hint:
             console.print(f"{record.device}: {record.hint}", soft_wrap=True)
 
 
 def scan(
-    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    port: Port,
     baud: Annotated[
         list[int] | None, typer.Option("--baud", help="Baud rate to try; may be repeated. All without it.")
     ] = None,
@@ -68,13 +63,10 @@ def scan(
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task(f"scanning {port}", total=len(plan) * STEPS)
 
-        def tell(text: str, step: int) -> None:
-            progress.update(task, description=text, completed=step)
-
-        for found in scan_port(port, plan, tell):
+        for found in scan_port(port, plan, lambda text, step: progress.update(task, description=text, completed=step)):
             table.add_row(*found.row)
     if table.row_count:
-        show_table(table, console)
+        show_table(table)
     else:
         console.print(
             f"No servo answered on {port}. Check its power, the wiring and the adapter's direction switch.",
@@ -83,13 +75,11 @@ def scan(
 
 
 def set_id(
-    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    port: Port,
     old: Annotated[int, typer.Argument(min=0, max=252, help="Id that the servo has.")],
     new: Annotated[int, typer.Argument(min=0, max=252, help="Id that it shall have.")],
     baud: Annotated[int, typer.Option(help="Baud rate it listens at; omote scan finds it.")] = 1_000_000,
-    protocol: Annotated[
-        int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")
-    ] = 2,
+    protocol: Protocol = 2,
     release: Annotated[
         bool, typer.Option("--release", help="Switch its motor off first; support what it holds.")
     ] = False,
@@ -105,11 +95,9 @@ def set_id(
 
 
 def monitor(
-    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")],
+    port: Port,
     baud: Annotated[int, typer.Option(help="Baud rate of the bus; omote scan finds it.")] = 1_000_000,
-    protocol: Annotated[
-        int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")
-    ] = 2,
+    protocol: Protocol = 2,
     listen: Annotated[
         bool, typer.Option("--listen", help="Only listen: for a second adapter on a wire that another program drives.")
     ] = False,
@@ -123,18 +111,56 @@ def monitor(
 
     Example: omote monitor /dev/ttyUSB0 --baud 57600
     """
-    from controller.base.signals import stop_flag  # start-up: --help does without it
-    from controller.body.process import Deadline  # start-up: --help does without it
-    from controller.tools.monitor import ask  # start-up: --help does without it
-    from controller.tools.monitor import listen as only_listen  # start-up: --help does without it
+    # start-up: --help does without any of these
+    from controller.base.signals import stop_flag
+    from controller.body.process import deadline
+    from controller.tools.monitor import listen_to_bus, poll_servos
 
-    deadline = Deadline(seconds)
+    in_time = deadline(seconds)
     with stop_flag() as flag:
 
-        def going() -> bool:
-            return not flag.is_set() and deadline()
+        def keep_going() -> bool:
+            return not flag.is_set() and in_time()
 
         if listen:
-            only_listen(port, baud, protocol, console, going, model)
+            listen_to_bus(port, baud, protocol, console, keep_going, model)
         else:
-            ask(port, baud, protocol, console, going, rate)
+            poll_servos(port, baud, protocol, console, keep_going, rate)
+
+
+def calibrate(
+    robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],
+    name: Annotated[str, typer.Option("--name", "-n", help="Name of the calibration.")] = "default",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write; beside the robot file without it.")
+    ] = None,
+    channel: Annotated[
+        list[str] | None, typer.Option("--channel", "-c", help="Only this channel; may be repeated.")
+    ] = None,
+    margin: Annotated[float, typer.Option(min=0, max=20, help="Degrees kept away from the captured ends.")] = 1.0,
+) -> None:
+    """Capture where each servo of a head has its neutral and its ends, by hand or by keys, and save it by name.
+
+    The motors are off until h is pressed: support what they hold. A file that exists is only replaced after a question.
+
+    Example: omote calibrate head24 --name desk
+    """
+    # start-up: --help does without any of these
+    from controller.base.parameters import PARAMETERS, did_you_mean
+    from controller.robot.calibration import calibration_path
+    from controller.robot.robot import load_robot
+    from controller.tools.calibrate import run_calibration
+
+    path = find_config("robots", robot)
+    settings = load_robot(path, PARAMETERS)
+    known = [each.name for each in settings.channels]
+    for word in channel or ():
+        if word not in known:
+            raise ConfigError(f"robot {settings.name} has no channel called {word!r}{did_you_mean(word, known)}")
+    channels = [each for each in settings.channels if not channel or each.name in channel]
+    target = out or calibration_path(name, path)
+    if run_calibration(settings, channels, name, target, margin, console):
+        console.print(f"wrote {target}", soft_wrap=True)
+        console.print(
+            f'The robot file takes it with: calibration = "{name if out is None else target}"', soft_wrap=True
+        )

@@ -1,17 +1,14 @@
-"""``omote check``: read a configuration, a head, a take or a surface and say everything that is wrong with it."""
+"""``omote check`` and ``plugins``: check any file omote reads; list every kind of bus, link, take and export."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 import typer
+from rich.markup import escape
+from rich.table import Table
 
-from controller.cli.console import console
-
-
-def register(app: typer.Typer) -> None:
-    """Add this module's command to ``app``."""
-    app.command()(check)
+from controller.cli.console import console, show_table
 
 
 def check(
@@ -30,3 +27,21 @@ def check(
 
     for line in check_anything(file):
         console.print(line, soft_wrap=True)
+
+
+def plugins() -> None:
+    """List every kind of bus, link, take and export: what omote brings, and what other packages add.
+
+    Example: omote plugins
+    """
+    from controller.tools.plugins import listed  # start-up: --help does without it
+
+    table, broken = Table(box=None, pad_edge=False), []
+    for head in ("sort", "kind", "what it is", "from"):
+        table.add_column(head, overflow="fold")
+    for each in listed():
+        table.add_row(each.sort, each.kind, escape(each.title) if each.works else "[red]cannot be loaded", each.package)
+        broken += [] if each.works else [each]
+    show_table(table)
+    for each in broken:
+        console.print(f"{escape(each.title)}\n[bold]try:[/] {escape(each.hint)}", soft_wrap=True)

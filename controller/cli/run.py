@@ -1,21 +1,17 @@
-"""``omote demo``, ``run`` and ``play``."""
+"""``omote demo``, ``run`` and ``play``: run a stage, or show what it would send."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
-from controller.cli.console import console
-from controller.stage.identity import parse_identity
-from controller.tools.report import rows
-from controller.tools.tables import show_table
-
-if TYPE_CHECKING:
-    from controller.body.sources import Voice  # start-up: --help does without it
+from controller.cli.console import console, show_table
+from controller.cli.heads import Identity
 
 Seconds = Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write what was measured to this JSON file.")]
@@ -24,10 +20,7 @@ Pictures = Annotated[
     Path | None, typer.Option("--pictures", help="Folder for a contact sheet and a clip (headless only).")
 ]
 NoFace = Annotated[bool, typer.Option("--no-face", help="Draw nothing: links and servos only, needs no OpenGL.")]
-DryRun = Annotated[
-    bool,
-    typer.Option("--dry-run", help="Open no port, move nothing; show what would be sent."),
-]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Open no port, move nothing; show what would be sent.")]
 Mirror = Annotated[bool, typer.Option("--mirror", help="Motors off: the face follows a head that is moved by hand.")]
 VoiceSource = Annotated[
     str | None, typer.Option("--voice", help="WAV that moves the mouth: a file or pipe, - for standard input.")
@@ -36,18 +29,8 @@ VoiceHz = Annotated[
     int | None,
     typer.Option("--voice-rate", min=1000, help="The voice is signed 16 bit mono PCM without a header, at this rate."),
 ]
-Record = Annotated[
-    Path | None,
-    typer.Option("--record", help="Write every command and tick to this file (.rec)."),
-]
+Record = Annotated[Path | None, typer.Option("--record", help="Write every command and tick to this file (.rec).")]
 StageName = Annotated[str, typer.Option("--stage", help="Stage: a name from configs/stages or a file.")]
-
-
-def register(app: typer.Typer) -> None:
-    """Add this module's commands to ``app``."""
-    app.command()(demo)
-    app.command()(run)
-    app.command()(play)
 
 
 def demo(
@@ -64,9 +47,10 @@ def demo(
     """
     from controller.tools.stage_run import has_display  # start-up: --help does without it
 
-    windowed = has_display() and not headless
-    pictures, report = (None, None) if windowed else (out, out / "report.json")
-    _run("demo", None, seconds if windowed else seconds or 15.0, headless, False, pictures, report)
+    if has_display() and not headless:
+        _run("demo", seconds)
+    else:
+        _run("demo", seconds or 15.0, headless, pictures=out, report=out / "report.json")
 
 
 def run(
@@ -81,9 +65,7 @@ def run(
     voice: VoiceSource = None,
     voice_hz: VoiceHz = None,
     record: Record = None,
-    identity: Annotated[
-        str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
-    ] = None,
+    identity: Identity = None,
     kiosk: Annotated[
         bool, typer.Option("--kiosk", help="Full screen, no panel, no cursor; Esc or Ctrl-C ends.")
     ] = False,
@@ -100,16 +82,10 @@ def run(
     if dry_run:
         _dry_run(stage, None, seconds, report)
         return
-    from controller.body.sources import Voice  # start-up: --help does without it
-
-    heard = Voice(voice, voice_hz) if voice is not None else None
-    _run(
-        stage, None, seconds, headless, no_face, pictures, report,
-        mirror=mirror, voice=heard, record=record, identity=parse_identity(identity), picture={
-            "kiosk": kiosk or None, "monitor": monitor, "quality": quality, "theme": theme, "camera": camera,
-            "evaluator": evaluator,
-        },
-    )  # fmt: skip
+    look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "theme": theme, "camera": camera,
+            "evaluator": evaluator}  # fmt: skip
+    _run(stage, seconds, headless, no_face, pictures, report, mirror=mirror, voice=voice, voice_hz=voice_hz,
+         record=record, identity=identity, look=look)  # fmt: skip
 
 
 def play(
@@ -132,43 +108,43 @@ def play(
     Example: omote play alex_rom_3.csv --headless --report r.json
     """
     if str(take) == "-":
-        from controller.body.sources import Voice  # start-up: --help does without it
-
-        heard = Voice("-", voice_hz, alone=True)
-        _run(stage, None, seconds, headless, no_face, pictures, report, voice=heard, record=record)
+        _run(stage, seconds, headless, no_face, pictures, report, voice="-", voice_hz=voice_hz, alone=True,
+             record=record)  # fmt: skip
     elif dry_run:
         _dry_run(stage, take, seconds, report)
     else:
-        _run(stage, take, seconds, headless, no_face, pictures, report, record=record)
+        _run(stage, seconds, headless, no_face, pictures, report, take=take, record=record)
 
 
 def _run(
     stage: str,
-    take: Path | None,
     seconds: float | None,
-    headless: bool,
-    no_face: bool,
-    pictures: Path | None,
-    report: Path | None,
+    headless: bool = False,
+    no_face: bool = False,
+    pictures: Path | None = None,
+    report: Path | None = None,
     *,
+    take: Path | None = None,
     mirror: bool = False,
-    voice: Voice | None = None,
+    voice: str | None = None,
+    voice_hz: int | None = None,
+    alone: bool = False,
     record: Path | None = None,
-    identity: dict[str, float] | None = None,
-    picture: dict[str, object] | None = None,
+    identity: str | None = None,
+    look: Mapping[str, object] | None = None,
 ) -> None:
-    from controller.body.preload import PreloadedBody, uncollected  # start-up: --help does without it
+    from controller.body.preload import PreloadedBody, garbage_collection_off  # start-up: --help does without it
 
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: its threads would spin where others have work
-    with console.status("starting") as status, PreloadedBody() as waiting, uncollected():
-        from controller.stage.stage import with_picture  # start-up: --help does without it
-        from controller.tools.stage_run import StageRun, has_display, write_report  # start-up: --help does without it
+    with console.status("starting") as status, PreloadedBody() as preloaded, garbage_collection_off():
+        # start-up: the body's process loads its code at the same time
+        from controller.body.messages import RunOptions
+        from controller.body.sources import Voice
+        from controller.stage.stage import parse_identity
+        from controller.tools.stage_run import StageRun, has_display, write_report
 
-        session = StageRun.load(
-            stage, take, status.update,
-            mirror=mirror, voice=voice, record=record, identity=identity, waiting=waiting,
-        )  # fmt: skip
-        session.stage = with_picture(session.stage, picture or {})
+        options = RunOptions(take, mirror, None if voice is None else Voice(voice, voice_hz, alone), record)
+        session = StageRun(stage, options, parse_identity(identity), look, status.update, preloaded)
         if no_face:
             measured = session.run_without_face(seconds)
         elif headless or not has_display():
@@ -178,36 +154,97 @@ def _run(
         if report is not None:
             write_report(measured, report)
             measured["written"].append(str(report))
-    show_report(measured)
+    table = Table("measured", "value", title=f"omote {measured['stage']}", title_justify="left")
+    for row in report_rows(measured):
+        table.add_row(*row)
+    show_table(table)
+    for path in measured["written"]:
+        console.print(f"wrote {path}", soft_wrap=True)
 
 
 def _dry_run(stage: str, take: Path | None, seconds: float | None, report: Path | None) -> None:
-    from controller.tools.stage_run import StageRun, write_report  # start-up: --help does without it
+    # start-up: --help does without any of these
+    from controller.base.parameters import PARAMETERS
+    from controller.stage.dry_run import dry_run
+    from controller.stage.stage import load_stage
+    from controller.tools.stage_run import write_report
 
-    with console.status("rehearsing"):
-        rows, sent = StageRun.load(stage, take).plan(seconds)
-    show_plan(rows)
+    with console.status("computing what would be sent"):
+        channels, sent = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS)
+    if channels:
+        table = Table(*channels[0], title="dry run: no port was opened", title_justify="left")
+        for channel in channels:
+            table.add_row(*channel.values())
+        show_table(table)
+    else:
+        console.print("This stage has no robot; nothing would be sent.", soft_wrap=True)
     if report is not None:
         write_report({"stage": stage, "dry_run": True, "buses": sent}, report)
         console.print(f"wrote {report}", soft_wrap=True)
 
 
-def show_report(report: dict[str, Any]) -> None:
-    """Print the table of what was measured."""
-    table = Table("measured", "value", title=f"omote {report['stage']}", title_justify="left")
-    for name, value in rows(report):
-        table.add_row(name, value)
-    show_table(table, console)
-    for path in report.get("written", []):
-        console.print(f"wrote {path}", soft_wrap=True)
+def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """Name and value of the most important entries of a run's report."""
+    face = report.get("face")
+    return [*(_face(face) if face else []), *_control(report), *_buses(report.get("buses", []))]
 
 
-def show_plan(plan: list[dict[str, str]]) -> None:
-    """Print what a stage would send, a channel a row."""
-    if not plan:
-        console.print("This stage has no robot; nothing would be sent.", soft_wrap=True)
-        return
-    table = Table(*plan[0], title="dry run: no port was opened", title_justify="left")
-    for row in plan:
-        table.add_row(*row.values())
-    show_table(table, console)
+def _face(face: dict[str, Any]) -> list[tuple[str, str]]:
+    width, height = face["size"]
+    found = [
+        ("picture", f"{width} x {height}, {face['quality']}, {face['renderer']}"),
+        ("frames", f"{face['frames']} in {face['seconds']:.1f} s, {face['frames_with_motion']} of them with motion"),
+        ("frames per second", f"{face['frames_per_second']:.1f}"),
+        ("milliseconds a frame", _spread(face["frame_ms"])),
+    ]
+    if report_start := face.get("start_to_first_frame_s"):
+        found.append(("start to first frame", f"{report_start:.2f} s"))
+    return found
+
+
+def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
+    found = []
+    if control := report.get("control"):
+        found.append(("control loop", _loop(control)))
+    if take := report.get("take"):
+        rate = f"{take['rows']} rows at {take['rate_hz']:.0f} Hz"
+        found.append(("take", f"{take['played_s']:.1f} of {take['duration_s']:.1f} s played, {rate}"))
+    if voice := report.get("voice"):
+        found.append(("voice", f"{voice['heard_s']:.1f} s heard"))
+    return found + [
+        (f"link {link['port']}", f"{link['accepted']} lines accepted, {sum(link['refused'].values())} refused")
+        for link in report.get("links", [])
+    ]
+
+
+def _buses(buses: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    found = []
+    for bus in buses:
+        name = f"bus {bus['name']}"
+        errors = ", ".join(f"{count} {kind}" for kind, count in bus["bus"]["errors"].items()) or "none"
+        found += [
+            (f"{name}: {bus['servos']} servos", _loop(bus)),
+            (f"{name}: jitter (ms)", _spread(bus["jitter_ms"])),
+            (f"{name}: command to wire (ms)", _spread(bus["command_to_wire_ms"])),
+            (f"{name}: errors", errors),
+            (f"{name}: targets held at a limit", str(bus["channels_held_at_limit"] + bus["bus"]["limits_hit"])),
+        ]
+        if away := bus.get("face_difference"):
+            worst = away["worst"][0]
+            text = f"rms {away['rms_deg']:.1f} deg, most at {worst['channel']}: rms {worst['rms_deg']:.1f} deg"
+            found.append((f"{name}: measured face is away from the wanted one by", text))
+            by_region = "  ".join(f"{region} {rms:.1f}" for region, rms in away.get("regions_rms_deg", {}).items())
+            found.append((f"{name}: by region (rms deg)", by_region))
+        for rule in bus.get("rules", []):
+            found.append((f"{name}: rule", f"{rule['rule']}: {rule['times']} times, {rule['seconds']:.1f} s"))
+    return found
+
+
+def _loop(loop: dict[str, Any]) -> str:
+    return f"{loop['rate_hz']:.1f} Hz of {loop['wanted_hz']:g} wanted, {loop['skipped']} skipped"
+
+
+def _spread(summary: dict[str, float]) -> str:
+    if not summary:
+        return "nothing measured"
+    return "  ".join(f"{key} {summary[key]:.2f}" for key in ("p50", "p95", "p99", "max"))

@@ -1,10 +1,10 @@
-"""``omote simulate``: hardware that is not there, at ports that any program can open."""
+"""``omote simulate``: serves simulated hardware at ports that any program can open."""
 
 from __future__ import annotations
 
 import inspect
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
@@ -23,48 +23,41 @@ log = logging.getLogger(__name__)
 
 
 class _Simulators(TyperGroup):
-    """A command for each family that has a simulator, besides those of this module; listed when asked for."""
+    """The commands of this module, and one for each family of servos that has a simulator."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Names of all commands."""
-        return [*_simulated_kinds(), *super().list_commands(ctx)]
+        """Names of all commands; a family that cannot be loaded is logged and left out."""
+        # start-up: most commands need no families
+        from drivers.core.registry import FAMILIES
+        from drivers.sim.wire.simulator import simulator_of
+
+        kinds = []
+        for family in FAMILIES.all():
+            if family.simulator:
+                try:
+                    simulator_of(family.kind)
+                    kinds.append(family.kind)
+                except PluginError as error:
+                    log.warning("%s", error)
+        return [*kinds, *super().list_commands(ctx)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name; None where there is none."""
         from drivers.core.registry import kinds  # start-up: most commands need no families
 
-        if cmd_name in self.commands:
-            return self.commands[cmd_name]
-        return _family_command(cmd_name) if cmd_name in kinds() else None
+        if cmd_name in self.commands or cmd_name not in kinds():
+            return self.commands.get(cmd_name)
+        app = typer.Typer(add_completion=False)
+        app.command(cmd_name)(_simulate_family(cmd_name))
+        return typer.main.get_command(app)
 
 
-def _simulated_kinds() -> Iterator[str]:
-    """Families that have a simulator; one that cannot be loaded is told and left out."""
-    from drivers.core.registry import FAMILIES  # start-up: most commands need no families
-    from drivers.sim.wire.simulator import simulator_of
-
-    for family in FAMILIES.all():
-        if family.simulator:
-            try:
-                simulator_of(family.kind)
-            except PluginError as error:
-                log.warning("%s", error)
-            else:
-                yield family.kind
-
-
-def _family_command(kind: str) -> Any:
-    app = typer.Typer(add_completion=False)
-    app.command(kind)(_simulate_family(kind))
-    return typer.main.get_command(app)
-
-
-def register(app: typer.Typer) -> None:
-    """Add this module's commands to ``app``."""
+def make_app() -> typer.Typer:
+    """The group of all these commands."""
     simulators = typer.Typer(cls=_Simulators, no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
     simulators.command("robot")(simulate_robot)
     simulators.command("host")(simulate_host)
-    app.add_typer(simulators, name="simulate")
+    return simulators
 
 
 Link = Annotated[Path | None, typer.Option("--link", help="Make this path a link to the pseudo-terminal.")]
@@ -105,8 +98,8 @@ def _serving(
     return Serving(where, wire, latency / 1000.0, tuple(fault or ()), control, watch)
 
 
-def _served(command: Callable[..., None], own: list[inspect.Parameter] | None = None) -> Callable[..., None]:
-    """The command with the options of :func:`_serving` for its first parameter, ``how``."""
+def _add_serving(command: Callable[..., None], own: list[inspect.Parameter] | None = None) -> Callable[..., None]:
+    """The command with the options of :func:`_serving` in the place of its first parameter, ``how``."""
     own, shared = _options(command)[1:] if own is None else own, _options(_serving)
 
     def run(**given: Any) -> None:
@@ -120,13 +113,13 @@ def _served(command: Callable[..., None], own: list[inspect.Parameter] | None = 
 
 
 def _options(command: Callable[..., Any]) -> list[inspect.Parameter]:
-    """A function's parameters, their annotations as objects; that of ``how`` is no option."""
+    """A function's parameters, with their annotations as objects."""
     hints = get_type_hints(command, localns={"Serving": object}, include_extras=True)
     return [p.replace(annotation=hints[p.name]) for p in inspect.signature(command).parameters.values()]
 
 
 def _simulate_family(kind: str) -> Callable[..., None]:
-    """The command that serves what stands in for a family."""
+    """The command that serves the simulator of a family."""
     from controller.base.schema import from_command_line  # start-up: the command line shows its help without it
     from controller.tools.simulate import serve_alone
     from drivers.core.registry import FAMILIES
@@ -139,11 +132,11 @@ def _simulate_family(kind: str) -> Callable[..., None]:
 
     command.__doc__ = simulator.help
     usual = {"baud": FAMILIES.get(kind).baud}
-    return _served(command, [_parameter(entry, usual.get(entry.name)) for entry in entries(simulator.options)])
+    return _add_serving(command, [_parameter(entry, usual.get(entry.name)) for entry in entries(simulator.options)])
 
 
 def _parameter(entry: Entry, usual: Any) -> inspect.Parameter:
-    """An option of a simulator as an option of the command; ``usual`` stands for its default where it is given."""
+    """An option of a simulator as an option of the command; ``usual`` replaces its default where it is given."""
     limits, name = entry.option, entry.name.replace("_", "-")
     flag = f"--{name}/--no-{name}" if entry.default is True else f"--{name}"
     shown = typer.Option(flag, min=limits.at_least, max=limits.at_most, help=limits.help)
@@ -152,7 +145,7 @@ def _parameter(entry: Entry, usual: Any) -> inspect.Parameter:
     return inspect.Parameter(entry.name, kind, default=default, annotation=Annotated[entry.type, shown])
 
 
-@_served
+@_add_serving
 def simulate_robot(
     how: Serving,
     robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],

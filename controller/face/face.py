@@ -1,6 +1,6 @@
-"""The face at its own clock: the newest parameters to the head, the head to a picture.
+"""Draws the face of a run frame by frame, from the newest parameters in a mailbox; keeps pictures and statistics.
 
-It reads parameters from a mailbox and never waits for links or servos.
+It never waits for links or servos.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.clock import Clock, Samples
+from controller.base.errors import ControllerError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import Floats, Parameters
 from controller.stage.stage import FaceSettings
@@ -25,53 +26,47 @@ if TYPE_CHECKING:
 
 Image = NDArray[np.uint8]
 
+_MOMENTS = 12  # pictures on the contact sheet
+_COLUMNS = 4
+
+
+def head_indices(parameters: Parameters, wanted: Sequence[str]) -> NDArray[np.intp]:
+    """(h,) index of each of a head's parameters in the full vector with a zero behind it: unknown names lead there."""
+    place = {name: i for i, name in enumerate(parameters.names)}
+    return np.array([place.get(name, len(place)) for name in wanted], dtype=np.intp)
+
 
 class HeadValues:
-    """Picks a head's parameters out of the full vector.
-
-    Parameters
-    ----------
-    mailbox : where the full vector (p,) is published.
-    parameters : names of the full vector.
-    wanted : names the head understands; names omote does not know stay 0.
+    """Selects a head's parameters from the full vector that a mailbox holds; names that omote does not know stay 0.
 
     Attributes
     ----------
     full : (p,) float64, the full vector of the last call.
-    values : (h,) float64, the head's share of it.
+    values : (h,) float64, those of the head.
     """
 
     def __init__(self, mailbox: Mailbox, parameters: Parameters, wanted: Sequence[str]) -> None:
-        place = {name: i for i, name in enumerate(parameters.names)}
-        self._mailbox = mailbox
-        self.full = np.zeros(len(parameters.names))
-        self._from = np.array([place[name] for name in wanted if name in place], dtype=np.intp)
-        self._to = np.array([i for i, name in enumerate(wanted) if name in place], dtype=np.intp)
-        self.values = np.zeros(len(wanted))
-        self.stamp_ns = 0
+        self._mailbox, self._indices = mailbox, head_indices(parameters, wanted)
+        self._padded = np.zeros(len(parameters.names) + 1)
+        self.full, self.values = self._padded[:-1], np.zeros(len(wanted))
 
     def __call__(self) -> Floats:
         """The newest values in the head's order, (h,) float64; the same array each time."""
-        _, self.stamp_ns = self._mailbox.read(self.full)
-        self.values[self._to] = self.full[self._from]
-        return self.values
+        self._mailbox.read(self.full)
+        return np.take(self._padded, self._indices, out=self.values)
 
 
 class Recorder:
-    """Keeps a few small pictures of a run: frames for a clip, moments for a contact sheet.
+    """Keeps a few small pictures of a run, for a clip and a contact sheet.
 
     Parameters
     ----------
-    clip_hz : pictures per second in the clip.
-    height : height of the kept pictures (pixels).
-    most : pictures kept. A longer run keeps every second one, then every fourth, and so on: all of it, in no more
-        memory.
+    clip_hz : pictures per second in the clip. height : height of the kept pictures (pixels).
+    most : pictures kept. A longer run keeps every second one, then every fourth, and so on.
     """
 
     def __init__(self, *, clip_hz: float = 12.5, height: int = 360, most: int = 400) -> None:
-        self.clip_hz = clip_hz
-        self._most = most
-        self.height = height
+        self.clip_hz, self.height, self._most = clip_hz, height, most
         self.frames: list[Image] = []
         self.times_s: list[float] = []
         self._next_s = 0.0
@@ -82,51 +77,54 @@ class Recorder:
 
     def keep(self, picture: Image, time_s: float) -> None:
         """Keep the middle square of one picture (h, w, 3) uint8, made smaller."""
+        side = min(picture.shape[:2])
+        top, left = (picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2
         step = max(1, picture.shape[0] // self.height)
-        self.frames.append(_shrink(_middle_square(picture), step))
+        n = side // step
+        square, total = picture[top : top + n * step, left : left + n * step], np.zeros((n, n, 3), np.uint16)
+        for row, column in np.ndindex(step, step):
+            total += square[row::step, column::step]
+        self.frames.append((total // step**2).astype(np.uint8))
         self.times_s.append(time_s)
         if len(self.frames) > self._most:
             self.frames, self.times_s, self.clip_hz = self.frames[::2], self.times_s[::2], self.clip_hz / 2
         self._next_s = (int(time_s * self.clip_hz) + 1) / self.clip_hz
 
+    def write(self, folder: Path) -> list[str]:
+        """Write ``sheet.png`` and ``face.webp`` into ``folder``; returns their paths, none without pictures.
 
-def _middle_square(picture: Image) -> Image:
-    h, w = picture.shape[:2]
-    side = min(h, w)
-    top, left = (h - side) // 2, (w - side) // 2
-    return picture[top : top + side, left : left + side]
+        Raises ControllerError when the folder cannot be made, ViewError when a picture cannot be written.
+        """
+        from surface.view.pictures.clip import write_clip  # start-up: few runs write pictures
+        from surface.view.pictures.sheet import compose, write_png  # start-up: few runs write pictures
 
-
-def _shrink(picture: Image, step: int) -> Image:
-    """Mean of ``step`` x ``step`` pixels."""
-    h, w = picture.shape[0] // step * step, picture.shape[1] // step * step
-    total = np.zeros((h // step, w // step, 3), dtype=np.uint16)
-    for row in range(step):
-        for column in range(step):
-            total += picture[row:h:step, column:w:step]
-    return (total // (step * step)).astype(np.uint8)
+        if not self.frames:
+            return []
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            hint = "choose another folder for the pictures"
+            raise ControllerError(f"{folder}: cannot be made: {error.strerror}", hint=hint) from error
+        chosen = np.unique(np.linspace(0, len(self.frames) - 1, _MOMENTS).round().astype(int))
+        labels = [f"{self.times_s[i]:.1f} s" for i in chosen]
+        sheet, clip = folder / "sheet.png", folder / "face.webp"
+        write_png(compose([self.frames[i] for i in chosen], labels, columns=_COLUMNS), sheet)
+        write_clip(self.frames, clip, fps=self.clip_hz)
+        return [str(sheet), str(clip)]
 
 
 class FrameLog:
-    """Counts frames, and what they cost.
-
-    Attributes
-    ----------
-    frames : frames drawn.
-    moved : frames whose values differed from the frame before.
-    frame_ms : time each frame took (ms).
-    """
+    """Statistics of frames: how many, how many differed from the one before (``moved``), and the time of each (ms)."""
 
     def __init__(self) -> None:
-        self.frames = 0
-        self.moved = 0
+        self.frames = self.moved = 0
         self.frame_ms = Samples()
         self._previous: Floats | None = None
         self._first_ns = self._last_ns = 0
         self._start_to_first_s = 0.0
 
     def add(self, values: Floats, began_ns: int, ended_ns: int) -> None:
-        """Note one frame of ``values`` : (h,), drawn between two monotonic times (ns)."""
+        """Add one frame of ``values`` : (h,), drawn between two monotonic times (ns)."""
         if self._previous is None:
             self._first_ns = began_ns
             self._start_to_first_s = process_age_s()
@@ -154,7 +152,7 @@ class FrameLog:
 
 
 def process_age_s() -> float:
-    """Seconds since the operating system started this process; 0 where it does not tell."""
+    """Seconds since the operating system started this process; 0 where that is not known."""
     try:
         fields = Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()
         uptime = float(Path("/proc/uptime").read_text().split()[0])
@@ -164,19 +162,9 @@ def process_age_s() -> float:
 
 
 class HeadlessFace:
-    """Draws frame after frame without a display.
+    """Draws frame after frame without a display; raises ViewError when there is no OpenGL.
 
-    Parameters
-    ----------
-    head : the head to draw.
-    settings : size, rate and quality.
-    values : gives the head's newest values, (h,) float64.
-    recorder : takes pictures along the way; None reads none back.
-
-    Raises
-    ------
-    ViewError
-        when there is no OpenGL.
+    ``values`` returns the head's newest values, (h,) float64. Without ``recorder``, no picture is read back.
     """
 
     def __init__(
@@ -191,33 +179,28 @@ class HeadlessFace:
         self._screen: Offscreen = Offscreen(
             head, settings.size, quality=settings.quality, theme=settings.make_theme(), evaluator=settings.evaluator
         )
-        self._camera = settings.make_camera()
-        self._values = values
-        self._recorder = recorder
-        self._settings = settings
+        self._camera, self._settings = settings.make_camera(), settings
+        self._values, self._recorder = values, recorder
         self._log = FrameLog()
         self._screen.go_live()
-        self._screen.draw(np.zeros(len(head.parameters)), self._camera)  # what loads at the first frame loads now
+        self._screen.draw(np.zeros(len(head.parameters)), self._camera)  # loads more code
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Draw until ``keep_going()`` is false, at most ``fps`` times a second."""
         started = time.monotonic_ns()
         for now in Clock(self._settings.fps, prompt=True).run(keep_going):
-            values = self._values()
-            self._draw(values, (now - started) / 1e9)
+            values, time_s = self._values(), (now - started) / 1e9
+            self._screen.draw(values, self._camera)
+            if self._recorder is not None and self._recorder.wants(time_s):
+                self._recorder.keep(self._screen.read(), time_s)
             self._log.add(values, now, time.monotonic_ns())
 
-    def _draw(self, values: Floats, time_s: float) -> None:
-        self._screen.draw(values, self._camera)
-        if self._recorder is not None and self._recorder.wants(time_s):
-            self._recorder.keep(self._screen.read(), time_s)
-
     def close(self) -> None:
-        """Give the graphics memory back."""
+        """Free the graphics memory."""
         self._screen.close()
 
     def report(self) -> dict[str, object]:
-        """What was drawn; see :meth:`FrameLog.report`."""
+        """Frames that were drawn; see :meth:`FrameLog.report`."""
         evaluator = self._screen.renderer.evaluator
         return {
             **self._log.report(self._settings, self._screen.ctx.info["GL_RENDERER"]),

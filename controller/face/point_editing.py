@@ -1,7 +1,7 @@
-"""Points of the face that somebody takes with the mouse: picked on the picture, dragged in the plane of the screen.
+"""Points of the face that the mouse picks on the picture and drags in the plane of the screen.
 
-Dragging moves parameters; dragging to reshape moves control points of the drawn head, which can be kept as a group
-file. Knows nothing of the window library.
+Dragging moves parameters; sculpting moves control points of the drawn head, which can be saved as a group file.
+Independent of the window library.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.base.parameters import Floats, Parameters
-from controller.robot.anchors import Skin, head_order, sample_skin, shapes_of, skin_points
-from controller.stage.inverse import PointSolver, Sculpted, SculptSolver, save_group
+from controller.robot.anchors import head_order, sample_skin, shapes_of, skin_points
+from controller.stage.inverse import GroupMoves, PointSolver, SculptSolver, save_group
 from surface.head import Head
 from surface.head.model.parameters import read_pose, rotation
 from surface.view.scene.camera import Camera
@@ -25,14 +24,14 @@ PART = "face"
 _POINTS = 900
 _SEED = 11
 _PICK_PIXELS, _HIDING_PIXELS, _HIDDEN_MM = 16.0, 48.0, 40.0
-_SPARSITY = 1.5  # a hand moves few things at a time
-_KEPT, _KEPT_MM, _KEPT_WEIGHT = 24, 30.0, 0.4
-_CHANGED = 0.004
+_SPARSITY = 1.5  # one drag should move few parameters
+_FIXED, _FIXED_MM, _FIXED_WEIGHT = 24, 30.0, 0.4  # points that shall stay: count, least distance, weight
+_LEAST_CHANGE, _LEAST_MM = 0.004, 0.01
 
 
 @dataclass(frozen=True)
 class Screen:
-    """Where the picture stands: its camera and its size (width, height) in pixels."""
+    """The projection of a picture: its camera and its size (width, height) in pixels."""
 
     camera: Camera
     size: tuple[float, float]
@@ -44,7 +43,7 @@ class Screen:
         return np.column_stack([(x + 1) / 2 * self.size[0], (1 - y) / 2 * self.size[1], clip[:, 3]])
 
     def place(self, pixel: tuple[float, float], beside: Floats) -> Floats:
-        """(3,) mm: what lies under a pixel, as deep in the picture as the place ``beside`` : (3,)."""
+        """(3,) mm: the place under a pixel, at the depth of the place ``beside`` : (3,)."""
         clip = self._matrix @ np.append(beside, 1.0)
         clip[0] = (2 * pixel[0] / self.size[0] - 1) * clip[3]
         clip[1] = (1 - 2 * pixel[1] / self.size[1]) * clip[3]
@@ -58,7 +57,7 @@ class Screen:
 
 
 class _Model:
-    """What is asked of a head once: some points of its skin, how shapes move them, and how control points do."""
+    """Samples of a head, computed once: points of its skin, how shapes move them, and how control points do."""
 
     def __init__(self, head: Head, parameters: Parameters) -> None:
         part = head.part(PART)
@@ -70,32 +69,28 @@ class _Model:
         self.normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         if self.normals[np.argmax(self.skin.rest[:, 2]), 2] < 0.0:
             self.normals = -self.normals
-        self.reshaper = SculptSolver(head, PART)
+        self.sculptor = SculptSolver(head, PART)
         self.pivot = np.array(head.data.neck.pivot)
 
 
 class PointEditor:
     """Takes points of a head in a picture and drags them.
 
-    What it has to know of the head it asks a copy of it, in a thread of its own, once somebody wants to take a point.
+    It samples a copy of the head, in a thread of its own, once somebody wants to take a point.
 
     Parameters
     ----------
-    head : the head that is drawn; reshaping moves its control points. copy : loads the same head again.
-
-    Attributes
-    ----------
-    ready : whether points can be taken. reshaped : whether control points were moved.
+    head : the head that is drawn; sculpting moves its control points. copy : loads the same head again.
     """
 
     def __init__(self, head: Head, copy: Callable[[], Head], parameters: Parameters) -> None:
-        self._head, self._parameters = head, parameters
-        self._rest = head.part(PART).rig.rest.copy()  # type: ignore[attr-defined]
+        self._rig, self._parameters = head.part(PART).rig, parameters  # type: ignore[attr-defined]
+        self._rest = self._rig.rest.copy()
         self._moves = np.zeros_like(self._rest)
         self._before = self._moves
         self._model: _Model | None = None
         self._held: _PointDrag | _SculptDrag | None = None
-        self._thread = threading.Thread(target=self._prepare, args=(copy,), name="handles", daemon=True)
+        self._thread = threading.Thread(target=self._prepare, args=(copy,), name="point editor", daemon=True)
 
     @property
     def ready(self) -> bool:
@@ -103,32 +98,24 @@ class PointEditor:
         return self._model is not None
 
     @property
-    def holding(self) -> bool:
+    def dragging(self) -> bool:
         """Whether a point is held."""
         return self._held is not None
 
     @property
-    def reshaped(self) -> bool:
+    def sculpted(self) -> bool:
         """Whether control points were moved."""
         return bool(self._moves.any())
 
     def prepare(self) -> None:
-        """Begin to get ready; may be called again."""
+        """Start to get ready; may be called again."""
         if self._thread.ident is None:
             self._thread.start()
 
-    def wait(self, seconds: float) -> bool:
-        """Wait until points can be taken; False if they cannot by then."""
-        self.prepare()
-        self._thread.join(seconds)
-        return self.ready
-
-    def take(self, pixel: tuple[float, float], screen: Screen, values: Floats, *, reshape: bool = False) -> bool:
+    def take(self, pixel: tuple[float, float], screen: Screen, values: Floats, *, sculpt: bool = False) -> bool:
         """Take the point of the skin under a pixel; False when there is none.
 
-        Parameters
-        ----------
-        values : (P,) what the face shows. reshape : move control points instead of parameters.
+        ``values`` : (P,) parameters of the shown face. ``sculpt`` : move control points instead of parameters.
         """
         model = self._model
         if model is None:
@@ -142,13 +129,13 @@ class PointEditor:
         if away[point] > _PICK_PIXELS:
             return False
         offset = places[point] - screen.place(pixel, places[point])
-        self._held = _SculptDrag(model, point, places[point], offset) if reshape else _PointDrag(
-            model, point, places[point], offset, self._parameters, values, self._moved_by_hand(model)
+        self._held = _SculptDrag(model, point, places[point], offset) if sculpt else _PointDrag(
+            model, point, places[point], offset, self._parameters, values, self._sculpted_by(model)
         )  # fmt: skip
         return True
 
     def drag(self, pixel: tuple[float, float], screen: Screen, values: Floats) -> dict[int, float]:
-        """Move the held point under a pixel; parameters and the values they have to be held at."""
+        """Move the held point under a pixel; returns indices of parameters and the values to hold them at."""
         held, model = self._held, self._model
         if held is None or model is None:
             return {}
@@ -157,36 +144,37 @@ class PointEditor:
         local = model.pivot + turn.T @ (wanted - model.pivot)
         if isinstance(held, _PointDrag):
             return held.solve(local)
-        ids, moves = held.solve(turn.T @ (wanted - held.place))
-        self._shape(self._before + _spread(ids, moves, len(self._rest)))
+        moves = self._before.copy()
+        moves[held.ids] += held.share[:, None] * (turn.T @ (wanted - held.place))
+        self._set_moves(moves)
         return {}
 
     def release(self) -> None:
-        """Let go; what was reshaped stays."""
+        """Release the point; moved control points stay."""
         self._held, self._before = None, self._moves
 
     def undo(self) -> None:
-        """Take back everything that was reshaped."""
-        self._shape(np.zeros_like(self._rest))
-        self._held, self._before = None, self._moves
+        """Move all control points back."""
+        self._set_moves(np.zeros_like(self._rest))
+        self.release()
 
     def save(self, path: Path, name: str) -> None:
-        """Keep what was reshaped as a group file; a stage wears it with ``groups``. Raises OSError."""
-        ids = np.flatnonzero(np.linalg.norm(self._moves, axis=1) >= 0.01).astype(np.int32)
-        save_group(path, name, Sculpted(PART, ids, self._moves[ids]))
+        """Write the moved control points as a group file; a stage adds it with ``groups``. Raises ControllerError."""
+        ids = np.flatnonzero(np.linalg.norm(self._moves, axis=1) >= _LEAST_MM).astype(np.int32)
+        save_group(path, name, GroupMoves(PART, ids, self._moves[ids]))
 
-    def _shape(self, moves: Floats) -> None:
+    def _set_moves(self, moves: Floats) -> None:
         self._moves = moves
-        rig = self._head.part(PART).rig  # type: ignore[attr-defined]
-        np.add(self._rest, moves, out=rig.rest)
-        rig.invalidate()
+        np.add(self._rest, moves, out=self._rig.rest)
+        self._rig.invalidate()
 
-    def _moved_by_hand(self, model: _Model) -> Floats:
+    def _sculpted_by(self, model: _Model) -> Floats:
+        """(m, 3) mm that the moved control points move the points by."""
         return np.asarray(model.basis @ self._moves)
 
     def _places(self, model: _Model, values: Floats) -> tuple[Floats, Floats]:
         """(m, 3) mm where the points are in the picture, and the head's rotation (3, 3)."""
-        local = model.skin.rest + model.skin.displacement(shapes_of(values, model.order)) + self._moved_by_hand(model)
+        local = model.skin.rest + model.skin.displacement(shapes_of(values, model.order)) + self._sculpted_by(model)
         turn = _turn(values[model.order])
         return model.pivot + (local - model.pivot) @ turn.T, turn
 
@@ -199,49 +187,38 @@ class PointEditor:
 
 
 class _PointDrag:
-    """A point whose place decides parameters, among others that stay where they are."""
+    """A held point whose place determines parameters, among other points that shall stay where they are."""
 
     def __init__(self, model: _Model, point: int, place: Floats, offset: Floats, parameters: Parameters, values: Floats,
-                 by_hand: Floats) -> None:  # fmt: skip
+                 sculpted: Floats) -> None:  # fmt: skip
         self.place, self.offset = place, offset
         skin = model.skin
-        far = np.flatnonzero(np.linalg.norm(skin.rest - skin.rest[point], axis=1) > _KEPT_MM)
-        chosen = np.concatenate([[point], far[:: max(1, len(far) // _KEPT)]])
-        part = Skin(skin.part, skin.uv[chosen], skin.rest[chosen], skin.moves[chosen], skin.jaw[chosen])
-        weights = np.full(len(chosen), _KEPT_WEIGHT)
+        far = np.flatnonzero(np.linalg.norm(skin.rest - skin.rest[point], axis=1) > _FIXED_MM)
+        part = skin.subset(np.concatenate([[point], far[:: max(1, len(far) // _FIXED)]]))
+        weights = np.full(len(part.rest), _FIXED_WEIGHT)
         weights[0] = 1.0
-        self._by_hand = np.broadcast_to(by_hand, skin.rest.shape)[point]
-        self._dragger = PointSolver.of(part, model.order, parameters, weights=weights, start=values, sparsity=_SPARSITY)
+        self._sculpted = np.broadcast_to(sculpted, skin.rest.shape)[point]
+        self._solver = PointSolver(part, model.order, parameters, weights=weights, start=values, sparsity=_SPARSITY)
         self._places = part.rest + part.displacement(shapes_of(values, model.order))
-        self._told = values.copy()
+        self._returned = values.copy()
 
     def solve(self, local: Floats) -> dict[int, float]:
-        """Parameters that changed since they were told last, for the point at ``local`` : (3,), head not turned."""
-        self._places[0] = local - self._by_hand
-        found = self._dragger.solve(self._places)
-        at = self._dragger.moved
-        changed = at[np.abs(found[at] - self._told[at]) > _CHANGED]
-        self._told[changed] = found[changed]
+        """Parameters that changed since the last call, for the point at ``local`` : (3,), head not turned."""
+        self._places[0] = local - self._sculpted
+        found = self._solver.solve(self._places)
+        at = self._solver.moved
+        changed = at[np.abs(found[at] - self._returned[at]) > _LEAST_CHANGE]
+        self._returned[changed] = found[changed]
         return {int(i): float(found[i]) for i in changed}
 
 
 class _SculptDrag:
-    """A point whose place moves control points; they answer alike in every direction."""
+    """A held point that control points ``ids`` : (k,) follow in every direction, each by its ``share`` : (k,)."""
 
     def __init__(self, model: _Model, point: int, place: Floats, offset: Floats) -> None:
         self.place, self.offset = place, offset
-        unit = model.reshaper.solve(model.skin.uv[point : point + 1], np.array([[1.0, 0.0, 0.0]]), least_mm=1e-4)
-        self._ids, self._share = unit.ids, unit.moves[:, 0]
-
-    def solve(self, move: Floats) -> tuple[NDArray[np.int32], Floats]:
-        """Control points and their moves (k, 3) mm that move the point by ``move`` : (3,) mm."""
-        return self._ids, self._share[:, None] * move
-
-
-def _spread(ids: NDArray[np.int32], moves: Floats, n: int) -> Floats:
-    out = np.zeros((n, 3))
-    out[ids] = moves
-    return out
+        unit = model.sculptor.solve(model.skin.uv[point : point + 1], np.array([[1.0, 0.0, 0.0]]), least_mm=1e-4)
+        self.ids, self.share = unit.ids, unit.moves[:, 0]
 
 
 def _turn(head_values: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""One picture, or one sheet of pictures, of a head."""
+"""Draws one picture, or a contact sheet, of a head from the options of a command line."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
-from controller.stage.identity import check_identity, parse_identity
-from controller.stage.picture import PictureSettings, checked
-from controller.stage.stage import FaceSettings, load_head, load_stage
+from controller.face.face import head_indices
+from controller.stage.picture import PictureSettings, with_options
+from controller.stage.stage import FaceSettings, check_identity, load_head, load_stage, parse_identity
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.view.pictures.offscreen import Offscreen
@@ -25,14 +25,12 @@ from surface.view.pictures.sheet import contact_sheet, write_png
 
 @dataclass(frozen=True)
 class Still:
-    """What to draw.
+    """A picture to draw.
 
     Attributes
     ----------
-    values : (p,) float64, the full parameter vector.
-    size : width and height (pixels).
-    look : theme, camera and the rest.
-    head : folder of the head. identity : variations of it to mix in, by name. groups : group files it wears.
+    values : (p,) float64, the full parameter vector. size : width and height (pixels). look : theme, camera and so on.
+    head : folder of the head. identity : its variations, by name. groups : group files and their amounts.
     vocabulary : the named expressions.
     """
 
@@ -50,12 +48,9 @@ class Still:
         look: Mapping[str, object] | None = None, head: str | None = None, identity: str | None = None, *,
         stage: str | None = None, vocabularies: Sequence[str] = (), groups: Sequence[str] = (),
     ) -> Still:  # fmt: skip
-        """Read the words of a command line; what they leave open is as the stage has it, if there is one.
+        """Read the options of a command line; what they leave out is taken from the stage, if there is one.
 
-        Raises
-        ------
-        ParameterError, ConfigError
-            naming the word that is wrong and what would be right.
+        Raises ParameterError or ConfigError that names the word that is wrong and what would be right.
         """
         base = load_stage(stage, PARAMETERS) if stage else None
         files = [*(base.vocabularies if base else ()), *(find_config("vocabularies", name) for name in vocabularies)]
@@ -69,10 +64,10 @@ class Still:
         folder = base.head if base and head is None else find_config("heads", head or "ict")
         wanted = dict(base.settings.identity) if base and identity is None else parse_identity(identity)
         check_identity(folder, wanted)
-        worn = (*(base.groups if base else ()), *(parse_group(word) for word in groups))
+        added = (*(base.groups if base else ()), *(parse_group(word) for word in groups))
         face = base.settings.face if base else FaceSettings()
         width_height = parse_size(size or "800x800") if size or base is None else face.size
-        return cls(values, width_height, checked(face, look or {}), folder, wanted, worn, vocabulary)
+        return cls(values, width_height, with_options(face, look or {}), folder, wanted, added, vocabulary)
 
     def load_head(self) -> Head:
         """The head with its identity and groups; see :func:`controller.stage.stage.load_head`."""
@@ -81,11 +76,10 @@ class Still:
 
 def parse_group(word: str) -> tuple[Path, float]:
     """``FILE=AMOUNT`` as path and amount, -1 to 1; a file alone counts 1."""
-    name, equals, text = word.rpartition("=")
-    amount = parse_number(f"--group {word}", text) if equals else 1.0
+    name, amount = _name_and_amount(word, "--group")
     if not -1.0 <= amount <= 1.0:
         raise ParameterError(f"--group {word}: the amount goes from -1 to 1")
-    return find_config("groups", name if equals else word), amount
+    return find_config("groups", name), amount
 
 
 def parse_setting(word: str) -> tuple[int, float]:
@@ -94,15 +88,15 @@ def parse_setting(word: str) -> tuple[int, float]:
     if not equals:
         raise ParameterError(f"--set {word}: expected NAME=VALUE", hint="for example --set jawOpen=0.8")
     index = PARAMETERS.index(name)
-    value = parse_number(f"--set {word}", text)
+    value = _number(f"--set {word}", text)
     low, high = PARAMETERS.low[index], PARAMETERS.high[index]
     if not low <= value <= high:
         raise ParameterError(f"--set {word}: {PARAMETERS.names[index]} goes from {low:g} to {high:g}")
     return index, value
 
 
-def parse_number(where: str, text: str) -> float:
-    """A finite number, or an error that says where it stood."""
+def _number(where: str, text: str) -> float:
+    """A finite number; raises ParameterError that begins with ``where``."""
     try:
         value = float(text)
     except ValueError:
@@ -121,9 +115,14 @@ def parse_size(text: str) -> tuple[int, int]:
     return size
 
 
+def _name_and_amount(word: str, option: str) -> tuple[str, float]:
+    """``NAME=AMOUNT``; a name alone counts 1."""
+    name, equals, text = word.rpartition("=")
+    return (name, _number(f"{option} {word}", text)) if equals else (word, 1.0)
+
+
 def _add_expression(vocabulary: Vocabulary, values: NDArray[np.float64], word: str) -> None:
-    name, equals, text = word.partition("=")
-    intensity = parse_number(f"--expression {word}", text) if equals else 1.0
+    name, intensity = _name_and_amount(word, "--expression")
     if not 0.0 <= intensity <= 1.0:
         raise ParameterError(f"--expression {word}: the intensity goes from 0 to 1")
     values += _vector(vocabulary.expand(name, intensity))
@@ -139,9 +138,8 @@ def draw_still(still: Still, out: Path) -> None:
 
 
 def for_head(values: NDArray[np.float64], wanted: tuple[str, ...]) -> NDArray[np.float64]:
-    """The full vector (p,) in a head's own order (h,); names omote does not know stay 0."""
-    place = {name: i for i, name in enumerate(PARAMETERS.names)}
-    return np.array([values[place[name]] if name in place else 0.0 for name in wanted])
+    """The full vector (p,) in a head's own order (h,); names that omote does not know stay 0."""
+    return np.append(values, 0.0)[head_indices(PARAMETERS, wanted)]
 
 
 def sheet_poses(vocabulary: Vocabulary | None = None) -> list[tuple[str, NDArray[np.float64]]]:
@@ -164,7 +162,7 @@ def _vector(values: dict[int, float]) -> NDArray[np.float64]:
 
 
 def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
-    """Draw every parameter and every named expression on one sheet (PNG); ``progress(done, total)`` is told."""
+    """Draw every parameter and every named expression on one sheet (PNG); calls ``progress(done, total)``."""
     head, look = still.load_head(), still.look
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]
     page = contact_sheet(

@@ -1,17 +1,11 @@
-"""The buses of a robot file: which family is on each wire, and what that family can be told."""
+"""Settings of the buses in a robot file: the family of servos on each wire, and the options of that family."""
 
 from __future__ import annotations
 
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    Field,
-    ValidationInfo,
-    create_model,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
 
 from controller.base.config import Settings
 from controller.base.schema import check_kind, fields_of, parse_with, to_options
@@ -20,16 +14,15 @@ from drivers.core.families import SERVO_BAUD, Family
 from drivers.core.registry import FAMILIES, SIMULATED, no_simulator_error
 
 SIMULATION = ("simulates", "transport", "faults", "wire", "latency_s", "seed")
-"""Options of a simulated bus, of whatever family."""
-
+"""Options of a simulated bus of any family."""
 
 Baud = Annotated[int, Field(ge=300, le=12_000_000)]
 
 
 class BusSettings(Settings):
-    """One wire with many servos; the fields of its family's own options come besides (:func:`read_bus`).
+    """One wire with many servos; :func:`read_bus` adds the fields of its family's options.
 
-    Options that are None were not given; the driver's own default holds.
+    Options that are None were not given; the driver uses its default.
     """
 
     name: str
@@ -47,20 +40,20 @@ class BusSettings(Settings):
 
     @classmethod
     def known_keys(cls) -> list[str]:
-        """Keys of such a table, those of all families included."""
-        return [*super().known_keys(), *takers()]
+        """Keys that such a table may have, those of all families included."""
+        return [*super().known_keys(), *families_by_option()]
 
     @property
     def family(self) -> str:
-        """What is on the wire, simulated or not."""
+        """The family of servos on the wire, simulated or not."""
         return family_in({"kind": self.kind, "simulates": self.simulates})
 
     def options(self) -> dict[str, Any]:
-        """What the driver is told; see :func:`drivers.open_bus`."""
+        """Options for the driver; see :func:`drivers.open_bus`."""
         own = [key for key in type(self).model_fields if key not in BusSettings.model_fields]
         given = {key: getattr(self, key) for key in (*SIMULATION, "port") if key in self.model_fields_set}
-        told = {key: value for key in own if (value := getattr(self, key)) is not None}
-        return {"baud": self.baud, **given, **told}
+        set_ = {key: value for key in own if (value := getattr(self, key)) is not None}
+        return {"baud": self.baud, **given, **set_}
 
     @field_validator("kind", "simulates")
     @classmethod
@@ -73,7 +66,10 @@ class BusSettings(Settings):
 
     @model_validator(mode="after")
     def _fits(self) -> BusSettings:
-        self._check_port()
+        if self.kind != SIMULATED and not self.port:
+            raise ValueError("port is needed for a real bus; omote ports lists them")
+        if self.kind == SIMULATED and self.port:
+            raise ValueError("port is for a real bus: set kind to its family, or leave the port out")
         for key in sorted(self.model_fields_set & set(SIMULATION)):
             if self.kind != SIMULATED:
                 raise ValueError(f'{key} is for a simulated bus: set kind = "simulated", or leave it out')
@@ -84,12 +80,6 @@ class BusSettings(Settings):
                 check(to_options(self, settings), self.rate_hz)
         return self
 
-    def _check_port(self) -> None:
-        if self.kind != SIMULATED and not self.port:
-            raise ValueError("port is needed for a real bus; omote ports lists them")
-        if self.kind == SIMULATED and self.port:
-            raise ValueError("port is for a real bus: set kind to its family, or leave the port out")
-
 
 def family_in(table: dict[str, Any]) -> str:
     """The family that a bus's table names, simulated or not."""
@@ -98,21 +88,16 @@ def family_in(table: dict[str, Any]) -> str:
 
 
 def read_bus(table: dict[str, Any]) -> BusSettings:
-    """A bus from its table in a robot file, with the options of its family.
-
-    Raises
-    ------
-    pydantic.ValidationError : every fault with its key.
-    """
+    """A bus from its table in a robot file, with the options of its family; raises pydantic.ValidationError."""
     try:
         family = FAMILIES.get(family_in(table))
     except PluginError:
-        return _Unknown.model_validate(table)  # which says what is wrong with the kind
+        return _Unknown.model_validate(table)  # its error names the kind
     return _model_of(family).model_validate(table)
 
 
-def takers() -> dict[str, list[str]]:
-    """The families that take each option."""
+def families_by_option() -> dict[str, list[str]]:
+    """The families that have each option."""
     found: dict[str, list[str]] = {}
     for family in FAMILIES.all():
         for key in fields_of(family.settings):
@@ -121,26 +106,26 @@ def takers() -> dict[str, list[str]]:
 
 
 class _Unknown(BusSettings, extra="ignore"):
-    """A bus of an unknown kind: nothing is known of its other keys."""
+    """A bus of an unknown kind, whose other keys cannot be checked."""
 
 
 @cache
 def _model_of(family: Family) -> type[BusSettings]:
-    """The table of a family's bus, with its own options and its usual rate."""
+    """The settings of a family's bus, with the family's options and its usual baud rate."""
     own = fields_of(family.settings)
 
     def refuse_others(table: dict[str, Any]) -> dict[str, Any]:
         for key in sorted(set(table) - {*BusSettings.model_fields, *own}):
-            if key in (others := takers()):
+            if key in (others := families_by_option()):
                 raise ValueError(f"{key} is not for {family.kind}, but for {', '.join(others[key])}")
         return table
 
     validators = {"refuse_others": model_validator(mode="before")(refuse_others)}
     own["baud"] = (Baud, family.baud)
     make: Any = create_model
-    made: type[BusSettings] = make(f"{family.kind} bus", __base__=BusSettings, __validators__=validators, **own)
-    return made
+    model: type[BusSettings] = make(f"{family.kind} bus", __base__=BusSettings, __validators__=validators, **own)
+    return model
 
 
 Bus = Annotated[BusSettings, parse_with(read_bus)]
-"""An entry of ``[[buses]]``: read by its family's own options."""
+"""An entry of ``[[buses]]``, read with the options of its family."""

@@ -1,7 +1,7 @@
-"""One bus at its own clock: the newest parameters out, measured positions back.
+"""Bus loop: a thread that drives the servos of one bus at its own rate and reads their positions back.
 
-The loop owns its bus: nobody else touches it. It reads the parameters from whoever makes them as a latest
-value, and leaves its own measurements as a latest value. It never waits for the face.
+Only the loop uses its bus. It takes the newest parameters each cycle, keeps its newest measurement for others to read,
+and never waits for the face.
 """
 
 from __future__ import annotations
@@ -18,18 +18,17 @@ import numpy as np
 from controller.base.clock import Clock, Samples
 from controller.base.parameters import Floats, Parameters
 from controller.robot.buses import BusSettings
-from controller.robot.channels import build_table, limiter_of, play, servo_specs
-from controller.robot.following import Following, regions_of
-from controller.robot.rules import RuleSettings
-from controller.robot.safety import Guard
-from controller.robot.settings import ChannelSettings
+from controller.robot.channels import servo_specs
+from controller.robot.following import FollowingStatistics
+from controller.robot.safety import GoalFilter
+from controller.robot.settings import ChannelSettings, RuleSettings
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState
 from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.base.priority import request_realtime
 
 if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorMap  # start-up: loads the head
+    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
 
 log = logging.getLogger(__name__)
 
@@ -46,13 +45,10 @@ class BusLoop:
 
     Parameters
     ----------
-    settings : the bus.
-    channels : its channels, one a servo.
-    parameters : the vocabulary the channels' mixes refer to.
-    newest : gives the newest parameter vector ``(p,) float64`` and the time (monotonic ns) at which the command
-        behind it arrived, 0 for none.
-    rules : what no servo does, whoever asks.
-    anchors : solves the channels that pull at the skin; those of other buses may be among them.
+    settings : the bus. channels : its channels, one for each servo. parameters : those that the mixes name.
+    newest : returns the newest parameter vector (p,) float64 and the time (monotonic ns) at which its command arrived,
+        0 for none.
+    rules : the robot's safety rules. anchors : solver of the robot's anchored channels, on this bus or another.
     limp : switch the motors off and only read where the servos are.
     """
 
@@ -63,41 +59,34 @@ class BusLoop:
         parameters: Parameters,
         newest: Newest,
         rules: RuleSettings = RuleSettings(),
-        anchors: AnchorMap | None = None,
+        anchors: AnchorSolver | None = None,
         *,
         limp: bool = False,
     ) -> None:
         self.settings = settings
-        own = [channel.name for channel in channels]
-        self.table = build_table(channels, parameters, anchors.on(own) if anchors is not None else None)
-        rest, _ = self.table.angles(np.zeros(len(parameters)))
-        self.bus: Bus = open_bus(settings.kind, servo_specs(channels, rest), **settings.options())
+        self._goals = GoalFilter(channels, parameters, rules, 1.0 / settings.rate_hz, anchors)
+        self.table = self._goals.table
+        specs = servo_specs(channels, self.table.neutral_rad)
+        self.bus: Bus = open_bus(settings.kind, specs, **settings.options())
         self.clock = Clock(settings.rate_hz)
         self.latency_ms = Samples()
-        self.following = Following(own, regions_of(self.table, parameters))
+        self.following = FollowingStatistics(self.table, parameters)
         self.held = 0
         self.limp = limp
         self.realtime = False
         self.error: Exception | None = None
         self._newest = newest
-        self._guard = Guard(rules, self.table, *play(channels))
-        self._limiter = limiter_of(self.table, 1.0 / settings.rate_hz)
-        self._sent = np.zeros(len(channels))
         self._last_stamp = 0
-        self._retry_ns: int | None = None
+        self._retry_ns: int | None = None  # when to try a lost port again; None while there is one
         self._state: BusState | None = None
-        self._stopping = threading.Event()
-        self._begun = threading.Event()
+        self._stopping, self._begun = threading.Event(), threading.Event()
         self._last_reason = ""
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
         """Open the bus, bring the servos up safely and begin to drive them.
 
-        Raises
-        ------
-        DriverError
-            when the port or a servo does not come up; the bus is closed again.
+        Raises DriverError when the port or a servo does not come up; the bus is closed again.
         """
         try:
             self.bus.open()
@@ -114,7 +103,7 @@ class BusLoop:
         self._thread.start()
 
     def begin(self) -> None:
-        """Follow the parameters from now on; until then the servos are held where they stood."""
+        """Follow the parameters from now on; until then the servos are held at the positions they started at."""
         self._begun.set()
 
     def stop(self) -> None:
@@ -132,26 +121,18 @@ class BusLoop:
         return self._state
 
     def _resume(self) -> None:
-        """Begin from where the servos are, so that the first goals are a ramp from there."""
-        state = self._all_fresh()
-        self._sent[:] = np.clip(state.position_rad, self.table.low_rad, self.table.high_rad)
-        self._limiter.reset(self._sent)
+        """Continue from where the servos are, so that the first goals are a ramp from there."""
+        self._goals.restart(self._all_fresh().position_rad)
 
     def _all_fresh(self) -> BusState:
-        """A measurement in which every servo answered.
-
-        Raises
-        ------
-        NoReply
-            when some keep silent: a pose that was missed or is old is none to begin from.
-        """
+        """Read until every servo has answered; raises NoReply when some do not: old positions are unsafe to use."""
         for _ in range(_READS):
             state = self._state = self.bus.read()
             if state.fresh.all() or not self.bus.measures:
                 return state
         names = [name for name, fresh in zip(self.table.names, state.fresh, strict=True) if not fresh]
         raise NoReply(
-            f"bus {self.settings.name}: where {', '.join(names)} stands is not known, for no answer came",
+            f"bus {self.settings.name}: the position of {', '.join(names)} is not known, for no answer came",
             hint="look at its cable, then start again",
         )
 
@@ -165,7 +146,7 @@ class BusLoop:
                     self._reconnect(now)
             if not self.limp:
                 self._come_to_rest()
-        except Exception as error:  # noqa: BLE001  the body has to hear of it and stop the servos
+        except Exception as error:  # noqa: BLE001  the body raises it and stops the servos
             self.error = error
 
     def _cycle(self) -> None:
@@ -180,31 +161,26 @@ class BusLoop:
 
     def _drive(self) -> None:
         if not self._begun.is_set():
-            self.bus.write(self._sent)
+            self.bus.write(self._goals.sent)
             self._state = self.bus.read()
             return
         values, stamp = self._newest()
         angles, held = self.table.angles(values)
         self.held += held
-        self._send(angles)
-        self._note_latency(stamp)
+        self.bus.write(self._goals.step(angles, self._state))
+        if stamp > self._last_stamp:
+            self._last_stamp = stamp
+            self.latency_ms.add((time.monotonic_ns() - stamp) / 1e6)
         self._state = self.bus.read()
-        self.following.note(angles, self._state)
-
-    def _send(self, angles: Floats) -> None:
-        """One step towards ``angles`` (n,) rad, as far as the rules and the limits of motion allow."""
-        dt = self.clock.period_ns / 1e9
-        allowed = self._guard.apply(angles, self._sent, self._limiter.rest(dt), self._state, dt)
-        self._limiter.step(dt, allowed, self._sent)
-        self.bus.write(self._sent)
+        self.following.add(angles, self._state)
 
     def _come_to_rest(self) -> None:
         """Lead the servos to the neutral face before they go limp, so that no part of the head drops."""
-        rest, _ = self.table.angles(np.zeros(self.table.mix.shape[1]))
+        rest = self.table.neutral_rad
         end_ns = time.monotonic_ns() + _REST_LIMIT_NS
         with suppress(DriverError):  # a bus that does not work is stopped as it is
             for now in Clock(self.settings.rate_hz).run(lambda: self._retry_ns is None):
-                self._send(rest)
+                self.bus.write(self._goals.step(rest, self._state))
                 state = self._state = self.bus.read()
                 known = state.fresh | (not self.bus.measures)
                 away = np.where(known, np.abs(state.position_rad - rest), np.inf)
@@ -212,7 +188,7 @@ class BusLoop:
                     return
 
     def _reconnect(self, now: int) -> None:
-        """One attempt to get a lost port back; motion goes on from where the servos are found."""
+        """Try once to get a lost port back; motion continues from the measured positions."""
         try:
             self.bus.reconnect()
             self._resume()
@@ -225,13 +201,8 @@ class BusLoop:
             log.warning("bus %s is back", self.settings.name)
             self._retry_ns = None
 
-    def _note_latency(self, stamp: int) -> None:
-        if stamp > self._last_stamp:
-            self._last_stamp = stamp
-            self.latency_ms.add((time.monotonic_ns() - stamp) / 1e6)
-
     def report(self) -> dict[str, object]:
-        """What was measured: rate and jitter, command-to-wire latency, errors by kind, limits hit."""
+        """Measurements: rate and jitter, command-to-wire latency, errors by kind, limits hit."""
         return {
             "name": self.settings.name,
             "servos": len(self.table.names),
@@ -239,7 +210,7 @@ class BusLoop:
             **self.clock.report(),
             "command_to_wire_ms": self.latency_ms.summary(),
             "channels_held_at_limit": self.held,
-            "rules": self._guard.report(),
+            "rules": self._goals.guard.report(),
             "face_difference": self.following.report(),
             "bus": self.bus.report().as_dict(),
             "fault": str(self.error) if self.error else None,

@@ -1,4 +1,4 @@
-"""Channels: from the parameter vector to one angle per servo, as flat arrays.
+"""Channels: map the parameter vector to one angle per servo, as flat arrays.
 
 The chain of a channel is mix (or anchor) -> calibrated points -> limits; safety rules (:mod:`controller.robot.safety`)
 and limits of motion (:class:`controller.motion.motion.MotionLimiter`) follow at the clock of the bus.
@@ -8,30 +8,50 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from controller.base.parameters import Floats, Indices, Parameters
 from controller.motion.motion import MotionLimiter
 from controller.robot.settings import ChannelSettings
-from controller.robot.terms import bend
+from controller.robot.terms import curve_corners
 from drivers.base.bus import ServoSpec
 
+if TYPE_CHECKING:
+    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
 
-class Anchors(Protocol):
-    """What solves the channels that say where they pull; see :mod:`controller.robot.anchors`.
+
+@dataclass(frozen=True)
+class PiecewiseLinear:
+    """``n`` functions made of straight pieces, constant on either side of them.
 
     Attributes
     ----------
-    names : the channels it solves, k of them. linear : (k, p) mm of pull per unit of each parameter, roughly.
+    start : (n,) first value. knots : (n, k) where each piece begins. widths : (n, k) its length, 0 where a function has
+    fewer pieces. slopes : (n, k).
     """
 
-    names: tuple[str, ...]
-    linear: Floats
+    start: Floats
+    knots: Floats
+    widths: Floats
+    slopes: Floats
 
-    def pulls(self, values: Floats) -> Floats:
-        """(k,) mm of pull for parameters (p,)."""
+    @classmethod
+    def through(cls, corners: Sequence[tuple[Floats, Floats]]) -> PiecewiseLinear:
+        """Functions given by their corners: places and values, (j,) each."""
+        most = max(len(at) for at, _ in corners) - 1
+        knots, widths, slopes = np.zeros((3, len(corners), most))
+        for i, (at, gives) in enumerate(corners):
+            k = len(at) - 1
+            knots[i, :k], widths[i, :k], slopes[i, :k] = at[:-1], np.diff(at), np.diff(gives) / np.diff(at)
+        return cls(np.array([gives[0] for _, gives in corners]), knots, widths, slopes)
+
+    def __call__(self, x: Floats) -> Floats:
+        """(n,) values at ``x`` : (n,)."""
+        pieces = np.clip(x[:, None] - self.knots, 0.0, self.widths)
+        values: Floats = self.start + (pieces * self.slopes).sum(axis=1)
+        return values
 
 
 @dataclass(frozen=True)
@@ -40,34 +60,28 @@ class Terms:
 
     Attributes
     ----------
-    parameter, channel : (t,) where each leads from and to.
-    start : (t,) value of the first corner. knots, widths, slopes : (t, k) straight pieces.
+    parameter, channel : (t,) input and output of each. curves : t functions.
     first : (j,) where each channel's terms begin; target : (j,) the channels. join : (j,) 0 sum, 1 min, 2 max.
     """
 
     parameter: Indices
     channel: Indices
-    start: Floats
-    knots: Floats
-    widths: Floats
-    slopes: Floats
+    curves: PiecewiseLinear
     first: Indices
     target: Indices
     join: Indices
 
     def add_to(self, mixed: Floats, values: Floats) -> None:
         """Add the terms for parameters (p,) to the mixes (n,), in place."""
-        x = values[self.parameter]
-        pieces = np.clip(x[:, None] - self.knots, 0.0, self.widths)
-        each = self.start + (pieces * self.slopes).sum(axis=1)
+        each = self.curves(values[self.parameter])
         joins = [ufunc.reduceat(each, self.first) for ufunc in (np.add, np.minimum, np.maximum)]
         mixed[self.target] += np.choose(self.join, joins)
 
     def linear(self, shape: tuple[int, int]) -> Floats:
         """(n, p) mean slope of each term."""
-        out = np.zeros(shape)
-        rise = (self.slopes * self.widths).sum(axis=1) / np.maximum(self.widths.sum(axis=1), 1e-12)
-        np.add.at(out, (self.channel, self.parameter), rise)
+        out, widths = np.zeros(shape), self.curves.widths
+        mean = (self.curves.slopes * widths).sum(axis=1) / np.maximum(widths.sum(axis=1), 1e-12)
+        np.add.at(out, (self.channel, self.parameter), mean)
         return out
 
 
@@ -77,41 +91,40 @@ class ChannelTable:
 
     Attributes
     ----------
-    names : the channels, in order.
-    mix : (n, p) float64, what of each parameter reaches the channel by weight alone.
-    start_rad : (n,) angle of the first calibrated point.
-    knots : (n, k) mix value where each straight piece begins.
-    widths : (n, k) length of each piece; 0 where a channel has fewer pieces.
-    slopes : (n, k) radians per unit of mix on each piece.
-    low_rad, high_rad : (n,) limits.
-    max_speed_rad_s, max_accel_rad_s2, max_jerk_rad_s3 : (n,) limits of the motion; infinite jerk for no limit.
-    terms : terms that are more than a weight. anchors, anchored : what solves channels (k,) that pull at the skin.
+    names : the channels, in order. mix : (n, p) weights of the parameters.
+    curves : n functions from mix to angle, the calibrated points. low_rad, high_rad : (n,) limits of position.
+    max_speed_rad_s, max_accel_rad_s2, max_jerk_rad_s3 : (n,) limits of motion; infinite jerk for no limit.
+    dead_band_rad, slack_rad : (n,), 0 for none.
+    terms : terms that are more than a weight. anchors, anchored : the solver of k channels, and their indices (k,).
     """
 
     names: tuple[str, ...]
     mix: Floats
-    start_rad: Floats
-    knots: Floats
-    widths: Floats
-    slopes: Floats
+    curves: PiecewiseLinear
     low_rad: Floats
     high_rad: Floats
     max_speed_rad_s: Floats
     max_accel_rad_s2: Floats
     max_jerk_rad_s3: Floats
+    dead_band_rad: Floats
+    slack_rad: Floats
     terms: Terms | None = None
-    anchors: Anchors | None = None
+    anchors: AnchorSolver | None = None
     anchored: Indices | None = None
 
     @property
     def linear(self) -> Floats:
         """(n, p) what a unit of each parameter adds to each mix, curves by their mean slope."""
         out = self.mix if self.terms is None else self.mix + self.terms.linear(self.mix.shape)
-        if self.anchors is None:
-            return out
-        out = out.copy()
-        out[self.anchored] = self.anchors.linear
+        if self.anchors is not None:
+            out = out.copy()
+            out[self.anchored] = self.anchors.linear
         return out
+
+    @property
+    def neutral_rad(self) -> Floats:
+        """(n,) angles of the neutral face."""
+        return self.angles(np.zeros(self.mix.shape[1]))[0]
 
     def mixed(self, values: Floats) -> Floats:
         """(n,) mixes for parameters (p,); mm of pull where a channel is anchored."""
@@ -119,85 +132,56 @@ class ChannelTable:
         if self.terms is not None:
             self.terms.add_to(mixed, values)
         if self.anchors is not None:
-            mixed[self.anchored] = self.anchors.pulls(values)
+            mixed[self.anchored] = self.anchors.pulls_mm(values)
         return mixed
 
     def angles(self, values: Floats) -> tuple[Floats, int]:
-        """Angles for parameters, before limits of motion.
-
-        Parameters
-        ----------
-        values : (p,) float64, the parameters.
-
-        Returns
-        -------
-        (n,) float64 angles inside the limits, and how many channels the limits held back.
-        """
-        mixed = self.mixed(values)
-        pieces = np.clip(mixed[:, None] - self.knots, 0.0, self.widths)
-        wanted = self.start_rad + (pieces * self.slopes).sum(axis=1)
+        """Angles (n,) inside the limits for parameters (p,), and how many channels the limits held back."""
+        wanted = self.curves(self.mixed(values))
         held = np.clip(wanted, self.low_rad, self.high_rad)
         return held, int(np.count_nonzero(held != wanted))
 
-
-def limiter_of(table: ChannelTable, period_s: float) -> MotionLimiter:
-    """Keeps the table's limits of position (rad) and motion at a bus that cycles every ``period_s``."""
-    return MotionLimiter(
-        table.max_speed_rad_s,
-        table.max_accel_rad_s2,
-        table.low_rad,
-        table.high_rad,
-        response_s=period_s,
-        max_jerk=table.max_jerk_rad_s3,
-        period_s=period_s,
-    )
+    def limiter(self, period_s: float) -> MotionLimiter:
+        """Keeps the limits of position (rad) and motion on a bus that cycles every ``period_s``."""
+        return MotionLimiter(
+            self.max_speed_rad_s,
+            self.max_accel_rad_s2,
+            self.low_rad,
+            self.high_rad,
+            response_s=period_s,
+            max_jerk=self.max_jerk_rad_s3,
+            period_s=period_s,
+        )
 
 
 def build_table(
-    channels: Sequence[ChannelSettings], parameters: Parameters, anchors: Anchors | None = None
-) -> ChannelTable:  # fmt: skip
-    """Flatten the settings of ``n`` channels into a :class:`ChannelTable`.
-
-    Parameters
-    ----------
-    anchors : solves the channels that have an anchor; they stay at 0 mm without.
-    """
+    channels: Sequence[ChannelSettings], parameters: Parameters, anchors: AnchorSolver | None = None
+) -> ChannelTable:
+    """Convert the settings of ``n`` channels to arrays; without ``anchors``, anchored channels stay at 0 mm."""
     mix = np.zeros((len(channels), len(parameters.names)))
     for row, channel in zip(mix, channels, strict=True):
         for name, term in channel.mix.items():
-            if term.plain and channel.join == "sum":
+            if term.is_weight and channel.join == "sum":
                 row[parameters.index(name)] = term.by
-    corners = [bend(np.array(c.map.at), np.radians(c.map.deg), c.map.curve) for c in channels]
-    start, knots, widths, slopes = _pieces(corners)
+
+    trim_rad = np.radians([channel.trim_deg for channel in channels])
+    corners = [curve_corners(np.array(c.map.at), np.radians(c.map.deg), c.map.curve) for c in channels]
     names = tuple(channel.name for channel in channels)
     return ChannelTable(
         names=names,
         mix=mix,
-        start_rad=start + np.radians([channel.trim_deg for channel in channels]),
-        knots=knots,
-        widths=widths,
-        slopes=slopes,
-        low_rad=np.radians([channel.limit_deg[0] for channel in channels]),
-        high_rad=np.radians([channel.limit_deg[1] for channel in channels]),
-        max_speed_rad_s=np.radians([channel.max_speed_deg_s for channel in channels]),
-        max_accel_rad_s2=np.radians([channel.max_accel_deg_s2 for channel in channels]),
-        max_jerk_rad_s3=np.radians([channel.max_jerk_deg_s3 or np.inf for channel in channels]),
+        curves=PiecewiseLinear.through([(at, rad + trim) for (at, rad), trim in zip(corners, trim_rad, strict=True)]),
+        low_rad=np.radians([c.limit_deg[0] for c in channels]),
+        high_rad=np.radians([c.limit_deg[1] for c in channels]),
+        max_speed_rad_s=np.radians([c.max_speed_deg_s for c in channels]),
+        max_accel_rad_s2=np.radians([c.max_accel_deg_s2 for c in channels]),
+        max_jerk_rad_s3=np.radians([c.max_jerk_deg_s3 or np.inf for c in channels]),
+        dead_band_rad=np.radians([c.dead_band_deg for c in channels]),
+        slack_rad=np.radians([c.slack_deg for c in channels]),
         terms=_terms(channels, parameters),
         anchors=anchors,
         anchored=None if anchors is None else np.array([names.index(name) for name in anchors.names], dtype=np.intp),
     )
-
-
-def _pieces(corners: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats, Floats, Floats]:
-    """First values (n,), and knots, widths and slopes (n, k) of curves given by their corners."""
-    most = max(len(at) for at, _ in corners) - 1
-    knots, widths, slopes = (np.zeros((len(corners), most)) for _ in range(3))
-    for i, (at, gives) in enumerate(corners):
-        k = len(at) - 1
-        knots[i, :k] = at[:-1]
-        widths[i, :k] = np.diff(at)
-        slopes[i, :k] = np.diff(gives) / np.diff(at)
-    return np.array([gives[0] for _, gives in corners]), knots, widths, slopes
 
 
 def _terms(channels: Sequence[ChannelSettings], parameters: Parameters) -> Terms | None:
@@ -205,32 +189,21 @@ def _terms(channels: Sequence[ChannelSettings], parameters: Parameters) -> Terms
         (i, parameters.index(name), term)
         for i, channel in enumerate(channels)
         for name, term in channel.mix.items()
-        if not (term.plain and channel.join == "sum")
+        if not (term.is_weight and channel.join == "sum")
     ]
     if not found:
         return None
-    corners = [term.points(parameters.low[p], parameters.high[p]) for _, p, term in found]
-    channel = np.array([i for i, _, _ in found], dtype=np.intp)
+    curves = PiecewiseLinear.through([term.points(parameters.low[p], parameters.high[p]) for _, p, term in found])
+    channel, parameter = np.array([(i, p) for i, p, _ in found], dtype=np.intp).T
     target, first = np.unique(channel, return_index=True)
     join = np.array([("sum", "min", "max").index(channels[i].join) for i in target], dtype=np.intp)
-    parameter = np.array([p for _, p, _ in found], dtype=np.intp)
-    return Terms(parameter, channel, *_pieces(corners), first=first, target=target, join=join)
-
-
-def play(channels: Sequence[ChannelSettings]) -> tuple[Floats, Floats]:
-    """Dead band and slack of ``n`` channels, each (n,) rad."""
-    return (
-        np.radians([channel.dead_band_deg for channel in channels]),
-        np.radians([channel.slack_deg for channel in channels]),
-    )
+    return Terms(parameter, channel, curves, first=first, target=target, join=join)
 
 
 def servo_specs(channels: Sequence[ChannelSettings], rest_rad: Floats | None = None) -> list[ServoSpec]:
-    """What the driver has to know of each channel's servo.
+    """The driver's specification of each channel's servo.
 
-    Parameters
-    ----------
-    rest_rad : (n,) angles of the neutral face, where servos begin that cannot tell where they are; 0 without.
+    ``rest_rad`` : (n,) angles of the neutral face, where servos begin that do not measure their position; 0 without.
     """
     rest = np.zeros(len(channels)) if rest_rad is None else rest_rad
     return [

@@ -1,85 +1,150 @@
-"""How the head and the picture follow each other: what a driven head lags behind, and what a limp one shows."""
+"""Measured positions of the servos: how far they are from the wanted ones, and the face that they show."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.base.parameters import REGIONS, Flags, Floats, Parameters
+from controller.base.solve import BoundedSolver
 from controller.layers.commands import CommandState, StatusValue
 from controller.robot.channels import ChannelTable
-from controller.robot.mirror import Mirror
 from drivers.base.bus import BusState
 
+_RIDGE = 1e-4
+_SPARSITY = 1e-3
+_TOLERANCE = 1e-5
 
-class Following:
-    """The difference between the face that was wanted and the one the servos were measured to make.
 
-    Parameters
-    ----------
-    names : the channels. regions : of the face, one a channel; none without.
+def _rms(squares: Floats, counts: NDArray[np.int64] | int) -> float:
+    return float(np.sqrt(squares.sum() / np.maximum(np.sum(counts), 1)))
+
+
+class FollowingStatistics:
+    """Statistics of the difference between the wanted angles of a bus's channels and the measured ones.
+
+    A channel belongs to the region of the face of the parameter that it follows most.
     """
 
-    def __init__(self, names: Sequence[str], regions: Sequence[str] = ()) -> None:
-        self._names, self._regions = tuple(names), tuple(regions)
+    def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
+        self._names = table.names
+        self._regions = np.array([parameters.regions[int(np.argmax(np.abs(row)))] for row in table.linear])
         self._now: Floats | None = None
-        self._squares, self._most = np.zeros(len(names)), np.zeros(len(names))
-        self._count = np.zeros(len(names), dtype=np.int64)
+        self._squares, self._most = np.zeros((2, len(table.names)))
+        self._count = np.zeros(len(table.names), dtype=np.int64)
 
-    def note(self, wanted_rad: Floats, state: BusState) -> None:
-        """Take one cycle: wanted angles (n,) rad, and what was measured; stale positions do not count."""
+    def add(self, wanted_rad: Floats, state: BusState) -> None:
+        """Add one cycle: wanted angles (n,) rad, and the measured ones; stale positions do not count."""
         good = state.fresh & np.isfinite(state.position_rad)
-        away = np.where(good, np.abs(state.position_rad - wanted_rad), 0.0)
-        self._now = np.degrees(np.where(good, away, np.nan))
+        away = np.where(good, np.degrees(np.abs(state.position_rad - wanted_rad)), 0.0)
+        self._now = np.where(good, away, np.nan)
         self._squares += away**2
         np.maximum(self._most, away, out=self._most)
         self._count += good
 
     def now(self) -> list[tuple[str, float]]:
         """Region and difference (deg) of every channel that was measured in the last cycle."""
-        away = self._now
-        if away is None:
+        if self._now is None:
             return []
-        return [(region, float(x)) for region, x in zip(self._regions, away, strict=False) if np.isfinite(x)]
+        return [(str(region), float(x)) for region, x in zip(self._regions, self._now, strict=True) if np.isfinite(x)]
 
     def report(self) -> dict[str, object]:
         """Root mean square (deg) over all channels and by region, and the three channels that were furthest away."""
         if not self._count.any():
             return {}
-        rms = np.degrees(np.sqrt(self._squares / np.maximum(self._count, 1)))
-        worst = np.argsort(-rms)[:3]
+        rms = np.sqrt(self._squares / np.maximum(self._count, 1))
         return {
-            "rms_deg": float(np.degrees(np.sqrt(self._squares.sum() / self._count.sum()))),
-            "regions_rms_deg": {region: self._region_rms(region) for region in REGIONS if region in self._regions},
+            "rms_deg": _rms(self._squares, self._count),
+            "regions_rms_deg": {
+                region: _rms(self._squares[self._regions == region], self._count[self._regions == region])
+                for region in REGIONS
+                if region in self._regions
+            },
             "worst": [
-                {"channel": self._names[i], "rms_deg": float(rms[i]), "max_deg": float(np.degrees(self._most[i]))}
-                for i in worst
+                {"channel": self._names[i], "rms_deg": float(rms[i]), "max_deg": float(self._most[i])}
+                for i in np.argsort(-rms)[:3]
             ],
         }
 
-    def _region_rms(self, region: str) -> float:
-        own = np.array([each == region for each in self._regions])
-        return float(np.degrees(np.sqrt(self._squares[own].sum() / max(int(self._count[own].sum()), 1))))
 
+class Mirror:
+    """Finds parameters whose channels give measured angles.
 
-def regions_of(table: ChannelTable, parameters: Parameters) -> list[str]:
-    """(n,) the region of the parameter each channel follows most."""
-    return [parameters.regions[int(np.argmax(np.abs(row)))] for row in table.linear]
-
-
-class MeasuredFace:
-    """The face that the servos were measured to make, whatever it was that moved them; asked from any thread.
-
-    Parameters
-    ----------
-    tables : the channels of each bus. measured : gives the newest measurement of each, None before the first.
-    following : of each bus, for the difference.
+    A servo head shows fewer things than a face, so many faces have one pose; the one with few and small values is
+    taken. The eyes are read as eye angles, never as eyeLook shapes.
 
     Attributes
     ----------
-    touched : (P,) bool, the parameters that any channel follows.
+    readable : (n,) bool, the channels that can be inverted; one whose map turns back or is flat cannot.
+    """
+
+    def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
+        self._table = table
+        high = parameters.high.copy()
+        high[[i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")]] = 0.0
+        self._bounds = parameters.low, high
+        self._at, self._rad = _points(table)
+        steps = np.diff(self._rad, axis=1)
+        real = np.diff(self._at, axis=1) > 0.0
+        self.readable = np.array([_is_monotonic(row[keep]) for row, keep in zip(steps, real, strict=True)])
+        self._solver = lru_cache(64)(self._make_solver)  # the same angles count in most cycles
+        self._last = parameters.neutral()
+        self._solver(self.readable.tobytes())  # compiled now, not while a bus waits
+
+    def read(self, angles_rad: Floats, fresh: Flags | None = None) -> Floats:
+        """Parameters (P,) that show ``angles_rad`` : (n,) best; angles that are not ``fresh`` : (n,) do not count."""
+        counted = self.readable & np.isfinite(angles_rad)
+        if fresh is not None:
+            counted &= fresh
+        wanted = np.where(counted, self._mixes(angles_rad), 0.0)
+        self._last = self._solver(counted.tobytes()).solve(wanted, start=self._last)
+        return self._last.copy()
+
+    def _mixes(self, angles_rad: Floats) -> Floats:
+        """(n,) mix values that give the angles, inside the calibrated points."""
+        mixes = np.zeros(len(angles_rad))
+        for i, angle in enumerate(angles_rad):
+            if self.readable[i] and np.isfinite(angle):
+                rad, at = self._rad[i], self._at[i]
+                mixes[i] = np.interp(angle, rad, at) if rad[-1] > rad[0] else np.interp(-angle, -rad, at)
+        return mixes
+
+    def _make_solver(self, counted: bytes) -> BoundedSolver:
+        """The solver for the angles that count."""
+        return BoundedSolver(
+            self._table.linear,
+            *self._bounds,
+            weights=np.frombuffer(counted, bool).astype(np.float64),
+            ridge=_RIDGE,
+            sparsity=_SPARSITY,
+            tolerance=_TOLERANCE,
+        )
+
+
+def _points(table: ChannelTable) -> tuple[Floats, Floats]:
+    """Calibrated points (n, k + 1) of mix and angle (rad); missing pieces repeat the last point."""
+    curves = table.curves
+    ends = np.where(curves.widths > 0.0, curves.knots + curves.widths, -np.inf)
+    at = np.maximum.accumulate(np.concatenate([curves.knots[:, :1], ends], axis=1), axis=1)
+    rise = np.cumsum(curves.widths * curves.slopes, axis=1)
+    return at, curves.start[:, None] + np.concatenate([np.zeros((len(at), 1)), rise], axis=1)
+
+
+def _is_monotonic(steps: Floats) -> bool:
+    return len(steps) > 0 and bool(np.all(steps > 0.0) or np.all(steps < 0.0))
+
+
+class MeasuredFace:
+    """The face that the measured positions of all servos show, whatever moved them; may be read from any thread.
+
+    Parameters
+    ----------
+    tables : the channels of each bus. measured : returns the newest measurement of each, None before the first.
+    following : the statistics of each bus.
     """
 
     def __init__(
@@ -87,14 +152,13 @@ class MeasuredFace:
         tables: Sequence[ChannelTable],
         measured: Sequence[Callable[[], BusState | None]],
         parameters: Parameters,
-        following: Sequence[Following] = (),
+        following: Sequence[FollowingStatistics] = (),
     ) -> None:
         self._mirrors = [(Mirror(table, parameters), read) for table, read in zip(tables, measured, strict=True)]
         self._touched = [np.abs(table.linear).sum(axis=0) > 0.0 for table in tables]
-        self._following, self._parameters = following, parameters
-        self.touched = np.any([np.zeros(len(parameters), dtype=bool), *self._touched], axis=0)
+        self._following = following
         self._lock = threading.Lock()
-        for mirror, _ in self._mirrors:  # the solver is made ready before the clock runs
+        for mirror, _ in self._mirrors:  # the solver is compiled before the clock runs
             mirror.read(np.zeros(len(mirror.readable)))
 
     def read(self, out: Floats, mask: Flags) -> bool:
@@ -110,41 +174,28 @@ class MeasuredFace:
         return bool(mask.any())
 
     def measured(self, out: Floats) -> bool:
-        """See :class:`controller.layers.commands.CommandSink`; what no servo shows is 0."""
+        """See :class:`controller.layers.commands.CommandSink`; parameters without a servo are 0."""
         out.fill(0.0)
         return self.read(out, np.zeros(len(out), dtype=bool))
 
+    def capture(self, state: CommandState, now_ns: int) -> None:
+        """Write the face to the capture layer, so that the picture follows a limp head that is moved by hand."""
+        values, mask = state.parameters.neutral(), np.zeros(len(state.parameters), dtype=bool)
+        if self.read(values, mask):
+            state.capture(values, mask, now_ns, now_ns)
+
     def differences(self) -> dict[str, float]:
-        """How far the servos of each region are from where they were wanted at this moment (rms, degrees)."""
+        """How far the servos of each region are from their wanted angles now (rms, degrees)."""
         found: dict[str, list[float]] = {}
         for following in self._following:
             for region, away in following.now():
                 found.setdefault(region, []).append(away)
-        return {region: float(np.sqrt(np.mean(np.square(found[region])))) for region in REGIONS if region in found}
+        return {region: _rms(np.square(found[region]), len(found[region])) for region in REGIONS if region in found}
 
     def status(self) -> dict[str, StatusValue]:
-        """How far the servos are from where they were wanted: everywhere, and by region (rms, degrees)."""
-        away = self.differences()
-        every = [each for following in self._following for _, each in following.now()]
-        if not every:
+        """How far the servos are from their wanted angles now: all together, and by region (rms, degrees)."""
+        every = np.array([each for following in self._following for _, each in following.now()])
+        if not len(every):
             return {"away_deg": "unknown"}
-        found: dict[str, StatusValue] = {"away_deg": round(float(np.sqrt(np.mean(np.square(every)))), 2)}
-        return found | {f"away_{region}_deg": round(value, 2) for region, value in away.items()}
-
-
-class FollowMode:
-    """A limp head that is moved by hand: what is measured goes to the capture layer, and the face follows.
-
-    Parameters
-    ----------
-    reflection : reads the head.
-    """
-
-    def __init__(self, reflection: MeasuredFace, parameters: Parameters) -> None:
-        self._measured_face = reflection
-        self._values, self._mask = parameters.neutral(), np.zeros(len(parameters), dtype=bool)
-
-    def tick(self, state: CommandState, now_ns: int) -> None:
-        """Write the face that the servos make now."""
-        if self._measured_face.read(self._values, self._mask):
-            state.capture(self._values, self._mask, now_ns, now_ns)
+        found: dict[str, StatusValue] = {"away_deg": round(_rms(every**2, len(every)), 2)}
+        return found | {f"away_{region}_deg": round(value, 2) for region, value in self.differences().items()}

@@ -1,4 +1,4 @@
-"""Robot files: read, cross-checked, and carried onto the calibration that they name."""
+"""Reads robot files, cross-checks them, and fits them to the calibration that they name."""
 
 from __future__ import annotations
 
@@ -8,27 +8,24 @@ from controller.base.config import load
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean
 from controller.robot.calibration import calibrated, calibration_path
-from controller.robot.settings import AnchorSettings, RobotSettings
+from controller.robot.settings import RobotSettings
 from drivers import check_model
 from drivers.base.errors import DriverError
 from drivers.core.registry import FAMILIES
 
 
 def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
-    """Read and cross-check a robot file.
+    """Read and cross-check a robot file, with its calibration.
 
-    Raises
-    ------
-    ConfigError
-        listing every fault: unknown keys and parameters, doubled names and ids, buses that do not exist.
+    Raises ConfigError that lists every fault: unknown keys and parameters, repeated names and ids, missing buses.
     """
-    robot = load(path, RobotSettings, lambda read: _doubled(read) + _references(read, parameters) + _rules(read))
+    robot = load(path, RobotSettings, lambda read: _repeated(read) + _references(read, parameters) + _rules(read))
     if robot.calibration is None:
         return robot
     return calibrated(robot, calibration_path(robot.calibration, path))
 
 
-def _doubled(robot: RobotSettings) -> list[str]:
+def _repeated(robot: RobotSettings) -> list[str]:
     faults = []
     seen: dict[tuple[str, object], int] = {}
     for i, channel in enumerate(robot.channels):
@@ -42,12 +39,11 @@ def _doubled(robot: RobotSettings) -> list[str]:
 
 
 def _models(robot: RobotSettings) -> list[str]:
-    """Servo models that their bus does not drive, and settings that mean nothing there."""
+    """Servo models that their bus does not drive, and pulses of servos that are no hobby servos."""
     faults = []
     buses = {bus.name: bus for bus in robot.buses}
     for i, channel in enumerate(robot.channels):
-        bus = buses.get(channel.bus)
-        if bus is None:
+        if (bus := buses.get(channel.bus)) is None:
             continue
         try:
             check_model(bus.family, channel.model)
@@ -70,9 +66,11 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
         if channel.bus not in buses:
             faults.append(f"channels[{i}].bus: no bus called {channel.bus!r} (buses: {', '.join(sorted(buses))})")
         named = [(f"mix.{name}", name) for name in channel.mix]
-        if channel.anchor is not None:
-            faults += _landmark(robot, i, channel.anchor)
-            named += [("anchor.like", channel.anchor.like)] if channel.anchor.like is not None else []
+        if (anchor := channel.anchor) is not None:
+            named += [("anchor.like", anchor.like)] if anchor.like is not None else []
+            if isinstance(point := anchor.point, str) and point not in robot.landmarks:
+                known = did_you_mean(point, robot.landmarks)
+                faults.append(f"channels[{i}].anchor.point: no landmark called {point!r}{known}")
         for key, name in named:
             try:
                 parameters.index(name)
@@ -85,13 +83,6 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
             if not low <= deg <= high
         ]
     return faults
-
-
-def _landmark(robot: RobotSettings, i: int, anchor: AnchorSettings) -> list[str]:
-    point = anchor.point
-    if not isinstance(point, str) or point in robot.landmarks:
-        return []
-    return [f"channels[{i}].anchor.point: no landmark called {point!r}{did_you_mean(point, robot.landmarks)}"]
 
 
 def _rules(robot: RobotSettings) -> list[str]:

@@ -1,57 +1,56 @@
-"""Safety before the bus: what stands between the angles a face asks for and the limiter of motion.
+"""Safety rules and limits of motion between the angles that a face asks for and the goals sent to a bus.
 
-The chain is dead band -> slack -> rules. Rules only narrow the window [low, high] in which each servo may be told to
-be; several rules join by intersection, so their order does not matter. All of it acts on targets: the
-:class:`controller.motion.motion.MotionLimiter` behind keeps speed and acceleration, whatever a rule does. After the
-rules of the Hanson motor stack, without its defects; see docs/robots.md for what differs.
+The chain is dead band -> slack -> rules -> limiter of motion. Rules only narrow the range [low, high] of positions that
+each servo may be sent; several rules combine by intersection, so their order does not matter. All of them act on
+targets: the :class:`controller.motion.motion.MotionLimiter` behind them keeps speed and acceleration, whatever a rule
+does. After the rules of the Hanson motor stack, without its defects; docs/robots.md lists the differences.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.base.parameters import Flags, Floats, Indices
-from controller.robot.channels import ChannelTable
-from controller.robot.rules import LoadRule, PreventRule, RuleSettings, TimingRule
+from controller.base.parameters import Flags, Floats, Indices, Parameters
+from controller.robot.channels import ChannelTable, build_table
+from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
+
+if TYPE_CHECKING:
+    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
 
 _NEAR_RAD = 1e-3
 
 
 @dataclass
-class Moment:
-    """What rules look at: angles, and what was measured.
+class RuleInput:
+    """Inputs of the rules in one cycle, the last of ``dt`` s.
 
     Attributes
     ----------
-    angles : (3, n) rad: where the servos are asked to be, where they were last told to be, and where they would come
-        to rest if they braked from the next step on. state : the newest measurement. dt : s.
+    target, position, rest : (n,) rad: the targets, the last goals, and where the servos would come to rest if they
+    braked from the next step on. state : the newest measurement.
     """
 
-    angles: Floats
+    target: Floats
+    position: Floats
+    rest: Floats
     state: BusState | None
     dt: float
 
-    @property
-    def position(self) -> Floats:
-        """(n,) rad, where the servos were last told to be."""
-        angles: Floats = self.angles[1]
-        return angles
-
 
 @dataclass
-class Window:
-    """Where each servo may be told to be; (n,) rad. ``narrow`` only ever makes it smaller."""
+class AllowedRange:
+    """Positions that each servo may be sent, low and high (n,) rad; ``narrow`` only makes the range smaller."""
 
     low: Floats
     high: Floats
 
     def narrow(self, at: Indices, sign: Floats, bound: Floats, where: Flags) -> None:
-        """Keep servos ``at`` : (k,) on the near side of ``bound`` : (k,), seen along ``sign`` : (k,) +1 or -1."""
+        """Bound servos ``at`` : (k,) from above by ``bound`` : (k,) where ``sign`` : (k,) is +1, else from below."""
         if not where.any():
             return
         up, down = where & (sign > 0), where & (sign < 0)
@@ -59,112 +58,102 @@ class Window:
         np.maximum.at(self.low, at[down], bound[down])
 
 
-@dataclass
-class Tally:
-    """How often each rule acted: ``times`` it began to, and for how many seconds, (k,)."""
+class RuleCounter:
+    """How many times each of k rules began to act, and for how many seconds it acted."""
 
-    labels: list[str]
-    times: NDArray[np.int64] = field(init=False)
-    seconds: Floats = field(init=False)
-    acting: Flags = field(init=False)
+    def __init__(self, labels: list[str]) -> None:
+        self.labels = labels
+        self._times, self._seconds = np.zeros(len(labels), np.int64), np.zeros(len(labels))
+        self._acting = np.zeros(len(labels), bool)
 
-    def __post_init__(self) -> None:
-        k = len(self.labels)
-        self.times, self.seconds, self.acting = np.zeros(k, np.int64), np.zeros(k), np.zeros(k, bool)
-
-    def note(self, acting: Flags, dt: float) -> None:
-        """Count what acts now."""
-        if not (acting.any() or self.acting.any()):
-            return
-        self.times += acting & ~self.acting
-        self.seconds += acting * dt
-        np.copyto(self.acting, acting)
+    def count(self, acting: Flags, dt: float) -> None:
+        """Count one cycle of the rules that act now."""
+        self._times += acting & ~self._acting
+        self._seconds += acting * dt
+        self._acting = acting
 
     def report(self) -> list[dict[str, object]]:
         """The rules that acted, with their counts."""
         return [
             {"rule": label, "times": int(times), "seconds": round(float(seconds), 3)}
-            for label, times, seconds in zip(self.labels, self.times, self.seconds, strict=True)
+            for label, times, seconds in zip(self.labels, self._times, self._seconds, strict=True)
             if times
         ]
 
 
-class _Ends:
+class _Thresholds:
     """Indices, signs and thresholds (k,) of relative positions of channels."""
 
-    def __init__(self, table: ChannelTable, neutral: Floats, ends: Sequence[tuple[str, str, float]]) -> None:
-        self.at = np.array([table.names.index(name) for name, _, _ in ends], dtype=np.intp)
-        self.sign = np.array([1.0 if side == "high" else -1.0 for _, side, _ in ends])
+    def __init__(self, table: ChannelTable, neutral: Floats, extremes: Sequence[tuple[str, str, float]]) -> None:
+        self.at = np.array([table.names.index(name) for name, _, _ in extremes], dtype=np.intp)
+        self.sign = np.array([1.0 if side == "high" else -1.0 for _, side, _ in extremes])
         self.neutral = neutral[self.at]
         self.limit = np.where(self.sign > 0, table.high_rad[self.at], table.low_rad[self.at])
-        self.bound = self.at_share(np.array([extreme for _, _, extreme in ends]))
+        self.bound = self.angle_rad(np.array([extreme for _, _, extreme in extremes]))
 
-    def at_share(self, share: Floats) -> Floats:
-        """(k,) rad of relative positions."""
+    def angle_rad(self, share: Floats) -> Floats:
+        """(k,) rad of relative positions (k,)."""
         return self.neutral + share * (self.limit - self.neutral)
-
-    def keep(self, window: Window, where: Flags) -> None:
-        """Keep the channels of ``where`` : (k,) on the near side of their threshold."""
-        window.narrow(self.at, self.sign, self.bound, where)
 
     def past(self, angles: Floats) -> Flags:
         """(..., k) whether the channels' ``angles`` : (..., n) lie beyond their threshold."""
         return self.sign * (angles[..., self.at] - self.bound) > _NEAR_RAD
 
 
-class Prevent:
+class AntagonistRules:
     """Keeps antagonists from being past their extremes at the same time.
 
     Decides by where a servo would come to rest, so that neither overshoots while it brakes.
     """
 
     def __init__(self, rules: Sequence[PreventRule], table: ChannelTable, neutral: Floats) -> None:
-        self._own = _Ends(table, neutral, [(r.channel, r.toward, r.extreme) for r in rules])
-        self._other = _Ends(table, neutral, [(r.other, r.other_toward, r.other_extreme) for r in rules])
-        self.tally = Tally([f"prevent {r.channel} against {r.other}" for r in rules])
+        self._own = _Thresholds(table, neutral, [(r.channel, r.toward, r.extreme) for r in rules])
+        self._other = _Thresholds(table, neutral, [(r.other, r.other_toward, r.other_extreme) for r in rules])
+        self.counter = RuleCounter([f"prevent {r.channel} against {r.other}" for r in rules])
 
-    def narrow(self, now: Moment, window: Window) -> None:
-        """See :class:`Guard`."""
-        own, other = self._own.past(now.angles), self._other.past(now.angles)
+    def narrow(self, now: RuleInput, allowed: AllowedRange) -> None:
+        """Narrow the allowed range for one cycle."""
+        angles = np.array((now.target, now.position, now.rest))
+        own, other = self._own.past(angles), self._other.past(angles)
         yields, waits = other[0] | other[1] | other[2], own[1] | own[2]
-        self._own.keep(window, yields)
-        self._other.keep(window, waits)
-        self.tally.note((yields & own[0]) | (waits & other[0]), now.dt)
+        for ends, where in ((self._own, yields), (self._other, waits)):
+            allowed.narrow(ends.at, ends.sign, ends.bound, where)
+        self.counter.count((yields & own[0]) | (waits & other[0]), now.dt)
 
 
-class Timing:
-    """Lets no servo stay at an extreme.
+class TimingRules:
+    """Limits how long a servo may stay at an extreme.
 
-    The time past the extreme adds up, and runs back at the same pace on the near side of it: a target that flickers
-    out for a moment does not begin anew.
+    The time past the extreme adds up, and runs back at the same pace on the near side of it: a target that leaves the
+    extreme for a moment does not restart the time.
     """
 
     def __init__(self, rules: Sequence[TimingRule], table: ChannelTable, neutral: Floats) -> None:
         each = [(rule, name) for rule in rules for name in rule.channels]
-        self._ends = _Ends(table, neutral, [(name, r.toward, r.extreme) for r, name in each])
+        self._ends = _Thresholds(table, neutral, [(name, r.toward, r.extreme) for r, name in each])
         self._extreme = np.array([r.extreme for r, _ in each])
         self._hold = np.array([r.hold_s for r, _ in each])
         times = np.array([(r.fall_s, r.rest_s, r.recover_s) for r, _ in each]).reshape(-1, 3)
         self._until = np.cumsum(times, axis=1)
         self._fall, self._recover = times[:, 0], times[:, 2]
-        self._spent, self._phase = np.zeros(len(each)), np.full(len(each), -1.0)
-        self._rests = True
-        self.tally = Tally([f"timing {name} toward {r.toward}" for r, name in each])
+        self._spent, self._phase = np.zeros(len(each)), np.full(len(each), -1.0)  # s; phase -1: not acting
+        self._idle = True
+        self.counter = RuleCounter([f"timing {name} toward {r.toward}" for r, name in each])
 
-    def narrow(self, now: Moment, window: Window) -> None:
-        """See :class:`Guard`."""
-        if self._rests and not self._ends.past(now.position).any():
+    def narrow(self, now: RuleInput, allowed: AllowedRange) -> None:
+        """Narrow the allowed range for one cycle."""
+        past = self._ends.past(now.position)
+        if self._idle and not past.any():
             return
-        idle = self._phase < 0
-        pace = np.where(self._ends.past(now.position), now.dt, -now.dt)
-        self._spent = np.where(idle, np.maximum(self._spent + pace, 0.0), 0.0)
-        self._phase = np.where(idle, np.where(self._spent > self._hold, 0.0, -1.0), self._phase + now.dt)
+        waiting = self._phase < 0
+        pace = np.where(past, now.dt, -now.dt)
+        self._spent = np.where(waiting, np.maximum(self._spent + pace, 0.0), 0.0)
+        self._phase = np.where(waiting, np.where(self._spent > self._hold, 0.0, -1.0), self._phase + now.dt)
         self._phase[self._phase >= self._until[:, 2]] = -1.0
         acting = self._phase >= 0
-        self._rests = not (acting.any() or self._spent.any() or self.tally.acting.any())
-        if acting.any():
-            window.narrow(self._ends.at, self._ends.sign, self._ends.at_share(self._level()), acting)
-        self.tally.note(acting, now.dt)
+        self._idle = not (acting.any() or self._spent.any())
+        allowed.narrow(self._ends.at, self._ends.sign, self._ends.angle_rad(self._level()), acting)
+        self.counter.count(acting, now.dt)
 
     def _level(self) -> Floats:
         """(k,) relative limit: 1 falls to the extreme, stays, and rises to 1 again."""
@@ -174,8 +163,8 @@ class Timing:
         return level
 
 
-class Load:
-    """Lets a servo that meets resistance give way, from where it stands, against the way it pushes.
+class LoadRules:
+    """Lets a servo that meets resistance give way, from its measured position, against the direction of its push.
 
     Only fresh, measured currents count; a servo that does not measure its current is never held by this rule.
     """
@@ -188,35 +177,31 @@ class Load:
         angles = np.array([(r.most_deg, r.fall_deg_s, r.rise_deg_s) for r, _ in each]).reshape(-1, 3)
         self._most, self._fall, self._rise = np.radians(angles).T
         self._low, self._high = table.low_rad[self._at], table.high_rad[self._at]
-        k = len(each)
-        self._over, self._calm = np.zeros(k), np.zeros(k)
-        self._push, self._from, self._given = np.zeros(k), np.zeros(k), np.zeros(k)
-        self.tally = Tally([f"load {name}" for _, name in each])
+        self._over, self._calm, self._push, self._from, self._given = np.zeros((5, len(each)))
+        self.counter = RuleCounter([f"load {name}" for _, name in each])
 
-    def narrow(self, now: Moment, window: Window) -> None:
-        """See :class:`Guard`."""
+    def narrow(self, now: RuleInput, allowed: AllowedRange) -> None:
+        """Narrow the allowed range for one cycle."""
         if now.state is not None:
             self._measure(now, now.state)
         acting = self._push != 0.0
-        if not (acting.any() or self.tally.acting.any()):
-            return
-        window.narrow(self._at, self._push, self._from - self._push * self._given, acting)
-        self.tally.note(acting, now.dt)
+        allowed.narrow(self._at, self._push, self._from - self._push * self._given, acting)
+        self.counter.count(acting, now.dt)
 
-    def _measure(self, now: Moment, state: BusState) -> None:
+    def _measure(self, now: RuleInput, state: BusState) -> None:
         current, position = np.abs(state.current_a[self._at]), state.position_rad[self._at]
-        told = state.fresh[self._at] & np.isfinite(current) & np.isfinite(position)
-        over = told & (current > self._current)
-        self._over = np.where(over, self._over + now.dt, np.where(told, 0.0, self._over))
+        known = state.fresh[self._at] & np.isfinite(current) & np.isfinite(position)
+        over = known & (current > self._current)
+        self._over = np.where(over, self._over + now.dt, np.where(known, 0.0, self._over))
         begins = over & (self._over > self._after) & (self._push == 0.0)
         push = np.where(now.position[self._at] < position, -1.0, 1.0)
         self._push = np.where(begins, push, self._push)
         self._from = np.where(begins, np.clip(position, self._low, self._high), self._from)
         self._given[begins] = 0.0
-        self._give_way(over, told, now.dt)
+        self._give_way(over, known, now.dt)
 
-    def _give_way(self, over: Flags, told: Flags, dt: float) -> None:
-        self._calm = np.where(over, 0.0, self._calm + dt * told)
+    def _give_way(self, over: Flags, known: Flags, dt: float) -> None:
+        self._calm = np.where(over, 0.0, self._calm + dt * known)
         falling, rising = over & (self._push != 0.0), self._calm > self._rest
         self._given = np.where(falling, np.minimum(self._given + self._fall * dt, self._most), self._given)
         self._given = np.where(rising, self._given - self._rise * dt, self._given)
@@ -224,83 +209,94 @@ class Load:
         self._push[rising & (-self._given >= limit)] = 0.0
 
 
-class Takeup:
-    """Dead band and slack of each channel.
+class DeadBandAndSlack:
+    """Applies the dead band and compensates the slack of each channel.
 
-    A target that moves by less than the dead band is not followed. Slack is the play of a gear or string: half of it
-    is added while the target rises and taken away while it falls, so that the far end goes where it should.
-
-    Parameters
-    ----------
-    dead_rad, slack_rad : (n,), 0 for none.
+    A target that moves by less than the dead band is ignored. Slack is the play of a gear or string: half of it is
+    added while the target rises and subtracted while it falls, so that the far end reaches the target.
     """
 
-    def __init__(self, dead_rad: Floats, slack_rad: Floats) -> None:
-        self._dead, self._half = dead_rad, 0.5 * slack_rad
+    def __init__(self, dead_band_rad: Floats, slack_rad: Floats) -> None:
+        self._dead, self._half = dead_band_rad, 0.5 * slack_rad
         self._turn = np.maximum(0.1 * slack_rad, _NEAR_RAD)
-        self._held, self._peak = np.full(len(dead_rad), np.nan), np.zeros(len(dead_rad))
-        self._way = np.zeros(len(dead_rad))
+        self._held, self._peak = np.full(len(slack_rad), np.nan), np.zeros(len(slack_rad))
+        self._direction = np.zeros(len(slack_rad))
 
     def apply(self, target: Floats) -> Floats:
-        """(n,) rad: what to ask of the servos for ``target`` : (n,) rad."""
+        """(n,) rad: the angles to send for ``target`` : (n,) rad."""
         moved = ~(np.abs(target - self._held) <= self._dead)
         self._held[moved] = target[moved]
-        # the way it goes turns when the target comes back from its furthest point
-        came = (self._held - self._peak) * np.where(self._way == 0.0, 1.0, self._way)
-        turned = (came < -self._turn) | ((self._way == 0.0) & (came > self._turn))
-        self._way = np.where(turned, np.sign(self._held - self._peak), self._way)
+        # the direction turns when the target comes back from its furthest point
+        came = (self._held - self._peak) * np.where(self._direction == 0.0, 1.0, self._direction)
+        turned = (came < -self._turn) | ((self._direction == 0.0) & (came > self._turn))
+        self._direction = np.where(turned, np.sign(self._held - self._peak), self._direction)
         self._peak = np.where(turned | (came > 0.0), self._held, self._peak)
-        return self._held + self._way * self._half
+        return self._held + self._direction * self._half
 
 
 class Guard:
-    """All of it for the channels of one bus.
+    """Dead band, slack and all safety rules for the channels of one bus."""
 
-    Parameters
-    ----------
-    rules : the rules. table : the channels. dead_rad, slack_rad : (n,) per channel; none without.
-    """
-
-    def __init__(
-        self,
-        rules: RuleSettings,
-        table: ChannelTable,
-        dead_rad: Floats | None = None,
-        slack_rad: Floats | None = None,
-    ) -> None:
-        none = np.zeros(len(table.names))
-        neutral, _ = table.angles(np.zeros(table.mix.shape[1]))
+    def __init__(self, rules: RuleSettings, table: ChannelTable) -> None:
+        neutral = table.neutral_rad
         rules = rules.within(table.names)
         self._table = table
-        self._takeup = Takeup(none if dead_rad is None else dead_rad, none if slack_rad is None else slack_rad)
-        every = (Prevent(rules.prevent, table, neutral), Timing(rules.timing, table, neutral), Load(rules.load, table))
-        self._rules = [rule for rule in every if rule.tally.labels]
-        self._window = Window(table.low_rad.copy(), table.high_rad.copy())
+        self._slack = DeadBandAndSlack(table.dead_band_rad, table.slack_rad)
+        every = (
+            AntagonistRules(rules.prevent, table, neutral),
+            TimingRules(rules.timing, table, neutral),
+            LoadRules(rules.load, table),
+        )
+        self._rules = [rule for rule in every if rule.counter.labels]
 
-    def apply(self, target: Floats, position: Floats, stop: Floats, state: BusState | None, dt: float) -> Floats:
-        """What the servos may be asked for.
+    def apply(self, target: Floats, position: Floats, rest: Floats, state: BusState | None, dt: float) -> Floats:
+        """Angles (n,) rad that the servos may be sent, inside the limits and every rule.
 
         Parameters
         ----------
-        target : (n,) rad, what the face asks for. position : (n,) rad, where the servos were last told to be.
-        stop : (n,) rad, where they would come to rest; see :meth:`controller.motion.motion.MotionLimiter.rest`.
+        target : (n,) rad, what the face asks for. position : (n,) rad, the last goals.
+        rest : (n,) rad, where they would come to rest; see :meth:`controller.motion.motion.MotionLimiter.rest`.
         state : the newest measurement. dt : s.
-
-        Returns
-        -------
-        (n,) rad, inside the limits and every rule.
         """
-        table, window = self._table, self._window
-        sound = np.where(np.isfinite(target), target, position)  # what is no number asks to stay
-        wanted = self._takeup.apply(np.minimum(np.maximum(sound, table.low_rad), table.high_rad))
-        wanted = np.minimum(np.maximum(wanted, table.low_rad), table.high_rad)
-        np.copyto(window.low, table.low_rad)
-        np.copyto(window.high, table.high_rad)
-        now = Moment(np.array((wanted, position, stop)), state, dt)
+        low, high = self._table.low_rad, self._table.high_rad
+        finite = np.where(np.isfinite(target), target, position)  # a servo whose target is no number stays
+        wanted = np.clip(self._slack.apply(np.clip(finite, low, high)), low, high)
+        allowed = AllowedRange(low.copy(), high.copy())
+        now = RuleInput(wanted, position, rest, state, dt)
         for rule in self._rules:
-            rule.narrow(now, window)
-        return np.maximum(np.minimum(wanted, window.high), np.minimum(window.low, window.high))
+            rule.narrow(now, allowed)
+        return np.maximum(np.minimum(wanted, allowed.high), np.minimum(allowed.low, allowed.high))
 
     def report(self) -> list[dict[str, object]]:
         """The rules that acted: which, how often, for how long (s)."""
-        return [row for rule in self._rules for row in rule.tally.report()]
+        return [row for rule in self._rules for row in rule.counter.report()]
+
+
+class GoalFilter:
+    """Turns the angles wanted of one bus's channels into goals: safety rules first, then limits of motion.
+
+    Parameters
+    ----------
+    channels : those of the bus. rules, anchors : of the robot. period_s : of the bus.
+    """
+
+    def __init__(self, channels: Sequence[ChannelSettings], parameters: Parameters, rules: RuleSettings,
+                 period_s: float, anchors: AnchorSolver | None = None) -> None:  # fmt: skip
+        names = [channel.name for channel in channels]
+        self.table = build_table(channels, parameters, None if anchors is None else anchors.for_channels(names))
+        self.guard = Guard(rules, self.table)
+        self.period_s = period_s
+        self._limiter = self.table.limiter(period_s)
+        self.sent = np.zeros(len(names))  # rad, the last goals
+        self.restart(self.table.neutral_rad)
+
+    def restart(self, position_rad: Floats) -> None:
+        """Continue from positions (n,) rad at rest, as far as the limits of position allow."""
+        np.clip(position_rad, self.table.low_rad, self.table.high_rad, out=self.sent)
+        self._limiter.reset(self.sent)
+
+    def step(self, wanted: Floats, state: BusState | None = None) -> Floats:
+        """One cycle towards angles (n,) rad, given the newest measurement; goals (n,) rad, the same array each time."""
+        rest = self._limiter.rest(self.period_s)
+        allowed = self.guard.apply(wanted, self.sent, rest, state, self.period_s)
+        return self._limiter.step(self.period_s, allowed, self.sent)

@@ -1,24 +1,30 @@
-"""A robot's configuration: buses, and channels from parameters to servo angles.
+"""Settings of a robot file: channels from parameters to servo angles, safety rules, profiles, landmarks.
 
-A channel is one servo: a weighted mix of parameters, carried through calibrated points to an angle, then kept
-inside its limits, speed and acceleration. Angles are degrees from the servo's centre, growing with its ticks.
+A channel is one servo: a weighted mix of parameters, mapped through calibrated points to an angle, then kept inside
+its limits of position, speed and acceleration. Angles are degrees from the servo's centre, growing with its ticks.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+import numpy as np
+from pydantic import Field, field_validator, model_validator
 
 from controller.base.config import Settings
+from controller.base.parameters import Floats
 from controller.robot.buses import Bus
-from controller.robot.rules import RuleSettings
 from controller.robot.terms import Curve, Finite, Term, check_points
 
 Degrees = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Play = Annotated[float, Field(ge=0, le=20, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+Side = Literal["low", "high"]
+Names = Annotated[list[str], Field(min_length=1)]
 
 
 class Calibration(Settings):
@@ -29,19 +35,19 @@ class Calibration(Settings):
     curve: Curve = "straight"
 
     @model_validator(mode="after")
-    def _pairs(self) -> Calibration:
+    def _are_points(self) -> Calibration:
         check_points(self.at, self.deg, "deg")
         return self
 
 
 class PulseSettings(Settings):
-    """Pulses of a hobby servo (us) at angles of the channel (degrees), measured in place of the model's."""
+    """Measured pulses of a hobby servo (us) at angles of the channel (degrees), instead of those of its model."""
 
     deg: list[Degrees]
     us: list[Annotated[float, Field(ge=64, le=4080)]]
 
     @model_validator(mode="after")
-    def _pairs(self) -> PulseSettings:
+    def _are_monotonic(self) -> PulseSettings:
         check_points(self.deg, self.us, "us")
         steps = [after - before for before, after in pairwise(self.us)]
         if not (all(step > 0 for step in steps) or all(step < 0 for step in steps)):
@@ -53,8 +59,8 @@ class AnchorSettings(Settings):
     """Where on the skin a servo pulls; its ``map`` then gives degrees for millimetres of pull.
 
     ``point`` is (u, v) of the part, a place [x, y, z] in mm, of which the nearest point of the skin is taken, or the
-    name of one of the robot's landmarks. Skin within ``reach_mm`` goes with it, less with distance; with ``like`` it
-    goes as that parameter moves it (a jaw on its hinge, a lid on its axle). ``both`` pulls at the mirrored point too.
+    name of one of the robot's landmarks. Skin within ``reach_mm`` moves along, less with distance; with ``like`` it
+    moves as that parameter moves it (a jaw on its hinge, a lid on its axle). ``both`` also pulls at the mirrored point.
     """
 
     point: str | Annotated[list[Finite], Field(min_length=2, max_length=3)]
@@ -66,20 +72,26 @@ class AnchorSettings(Settings):
 
     @field_validator("direction")
     @classmethod
-    def _is_one(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
+    def _is_not_zero(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
         if not any(value):
             raise ValueError("a direction must not be zero")
         return value
 
     @model_validator(mode="after")
-    def _one_kind(self) -> AnchorSettings:
+    def _is_both_or_like(self) -> AnchorSettings:
         if self.both and self.like is not None:
             raise ValueError("both and like do not go together")
         return self
 
+    @property
+    def unit_direction(self) -> Floats:
+        """(3,) the direction with length 1."""
+        unit: Floats = np.array(self.direction) / np.linalg.norm(self.direction)
+        return unit
+
 
 class ChannelSettings(Settings):
-    """One servo and the chain that leads to it."""
+    """One servo: what it follows, its calibrated points and its limits."""
 
     name: str
     bus: str
@@ -104,22 +116,100 @@ class ChannelSettings(Settings):
 
     @field_validator("limit_deg")
     @classmethod
-    def _in_order(cls, value: tuple[float, float], info: ValidationInfo) -> tuple[float, float]:
+    def _is_in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
         if value[0] >= value[1]:
             raise ValueError("the lower limit must be below the upper one")
         return value
 
     @model_validator(mode="after")
-    def _one_source(self) -> ChannelSettings:
+    def _has_mix_or_anchor(self) -> ChannelSettings:
         if bool(self.mix) == (self.anchor is not None):
             raise ValueError("needs either mix or anchor")
         return self
 
 
+class PreventRule(Settings):
+    """Antagonists: ``channel`` is held at ``extreme`` while ``other`` is, or wants to be, past ``other_extreme``.
+
+    ``other`` has precedence, but waits until ``channel`` has moved back. Positions in rules are relative: 0 is the
+    channel's angle for the neutral face, 1 its limit on the side of ``toward``, so a rule stays valid after another
+    calibration. :mod:`controller.robot.safety` applies the rules.
+    """
+
+    channel: str
+    toward: Side
+    extreme: Share
+    other: str
+    other_toward: Side
+    other_extreme: Share
+
+
+class TimingRule(Settings):
+    """Time at an extreme: after ``hold_s`` past ``extreme`` the limit falls to it, stays there, and comes back."""
+
+    channels: Names
+    toward: Side
+    extreme: Share
+    hold_s: Seconds
+    fall_s: Positive
+    rest_s: Seconds
+    recover_s: Positive
+
+
+class LoadRule(Settings):
+    """Load: after ``after_s`` above ``current_a`` the servo gives way from its measured position.
+
+    It gives way at ``fall_deg_s`` while overloaded, by at most ``most_deg``; ``rest_s`` after the load has gone the
+    limit comes back at ``rise_deg_s``.
+    """
+
+    channels: Names
+    current_a: Positive
+    after_s: Seconds
+    most_deg: Positive = 15.0
+    fall_deg_s: Positive = 30.0
+    rest_s: Seconds = 1.0
+    rise_deg_s: Positive = 10.0
+
+
+Rule = TypeVar("Rule", TimingRule, LoadRule)
+
+
+class RuleSettings(Settings):
+    """All safety rules of a robot, by kind."""
+
+    prevent: list[PreventRule] = []
+    timing: list[TimingRule] = []
+    load: list[LoadRule] = []
+
+    def within(self, names: Sequence[str]) -> RuleSettings:
+        """The rules as far as they concern the channels called ``names``; ``prevent`` needs both of its channels."""
+        return RuleSettings(
+            prevent=[rule for rule in self.prevent if {rule.channel, rule.other} <= set(names)],
+            timing=_for_channels(self.timing, names),
+            load=_for_channels(self.load, names),
+        )
+
+    def mentions(self) -> Iterator[tuple[str, str]]:
+        """Key and name of every channel that a rule names."""
+        for i, rule in enumerate(self.prevent):
+            yield f"rules.prevent[{i}].channel", rule.channel
+            yield f"rules.prevent[{i}].other", rule.other
+        for kind in ("timing", "load"):
+            for i, named in enumerate(getattr(self, kind)):
+                for j, name in enumerate(named.channels):
+                    yield f"rules.{kind}[{i}].channels[{j}]", name
+
+
+def _for_channels(rules: list[Rule], names: Sequence[str]) -> list[Rule]:
+    kept = [(rule, [name for name in rule.channels if name in names]) for rule in rules]
+    return [rule.model_copy(update={"channels": own}) for rule, own in kept if own]
+
+
 class RobotSettings(Settings):
     """The channels of one robot, on one or more buses.
 
-    ``calibration`` names a file that ``omote calibrate`` made of this very head (:mod:`controller.robot.calibration`).
+    ``calibration`` names a file that ``omote calibrate`` wrote for this head (:mod:`controller.robot.calibration`).
     """
 
     name: str
@@ -134,12 +224,16 @@ class RobotSettings(Settings):
     @model_validator(mode="before")
     @classmethod
     def _fill_in_profiles(cls, table: Any) -> Any:
-        """Give channels what their profile says and they do not."""
+        """Give channels the values of their profile that they do not set themselves."""
         channels, profiles = table.get("channels"), table.get("profiles", {})
         if not isinstance(channels, list) or not isinstance(profiles, dict):
             return table
-        filled = [_with_profile(channel, profiles) for channel in channels]
-        return {**table, "channels": filled}
+        return {**table, "channels": [_with_profile(channel, profiles) for channel in channels]}
+
+    @property
+    def anchored_channels(self) -> list[ChannelSettings]:
+        """The channels that have an anchor, in file order."""
+        return [channel for channel in self.channels if channel.anchor is not None]
 
     def on_bus(self, name: str) -> list[ChannelSettings]:
         """The channels on the bus called ``name``, in file order."""
@@ -147,7 +241,7 @@ class RobotSettings(Settings):
 
 
 def _with_profile(channel: Any, profiles: dict[str, Any]) -> Any:
-    """A channel with what its profile says; with that of all profiles where there is none of that name (a fault)."""
+    """A channel with the values of its profile; with those of all profiles where none has that name (a fault)."""
     if not isinstance(channel, dict) or "profile" not in channel:
         return channel
     own = profiles.get(str(channel["profile"]))

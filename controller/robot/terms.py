@@ -1,13 +1,13 @@
-"""Terms of a channel's mix: how one parameter reaches one channel.
+"""Terms of a channel's mix: how one parameter contributes to one channel.
 
-A number weighs the parameter. A table may first keep it inside an input range, or carry it through points of its own::
+A number weighs the parameter. A table may first keep it inside an input range, or map it through points::
 
     mix.jawOpen = 1
     mix.mouthClose = { by = -0.4, in = [0.2, 1] }
     mix.mouthFunnel = { at = [0, 0.5, 1], gives = [0, 0.3, 0.2], curve = "smooth" }
 
 Smooth curves go through their points without overshooting between them (monotone cubics, Fritsch and Carlson 1980).
-They are kept as short straight pieces, so that every curve is evaluated the same way.
+They are cut into short straight pieces, so that every curve is evaluated the same way.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from controller.base.parameters import Floats
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Curve = Literal["straight", "smooth"]
 
-_PIECES = 8
+_PIECES = 8  # straight pieces between two points of a smooth curve
 
 
 def check_points(at: list[float], others: list[float], name: str) -> None:
@@ -47,7 +47,7 @@ class TermSettings(Settings):
     curve: Curve = "straight"
 
     @model_validator(mode="after")
-    def _one_way(self) -> TermSettings:
+    def _is_weight_or_curve(self) -> TermSettings:
         if self.within is not None and not self.within[0] < self.within[1]:
             raise ValueError("in must be [lowest, highest]")
         if (self.at is None) != (self.gives is None):
@@ -59,20 +59,20 @@ class TermSettings(Settings):
         return self
 
     @property
-    def plain(self) -> bool:
-        """Whether the term is nothing but a weight."""
+    def is_weight(self) -> bool:
+        """Whether the term is only a weight, without a range or a curve."""
         return self.within is None and self.at is None
 
     def points(self, low: float, high: float) -> tuple[Floats, Floats]:
         """Corners (k,) of the term as straight pieces, for a parameter that runs from ``low`` to ``high``."""
         if self.at is not None and self.gives is not None:
-            return bend(np.array(self.at), np.array(self.gives), self.curve)
+            return curve_corners(np.array(self.at), np.array(self.gives), self.curve)
         at = np.array(self.within or (low, high), dtype=np.float64)
         return at, self.by * at
 
-    def words(self, name: str) -> str:
-        """The term for a person: ``+0.5 jawOpen``."""
-        if self.at is not None and self.gives is not None:
+    def describe(self, name: str) -> str:
+        """The term as text: ``+0.5 jawOpen``."""
+        if self.at is not None:
             return f"+{name} through {len(self.at)} points"
         inside = "" if self.within is None else f" in {self.within[0]:g}..{self.within[1]:g}"
         return f"{self.by:+g} {name}{inside}"
@@ -87,37 +87,12 @@ def _as_table(value: Any) -> Any:
 Term = Annotated[TermSettings, BeforeValidator(_as_table)]
 
 
-def bend(at: Floats, gives: Floats, curve: Curve) -> tuple[Floats, Floats]:
+def curve_corners(at: Floats, gives: Floats, curve: Curve) -> tuple[Floats, Floats]:
     """Corners (k,) of straight pieces along the curve through points (j,)."""
     if curve == "straight" or len(at) < 3:
         return at, gives
-    slopes = _monotone_slopes(np.diff(at), np.diff(gives) / np.diff(at))
-    share = np.arange(_PIECES)[None] / _PIECES
-    width = np.diff(at)[:, None]
-    x = at[:-1, None] + share * width
-    y = (
-        (1 + 2 * share) * (1 - share) ** 2 * gives[:-1, None]
-        + share * (1 - share) ** 2 * width * slopes[:-1, None]
-        + share**2 * (3 - 2 * share) * gives[1:, None]
-        + share**2 * (share - 1) * width * slopes[1:, None]
-    )
-    return np.append(x.ravel(), at[-1]), np.append(y.ravel(), gives[-1])
+    from scipy.interpolate import PchipInterpolator  # start-up: few robots have a smooth curve
 
-
-def _monotone_slopes(width: Floats, rise: Floats) -> Floats:
-    """Slopes (j,) at the points: weighted harmonic means, zero where the curve turns (Fritsch and Butland 1984)."""
-    a, b = width[:-1] + 2 * width[1:], 2 * width[:-1] + width[1:]
-    product = rise[:-1] * rise[1:]
-    same = product > 0
-    inner = np.zeros(len(rise) - 1)
-    inner[same] = ((a + b) * product)[same] / (a * rise[1:] + b * rise[:-1])[same]  # no tiny rise is divided by
-    ends = [_end_slope(*width[:2], *rise[:2]), _end_slope(*width[:-3:-1], *rise[:-3:-1])]
-    return np.concatenate([ends[:1], inner, ends[1:]])
-
-
-def _end_slope(width: float, next_width: float, rise: float, next_rise: float) -> float:
-    """Slope at an end from the two pieces beside it, such that the curve does not overshoot."""
-    slope = ((2 * width + next_width) * rise - width * next_rise) / (width + next_width)
-    if slope * rise <= 0:
-        return 0.0
-    return slope if abs(slope) <= 3 * abs(rise) else 3 * rise
+    x = np.append((at[:-1, None] + np.arange(_PIECES) / _PIECES * np.diff(at)[:, None]).ravel(), at[-1])
+    with np.errstate(over="ignore"):  # it divides by slopes, which may be next to zero
+        return x, np.append(PchipInterpolator(at, gives)(x[:-1]), gives[-1])

@@ -1,25 +1,32 @@
-"""What a stage would send to its servos, without opening a port."""
+"""Dry run: computes what a stage would send to its servos, without opening a port or waiting for a clock.
+
+Layers, limits of motion, mixes and safety rules are those of a real run; nothing is measured, so load rules do not act.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
-from controller.base.parameters import Parameters
+from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState
 from controller.links.line.script import Script, load_script
 from controller.links.line.show import Show
-from controller.robot.anchors import AnchorMap, load_anchors
-from controller.robot.channels import build_table
+from controller.robot.anchors import AnchorSolver, load_anchors
+from controller.robot.safety import GoalFilter
 from controller.robot.settings import ChannelSettings, RobotSettings
-from controller.stage.offline import Feed, OfflineRun
 from controller.stage.stage import Stage
 from controller.takes.livelink import TakePlayer
 from controller.takes.reader import load_take, reader_of
 from controller.takes.recording import SUFFIX, replay
 
+Feed = Callable[[int], object]
+"""Writes to the layers what is due at a time (ns)."""
+
+_FIRST_NS = 1_000_000_000
 _LONGEST_S = 30.0
 _EACH_S = 1.5
 
@@ -29,9 +36,8 @@ def dry_run(
 ) -> tuple[list[dict[str, str]], list[dict[str, object]]]:
     """Play a stage's take, its simulated hosts' scripts or else every named expression to each of its robots.
 
-    Returns
-    -------
-    A row a channel, and for each bus every angle of every cycle (deg).
+    ``seconds`` : how much of it; without, all of the take or one round of the script, 30 s at most.
+    Returns a row for each channel, and for each bus every angle of every cycle (deg).
     """
     rows: list[dict[str, str]] = []
     report: list[dict[str, object]] = []
@@ -39,44 +45,131 @@ def dry_run(
         state = stage.state(parameters)
         state.live(stage.settings.liveliness, 0)
         feed, length_s = _feed(stage, take, state)
-        rehearsal = OfflineRun(robot, state, feed, stage.settings.control_hz, _anchors(stage, robot, parameters))
-        rehearsal.run(min(length_s, _LONGEST_S) if seconds is None else seconds)
-        rows += [fixed | sent for fixed, sent in zip(plan_rows(robot, parameters), rehearsal.rows(), strict=True)]
-        report += rehearsal.report()
+        anchors = load_anchors(robot, stage.head, parameters)
+        offline = OfflineRun(robot, state, feed, stage.settings.control_hz, anchors)
+        offline.run(min(length_s, _LONGEST_S) if seconds is None else seconds)
+        rows += offline.rows()
+        report += offline.report()
     return rows, report
 
 
-def _anchors(stage: Stage, robot: RobotSettings, parameters: Parameters) -> AnchorMap | None:
-    if all(channel.anchor is None for channel in robot.channels):
-        return None
+class OfflineRun:
+    """Runs a robot from the layers to the goals of its servos, faster than real time.
 
-    return load_anchors(robot, stage.head, parameters)
+    Parameters
+    ----------
+    robot : its channels, on any number of buses. state : the layers. feed : writes to them what is due.
+    control_hz : ticks of the layers per second. anchors : solver of the robot's anchored channels.
+    """
+
+    def __init__(
+        self,
+        robot: RobotSettings,
+        state: CommandState,
+        feed: Feed,
+        control_hz: float = 100.0,
+        anchors: AnchorSolver | None = None,
+    ) -> None:
+        self._robot, self._state, self._feed, self._dt = robot, state, feed, 1.0 / control_hz
+        self._buses = {
+            bus.name: GoalFilter(robot.on_bus(bus.name), state.parameters, robot.rules, 1.0 / bus.rate_hz, anchors)
+            for bus in robot.buses
+        }
+        self._neutral = {name: bus.sent.copy() for name, bus in self._buses.items()}
+        self._limited = {name: np.zeros(len(bus.sent), dtype=np.int64) for name, bus in self._buses.items()}
+        self.sent_rad: dict[str, Floats] = {}  # for each bus, the goals (c, n) of every cycle
+
+    def run(self, seconds: float) -> None:
+        """Play so many seconds."""
+        values, rows = self._state.parameters.neutral(), {name: [rest] for name, rest in self._neutral.items()}
+        for tick in range(math.ceil(seconds / self._dt)):
+            now_ns = _FIRST_NS + round(tick * self._dt * 1e9)
+            self._feed(now_ns)
+            self._state.tick(now_ns, self._dt, values)
+            for name, bus in self._buses.items():
+                while len(rows[name]) * bus.period_s <= (tick + 1) * self._dt:
+                    wanted = bus.table.angles(values)[0]
+                    self._limited[name] += (wanted <= bus.table.low_rad) | (wanted >= bus.table.high_rad)
+                    rows[name].append(bus.step(wanted).copy())
+        self.sent_rad = {name: np.array(each) for name, each in rows.items()}
+
+    def rows(self) -> Iterator[dict[str, str]]:
+        """One row for each channel, in file order: servo, mix, neutral angle, what it was sent, what limited it."""
+        for channel in self._robot.channels:
+            bus = self._buses[channel.bus]
+            i = bus.table.names.index(channel.name)
+            sent = np.degrees(self.sent_rad[channel.bus][:, i])
+            fastest = np.abs(np.diff(sent)).max(initial=0.0) / bus.period_s
+            yield {
+                "channel": channel.name,
+                "servo": f"{channel.bus} id {channel.id}, {channel.model}",
+                "mix": _mix(channel),
+                "neutral (deg)": f"{np.degrees(self._neutral[channel.bus][i]):.1f}",
+                "sent (deg)": f"{sent.min():.1f} to {sent.max():.1f}",
+                "limits (deg)": f"{channel.limit_deg[0]:g} to {channel.limit_deg[1]:g}",
+                "fastest (deg/s)": f"{fastest:.0f} of {channel.max_speed_deg_s:g}",
+                "held by": ", ".join(self._held_by(channel, i)) or "nothing",
+            }
+
+    def _held_by(self, channel: ChannelSettings, i: int) -> Iterator[str]:
+        """What limited a channel: its limit of position, and the rules that name it."""
+        bus = self._buses[channel.bus]
+        if limited := self._limited[channel.bus][i]:
+            yield f"limit {limited * bus.period_s:.1f} s"
+        for rule in bus.guard.report():
+            kind, *words = str(rule["rule"]).split()
+            if channel.name in words:
+                yield f"{kind} {rule['seconds']:.1f} s"
+
+    def report(self) -> list[dict[str, object]]:
+        """What each bus would have been sent, a row for each cycle (deg), and the rules that acted."""
+        return [
+            {
+                "robot": self._robot.name,
+                "bus": name,
+                "period_s": bus.period_s,
+                "channels": list(bus.table.names),
+                "sent_deg": np.round(np.degrees(self.sent_rad[name]), 3).tolist(),
+                "rules": bus.guard.report(),
+            }
+            for name, bus in self._buses.items()
+        ]
+
+
+def _mix(channel: ChannelSettings) -> str:
+    if channel.anchor is not None:
+        point = channel.anchor.point
+        return "pulls at " + (point if isinstance(point, str) else ", ".join(f"{x:g}" for x in point))
+    terms = " ".join(term.describe(name) for name, term in channel.mix.items()).removeprefix("+")
+    return terms if channel.join == "sum" else f"{channel.join} of {terms}"
 
 
 def _feed(stage: Stage, take: Path | None, state: CommandState) -> tuple[Feed, float]:
-    """What gives the layers what is due, and for how long it does (s)."""
+    """A function that writes to the layers what is due, and for how long it does (s)."""
+    if take is not None and take.suffix == SUFFIX:
+        return _recording_feed(stage, take, state)
     if take is not None:
-        return _of_take(stage, take, state)
+        loaded = load_take(take, state.parameters)
+        return TakePlayer(loaded, state, reader_of(take).layer).tick, loaded.duration_s
     names = [script for link in stage.settings.links if (script := link.simulated) is not None]
     names += [stage.settings.show] if stage.settings.show is not None else []
-    scripts = [load_script(name, state.parameters, stage.vocabulary, beside=stage.path) for name in names] or [
-        _every(state)
-    ]
+    scripts = [load_script(name, state.parameters, stage.vocabulary, beside=stage.path) for name in names]
+    if not scripts:  # each named expression in turn
+        expressions = [*state.vocabulary.names, "neutral"]
+        scripts = [Script(tuple((i * _EACH_S, f"EXPR {name}") for i, name in enumerate(expressions)))]
     shows = [Show(script, state) for script in scripts]
     for show in shows:
         show.playing = True
-    return _all([show.tick for show in shows]), max(script.loop_s or _last_s(script) for script in scripts)
+
+    def feed(now_ns: int) -> None:
+        for show in shows:
+            show.tick(now_ns)
+
+    return feed, max(script.loop_s or (script.steps[-1][0] if script.steps else 0.0) + _EACH_S for script in scripts)
 
 
-def _of_take(stage: Stage, take: Path, state: CommandState) -> tuple[Feed, float]:
-    if take.suffix == SUFFIX:
-        return _of_recording(stage, take, state)
-    loaded = load_take(take, state.parameters)
-    return TakePlayer(loaded, state, reader_of(take).layer).tick, loaded.duration_s
-
-
-def _of_recording(stage: Stage, path: Path, state: CommandState) -> tuple[Feed, float]:
-    """The recorded face in the highest layer, which is what a replay shows but for the time it takes to get there."""
+def _recording_feed(stage: Stage, path: Path, state: CommandState) -> tuple[Feed, float]:
+    """Writes the recorded face to the highest layer: what a replay shows, except for the motion to its first face."""
     ticks = [(now_ns, values.copy()) for now_ns, values in replay(path, state.parameters, make=stage.state)]
     times = np.array([now_ns for now_ns, _ in ticks], dtype=np.int64)
     every, first = np.ones(len(state.parameters), dtype=bool), [0]
@@ -87,42 +180,3 @@ def _of_recording(stage: Stage, path: Path, state: CommandState) -> tuple[Feed, 
         state.write_layer("manual", ticks[at][1], every, now_ns)
 
     return feed, float(times[-1] - times[0]) * 1e-9 if len(times) else 0.0
-
-
-def _every(state: CommandState) -> Script:
-    """Each named expression in turn."""
-    names = [*state.vocabulary.names, "neutral"]
-    return Script(tuple((i * _EACH_S, f"EXPR {name}") for i, name in enumerate(names)))
-
-
-def _last_s(script: Script) -> float:
-    return script.steps[-1][0] + _EACH_S if script.steps else _EACH_S
-
-
-def _all(feeds: list[Callable[[int], object]]) -> Feed:
-    def feed(now_ns: int) -> None:
-        for each in feeds:
-            each(now_ns)
-
-    return feed
-
-
-def plan_rows(robot: RobotSettings, parameters: Parameters) -> Iterator[dict[str, str]]:
-    """One row a channel: servo, mix, and the angle of the neutral face."""
-    table = build_table(robot.channels, parameters)
-    neutral, _ = table.angles(parameters.neutral())
-    for channel, angle in zip(robot.channels, neutral, strict=True):
-        yield {
-            "channel": channel.name,
-            "servo": f"{channel.bus} id {channel.id}, {channel.model}",
-            "mix": _mix(channel),
-            "neutral (deg)": f"{np.degrees(angle):.1f}",
-        }
-
-
-def _mix(channel: ChannelSettings) -> str:
-    if channel.anchor is not None:
-        point = channel.anchor.point
-        return "pulls at " + (point if isinstance(point, str) else ", ".join(f"{x:g}" for x in point))
-    words = " ".join(term.words(name) for name, term in channel.mix.items()).removeprefix("+")
-    return words if channel.join == "sum" else f"{channel.join} of {words}"

@@ -1,4 +1,4 @@
-"""How the picture looks, as configuration says it: theme, light, background, camera, who evaluates, kiosk."""
+"""Settings of the picture: theme, lights, background, camera, evaluator of the vertices, kiosk."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from controller.base.errors import ParameterError
 
 if TYPE_CHECKING:
     from surface.view.scene.camera import Camera  # start-up: the body reads stages and draws nothing
-    from surface.view.scene.theme import Colour, Light, Theme  # start-up: the body reads stages and draws nothing
+    from surface.view.scene.theme import Colour, Theme  # start-up: the body reads stages and draws nothing
 
 HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 Share = Annotated[float, Field(ge=0, le=4)]
@@ -22,7 +22,7 @@ _WARM = 0.35  # how much a warmth of 1 adds to red and takes from blue
 
 
 class LightSettings(Settings):
-    """The key light, and how strong each light is beside the theme's own."""
+    """The direction of the key light, and the strength of each light relative to the theme's."""
 
     yaw_deg: Annotated[float | None, Field(ge=-180, le=180)] = None
     pitch_deg: Annotated[float | None, Field(ge=-90, le=90)] = None
@@ -35,7 +35,7 @@ class LightSettings(Settings):
 
 
 class PictureSettings(Settings):
-    """How the picture looks. ``background`` is one colour, or the upper and the lower one of a gradient."""
+    """Look of the picture. ``background`` is one colour, or the upper and the lower one of a gradient."""
 
     quality: Literal["full", "fast"] = "full"
     camera: CameraName = "front"
@@ -57,19 +57,23 @@ class PictureSettings(Settings):
         from surface.view.scene.theme import THEMES  # start-up: the body reads stages and draws nothing
 
         theme, light = THEMES[self.theme], self.light
-        lit = replace(
+        red, green, blue = theme.key.colour
+        warm = red * (1 + _WARM * light.warmth), green, blue * (1 - _WARM * light.warmth)
+        own = {"yaw_deg": light.yaw_deg, "pitch_deg": light.pitch_deg}
+        direction = {key: value for key, value in own.items() if value is not None}
+        theme = replace(
             theme,
-            key=_scaled(_aimed(theme.key, light), light.key, light.warmth),
-            fill=_scaled(theme.fill, light.fill, 0.0),
-            rim=_scaled(theme.rim, light.rim, 0.0),
+            key=replace(theme.key, colour=_times(warm, light.key), **direction),
+            fill=replace(theme.fill, colour=_times(theme.fill.colour, light.fill)),
+            rim=replace(theme.rim, colour=_times(theme.rim.colour, light.rim)),
             sky=_times(theme.sky, light.ambient),
             ground=_times(theme.ground, light.ambient),
             lights_follow=theme.lights_follow if light.follows_camera is None else light.follows_camera,
         )
         if self.background is None:
-            return lit
+            return theme
         top, bottom = (self.background, self.background) if isinstance(self.background, str) else self.background
-        return replace(lit, background_top=_colour(top), background_bottom=_colour(bottom))
+        return replace(theme, background_top=_colour(top), background_bottom=_colour(bottom))
 
     def make_camera(self) -> Camera:
         """The camera of that name."""
@@ -78,46 +82,29 @@ class PictureSettings(Settings):
         return PRESETS[self.camera.replace("_", "-")]()
 
 
-def checked(settings: PictureSettings, wanted: Mapping[str, object]) -> Any:
+def with_options(settings: PictureSettings, wanted: Mapping[str, object]) -> Any:
     """``settings`` with the values of command-line options; those that are None were not given.
 
-    Raises
-    ------
-    ParameterError
-        naming the option whose value is wrong.
+    Raises ParameterError that names the option whose value is wrong.
     """
     given = {key: value for key, value in wanted.items() if value is not None}
     try:
         return type(settings).model_validate(settings.model_dump() | given)
     except ValidationError as error:
         fault = error.errors()[0]
-        option, said = str(fault["loc"][0]), fault["msg"].removeprefix("Input should be ")
+        option, expected = str(fault["loc"][0]), fault["msg"].removeprefix("Input should be ")
+        value = given.get(option)
         if option == "background":
-            said = "#rrggbb, or #rrggbb,#rrggbb from top to bottom"
-        raise ParameterError(f"--{option} {_said(given.get(option))}: must be {said}") from error
+            expected = "#rrggbb, or #rrggbb,#rrggbb from top to bottom"
+            value = ",".join(value) if isinstance(value, tuple) else value
+        raise ParameterError(f"--{option} {value}: must be {expected}") from error
 
 
-def parse_background(words: str | None) -> str | tuple[str, ...] | None:
-    """``#rrggbb`` or ``#rrggbb,#rrggbb`` as the key ``background`` wants it."""
-    if words is None or "," not in words:
-        return words
-    return tuple(word.strip() for word in words.split(","))
-
-
-def _said(value: object) -> str:
-    """A value as it stood on the command line."""
-    return ",".join(value) if isinstance(value, tuple) else str(value)
-
-
-def _aimed(light: Light, settings: LightSettings) -> Light:
-    yaw = light.yaw_deg if settings.yaw_deg is None else settings.yaw_deg
-    return replace(light, yaw_deg=yaw, pitch_deg=light.pitch_deg if settings.pitch_deg is None else settings.pitch_deg)
-
-
-def _scaled(light: Light, strength: float, warmth: float) -> Light:
-    red, green, blue = light.colour
-    warm = red * (1 + _WARM * warmth), green, blue * (1 - _WARM * warmth)
-    return replace(light, colour=_times(warm, strength))
+def parse_background(text: str | None) -> str | tuple[str, ...] | None:
+    """``#rrggbb`` or ``#rrggbb,#rrggbb`` as a value for the key ``background``."""
+    if text is None or "," not in text:
+        return text
+    return tuple(word.strip() for word in text.split(","))
 
 
 def _times(colour: Colour, factor: float) -> Colour:

@@ -1,4 +1,4 @@
-"""A stage: one head, the links that command it and the robots that make the same face."""
+"""Reads stage files: one head, the links that command it and the robots that make the same face."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from controller.base.config import Settings, load
-from controller.base.errors import ConfigError, TakeError
+from controller.base.errors import ConfigError, ParameterError, TakeError
 from controller.base.parameters import Parameters
 from controller.base.paths import find_config
 from controller.layers.commands import CommandState
@@ -21,8 +21,7 @@ from controller.links.line.script import load_script
 from controller.links.links import LinkTable
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
-from controller.stage.identity import check_identity
-from controller.stage.picture import PictureSettings, checked
+from controller.stage.picture import PictureSettings, with_options
 from controller.takes.reader import load_take
 from controller.vocabulary.vocabulary import Vocabulary
 
@@ -39,8 +38,42 @@ class FaceSettings(PictureSettings):
     fps: Annotated[float, Field(ge=1, le=1000)] = 60.0
 
 
+IDENTITY_HINT = "--identity broad=0.6,young=0.4"
+
+
+def parse_identity(text: str | None) -> dict[str, float]:
+    """``broad=0.6,young=0.4`` of a command line as names and amounts; a name alone counts 1.
+
+    Raises ParameterError for a word that is not NAME=AMOUNT, or an amount that is not 0 to 1.
+    """
+    identity: dict[str, float] = {}
+    for word in (text or "").split(","):
+        name, equals, amount = (x.strip() for x in word.partition("="))
+        if not word.strip():
+            continue
+        where = f"--identity {word.strip()}"
+        try:
+            identity[name] = float(amount) if equals else 1.0
+        except ValueError as error:
+            raise ParameterError(f"{where}: {amount!r} is not a number", hint=IDENTITY_HINT) from error
+        if not name or not 0.0 <= identity[name] <= 1.0:
+            raise ParameterError(f"{where}: expected NAME=AMOUNT, 0 to 1", hint=IDENTITY_HINT)
+    return identity
+
+
+def check_identity(head: Path, wanted: Mapping[str, float]) -> None:
+    """Raise ConfigError for a name that the head in folder ``head`` does not have."""
+    from surface.head.model.identity import load_identities  # start-up: few stages name any
+
+    known = load_identities(head) if wanted else {}
+    for name in wanted:
+        if name not in known:
+            there = ", ".join(known) or "none"
+            raise ConfigError(f"{head}: no identity {name!r}; there are {there}", hint="see docs/heads.md")
+
+
 class StageSettings(Settings):
-    """What a stage file holds."""
+    """The contents of a stage file."""
 
     name: str
     description: str = ""
@@ -68,12 +101,8 @@ class Stage:
 
     Attributes
     ----------
-    path : the stage's file.
-    settings : its content.
-    head : folder of the head.
-    robots : the robots, in file order.
-    vocabulary : the named expressions, the user's own from files ``vocabularies`` among them.
-    layers : the layers. life : figures of idle life. groups : group files the head wears, and how much.
+    path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
+    layers : the layers. life : settings of idle life. groups : group files added to the head, each with its amount.
     """
 
     path: Path
@@ -87,21 +116,21 @@ class Stage:
     groups: tuple[tuple[Path, float], ...] = ()
 
     def file(self, name: str) -> Path:
-        """A file the stage names: beside it, or a path."""
+        """A file that the stage names: relative to the stage's folder, or a path."""
         beside = self.path.parent / name
         return beside if beside.exists() else Path(name)
 
     @property
     def period_s(self) -> float:
-        """Length of a tick."""
+        """Length of a control tick."""
         return 1.0 / self.settings.control_hz
 
     def load_head(self) -> Head:
-        """The head as the stage wants it; see :func:`load_head`."""
+        """The stage's head with its identity and groups; see :func:`load_head`."""
         return load_head(self.head, self.settings.identity, self.groups)
 
     def state(self, parameters: Parameters, seed: int | None = None, period_s: float | None = None) -> CommandState:
-        """A face of its own, as the stage wants it; nothing is commanded yet."""
+        """A new state of all layers with the stage's settings; nothing is commanded yet."""
         return CommandState(
             parameters,
             self.vocabulary,
@@ -113,38 +142,29 @@ class Stage:
 
 
 def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]]) -> Head:
-    """A head with identities mixed in and groups worn, each by its amount.
+    """A head with identities and groups added, each by its amount.
 
-    Raises
-    ------
-    SurfaceError : the head cannot be read. ConfigError : a group does not fit it.
+    Raises SurfaceError when the head cannot be read, ConfigError when a group does not fit it.
     """
-    from controller.stage.inverse import load_group, wear  # start-up: as Head
+    from controller.stage.inverse import add_group, load_group  # start-up: as Head
     from surface.head import Head  # start-up: the body reads stages and draws nothing
 
     head = Head.load(folder, identity)
     for path, amount in groups:
-        wear(head, load_group(path, head)[1], amount)
+        add_group(head, load_group(path, head)[1], amount)
     return head
 
 
 def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
-    """``stage`` with command-line options laid over its ``[face]``; see :func:`controller.stage.picture.checked`."""
-    face = checked(stage.settings.face, wanted)
+    """``stage`` with command-line options over its ``[face]``; see :func:`controller.stage.picture.with_options`."""
+    face = with_options(stage.settings.face, wanted)
     return replace(stage, settings=stage.settings.model_copy(update={"face": face}))
 
 
 def load_stage(name: str, parameters: Parameters) -> Stage:
-    """Find, read and cross-check a stage and all it refers to.
+    """Find, read and cross-check a stage and all it refers to; ``name`` : a path, or a file in ``configs/stages``.
 
-    Parameters
-    ----------
-    name : a path, or the name of a file in ``configs/stages``.
-
-    Raises
-    ------
-    ConfigError
-        listing every fault of the stage and of the files it names.
+    Raises ConfigError that lists every fault of the stage and of the files it names.
     """
     path = find_config("stages", name)
     found: list[Stage] = []
@@ -159,14 +179,12 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
 
 
 def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
-    """All that a stage refers to; what is wrong with it goes to ``faults``, and leaves the stage unfit for use."""
+    """All that a stage refers to; faults are added to ``faults``, and leave the stage unfit for use."""
     head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
     if head is not None and settings.identity:
         _collect(faults, "identity", lambda: check_identity(head, settings.identity))
     robots = [
-        _collect(
-            faults, f"robots[{i}]", lambda name=name: load_robot(find_config("robots", name, beside=path), parameters)
-        )
+        _collect(faults, f"robots[{i}]", lambda n=name: load_robot(find_config("robots", n, beside=path), parameters))
         for i, name in enumerate(settings.robots)
     ]
     more = _files(faults, "vocabularies", settings.vocabularies, path)
@@ -180,15 +198,15 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     for key, script in scripts:
         if script is not None:
             _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
-    worn = tuple(zip(groups, settings.groups.values(), strict=False))
-    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, worn)
+    amounts = tuple(zip(groups, settings.groups.values(), strict=False))
+    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, amounts)
     if settings.take is not None:
         _collect(faults, "take", lambda: load_take(stage.file(str(settings.take)), parameters))
     return stage
 
 
 def _files(faults: list[str], kind: str, names: list[str], path: Path) -> tuple[Path, ...]:
-    """The files of one kind that a stage names, those that are there."""
+    """The files of one kind that a stage names, those that exist."""
     found = [
         _collect(faults, f"{kind}[{i}]", lambda name=name: find_config(kind, name, beside=path))
         for i, name in enumerate(names)
@@ -197,7 +215,7 @@ def _files(faults: list[str], kind: str, names: list[str], path: Path) -> tuple[
 
 
 def _collect(faults: list[str], key: str, read: Callable[..., object]) -> Any:
-    """Run ``read``; a configuration error becomes a fault of ``key``, so that all are seen at once."""
+    """Run ``read``; a configuration error becomes a fault of ``key``, so that all are reported at once."""
     try:
         return read()
     except (ConfigError, TakeError) as error:

@@ -63,7 +63,7 @@ TAKES: Registry[TakeReader] = Registry(TakeReader, "take", "omote.takes", API, _
 
 
 def suffixes() -> list[str]:
-    """The endings of the names of all takes."""
+    """The termination_signals of the names of all takes."""
     return [suffix for reader in TAKES.all() for suffix in reader.suffixes]
 
 

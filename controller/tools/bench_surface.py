@@ -1,25 +1,26 @@
-"""What ``omote bench`` measures: a head's own engine, part by part and as a whole, beside its peers."""
+"""Benchmarks of ``omote bench``: a head's engine, part by part and as a whole, and other libraries beside it."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from controller.base.parameters import Floats
 from controller.base.paths import find_config
 from surface.base.progress import Progress
 from surface.bench import growth
 from surface.bench.bench import Measure, build_table, large_table, least, measure, speed_table
-from surface.bench.comparison import Variant, compare
+from surface.bench.comparison import Variant, compare, draw
 from surface.bench.drift import drift
 from surface.head import Head
 from surface.head.model.meshes import domain_of
 
-Tell = Callable[[str], None]
+Log = Callable[[str], None]
 Tables = list[tuple[str, list[Measure]]]
 
 _MOVING = ("jawOpen", "eyeBlinkLeft", "browInnerUp")
@@ -29,9 +30,9 @@ UNIFORM_LEVEL = 7  # quarterings of the uniform mesh that adaptive ones are comp
 VERTICES = 100_000  # of the sheet that the bounds are for
 
 
-def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
-    """Tables of a head: posing it, and the engine on its largest surface."""
-    tell("loading")
+def bench_head(name: str, seconds: float, log: Log) -> Tables:
+    """Tables of a head: how long posing takes, and the engine on its largest surface."""
+    log("loading")
     started = time.perf_counter()
     head = Head.load(find_config("heads", name))
     loading = 1e3 * (time.perf_counter() - started)
@@ -39,25 +40,25 @@ def bench_head(name: str, seconds: float, tell: Tell) -> Tables:
     vertices = sum(len(part.vertices) for part in head.parts)
     title = f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, loaded in {loading:.0f} ms"
     about = f"{largest.name}: {largest.surface.n} control points, {len(largest.mesh.vertices)} vertices"
-    engine = measure(largest.surface, largest.mesh, seconds=seconds, report=tell)
+    engine = measure(largest.surface, largest.mesh, seconds=seconds, report=log)
     # The bounds are for the large sheet; on a small mesh everything fits the cache.
-    return [(title, pose_rows(head, seconds, tell)), (about, [replace(row, reach="") for row in engine])]
+    return [(title, pose_rows(head, seconds, log)), (about, [replace(row, reach="") for row in engine])]
 
 
-def bench_surface(seconds: float, tell: Tell, vertices: int = VERTICES) -> Tables:
+def bench_surface(seconds: float, log: Log, vertices: int = VERTICES) -> Tables:
     """The engine at its memory limit, on a plain sheet of about so many vertices."""
-    return [(f"about {vertices:,} vertices, 16 influences, one thread", speed_table(vertices, seconds, tell))]
+    return [(f"about {vertices:,} vertices, 16 influences, one thread", speed_table(vertices, seconds, log))]
 
 
-def bench_large(seconds: float, tell: Tell, progress: Progress, vertices: int = VERTICES) -> Tables:
+def bench_large(seconds: float, log: Log, progress: Progress, vertices: int = VERTICES) -> Tables:
     """Building trees and lists for that many control points; two threads against one; ten times ``vertices``."""
     large = 10 * vertices
     level = max(0, round(np.log2(np.sqrt(large) / 8)))  # under 8 x 8 roots
     built = build_table(vertices, level, progress)
-    return [(f"about {large:,} vertices", built + large_table(large, seconds, tell))]
+    return [(f"about {large:,} vertices", built + large_table(large, seconds, log))]
 
 
-def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES) -> Tables:
+def bench_growth(seconds: float, log: Log, out: Path, vertices: int = VERTICES) -> Tables:
     """Slopes of time and memory against size on logarithmic scales; draws them as SVG, too.
 
     Sizes run from a tenth to ten times ``vertices``, and from a thousandth of it to as many control points.
@@ -65,20 +66,18 @@ def bench_growth(seconds: float, tell: Tell, out: Path, vertices: int = VERTICES
     share = vertices / VERTICES
     sizes = tuple(max(256, round(share * count)) for count in growth.VERTICES)
     points = tuple(max(25, round(share * count)) for count in growth.POINTS)
-    series = growth.growth(sizes, points, seconds, tell)
+    series = growth.growth(sizes, points, seconds, log)
     growth.plot(series, out)
-    title = (
-        f"growth, from {sizes[0]:,} to {sizes[-1]:,} vertices and from {points[0]:,} to {points[-1]:,} control points"
-    )
-    return [(title, growth.slopes(series))]
+    title = f"from {sizes[0]:,} to {sizes[-1]:,} vertices and from {points[0]:,} to {points[-1]:,} control points"
+    return [(f"growth, {title}", growth.slopes(series))]
 
 
-def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
+def bench_drift(name: str, updates: int, log: Log) -> Tables:
     """Random updates of every kind on a head's largest surface, against a fresh evaluation."""
-    tell("loading")
+    log("loading")
     head = Head.load(find_config("heads", name))
     part = max(head.parts, key=lambda part: part.surface.n)
-    found = drift(part.surface, part.mesh, updates, report=tell)
+    found = drift(part.surface, part.mesh, updates, report=log)
     title = (
         f"{part.name} of {name} after {found.moves} moves of one point, {found.groups} of a group, "
         f"{found.weights} changes of a weight and {found.knots} of knots"
@@ -90,23 +89,25 @@ def bench_drift(name: str, updates: int, tell: Tell) -> Tables:
     return [(title, rows)]
 
 
-def bench_quadtree(name: str, tell: Tell, level: int = UNIFORM_LEVEL) -> tuple[Tables, list[Variant]]:
+def bench_quadtree(name: str, log: Log, level: int = UNIFORM_LEVEL, out: Path | None = None) -> Tables:
     """The paper's figures 2 and 3 on a head's face: a uniform mesh, and adaptive ones that deviate no more.
 
-    Once by the greatest deviation anywhere, as in the paper, once by the deviation that 99 % of the area keeps;
-    the pictures are of the second. A way that finds no mesh within the bound is left out. The uniform mesh is
+    Once by the greatest deviation anywhere, as in the paper, once by the deviation that 99 % of the area keeps, of
+    which the picture ``out`` is drawn. A method that finds no mesh within the bound is left out. The uniform mesh is
     quartered ``level`` times.
     """
-    tell("loading")
+    log("loading")
     head = Head.load(find_config("heads", name))
     domain = domain_of(next(part for part in head.data.parts if part.name == "face"))
     tables = []
     for quantile, title in ((1.0, "greatest deviation"), (_AREA, f"deviation of {_AREA:.0%} of the area")):
-        tell(title)
+        log(title)
         face = head.part("face").surface
-        variants = compare(face, domain, level=level, quantile=quantile, report=tell)
+        variants = compare(face, domain, level=level, quantile=quantile, report=log)
         tables.append((f"quad tree on the face of {name}, at equal {title}", [_saving(v) for v in variants]))
-    return tables, variants
+    if out is not None:
+        draw(variants, out)
+    return tables
 
 
 def _saving(variant: Variant) -> Measure:
@@ -117,35 +118,24 @@ def _saving(variant: Variant) -> Measure:
     return Measure(name, 0.0, variant.saving, "the uniform mesh is saved", reach)
 
 
-def pose_rows(head: Head, seconds: float, tell: Tell) -> list[Measure]:
+def pose_rows(head: Head, seconds: float, log: Log) -> list[Measure]:
     """Posing with everything, one parameter and nothing changing."""
     count = len(head.parameters)
     rng = np.random.default_rng(1)
-    tell("every parameter")
-    whole = least(poser(head, [rng.uniform(0, 0.5, count) for _ in range(_POSES)]), seconds)
+    log("every parameter")
+    whole = least(poser(head, rng.uniform(0, 0.5, (_POSES, count))), seconds)
     rows = [Measure("pose, every parameter changed", whole)]
     for parameter in _MOVING:
-        tell(parameter)
-        took = least(poser(head, _one_moving(head.parameters.index(parameter), count)), seconds)
+        log(parameter)
+        poses = np.zeros((_POSES, count))
+        poses[:, head.parameters.index(parameter)] = np.arange(_POSES) / _POSES
+        took = least(poser(head, poses), seconds)
         rows.append(Measure(f"pose, only {parameter} changed", took, took / whole, "every parameter"))
-    still = least(poser(head, [np.zeros(count)]), seconds)
+    still = least(poser(head, np.zeros((1, count))), seconds)
     return [*rows, Measure("pose, nothing changed", still, still / whole, "every parameter")]
 
 
-def poser(head: Head, poses: list[NDArray[np.float64]]) -> Callable[[], object]:
-    """A call that poses ``head`` with the next of ``poses``, each (h,) float64."""
-    turn = 0
-
-    def step() -> None:
-        nonlocal turn
-        head.pose(poses[turn % len(poses)])
-        turn += 1
-
-    return step
-
-
-def _one_moving(index: int, count: int) -> list[NDArray[np.float64]]:
-    poses = [np.zeros(count) for _ in range(_POSES)]
-    for k, pose in enumerate(poses):
-        pose[index] = k / _POSES
-    return poses
+def poser(head: Head, poses: Floats) -> Callable[[], object]:
+    """A call that poses ``head`` with the next of ``poses`` : (n, h)."""
+    each = cycle(poses)
+    return lambda: head.pose(next(each))

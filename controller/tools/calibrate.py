@@ -1,10 +1,16 @@
-"""Running a calibration: the buses, the keyboard and the screen together."""
+"""Runs a calibration: reads the buses and single key presses from the terminal, and shows the screen."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, replace
+import os
+import re
+import select
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +18,17 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.live import Live
 
+from controller.base.errors import ControllerError
 from controller.base.signals import stop_flag
 from controller.robot.buses import BusSettings
 from controller.robot.calibration import rest_deg, save_calibration
 from controller.robot.channels import servo_specs
 from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.tools.calibrate_screen import CalibrationScreen
-from controller.tools.keys import Keyboard
 from drivers import open_bus
 from drivers.base.bus import Bus
+
+ARROWS = {"[A": "up", "[B": "down", "[C": "right", "[D": "left", "OA": "up", "OB": "down", "OC": "right", "OD": "left"}
 
 PERIOD_S = 0.03
 STALE_S = 0.5
@@ -28,83 +36,120 @@ STALE_S = 0.5
 SLOW_RAD_S = 0.5
 """Nothing moves faster than this while it is calibrated."""
 
-
-@dataclass
-class _Wire:
-    """One bus and which of the channels (k,) are on it."""
-
-    bus: Bus
-    indices: NDArray[np.intp]
+BusChannels = tuple[Bus, NDArray[np.intp]]
+"""A bus and the indices of its channels."""
 
 
 def run_calibration(
-    stack: ExitStack,
-    robot: RobotSettings,
-    channels: Sequence[ChannelSettings],
-    name: str,
-    target: Path,
-    margin_deg: float,
+    robot: RobotSettings, channels: Sequence[ChannelSettings], name: str, target: Path, margin_deg: float,
     console: Console,
-) -> bool:
-    """Let a person capture ``channels``; motors are off whenever it ends, however it ends.
+) -> bool:  # fmt: skip
+    """Let a person capture ``channels``; the motors are off whenever it ends. Returns whether the file was written.
 
-    Returns
-    -------
-    bool : whether the calibration was written.
-
-    Raises
-    ------
-    DriverError, ControllerError
+    Raises DriverError or ControllerError.
     """
-    ended = stack.enter_context(stop_flag())
-    keyboard = stack.enter_context(Keyboard())
-    wires = [_opened(stack, robot, bus, channels) for bus in robot.buses if any(c.bus == bus.name for c in channels)]
-    state = CalibrationScreen(channels, all(wire.bus.measures for wire in wires), margin_deg)
-    written = False
-    title = f"{robot.name}, calibration {name!r}"
-    with Live(state.picture(title), console=console, auto_refresh=False, screen=True) as live:
-        while not (state.done or ended.is_set()):
-            _cycle(wires, state)
-            live.update(state.picture(title), refresh=True)
-            for key in keyboard.keys(PERIOD_S):
-                state.press(key)
-            if state.saving:
-                written |= _save(state, robot, name, target, written)
+    with ExitStack() as stack:
+        ended = stack.enter_context(stop_flag())
+        read_keys = stack.enter_context(keyboard())
+        used = [bus for bus in robot.buses if any(channel.bus == bus.name for channel in channels)]
+        buses = [_open_bus(stack, bus, channels) for bus in used]
+        screen = CalibrationScreen(channels, all(bus.measures for bus, _ in buses), margin_deg)
+        written = False
+        title = f"{robot.name}, calibration {name!r}"
+        with Live(screen.picture(title), console=console, auto_refresh=False, screen=True) as live:
+            while not (screen.done or ended.is_set()):
+                _cycle(buses, screen)
+                live.update(screen.picture(title), refresh=True)
+                for key in read_keys(PERIOD_S):
+                    screen.handle_key(key)
+                if screen.saving:
+                    written |= _save(screen, robot, name, target, written)
     return written
 
 
-def _opened(stack: ExitStack, robot: RobotSettings, bus: BusSettings, channels: Sequence[ChannelSettings]) -> _Wire:
+def _open_bus(stack: ExitStack, bus: BusSettings, channels: Sequence[ChannelSettings]) -> BusChannels:
     indices = [i for i, channel in enumerate(channels) if channel.bus == bus.name]
     own = [channels[i] for i in indices]
     specs = servo_specs(own, np.radians([rest_deg(channel) + channel.trim_deg for channel in own]))
     slow = [replace(spec, max_speed_rad_s=min(spec.max_speed_rad_s, SLOW_RAD_S)) for spec in specs]
-    opened = open_bus(bus.kind, slow, **bus.options())
-    stack.enter_context(opened)
-    return _Wire(opened, np.array(indices, dtype=np.intp))
+    return stack.enter_context(open_bus(bus.kind, slow, **bus.options())), np.array(indices, dtype=np.intp)
 
 
-def _cycle(wires: Sequence[_Wire], state: CalibrationScreen) -> None:
-    """Switch as the keys said, move what holds, and read where everything is."""
-    angles = np.full(len(state.channels), np.nan)
-    for wire in wires:
-        if state.holding != wire.bus.running:
-            wire.bus.start() if state.holding else wire.bus.stop()
-        if state.holding:
-            wire.bus.write(np.radians(state.target_deg[wire.indices]))
-        measured = wire.bus.read()
-        known = (measured.age_s < STALE_S) | (not wire.bus.measures)
-        angles[wire.indices] = np.degrees(np.where(known, measured.position_rad, np.nan))
-    state.see(angles)
+def _cycle(buses: Sequence[BusChannels], screen: CalibrationScreen) -> None:
+    """Switch the motors as the keys ask, move those that hold, and read where everything is."""
+    angles = np.full(len(screen.channels), np.nan)
+    for bus, indices in buses:
+        if screen.holding != bus.running:
+            bus.start() if screen.holding else bus.stop()
+        if screen.holding:
+            bus.write(np.radians(screen.target_deg[indices]))
+        measured = bus.read()
+        known = (measured.age_s < STALE_S) | (not bus.measures)
+        angles[indices] = np.degrees(np.where(known, measured.position_rad, np.nan))
+    screen.set_angles(angles)
 
 
-def _save(state: CalibrationScreen, robot: RobotSettings, name: str, target: Path, own: bool) -> bool:
-    """Write the file, or ask first where one is in the way that this run did not write."""
-    if target.exists() and not own and not state.may_replace:
-        state.ask(f"replace {target}? (y/n)")
+def _save(screen: CalibrationScreen, robot: RobotSettings, name: str, target: Path, own: bool) -> bool:
+    """Write the file, or ask first if it exists and this run did not write it."""
+    if target.exists() and not own and not screen.may_replace:
+        screen.ask(f"replace {target}? (y/n)")
         return False
-    captured = state.captured()
+    captured = screen.captured()
     save_calibration(target, name, robot.name, captured)
-    left_out = [channel.name for channel in state.channels if channel.name not in captured]
-    state.changed = False
-    state.saved(f"saved {len(captured)} channels" + (f"; not complete: {', '.join(left_out)}" if left_out else ""))
+    left_out = [channel.name for channel in screen.channels if channel.name not in captured]
+    screen.saved(f"saved {len(captured)} channels" + (f"; not complete: {', '.join(left_out)}" if left_out else ""))
     return True
+
+
+@contextmanager
+def keyboard(descriptor: int | None = None) -> Iterator[Callable[[float], list[str]]]:
+    """A function that returns the keys pressed within a time (s): characters, ``up``, ``down``, ``left``, ``right``.
+
+    ``descriptor`` : of a terminal, standard input without; its settings are restored at the end. Raises ControllerError
+    where it is no terminal.
+    """
+    fd = sys.stdin.fileno() if descriptor is None else descriptor
+    if not os.isatty(fd):
+        raise ControllerError("keys can only be read from a terminal", hint="start omote in a terminal window")
+    if sys.platform == "win32":
+        yield _windows_keys
+        return
+    import termios  # not on Windows
+    import tty  # not on Windows
+
+    before = termios.tcgetattr(fd)
+    tty.setcbreak(fd)
+    try:
+        yield partial(_terminal_keys, fd)
+    finally:
+        termios.tcsetattr(fd, termios.TCSADRAIN, before)
+
+
+def _terminal_keys(fd: int, wait_s: float) -> list[str]:
+    end, data = time.monotonic() + wait_s, b""
+    while select.select([fd], [], [], max(0.0, end - time.monotonic()))[0]:
+        piece = os.read(fd, 64)
+        if not piece:
+            break
+        data += piece
+    return split_keys(data.decode("utf-8", "ignore"))
+
+
+def split_keys(text: str) -> list[str]:
+    """The input of a terminal, key by key; escape sequences of other keys are left out."""
+    keys = [ARROWS.get(key[1:], "") if key[0] == "\x1b" else key for key in re.findall("\x1b.{0,2}|.", text, re.DOTALL)]
+    return [key for key in keys if key]
+
+
+def _windows_keys(wait_s: float) -> list[str]:  # pragma: no cover
+    import msvcrt  # Windows only
+
+    names = {"H": "up", "P": "down", "M": "right", "K": "left"}
+    end, keys = time.monotonic() + wait_s, []
+    while time.monotonic() < end:
+        if not msvcrt.kbhit():  # type: ignore[attr-defined]
+            time.sleep(0.01)
+            continue
+        key = msvcrt.getwch()  # type: ignore[attr-defined]
+        keys.append(names.get(msvcrt.getwch(), "") if key in ("\x00", "\xe0") else key)  # type: ignore[attr-defined]
+    return [key for key in keys if key]

@@ -1,4 +1,4 @@
-"""CalibrationScreen a calibration: what the keys do, and the screen that shows it. No port is touched here."""
+"""The screen of a calibration: handles keys, collects captured angles and draws them. Opens no port."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from controller.base.parameters import Floats
-from controller.robot.calibration import Captured
+from controller.robot.calibration import CapturedAngles
 from controller.robot.settings import ChannelSettings
 
 STEP_DEG = 0.5
@@ -26,7 +26,7 @@ HELP = (
 
 @dataclass
 class Marks:
-    """What has been captured of one channel, degrees; NaN is not yet."""
+    """Captured angles of one channel, degrees; NaN before they are captured."""
 
     low: float = math.nan
     neutral: float = math.nan
@@ -34,28 +34,23 @@ class Marks:
 
     @property
     def missing(self) -> list[str]:
-        """What is still to be captured."""
+        """Names of the angles that are still to be captured."""
         found = {"lowest": self.low, "neutral": self.neutral, "highest": self.high}
         return [name for name, value in found.items() if math.isnan(value)]
 
 
 @dataclass
 class CalibrationScreen:
-    """The state between the keys and the file.
-
-    Parameters
-    ----------
-    channels : n channels.
-    measures : whether their servos say where they are; those that do not are moved by keys alone.
-    margin_deg : kept away from the captured ends, so that nothing is driven into its stop.
+    """State of a calibration, from key presses to the captured angles.
 
     Attributes
     ----------
-    angle_deg : (n,) newest angles, NaN where not known.
-    target_deg : (n,) where the servos shall hold.
-    holding : whether the motors shall be on. tracking : whether ``see`` widens lowest and highest.
-    asking : a question that only y or n answers, or empty. done : whether to leave. saving : whether to save.
-    may_replace : whether a file that is in the way may be replaced.
+    channels : n channels. measures : whether their servos measure their position; others are moved by keys alone.
+    margin_deg : kept away from the captured ends, so that nothing is driven into its stop.
+    angle_deg : (n,) newest angles, NaN where not known. target_deg : (n,) where the servos shall hold.
+    holding : whether the motors shall be on. tracking : whether new angles widen lowest and highest.
+    question : one that only y or n answers, or empty. done : whether to leave. saving : whether to save.
+    may_replace : whether an existing file may be replaced.
     """
 
     channels: Sequence[ChannelSettings]
@@ -68,8 +63,8 @@ class CalibrationScreen:
     saving: bool = False
     may_replace: bool = False
     done: bool = False
-    asking: str = ""
-    told: str = ""
+    question: str = ""
+    message: str = ""
     angle_deg: Floats = field(init=False)
     target_deg: Floats = field(init=False)
     marks: list[Marks] = field(init=False)
@@ -79,10 +74,10 @@ class CalibrationScreen:
         self.angle_deg, self.target_deg = np.full(n, np.nan), np.full(n, np.nan)
         self.marks = [Marks() for _ in self.channels]
 
-    def see(self, angle_deg: Floats) -> None:
-        """Take in angles (n,), NaN where nothing fresh is known."""
+    def set_angles(self, angle_deg: Floats) -> None:
+        """Update the angles (n,), NaN where nothing fresh is known."""
         self.angle_deg = np.array(angle_deg, dtype=np.float64)
-        if self.holding:  # a board only knows where its servos are once it moves them
+        if self.holding:  # a board knows the angle of a servo only after it has moved it
             self.target_deg = np.where(np.isnan(self.target_deg), self.angle_deg, self.target_deg)
         if not self.tracking or self.holding:
             return
@@ -91,12 +86,12 @@ class CalibrationScreen:
                 mark.low, mark.high = float(np.fmin(mark.low, angle)), float(np.fmax(mark.high, angle))
                 self.changed = True
 
-    def press(self, key: str) -> None:
-        """One key: a character, or ``up``, ``down``, ``left``, ``right``."""
-        if self.asking:
+    def handle_key(self, key: str) -> None:
+        """Handle one key: a character, or ``up``, ``down``, ``left``, ``right``."""
+        if self.question:
             self._answer(key)
             return
-        self.told = ""
+        self.message = ""
         {
             "up": lambda: self._select(-1),
             "down": lambda: self._select(1),
@@ -113,45 +108,43 @@ class CalibrationScreen:
             "q": self._leave,
         }.get(key, lambda: None)()
 
-    def captured(self) -> dict[str, Captured]:
-        """Channels of which all three angles are known, ends moved inwards by the margin."""
+    def captured(self) -> dict[str, CapturedAngles]:
+        """The channels whose three angles are known, ends moved inwards by the margin."""
         found = {}
         for channel, mark in zip(self.channels, self.marks, strict=True):
             if not mark.missing:
                 low = min(mark.low + self.margin_deg, mark.neutral)
                 high = max(mark.high - self.margin_deg, mark.neutral)
                 if low < high:
-                    found[channel.name] = Captured(min_deg=low, neutral_deg=mark.neutral, max_deg=high)
+                    found[channel.name] = CapturedAngles(min_deg=low, neutral_deg=mark.neutral, max_deg=high)
         return found
 
-    def saved(self, told: str) -> None:
-        """The file was written, or was not."""
-        self.saving = False
-        self.told = told
+    def saved(self, message: str) -> None:
+        """The file was written: show a message."""
+        self.saving = self.changed = False
+        self.message = message
 
     def ask(self, question: str) -> None:
         """Ask before a file is replaced; ``y`` sets ``saving`` again."""
-        self.saving, self.asking = False, question
-
-    # ------------------------------------------------------------------ keys
+        self.saving, self.question = False, question
 
     def _answer(self, key: str) -> None:
-        question, agreed = self.asking, key in "yY"
+        question, agreed = self.question, key in "yY"
         if key not in "yYnN":
             return
-        self.asking = ""
+        self.question = ""
         if question.startswith("leave"):
             self.done = agreed
         else:
             self.saving = self.may_replace = agreed
-            self.told = "" if agreed else "not saved"
+            self.message = "" if agreed else "not saved"
 
     def _select(self, step: int) -> None:
         self.selected = (self.selected + step) % len(self.channels)
 
     def _move(self, step_deg: float) -> None:
         if not self.holding:
-            self.told = "h switches the motors on where they stand; then the arrows move"
+            self.message = "h switches the motors on where they stand; then the arrows move"
             return
         low, high = self.channels[self.selected].limit_deg
         target = self.target_deg[self.selected] + step_deg
@@ -159,27 +152,23 @@ class CalibrationScreen:
             return
         self.target_deg[self.selected] = min(max(target, low), high)
         if target != self.target_deg[self.selected]:
-            self.told = f"limit_deg of the robot file ends at {self.target_deg[self.selected]:g}"
+            self.message = f"limit_deg of the robot file ends at {self.target_deg[self.selected]:g}"
 
     def _capture(self, name: str, indices: Sequence[int]) -> None:
-        unknown = []
-        for i in indices:
-            angle = float(self.angle_deg[i])
-            if math.isnan(angle):
-                unknown.append(self.channels[i].name)
-                continue
-            setattr(self.marks[i], name, angle)
+        known = [i for i in indices if not math.isnan(self.angle_deg[i])]
+        for i in known:
+            setattr(self.marks[i], name, float(self.angle_deg[i]))
             self.changed = True
-        if unknown:
-            self.told = f"no angle from {', '.join(unknown)}"
+        if unknown := [self.channels[i].name for i in indices if i not in known]:
+            self.message = f"no angle from {', '.join(unknown)}"
 
     def _toggle_tracking(self) -> None:
         self.tracking = not self.tracking and self.measures
-        self.told = "" if self.measures else "these servos do not say where they are: use the arrows"
+        self.message = "" if self.measures else "these servos do not say where they are: use the arrows"
 
     def _toggle_holding(self) -> None:
         if not self.holding and np.isnan(self.angle_deg).any() and self.measures:
-            self.told = "not every servo says where it is"
+            self.message = "not every servo says where it is"
             return
         self.holding = not self.holding
         self.target_deg = self.angle_deg.copy()
@@ -191,34 +180,29 @@ class CalibrationScreen:
         self.saving = bool(self.captured())
         if not self.saving:
             missing = self.marks[self.selected].missing or ["a way between its ends"]
-            self.told = f"nothing to save yet: {self.channels[self.selected].name} lacks {', '.join(missing)}"
+            self.message = f"nothing to save yet: {self.channels[self.selected].name} lacks {', '.join(missing)}"
 
     def _leave(self) -> None:
         if self.changed:
-            self.asking = "leave without saving? (y/n)"
+            self.question = "leave without saving? (y/n)"
         else:
             self.done = True
 
-    # ------------------------------------------------------------------ screen
-
     def picture(self, title: str) -> Group:
-        """The screen: a bar for each channel and what the keys do."""
+        """The screen: a bar for each channel, and help for the keys."""
         table = Table("", "channel", "now", "", "lowest", "neutral", "highest", box=None, pad_edge=False)
         for i, channel in enumerate(self.channels):
             mark = self.marks[i]
-            words = [_degrees(value) for value in (mark.low, mark.neutral, mark.high)]
-            style = "bold" if i == self.selected else ""
-            pointer = ">" if i == self.selected else ""
-            table.add_row(pointer, channel.name, _degrees(self.angle_deg[i]), self._bar(i), *words, style=style)
+            now, *words = [_degrees(value) for value in (self.angle_deg[i], mark.low, mark.neutral, mark.high)]
+            pointer, style = (">", "bold") if i == self.selected else ("", "")
+            table.add_row(pointer, channel.name, now, self._bar(i), *words, style=style)
         motors = "motors on" if self.holding else "motors off: move it by hand"
         state = motors + (", following the extremes" if self.tracking else "")
-        told = self.asking or self.told
-        return Group(
-            Text(f"{title}   {state}", style="bold"), table, Text(told, style="yellow"), Text(HELP, style="dim")
-        )
+        message = Text(self.question or self.message, style="yellow")
+        return Group(Text(f"{title}   {state}", style="bold"), table, message, Text(HELP, style="dim"))
 
     def _bar(self, i: int) -> Text:
-        """The channel's range with what was captured and where it is."""
+        """The channel's range with its captured angles and its present one."""
         mark, limit = self.marks[i], self.channels[i].limit_deg
         known = [v for v in (*limit, mark.low, mark.neutral, mark.high, self.angle_deg[i]) if not math.isnan(v)]
         low, high = min(known), max(known)

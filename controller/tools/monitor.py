@@ -1,112 +1,97 @@
-"""Looking at a bus that works: who is on it, how they are, and what passes. Nothing is switched on or moved."""
+"""Monitors a working bus: its servos, their states and the packets that pass. Nothing is switched on or moved."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
 
-from controller.tools.monitor_view import Watch
-from controller.tools.scan import Found, scan_port
+from controller.tools.scan import scan_port
 from drivers import open_bus
-from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
+from drivers.base.bus import Bus, BusState, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
-from drivers.core.traffic import Decoder, Decoder1, Decoder2, ServoTraffic
+from drivers.core.traffic import Decoder, Decoder1, Decoder2
 from drivers.port.serialport import SerialPort, tapped
 from drivers.tables.tables import ControlTable, load_table
 
 FEETECH = ("sts", "scs")
 SHOWN = ("Present Position", "Goal Position")
 WAIT_S = 0.1
+Rows = Callable[[], Iterable[Mapping[str, Any]]]
+
+REFRESH_S = 0.1
+KEPT = 4096
+"""Pieces of traffic kept between two refreshes; older ones of a busy bus are dropped, and the view shows how many."""
 
 
-def decoder_of(protocol: int, found: Sequence[ServoInfo] = (), model: str = "") -> Decoder:
-    """A decoder that knows the registers of the servos found, and takes all others for ``model``.
-
-    Raises
-    ------
-    DriverError : there is no such model.
-    """
+def make_decoder(protocol: int, tables: Mapping[int, ControlTable], model: str = "") -> Decoder:
+    """A decoder that knows the registers of servos by id, and takes all others for ``model``; raises DriverError."""
     default = load_table(model) if model else None
-    tables: dict[int, ControlTable] = {}
-    for info in found:
-        try:
-            tables[info.id] = load_table(info.model_number, info.firmware)
-        except DriverError:  # an unknown model is shown by addresses
-            continue
     return Decoder1(tables, default) if protocol == 1 else Decoder2(tables, default)
 
 
-def listen(port: str, baud: int, protocol: int, console: Console, going: Callable[[], bool], model: str = "") -> None:
-    """Show what passes on a wire without a byte of our own: an adapter that only hears it is enough.
+def listen_to_bus(
+    port: str, baud: int, protocol: int, console: Console, keep_going: Callable[[], bool], model: str = ""
+) -> None:
+    """Show the traffic of a bus without sending a byte: an adapter that only receives is enough.
 
-    Parameters
-    ----------
-    model : of servos that do not tell theirs while it listens, so that registers have names; may be empty.
-
-    Raises
-    ------
-    PortError
-    DriverError : there is no such model.
+    ``model`` : of servos whose model is not seen in the traffic, for the names of registers; may be empty.
+    Raises PortError, or DriverError when there is no such model.
     """
-    decoder = decoder_of(protocol, model=model)
-    watch = Watch(f"listening on {port} at {baud} baud", lambda: _heard_rows(decoder), decoder, console)
+    decoder = make_decoder(protocol, {}, model)
+    view = BusView(f"listening on {port} at {baud} baud", lambda: _heard_rows(decoder), decoder, console)
     link = SerialPort(port, baud)
     link.open()
-    link.tap = lambda sent, data: watch.tap(None, data)
+    link.tap = lambda sent, data: view.tap(None, data)
     try:
-        watch.run(going, lambda: _take(link))
+        view.run(keep_going, lambda: _read_for_a_moment(link))
     finally:
         link.close()
 
 
-def ask(port: str, baud: int, protocol: int, console: Console, going: Callable[[], bool], rate_hz: float) -> None:
-    """Find the servos on a port, then ask them for their state in turn and show it with all that passes.
-
-    Raises
-    ------
-    PortError
-    NoReply : nobody is there.
-    """
-    found = [item.servo for item in scan_port(port, [(protocol, baud)]) if isinstance(item, Found) and item.servo]
-    known = [info for info in found if _drivable(info)]
-    if not known:
-        which = f": {', '.join(info.model for info in found)} cannot be asked" if found else ""
-        raise NoReply(f"no servo to ask on {port} at {baud} baud{which}", hint=f"omote scan {port}", port=port)
-    decoder = decoder_of(protocol, known)
-    watch = Watch(f"{port} at {baud} baud", lambda: (), decoder, console)
-    kind = "feetech" if known[0].model.startswith(FEETECH) else "dynamixel"
-    with tapped(watch.tap):
-        bus = open_bus(kind, [_spec(info) for info in known], port=port, baud=baud)
-    with bus:
-        reader = _Reader(bus, 1.0 / rate_hz)
-        watch.rows = reader.rows
-        watch.run(going, reader.step)
-
-
-def _take(link: SerialPort) -> None:
+def _read_for_a_moment(link: SerialPort) -> None:
     link.read(time.monotonic() + WAIT_S)
 
 
-def _drivable(info: ServoInfo) -> bool:
-    try:
-        load_table(info.model_number, info.firmware)
-    except DriverError:
-        return False
-    return True
+def poll_servos(
+    port: str, baud: int, protocol: int, console: Console, keep_going: Callable[[], bool], rate_hz: float
+) -> None:
+    """Find the servos on a port, then read their states at a rate and show them with all traffic.
 
-
-def _spec(info: ServoInfo) -> ServoSpec:
-    """Enough of a servo to read it; nothing is ever written to it."""
-    return ServoSpec(info.id, f"servo {info.id}", info.model, -math.pi, math.pi, 1.0, 1.0)
+    Raises PortError, or NoReply when no servo answers.
+    """
+    found = [item.servo for item in scan_port(port, [(protocol, baud)]) if item.servo]
+    tables: dict[int, ControlTable] = {}
+    for info in found:
+        with suppress(DriverError):  # an unknown model is shown by addresses
+            tables[info.id] = load_table(info.model_number, info.firmware)
+    known = [info for info in found if info.id in tables]
+    if not known:
+        which = f": {', '.join(info.model for info in found)} cannot be asked" if found else ""
+        raise NoReply(f"no servo to ask on {port} at {baud} baud{which}", hint=f"omote scan {port}", port=port)
+    decoder = make_decoder(protocol, tables)
+    view = BusView(f"{port} at {baud} baud", lambda: (), decoder, console)
+    kind = "feetech" if known[0].model.startswith(FEETECH) else "dynamixel"
+    specs = [ServoSpec(info.id, f"servo {info.id}", info.model, -math.pi, math.pi, 1.0, 1.0) for info in known]
+    with tapped(view.tap):
+        bus = open_bus(kind, specs, port=port, baud=baud)
+    with bus:
+        reader = _Reader(bus, 1.0 / rate_hz)
+        view.rows = reader.rows
+        view.run(keep_going, reader.step)
 
 
 class _Reader:
-    """Reads a bus at a steady rate and keeps the newest state."""
+    """Reads a bus at a fixed rate and keeps the newest state."""
 
     def __init__(self, bus: Bus, period_s: float) -> None:
         self._bus, self._period_s = bus, period_s
@@ -114,7 +99,7 @@ class _Reader:
         self._next_s = time.monotonic()
 
     def step(self) -> None:
-        """One read, when it is due; a port that went away is tried again."""
+        """Wait until a read is due, and read; a lost port is tried again."""
         time.sleep(max(0.0, self._next_s - time.monotonic()))
         self._next_s = max(self._next_s + self._period_s, time.monotonic())
         try:
@@ -138,7 +123,7 @@ class _Reader:
                 "model": servo.model,
                 "position deg": float(degrees[i]),
                 "speed deg/s": float(np.degrees(state.velocity_rad_s[i])),
-                "current A": _rounded(state.current_a[i], 3),
+                "current A": "" if math.isnan(state.current_a[i]) else f"{state.current_a[i]:.3f}",
                 "supply V": float(state.voltage_v[i]),
                 "temp. C": float(state.temperature_c[i]),
                 "torque": bool(state.torque[i]),
@@ -146,10 +131,6 @@ class _Reader:
             }
             for i, servo in enumerate(self._bus.servos)
         ]
-
-
-def _rounded(value: float, digits: int) -> str:
-    return "" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 def _state(state: BusState, i: int) -> str:
@@ -161,9 +142,88 @@ def _state(state: BusState, i: int) -> str:
 
 
 def _heard_rows(decoder: Decoder) -> list[dict[str, Any]]:
-    return [_heard_row(servo, heard) for servo, heard in sorted(decoder.heard.items())]
+    """One row a servo whose answers were heard."""
+    return [
+        {"id": servo, "answers": heard.packets, "error": heard.error}
+        | {name: heard.values[name] for name in SHOWN if name in heard.values}
+        for servo, heard in sorted(decoder.heard.items())
+    ]
 
 
-def _heard_row(servo: int, heard: ServoTraffic) -> dict[str, Any]:
-    row: dict[str, Any] = {"id": servo, "answers": heard.packets, "error": heard.error}
-    return row | {name: heard.values[name] for name in SHOWN if name in heard.values}
+class BusView:
+    """Shows the traffic of a bus and the state of its servos.
+
+    ``tap`` may be called from any thread and only stores the bytes; decoding and drawing happen in :meth:`run`.
+
+    Parameters
+    ----------
+    title : of the view. rows : returns one mapping for each servo, values by column. decoder : of the bus's protocol.
+    console : to print to; where it is no terminal, lines are printed as they come. lines : lines of traffic shown.
+    """
+
+    def __init__(self, title: str, rows: Rows, decoder: Decoder, console: Console, lines: int = 16) -> None:
+        self.title, self.rows, self._decoder, self._console = title, rows, decoder, console
+        self._pieces: deque[tuple[float, bool | None, bytes]] = deque(maxlen=KEPT)
+        self._log: deque[str] = deque(maxlen=lines)
+        self._begun_s = time.monotonic()
+        self._taken = self._passed = 0
+
+    def tap(self, sent: bool | None, data: bytes) -> None:
+        """Store bytes that passed; ``sent`` None where the direction is not known."""
+        self._passed += 1
+        self._pieces.append((time.monotonic(), sent, bytes(data)))
+
+    def lines(self) -> list[str]:
+        """Lines decoded since the last call, with the time since the beginning."""
+        new = []
+        while self._pieces:
+            time_s, sent, data = self._pieces.popleft()
+            self._taken += 1
+            new += [f"{time_s - self._begun_s:9.3f}  {line}" for line in self._decoder.feed(sent, data)]
+        return new
+
+    def run(self, keep_going: Callable[[], bool], step: Callable[[], None] = lambda: time.sleep(REFRESH_S)) -> None:
+        """Show until ``keep_going()`` is false; calls ``step`` in a loop, which waits a moment each time."""
+        if self._console.is_terminal:
+            with Live(self._picture(), console=self._console, auto_refresh=False, screen=True) as live:
+                self._loop(keep_going, step, lambda: live.update(self._picture(), refresh=True))
+        else:
+            self._loop(keep_going, step, self._print)
+            self._print()
+
+    def _loop(self, keep_going: Callable[[], bool], step: Callable[[], None], show: Callable[[], None]) -> None:
+        next_s = 0.0
+        while keep_going():
+            step()
+            if time.monotonic() >= next_s:
+                show()
+                next_s = time.monotonic() + REFRESH_S
+
+    def _print(self) -> None:
+        for line in self.lines():
+            self._console.print(Text(line), soft_wrap=True)
+
+    def _picture(self) -> Group:
+        self._log.extend(self.lines())
+        left_out = self._passed - self._taken - len(self._pieces)
+        note = f"  ({left_out} pieces left out)" if left_out > 0 else ""
+        traffic = Text("\n".join(self._log), no_wrap=True, overflow="ellipsis")
+        return Group(Text(f"{self.title}   Ctrl-C ends{note}", style="bold"), table_of(self.rows()), traffic)
+
+
+def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
+    """Mappings as a table; unknown values stay empty."""
+    listed = list(rows)
+    names = list(dict.fromkeys(name for row in listed for name in row))
+    table = Table(*names)
+    for row in listed:
+        table.add_row(*(_cell(row.get(name)) for name in names))
+    return table
+
+
+def _cell(value: Any) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:.1f}" if isinstance(value, float) else str(value)

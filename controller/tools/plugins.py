@@ -1,4 +1,4 @@
-"""Every plug-in there is: what omote brings and what other packages add."""
+"""Lists every plug-in: the kinds of bus, link, take and export of omote and of other packages."""
 
 from __future__ import annotations
 
@@ -8,24 +8,47 @@ from typing import Any
 
 from controller.links.kind import LINKS
 from controller.takes.reader import TAKES
-from controller.tools.export import EXPORTERS
 from drivers.base.errors import PluginError
 from drivers.base.plugins import Registry
 from drivers.core.registry import FAMILIES
+from surface.export import API, Exporter, exporters
+
+
+def _check_exporter(exporter: Exporter) -> None:
+    """Raise ValueError for a suffix that a built-in exporter has."""
+    for one in exporters():
+        clash = sorted({*one.suffixes} & {*exporter.suffixes}) if one.kind != exporter.kind else []
+        if clash:
+            raise ValueError(f"{', '.join(clash)} is written by the built-in kind {one.kind!r}")
+
+
+EXPORTERS: Registry[Exporter] = Registry(
+    Exporter,
+    "exporter",
+    "omote.exporters",
+    API,
+    lambda: {one.kind: f"surface.export.{one.kind}" for one in exporters()},
+    "EXPORTER",
+    check=_check_exporter,
+)
 
 SORTS: dict[str, Registry[Any]] = {"bus": FAMILIES, "link": LINKS, "take": TAKES, "export": EXPORTERS}
-"""Every sort of plug-in, by what people call one."""
+"""The registry of every sort of plug-in."""
+
+
+def added_exporters() -> list[Exporter]:
+    """Exporters of other packages; where two have the same suffix, only the first."""
+    own, suffixes, found = {one.kind for one in exporters()}, set[str](), []
+    for one in EXPORTERS.all():
+        if one.kind not in own and not suffixes & {*one.suffixes}:
+            suffixes |= {*one.suffixes}
+            found.append(one)
+    return found
 
 
 @dataclass(frozen=True)
 class Listed:
-    """One plug-in.
-
-    Attributes
-    ----------
-    sort, kind : what it is. title : what people call it; what is wrong with one that cannot be loaded.
-    package : name and version of the package it comes from. works : whether it can be loaded. hint : what to type.
-    """
+    """One plug-in; where it does not work, ``title`` is the reason and ``hint`` what to type."""
 
     sort: str
     kind: str

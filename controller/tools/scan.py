@@ -1,4 +1,4 @@
-"""Looking for servos on a port, at every rate and in both protocols they may speak; nothing moves."""
+"""Scans a port for servos, at every baud rate and in both protocols; nothing moves."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ BAUDS = {
 STEPS = 254
 """Progress steps of one rate and protocol."""
 
-# A bus is made for servos; looking around uses none of this one's settings.
+# A bus needs a servo to be made; a scan uses nothing of this one.
 _ANY = ServoSpec(0, "any", "xl330-m288", -1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Found:
-    """What answered at a rate in a protocol: a servo, or None for bytes that are no answer."""
+    """An answer at a rate in a protocol: a servo, or None for bytes that are no answer."""
 
     baud: int
     protocol: int
@@ -33,7 +33,7 @@ class Found:
 
     @property
     def row(self) -> tuple[str, ...]:
-        """Rate, protocol, id, model, firmware, voltage, temperature, error, torque, as words."""
+        """Rate, protocol, id, model, firmware, voltage, temperature, error and torque as text."""
         head = (str(self.baud), f"{self.protocol}.0")
         info = self.servo
         if info is None:
@@ -56,39 +56,29 @@ def plan_scan(bauds: Sequence[int] | None, protocols: Sequence[int]) -> list[tup
 
 
 def scan_port(
-    port: str, plan: Sequence[tuple[int, int]], tell: Callable[[str, int], None] = lambda text, step: None
+    port: str, plan: Sequence[tuple[int, int]], progress: Callable[[str, int], object] = lambda text, step: None
 ) -> Iterator[Found]:
-    """What answers on a port.
+    """Everything that answers on a port; ``plan`` : what to try, see :func:`plan_scan`.
 
-    Parameters
-    ----------
-    port : device path.
-    plan : what to try, see :func:`plan_scan`.
-    tell : called with what is being tried and how far it is, in :data:`STEPS` for each entry of the plan.
-
-    Raises
-    ------
-    PortError
-        when the port cannot be opened or goes away.
+    ``progress`` is called with what is being tried and how far it is, in :data:`STEPS` for each entry of the plan.
+    Raises PortError when the port cannot be opened or is lost.
     """
     for done, (protocol, baud) in enumerate(plan):
         text = f"{baud} baud, Protocol {protocol}.0"
 
         def step(servo: int, text: str = text, done: int = done) -> None:
-            tell(text, done * STEPS + servo)
+            progress(text, done * STEPS + servo)
 
         step(0)
-        yield from (_protocol_1 if protocol == 1 else _protocol_2)(port, baud, step)
-    tell("done", len(plan) * STEPS)
+        if protocol == 1:
+            yield from _scan_protocol_1(port, baud, step)
+        else:
+            with open_bus("dynamixel", [_ANY], port=port, baud=baud) as bus:
+                yield from (Found(baud, 2, info) for info in bus.discover())
+    progress("done", len(plan) * STEPS)
 
 
-def _protocol_2(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
-    with open_bus("dynamixel", [_ANY], port=port, baud=baud) as bus:
-        for info in bus.discover():
-            yield Found(baud, 2, info)
-
-
-def _protocol_1(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
+def _scan_protocol_1(port: str, baud: int, step: Callable[[int], None]) -> Iterator[Found]:
     link = SerialPort(port, baud)
     link.open()
     try:

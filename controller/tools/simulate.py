@@ -1,4 +1,4 @@
-"""Serving simulated hardware until interrupted, for ``omote simulate``."""
+"""Serves simulated servos, boards and robot hosts until interrupted, for ``omote simulate``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,31 +25,26 @@ from controller.robot.buses import SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
-from controller.tools.monitor_view import Watch
+from controller.tools.monitor import BusView
 from drivers import open_bus
-from drivers.core.traffic import Decoder
 from drivers.sim.serving.serve import PortServer, serve
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.simulator import Setting, Simulator, make_line, simulator_of
 
-Where = Path | str | None
-"""A path that becomes a link to a pseudo-terminal, or a URL to listen at instead."""
-
 
 @dataclass(frozen=True)
 class Serving:
-    """Where and how something is served.
+    """Options of a server.
 
     Attributes
     ----------
-    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT``.
-    wire : bytes take the time they take at the baud rate. latency_s : a USB adapter's latency timer besides.
-    faults : faults to inject, see docs/simulated-buses.md.
-    control : path of a socket that takes faults while it runs.
+    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT`` to listen at instead.
+    wire : bytes take the time they take at the baud rate. latency_s : latency timer of a USB adapter, added to it.
+    faults : faults to inject, see docs/simulated-buses.md. control : path of a socket that takes faults while it runs.
     watch : show the servos and the traffic while it runs.
     """
 
-    link: Where = None
+    link: Path | str | None = None
     wire: bool = False
     latency_s: float = 0.0
     faults: tuple[str, ...] = ()
@@ -58,15 +53,9 @@ class Serving:
 
 
 def serve_alone(kind: str, options: Any, how: Serving, console: Console) -> None:
-    """Serve what stands in for a family; prints ``ready PATH`` and returns when interrupted.
+    """Serve the simulator of a family with its ``options``; prints ``ready PATH`` and returns when interrupted.
 
-    Parameters
-    ----------
-    options : an instance of the options of the family's simulator.
-
-    Raises
-    ------
-    DriverError : options that do not fit, or a port that cannot be made.
+    Raises DriverError for options that do not fit, or a port that cannot be made.
     """
     simulator = simulator_of(kind)
     setting = Setting(now_s=time.monotonic(), baud=options.baud, names=PARAMETERS.names)
@@ -74,61 +63,56 @@ def serve_alone(kind: str, options: Any, how: Serving, console: Console) -> None
 
 
 def _serve(line: Line, baud: int, how: Serving, console: Console, simulator: Simulator) -> None:
-    line.faults.add(how.faults, time.monotonic())
-    with _watching(simulator.decoder(line) if how.watch else None, console) as look:
-        _until_stopped(
-            lambda stop: serve(
-                line,
-                how.link,
-                lambda path: _say_ready(path, console),
-                baud=baud,
-                wire=how.wire,
-                latency_s=how.latency_s,
-                commands=how.control,
-                stop=stop,
-                on_server=look,
-            )
-        )
-
-
-@contextmanager
-def _watching(decoder: Decoder | None, console: Console) -> Iterator[Callable[[PortServer], None]]:
-    """Gives what begins to watch a server; the view ends with the block. Without a decoder nobody watches."""
-    over = threading.Event()
-    threads: list[threading.Thread] = []
-
-    def look(server: PortServer) -> None:
-        if decoder is None:
-            return
-
+    def start_view(server: PortServer) -> None:
         def rows() -> list[dict[str, Any]]:
             with server.line.lock:
                 return server.line.describe(time.monotonic())
 
-        watch = Watch(f"simulated bus on {server.port.path}", rows, decoder, console)
-        server.tap = watch.tap
-        threads.append(threading.Thread(target=watch.run, args=(lambda: not over.is_set(),)))
-        threads[-1].start()
+        view = BusView(f"simulated bus on {server.port.path}", rows, simulator.decoder(line), console)
+        server.tap = view.tap
+        over = threading.Event()
+        thread = threading.Thread(target=view.run, args=(lambda: not over.is_set(),))
+        stack.callback(thread.join)
+        stack.callback(over.set)
+        thread.start()
 
+    line.faults.add(how.faults, time.monotonic())
+    with ExitStack() as stack, _stop_socket() as stop:
+        serve(
+            line,
+            how.link,
+            lambda path: console.print(f"ready {path}", soft_wrap=True),
+            baud=baud,
+            wire=how.wire,
+            latency_s=how.latency_s,
+            commands=how.control,
+            stop=stop,
+            on_server=start_view if how.watch else lambda server: None,
+        )
+
+
+@contextmanager
+def _stop_socket() -> Iterator[socket.socket]:
+    """A socket that becomes readable on SIGINT or SIGTERM."""
+    reading, writing = socket.socketpair()
+
+    def stop(_number: int, _frame: object) -> None:
+        writing.send(b"x")
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield look
+        yield reading
     finally:
-        over.set()
-        for thread in threads:
-            thread.join()
-
-
-def _say_ready(path: str, console: Console) -> None:
-    console.print(f"ready {path}", soft_wrap=True)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        reading.close()
+        writing.close()
 
 
 def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSettings]]:
     """One bus of a robot file and the channels on it; the first bus without a name.
 
-    Raises
-    ------
-    ConfigError
-        when the file is wrong or has no such bus.
+    Raises ConfigError when the file is wrong or has no such bus.
     """
     robot = load_robot(find_config("robots", name), PARAMETERS)
     names = [entry.name for entry in robot.buses]
@@ -139,7 +123,7 @@ def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSett
 
 
 def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> None:
-    """Serve what is on a bus of a robot file (:func:`robot_bus`), set to what its driver will expect."""
+    """Serve simulated servos for a bus of a robot file (:func:`robot_bus`), set up as its driver expects them."""
     chosen, channels = robot_bus(name, bus)
     simulator = simulator_of(chosen.family)  # before the driver, which may not be there
     options = {key: value for key, value in chosen.options().items() if key not in SIMULATION}
@@ -150,12 +134,9 @@ def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> N
 
 
 def serve_host(script: str, link: Path | None, console: Console) -> None:
-    """Serve a simulated robot host; prints ``ready PATH``, returns when interrupted and says what it counted.
+    """Serve a simulated robot host; prints ``ready PATH``, and its counts when it is interrupted.
 
-    Raises
-    ------
-    ConfigError
-        when the script is unknown or wrong.
+    Raises ConfigError when the script is unknown or wrong.
     """
     loaded = load_script(script, PARAMETERS)
     with HostPort(link) as port, stop_flag() as flag:
@@ -166,20 +147,3 @@ def serve_host(script: str, link: Path | None, console: Console) -> None:
     console.print(
         f"{counts['sent']} lines sent, {counts['accepted']} accepted, {counts['refused']} refused", soft_wrap=True
     )
-
-
-def _until_stopped(serve: Callable[[socket.socket], None]) -> None:
-    """Run ``serve(stop)`` until SIGINT or SIGTERM; the socket ``stop`` becomes readable then."""
-    reading, writing = socket.socketpair()
-
-    def note(_number: int, _frame: object) -> None:
-        writing.send(b"x")
-
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        serve(reading)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        reading.close()
-        writing.close()

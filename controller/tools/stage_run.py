@@ -1,4 +1,4 @@
-"""A session: one stage run from start to end, with or without a window, and its report."""
+"""Runs one stage from start to end, with or without a window, and returns its report."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +18,11 @@ from controller.base.errors import ConfigError
 from controller.base.files import replacing
 from controller.base.parameters import PARAMETERS
 from controller.base.signals import stop_flag
+from controller.body.messages import RunOptions
 from controller.body.preload import PreloadedBody
-from controller.body.process import BodyProcess, Deadline
-from controller.body.sources import Voice
+from controller.body.process import BodyProcess, deadline
 from controller.face.face import HeadlessFace, HeadValues, Recorder
-from controller.stage.identity import check_identity
-from controller.stage.stage import Stage, load_stage
+from controller.stage.stage import check_identity, load_stage, with_picture
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
 from drivers.base.priority import lower_process_priority
@@ -30,11 +30,8 @@ from drivers.base.priority import lower_process_priority
 if TYPE_CHECKING:
     from surface.head import Head  # start-up: the body gets its orders first
 
-
-Tell = Callable[[str], None]
-
 REPORT_FORMAT = 1
-"""Version of a report's keys: raised when one changes its meaning or goes; reports before it state none."""
+"""Version of a report's keys: raised when one changes its meaning or is removed; older reports state none."""
 
 _IDLE_S = 0.05
 
@@ -47,163 +44,99 @@ def has_display() -> bool:
 
 
 class StageRun:
-    """One stage, ready to run.
+    """One stage, ready to run; every method runs it once and returns the report.
+
+    Finds and checks the stage and the take of ``options``; raises before anything is opened.
 
     Parameters
     ----------
-    stage : what to run.
-    take : a recorded take to play instead of the stage's links.
-    tell : hears in a few words what is being done.
-    mirror : leave the servos limp; the face shows where somebody moves them.
-    voice : a voice that moves the mouth. record : file to write every command and tick to.
-    waiting : the body's process, where it has been started already.
+    name : of the stage, or its file. identity : replaces the stage's own. look : command-line options over its picture.
+    status : called with what is being done, in a few words. preloaded : the body's process, if it was started already.
     """
 
     def __init__(
         self,
-        stage: Stage,
-        take: Path | None = None,
-        tell: Tell = lambda _: None,
-        *,
-        mirror: bool = False,
-        voice: Voice | None = None,
-        record: Path | None = None,
-        waiting: PreloadedBody | None = None,
-    ) -> None:
-        self.stage = stage
-        self.take = take
-        self.tell = tell
-        self.mirror = mirror
-        self.voice = voice
-        self.record = record
-        self.waiting = waiting
-
-    @classmethod
-    def load(
-        cls,
-        stage: str,
-        take: Path | None = None,
-        tell: Tell = lambda _: None,
-        *,
-        mirror: bool = False,
-        voice: Voice | None = None,
-        record: Path | None = None,
+        name: str,
+        options: RunOptions = RunOptions(),
         identity: Mapping[str, float] | None = None,
-        waiting: PreloadedBody | None = None,
-    ) -> StageRun:
-        """Find and check a stage and, where given, a take; raises before anything is opened.
-
-        ``identity`` replaces the stage's own.
-        """
-        found = load_stage(stage, PARAMETERS)
+        look: Mapping[str, object] | None = None,
+        status: Callable[[str], object] = lambda _: None,
+        preloaded: PreloadedBody | None = None,
+    ) -> None:
+        stage = with_picture(load_stage(name, PARAMETERS), look or {})
         if identity:
-            check_identity(found.head, identity)
-            found = replace(found, settings=found.settings.model_copy(update={"identity": dict(identity)}))
-        if take is not None:
-            check_take(take, found)
-        if mirror and not found.robots:
-            raise ConfigError(f"{found.path}: robots: a stage without a robot has nothing to mirror")
-        return cls(found, take, tell, mirror=mirror, voice=voice, record=record, waiting=waiting)
+            check_identity(stage.head, identity)
+            stage = replace(stage, settings=stage.settings.model_copy(update={"identity": dict(identity)}))
+        if options.take is not None and options.take.suffix == SUFFIX:
+            next(replay(options.take, PARAMETERS, make=stage.state), None)
+        elif options.take is not None:
+            load_take(options.take, PARAMETERS)
+        if options.mirror and not stage.robots:
+            raise ConfigError(f"{stage.path}: robots: a stage without a robot has nothing to mirror")
+        self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
-        """Run without a display; returns the report.
+        """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.
 
-        Parameters
-        ----------
-        seconds : when to stop; None runs until the take ends or Ctrl-C.
-        pictures : folder for a contact sheet and a clip; None reads no picture back.
+        ``pictures`` : folder for a contact sheet and a clip; None reads no picture back.
         """
         recorder = Recorder() if pictures else None
-        with stop_flag() as flag, self._body() as body:
-            values, head = self._head(body)
-            face = HeadlessFace(head, self.stage.settings.face, values, recorder)
-            try:
+        with self._body() as (body, flag):
+            values, head = self._load_head(body)
+            with closing(HeadlessFace(head, self.stage.settings.face, values, recorder)) as face:
                 face.run(self._begin(body, flag, seconds))
-            finally:
-                face.close()
             report = self._end(body, face.report())
         if recorder is not None and pictures is not None:
-            from controller.face.pictures import write_pictures  # start-up: only --pictures draws any
-
-            self.tell("writing the pictures")
-            report["written"] = write_pictures(recorder, pictures)
+            self._status("writing the pictures")
+            report["written"] = recorder.write(pictures)
         return report
 
     def run_window(self, seconds: float | None) -> dict[str, Any]:
-        """Run with a window until it is closed, the take ends or ``seconds`` are over; returns the report."""
-        with stop_flag() as flag, self._body() as body:
-            values, head = self._head(body)
+        """Run with a window until it is closed, the take ends or ``seconds`` are over."""
+        with self._body() as (body, flag):
+            values, head = self._load_head(body)
             from controller.face.window import WindowFace  # start-up: the body gets its orders first
 
-            face = WindowFace(head, self.stage.settings.face, values, body, self.stage.load_head)
+            face = WindowFace(head, self.stage.settings.face, values, body.send, body.panel_state, self.stage.load_head)
             face.run(self._begin(body, flag, seconds))
             return self._end(body, face.report())
 
     def run_without_face(self, seconds: float | None) -> dict[str, Any]:
-        """Run links and servos only, as on a robot without OpenGL; returns the report."""
-        with stop_flag() as flag, self._body() as body:
+        """Run links and servos only, as on a robot without OpenGL."""
+        with self._body() as (body, flag):
             keep_going = self._begin(body, flag, seconds)
             while keep_going():
                 time.sleep(_IDLE_S)
             return self._end(body, None)
 
-    def _body(self) -> BodyProcess:
-        self.tell("starting")
-        waiting, self.waiting = self.waiting, None
-        return BodyProcess(
-            self.stage,
-            PARAMETERS,
-            self.take,
-            mirror=self.mirror,
-            voice=self.voice,
-            record=self.record,
-            waiting=waiting,
-        )
+    @contextmanager
+    def _body(self) -> Iterator[tuple[BodyProcess, threading.Event]]:
+        """The body's process and a flag that Ctrl-C sets."""
+        self._status("starting")
+        preloaded, self._preloaded = self._preloaded, None
+        with stop_flag() as flag, BodyProcess(self.stage, PARAMETERS, self._options, preloaded=preloaded) as body:
+            yield body, flag
 
-    def _head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
-        """The head and its values; the servos come up meanwhile in the body's process."""
+    def _load_head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
+        """The head and its values, while the servos start in the body's process."""
         lower_process_priority()
         head = self.stage.load_head()
         return HeadValues(body.mailbox, PARAMETERS, head.parameters), head
 
     def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:
-        """Wait for the servos, let commands in; gives the question whether to go on."""
+        """Wait for the servos and let commands in; returns a function that is true while the run shall go on."""
         gc.enable()
-        gc.freeze()  # what was loaded stays: no collection has to look at it while pictures are drawn
+        gc.freeze()  # nothing that was loaded is garbage: no collection has to look at it while pictures are drawn
         body.wait_ready()
         body.begin()
-        self.tell("running" + (f" for {seconds:g} s" if seconds else ""))
-        deadline = Deadline(seconds)
-        return lambda: not flag.is_set() and deadline() and body.alive()
+        self._status("running" + (f" for {seconds:g} s" if seconds else ""))
+        in_time = deadline(seconds)
+        return lambda: not flag.is_set() and in_time() and body.alive()
 
     def _end(self, body: BodyProcess, face: dict[str, object] | None) -> dict[str, Any]:
-        self.tell("stopping" if self.mirror else "bringing the servos to rest")
+        self._status("stopping" if self._options.mirror else "bringing the servos to rest")
         body.stop()
         return {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}
-
-    def plan(self, seconds: float | None = None) -> tuple[list[dict[str, str]], list[dict[str, object]]]:
-        """What the servos would be sent, without opening a port.
-
-        Parameters
-        ----------
-        seconds : how much of it; all of the take or one round of the script without, 30 s at most for an endless one.
-
-        Returns
-        -------
-        A row a channel for people, and every angle of every cycle for programs.
-        """
-        from controller.stage.dry_run import dry_run  # start-up: only a dry run needs it
-
-        return dry_run(self.stage, self.take, seconds, PARAMETERS)
-
-
-def check_take(take: Path, stage: Stage) -> None:
-    """Raise what is wrong with a take or a recording."""
-    if take.suffix == SUFFIX:
-        next(replay(take, PARAMETERS, make=stage.state), None)
-        return
-
-    load_take(take, PARAMETERS)
 
 
 def write_report(report: dict[str, Any], path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import select
 
-from drivers.sim.serving.ptyport import PtyPort
+from drivers.sim.serving.ports import Link, PtyPort
 
 _WRITE_LIMIT_S = 0.2
 
@@ -24,10 +24,10 @@ class HostPort(PtyPort):
     Raises PortError: the system has no pseudo-terminals, or ``link`` cannot be made.
     """
 
-    @property
-    def path(self) -> str:
-        """The terminal's own name, with a link too."""
-        return self.device
+    def open(self, link: Link = None) -> None:
+        """Make the pseudo-terminal; ``path`` is its own name, with a link too."""
+        super().open(link)
+        self.path = self.device
 
     def read(self, timeout_s: float = 0.0) -> bytes:
         """What has arrived; waits for the first byte, empty after ``timeout_s``."""

@@ -8,10 +8,10 @@ import pytest
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
-from controller.body.panel_state import PanelState, PanelStateWriter, panel_state_size
+from controller.body.panel_state import PanelState
 from controller.layers.commands import CommandState
 from controller.robot.channels import build_table
-from controller.robot.following import Following, MeasuredFace, regions_of
+from controller.robot.following import FollowingStatistics, MeasuredFace
 from controller.robot.robot import load_robot
 from drivers.base.bus import BusState
 
@@ -29,18 +29,18 @@ def standing(position: np.ndarray) -> BusState:
 def test_holders_measured_values_and_differences_reach_the_other_side() -> None:
     state, out = CommandState(P), P.neutral()
     table = build_table(load_robot(find_config("robots", "head24"), P).channels, P)
-    following = Following(table.names, regions_of(table, P))
+    following = FollowingStatistics(table, P)
     wanted = table.angles(P.neutral())[0]
     there = wanted + np.radians(np.where(np.array(table.names) == "jawOpen", 14.0, 0.0))
     reflection = MeasuredFace([table], [lambda: standing(there)], P, [following])
-    following.note(wanted, standing(there))
-    with Mailbox.create(panel_state_size(P)) as mailbox:
+    following.add(wanted, standing(there))
+    with Mailbox.create(PanelState.size(P)) as mailbox:
         insight = PanelState(mailbox, state.layer_names(), P)
         insight.refresh()
         assert insight.holder(JAW) == "" and insight.measured(JAW) is None and insight.away_deg("jaw") is None
         state.set_parameters([JAW], [0.5], 0)
         state.tick(10_000_000, 0.01, out)
-        PanelStateWriter(mailbox, state, reflection).publish()
+        PanelState(mailbox, state.layer_names(), P).publish(state, reflection)
         insight.refresh()
         assert insight.holder(JAW) == "manual" and insight.holder(P.index("browInnerUp")) == "expression"
         assert insight.measured(JAW) == pytest.approx(0.5, abs=0.15)
@@ -52,8 +52,8 @@ def test_holders_measured_values_and_differences_reach_the_other_side() -> None:
 def test_without_servos_only_holders_are_known() -> None:
     state, out = CommandState(P), P.neutral()
     state.tick(10_000_000, 0.01, out)
-    with Mailbox.create(panel_state_size(P)) as mailbox:
+    with Mailbox.create(PanelState.size(P)) as mailbox:
         insight = PanelState(mailbox, state.layer_names(), P)
-        PanelStateWriter(mailbox, state, None).publish()
+        PanelState(mailbox, state.layer_names(), P).publish(state, None)
         insight.refresh()
         assert insight.holder(JAW) == "expression" and insight.measured(JAW) is None

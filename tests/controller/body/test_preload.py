@@ -10,7 +10,7 @@ import pytest
 
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS
-from controller.body.messages import BodyOrders, Failed
+from controller.body.messages import BodyOrders, Failed, RunOptions
 from controller.body.preload import PreloadedBody
 from controller.body.process import BodyProcess
 from controller.body.sources import Voice
@@ -53,7 +53,7 @@ def test_it_ends_where_the_voice_cannot_be_had(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(sys, "stdin", None)
     stage = load_stage("everything", PARAMETERS)
     with pytest.raises(TakeError, match="standard input is closed"), PreloadedBody() as waiting:
-        BodyProcess(stage, PARAMETERS, voice=Voice("-"), waiting=waiting)
+        BodyProcess(stage, PARAMETERS, RunOptions(voice=Voice("-")), preloaded=waiting)
     assert waiting.process.exitcode is not None
 
 

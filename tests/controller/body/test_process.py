@@ -66,18 +66,18 @@ def test_servos_stand_until_commands_may_come_obey_the_panel_and_end_limp(stage:
     with BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
         assert powered(servos) == list(range(1, 25))
-        body.tell(Hold(jaw, 1.0))
+        body.send(Hold(jaw, 1.0))
         assert until(lambda: newest(body, "jawOpen") > 0.999)
         assert [servos.servo(i).position_ticks for i in range(1, 25)] == pytest.approx(places, abs=2)
         body.begin()
         assert until(lambda: servos.servo(JAW_ID).position_ticks - rest > 300)
-        body.tell(Hold(jaw, None))
+        body.send(Hold(jaw, None))
         assert until(lambda: newest(body, "jawOpen") < 0.001)
-        body.tell(Show("happiness", 1.0))
+        body.send(Show("happiness", 1.0))
         assert until(lambda: newest(body, "mouthSmileLeft") > 0.3)
-        body.tell(Neutral(0.1))
+        body.send(Neutral(0.1))
         assert until(lambda: newest(body, "mouthSmileLeft") < 0.01)
-        body.tell(Hold(jaw, 1.0))
+        body.send(Hold(jaw, 1.0))
         assert until(lambda: servos.servo(JAW_ID).position_ticks - rest > 300)
         body.stop()
         report = body.report
@@ -102,15 +102,15 @@ def test_a_body_that_is_told_to_end_stops_the_servos_first(
 ) -> None:
     with BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
-        os.kill(body.pid, ending)
+        os.kill(body._process.pid or 0, ending)
         assert until(lambda: powered(servos) == [])
 
 
 def test_a_body_that_is_killed_leaves_the_rest_to_the_bus_watchdog(stage: Stage, servos: SimulatedBus) -> None:
     with pytest.raises(ControllerError, match="ended by itself"), BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
-        body.tell(Hold(PARAMETERS.index("jawOpen"), 1.0))
-        body.kill()
+        body.send(Hold(PARAMETERS.index("jawOpen"), 1.0))
+        body._process.kill()
         assert until(lambda: all(servos.servo(i).register("Bus Watchdog") == 255 for i in range(1, 25)))
         while body.alive():
             time.sleep(0.02)
@@ -124,7 +124,7 @@ def test_main_killed_is_noticed_and_the_servos_stopped(stage: Stage, servos: Sim
         "from controller.stage.stage import load_stage\n"
         "if __name__ == '__main__':\n"
         "    body = BodyProcess(load_stage(sys.argv[1], PARAMETERS), PARAMETERS)\n"
-        "    body.wait_ready(); print(body.mailbox.path, body._insights.path, flush=True); time.sleep(60)\n"
+        "    body.wait_ready(); print(body.mailbox.path, body._panel_mailbox.path, flush=True); time.sleep(60)\n"
     )
     script = stage.path.parent / "main.py"
     script.write_text(program)

@@ -57,7 +57,7 @@ def test_a_file_moves_the_mouth_and_ends(tmp_path: Path) -> None:
     sources = Sources(state, voice=Voice(str(tmp_path / "a.wav")))
     assert not sources.finished and sources.report()["voice"] == {"heard_s": 0.0}
     sources.begin()
-    assert until(lambda: sources.heard)
+    assert until(lambda: sources.voice_ended)
     assert jaw_of(state) > 0.3 and sources.error is None
     assert sources.report()["voice"] == {"heard_s": pytest.approx(0.3, abs=0.02)}
     assert not sources.finished  # the run goes on without it
@@ -90,7 +90,7 @@ def test_a_stages_own_take_and_voice_play_beside_its_links(tmp_path: Path) -> No
         body.begin()
         try:
             most, sources = 0.0, body.sources
-            while not (sources.heard and sources._player is not None and sources._player.finished):
+            while not (sources.voice_ended and sources._player is not None and sources._player.finished):
                 most = max(most, body.newest()[0][JAW])
                 time.sleep(0.01)
             assert most > 0.1 and not body.finished
@@ -114,5 +114,5 @@ def test_what_is_no_voice_is_told(tmp_path: Path) -> None:
     for path in (tmp_path / "a.wav", tmp_path / "none.wav"):
         sources = Sources(CommandState(P), voice=Voice(str(path)))
         sources.begin()
-        assert until(lambda sources=sources: sources.heard)
+        assert until(lambda sources=sources: sources.voice_ended)
         assert isinstance(sources.error, TakeError)

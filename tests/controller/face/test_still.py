@@ -103,3 +103,34 @@ def test_wrong_groups_are_told(own: Path) -> None:
         parse_group(f"{own / 'dimple.json'}=x")
     with pytest.raises(ConfigError, match=r"none\.json"):
         parse_group("none.json")
+
+
+def test_amounts_reach_from_end_to_end(own: Path) -> None:
+    group = str(own / "dimple.json")
+    assert [parse_group(f"{group}{end}")[1] for end in ("=-1", "=1", "")] == [-1.0, 1.0, 1.0]
+    with pytest.raises(ParameterError, match="from -1 to 1"):
+        parse_group(f"{group}=-1.01")
+    jaw = PARAMETERS.index("mouthSmileLeft")
+    vocabulary = [str(own / "mine.toml")]
+    for word, value in (("grin=0", 0.0), ("grin=1", 0.9), ("grin", 0.9)):
+        assert Still.parse([], [word], vocabularies=vocabulary).values[jaw] == pytest.approx(value)
+    for word in ("grin=1.01", "grin=-0.01"):
+        with pytest.raises(ParameterError, match="intensity goes from 0 to 1"):
+            Still.parse([], [word], vocabularies=vocabulary)
+    both = Still.parse(["mouthSmileLeft=0.1"], ["grin", "grin=0.5"], vocabularies=vocabulary)
+    assert both.values[jaw] == 0.1 and both.values[PARAMETERS.index("mouthSmileRight")] == 1.0
+
+
+def test_sizes_have_ends() -> None:
+    assert parse_size("16x16384") == (16, 16384) and parse_size(" 32X16 ") == (32, 16)
+    for wrong in ("15x16", "16x16385"):
+        with pytest.raises(ParameterError):
+            parse_size(wrong)
+    assert Still.parse([], []).size == (800, 800)
+
+
+def test_the_sheet_names_two_sides_of_angles_only() -> None:
+    labels = [label for label, _ in sheet_poses()]
+    assert {"headYaw +", "headYaw \N{MINUS SIGN}", "jawOpen"} <= set(labels)
+    assert not {"headYaw", "jawOpen +", "jawOpen \N{MINUS SIGN}"} & set(labels)
+    assert labels.index("happiness") < labels.index("jawOpen")

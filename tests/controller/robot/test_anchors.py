@@ -13,17 +13,16 @@ from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.anchors import (
-    AnchorMap,
-    Rows,
-    anchored,
-    first,
+    AnchorSolver,
+    PullRows,
     load_anchors,
+    pull_range_mm,
     residual_rows,
     sample_skin,
     servo_field,
 )
 from controller.robot.channels import build_table
-from controller.robot.mirror import Mirror
+from controller.robot.following import Mirror
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
 from controller.tools.check import check_anything
@@ -58,7 +57,7 @@ def robot() -> RobotSettings:
 
 
 @pytest.fixture(scope="module")
-def solved(head: Head, robot: RobotSettings) -> AnchorMap:
+def solved(head: Head, robot: RobotSettings) -> AnchorSolver:
     found = load_anchors(robot, head, P)
     assert found is not None
     return found
@@ -87,18 +86,20 @@ def written(tmp_path: Path, text: str) -> RobotSettings:
         {"leftEyePitch": 0.5},
     ],
 )
-def test_the_sampled_skin_goes_where_the_head_goes(head: Head, solved: AnchorMap, values: dict[str, float]) -> None:
+def test_the_sampled_skin_goes_where_the_head_goes(head: Head, solved: AnchorSolver, values: dict[str, float]) -> None:
     skin = solved.skin
     part = head.part(skin.part)
     head.pose(head.values(values))
     true = part.surface.basis_matrix(skin.uv) @ part.control_points - skin.rest
     head.pose(np.zeros(len(head.parameters)))
-    away = np.linalg.norm(skin.displacement(solved.shapes(face(**values))) - true, axis=1)
+    away = np.linalg.norm(skin.displacement(solved.shape_values(face(**values))) - true, axis=1)
     assert away.max() < 1.0  # mm; arcs and lids meet between the samples
 
 
-def test_anchors_lie_where_their_landmarks_say(robot: RobotSettings, solved: AnchorMap) -> None:
-    wanted = [robot.landmarks[c.anchor.point] for c in anchored(robot) if c.anchor and isinstance(c.anchor.point, str)]
+def test_anchors_lie_where_their_landmarks_say(robot: RobotSettings, solved: AnchorSolver) -> None:
+    wanted = [
+        robot.landmarks[c.anchor.point] for c in robot.anchored_channels if c.anchor and isinstance(c.anchor.point, str)
+    ]
     own = solved.skin.rest[: len(wanted)]
     assert np.linalg.norm(own - wanted, axis=1).max() < 2.0  # mm
     left, right = (own[[n.endswith(side) for n in solved.names]] for side in ("Left", "Right"))
@@ -110,27 +111,27 @@ def test_one_anchor_is_pulled_as_far_as_the_skin_goes(tmp_path: Path, head: Head
     one = load_anchors(robot, head, P)
     assert one is not None
     for amount in (0.3, 0.8):
-        moved = one.skin.displacement(one.shapes(face(mouthSmileLeft=amount)))[:, 1]
+        moved = one.skin.displacement(one.shape_values(face(mouthSmileLeft=amount)))[:, 1]
         near = np.linalg.norm(one.skin.rest - one.skin.rest[0], axis=1) < 8.0
         mean = moved[near].mean()  # the field falls off with distance and across the mouth, so it takes a little more
-        assert mean < one.pulls(face(mouthSmileLeft=amount))[0] < 1.35 * mean
-    assert one.pulls(face(mouthFrownLeft=1.0))[0] < -3.0
-    assert one.pulls(face(mouthSmileLeft=1.0, mouthUpperUpLeft=1.0, noseSneerLeft=1.0))[0] == pytest.approx(10.0)
+        assert mean < one.pulls_mm(face(mouthSmileLeft=amount))[0] < 1.35 * mean
+    assert one.pulls_mm(face(mouthFrownLeft=1.0))[0] < -3.0
+    assert one.pulls_mm(face(mouthSmileLeft=1.0, mouthUpperUpLeft=1.0, noseSneerLeft=1.0))[0] == pytest.approx(10.0)
     angle = build_table(robot.channels, P, one).angles(face(mouthSmileLeft=0.8))[0]
-    assert np.degrees(angle[0]) == pytest.approx(4.0 * one.pulls(face(mouthSmileLeft=0.8))[0])
+    assert np.degrees(angle[0]) == pytest.approx(4.0 * one.pulls_mm(face(mouthSmileLeft=0.8))[0])
 
 
 def test_unseen_skin_follows_better_than_one_parameter_for_one_servo(
-    head: Head, robot: RobotSettings, solved: AnchorMap
+    head: Head, robot: RobotSettings, solved: AnchorSolver
 ) -> None:
-    channels = anchored(robot)
+    channels = robot.anchored_channels
     anchors = [channel.anchor for channel in channels if channel.anchor is not None]
     k = len(anchors)
     used = {tuple(point) for point in solved.skin.uv}
     fresh = [point for point in head.part("face").mesh.uv.astype(float) if tuple(point) not in used]
     unseen = sample_skin(head, "face", np.concatenate([solved.skin.uv[:k], fresh]))
-    own = first(unseen, k)
-    field, rows = servo_field(anchors, own, unseen).reshape(-1, 3, k), Rows.around(anchors, own, unseen, 6.0)
+    own = unseen.subset(slice(k))
+    field, rows = servo_field(anchors, own, unseen).reshape(-1, 3, k), PullRows.near(anchors, own, unseen, 6.0)
     main = ["jawOpen", "jawLeft", *(f"{n}{s}" for n in ("eyeBlink", "eyeSquint") for s in ("Left", "Right"))]
     main += ["browInnerUp", "browInnerUp", "browOuterUpLeft", "browOuterUpRight"]
     main += [f"{n}{s}" for n in ("mouthSmile", "mouthStretch") for s in ("Left", "Right")]
@@ -138,39 +139,39 @@ def test_unseen_skin_follows_better_than_one_parameter_for_one_servo(
     vocabulary, left = Vocabulary.load(P), {"naive": 0.0, "solved": 0.0}
     for name in ("happiness", "sadness", "surprise", "fear", "anger", "disgust", "contempt"):
         values = vocabulary[name].weights
-        wanted = unseen.displacement(solved.shapes(values))
+        wanted = unseen.displacement(solved.shape_values(values))
         naive = np.array([values[P.index(n)] * c.map.at[-1] for n, c in zip(main, channels, strict=True)])
-        for key, pulls in (("naive", naive), ("solved", solved.pulls(values))):
-            left[key] += float((rows.along(wanted - field @ pulls) ** 2).sum())
+        for key, pulls in (("naive", naive), ("solved", solved.pulls_mm(values))):
+            left[key] += float((rows.project(wanted - field @ pulls) ** 2).sum())
     assert left["solved"] < 0.25**2 * left["naive"]  # sums of squares: a quarter of the rms
 
 
-def test_pulls_stay_within_travel_whatever_is_asked(robot: RobotSettings, solved: AnchorMap) -> None:
+def test_pulls_stay_within_travel_whatever_is_asked(robot: RobotSettings, solved: AnchorSolver) -> None:
     rng = np.random.default_rng(0)
-    low, high = np.array([(c.map.at[0], c.map.at[-1]) for c in anchored(robot)]).T
+    low, high = np.array([(c.map.at[0], c.map.at[-1]) for c in robot.anchored_channels]).T
     for _ in range(100):
-        pulls = solved.pulls(rng.uniform(P.low, P.high))
+        pulls = solved.pulls_mm(rng.uniform(P.low, P.high))
         assert np.all(pulls >= low - 1e-9) and np.all(pulls <= high + 1e-9)
-    assert np.abs(solved.pulls(P.neutral())).max() < 1e-6
+    assert np.abs(solved.pulls_mm(P.neutral())).max() < 1e-6
 
 
-def test_a_bus_gets_the_pulls_of_its_own_channels(robot: RobotSettings, solved: AnchorMap) -> None:
-    part = solved.on(["lowerLip", "jawOpen", "neckYaw"])
+def test_a_bus_gets_the_pulls_of_its_own_channels(robot: RobotSettings, solved: AnchorSolver) -> None:
+    part = solved.for_channels(["lowerLip", "jawOpen", "neckYaw"])
     assert part is not None
     assert part.names == ("jawOpen", "lowerLip")
     values = face(jawOpen=0.5, mouthLowerDownLeft=0.5)
-    both = dict(zip(solved.names, solved.pulls(values), strict=True))
-    assert part.pulls(values) == pytest.approx([both["jawOpen"], both["lowerLip"]], abs=1e-3)
-    assert solved.on(["neckYaw"]) is None
+    both = dict(zip(solved.names, solved.pulls_mm(values), strict=True))
+    assert part.pulls_mm(values) == pytest.approx([both["jawOpen"], both["lowerLip"]], abs=1e-3)
+    assert solved.for_channels(["neckYaw"]) is None
 
 
-def test_the_mirror_reads_a_head_of_anchors(robot: RobotSettings, solved: AnchorMap) -> None:
+def test_the_mirror_reads_a_head_of_anchors(robot: RobotSettings, solved: AnchorSolver) -> None:
     table = build_table(robot.channels, P, solved)
     read = Mirror(table, P).read(table.angles(face(jawOpen=0.6))[0])
     assert read[P.index("jawOpen")] == pytest.approx(0.6, abs=0.2)
 
 
-def test_what_a_head_cannot_show_is_told_by_region(solved: AnchorMap) -> None:
+def test_what_a_head_cannot_show_is_told_by_region(solved: AnchorSolver) -> None:
     vocabulary = Vocabulary.load(P)
     found = {region: (wanted, left) for region, wanted, left in
              residual_rows(solved, {"happiness": vocabulary["happiness"].weights}, P)}  # fmt: skip
@@ -213,3 +214,23 @@ def test_the_shipped_robot_differs_from_its_sister_only_in_its_mapping(robot: Ro
     ]
     assert robot.rules == other.rules
     assert len(tomllib.loads(find_config("robots", "head24-anchors").read_text())["landmarks"]) >= 10
+
+
+def test_pulls_end_where_the_trimmed_map_meets_the_limits(tmp_path: Path) -> None:
+    channel = written(tmp_path, ROBOT).channels[0]
+    assert pull_range_mm(channel) == (-5.0, 10.0)
+    assert pull_range_mm(channel.model_copy(update={"trim_deg": 6.0})) == (-5.0, 0.0)  # 46 degrees is too far
+    assert pull_range_mm(channel.model_copy(update={"trim_deg": -6.0})) == (0.0, 10.0)
+    assert pull_range_mm(channel.model_copy(update={"limit_deg": (-20.0, 40.0)})) == (-5.0, 10.0)
+
+
+def test_every_fault_of_the_anchors_is_listed_at_once(tmp_path: Path, head: Head) -> None:
+    second = ROBOT[ROBOT.index("[[channels]]") :].replace('"corner"', '"lip"').replace("id = 1", "id = 2")
+    second = second.replace('point = "lip"', 'point = "corner"')
+    text = ROBOT.replace("[0, 1, 0] }", '[0, 1, 0], like = "headYaw" }')
+    text += second.replace("[0, 1, 0] }", '[0, 1, 0], part = "hair" }')
+    with pytest.raises(ConfigError, match="2 faults") as caught:
+        load_anchors(written(tmp_path, text), head, P, where="mine.toml")
+    message = str(caught.value)
+    assert message.startswith("mine.toml: ") and "omote check mine.toml" in caught.value.hint
+    assert "channels[0].anchor.like: the head has no shape" in message and "channels[1].anchor.part: 'hair'" in message

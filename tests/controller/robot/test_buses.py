@@ -10,14 +10,14 @@ from pydantic import ValidationError
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
-from controller.robot.buses import BusSettings, read_bus, takers
+from controller.robot.buses import BusSettings, families_by_option, read_bus
 from controller.robot.robot import load_robot
 from drivers import kinds, open_bus
 from drivers.base.bus import ServoSpec
 from drivers.core.families import RESERVED
 
 FAMILIES = kinds()
-OPTIONS = takers()
+OPTIONS = families_by_option()
 MODEL = {"dynamixel": "xl330-m288", "feetech": "sts3215", "omote": "parameter"}
 VALUES: dict[str, Any] = {
     "watchdog_ms": 100, "takeover": "release", "reboot_faulted": True, "min_voltage_v": 4.5, "voltage_wait_s": 1.0,

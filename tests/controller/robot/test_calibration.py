@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,14 @@ import pytest
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
-from controller.robot.calibration import Captured, calibrated, calibration_path, carried, save_calibration
+from controller.robot.calibration import (
+    CapturedAngles,
+    calibrated,
+    calibration_path,
+    fit_to_captured,
+    rest_deg,
+    save_calibration,
+)
 from controller.robot.channels import build_table
 from controller.robot.robot import load_robot
 
@@ -26,7 +34,7 @@ def jaw_deg(robot, value: float) -> float:
 
 def test_neutral_and_ends_become_those_captured(tmp_path: Path) -> None:
     path = tmp_path / "c.toml"
-    save_calibration(path, "desk", "head24", {"jawOpen": Captured(min_deg=-4, neutral_deg=3, max_deg=19)})
+    save_calibration(path, "desk", "head24", {"jawOpen": CapturedAngles(min_deg=-4, neutral_deg=3, max_deg=19)})
     robot = calibrated(load_robot(HEAD, PARAMETERS), path)
     assert jaw_deg(robot, 0.0) == pytest.approx(3.0)
     assert jaw_deg(robot, 1.0) == pytest.approx(19.0)
@@ -51,7 +59,7 @@ def test_points_are_stretched_on_either_side_of_rest(at: list[float], deg: list[
     robot = load_robot(HEAD, PARAMETERS)
     points = robot.channels[0].map.model_copy(update={"at": at, "deg": deg})
     channel = robot.channels[0].model_copy(update={"map": points, "trim_deg": 4.0})
-    out = carried(channel, Captured(min_deg=-5, neutral_deg=2, max_deg=9))
+    out = fit_to_captured(channel, CapturedAngles(min_deg=-5, neutral_deg=2, max_deg=9))
     assert out.map.deg == pytest.approx(gives)
     assert out.trim_deg == 0.0
 
@@ -63,13 +71,13 @@ def test_a_robot_file_names_its_calibration(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"mine\.desk\.calibration\.toml"):
         load_robot(robot, PARAMETERS)
     path = calibration_path("desk", robot)
-    save_calibration(path, "desk", "head24", {"jawOpen": Captured(min_deg=-4, neutral_deg=3, max_deg=19)})
+    save_calibration(path, "desk", "head24", {"jawOpen": CapturedAngles(min_deg=-4, neutral_deg=3, max_deg=19)})
     assert jaw_deg(load_robot(robot, PARAMETERS), 0.0) == pytest.approx(3.0)
 
 
 def test_faults_are_told_together_with_the_nearest_name(tmp_path: Path) -> None:
     path = tmp_path / "c.toml"
-    save_calibration(path, "desk", "other", {"jawOpne": Captured(min_deg=-4, neutral_deg=3, max_deg=19)})
+    save_calibration(path, "desk", "other", {"jawOpne": CapturedAngles(min_deg=-4, neutral_deg=3, max_deg=19)})
     with pytest.raises(ConfigError, match="2 faults") as caught:
         calibrated(load_robot(HEAD, PARAMETERS), path)
     assert "'jawOpen'" in str(caught.value)
@@ -89,7 +97,7 @@ def test_angles_out_of_order_are_refused(angles: tuple[float, float, float], tmp
 
 def test_a_file_without_a_version_is_read_as_one_with(tmp_path: Path) -> None:
     new, old = tmp_path / "new.toml", tmp_path / "old.toml"
-    save_calibration(new, "desk", "head24", {"jawOpen": Captured(min_deg=-4, neutral_deg=3, max_deg=19)})
+    save_calibration(new, "desk", "head24", {"jawOpen": CapturedAngles(min_deg=-4, neutral_deg=3, max_deg=19)})
     first, rest = new.read_text().split("\n", 1)
     assert first == "format = 1"
     old.write_text(rest)
@@ -103,3 +111,41 @@ def test_a_newer_file_is_refused_for_that_alone(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="newer omote") as caught:
         calibrated(load_robot(HEAD, PARAMETERS), path)
     assert "1 fault" in str(caught.value)
+
+
+def test_the_neutral_angle_may_be_an_end() -> None:
+    for angles in ((-4, -4, 9), (-4, 9, 9)):
+        low, rest, high = angles
+        found = CapturedAngles(min_deg=low, neutral_deg=rest, max_deg=high)
+        assert (found.min_deg, found.neutral_deg, found.max_deg) == angles
+
+
+def test_the_angle_at_rest_is_that_of_zero_or_of_the_nearest_end() -> None:
+    channel = load_robot(HEAD, PARAMETERS).channels[0]
+    for at, deg, wanted in (([-1, 1], [10, 30], 20.0), ([0.5, 1], [4, 8], 4.0), ([-2, -1], [4, 8], 8.0)):
+        points = channel.map.model_copy(update={"at": at, "deg": deg})
+        assert rest_deg(channel.model_copy(update={"map": points, "trim_deg": 5.0})) == pytest.approx(wanted)
+
+
+def test_a_calibration_is_written_as_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    save_calibration(
+        path, 'my "desk"', "head24", {"jawOpen": CapturedAngles(min_deg=-4, neutral_deg=1.23456, max_deg=19)}
+    )
+    assert tomllib.loads(path.read_text()) == {
+        "format": 1,
+        "name": 'my "desk"',
+        "robot": "head24",
+        "channels": {"jawOpen": {"min_deg": -4.0, "neutral_deg": 1.23, "max_deg": 19.0}},
+    }
+    assert calibration_path("desk", Path("/a/mine.toml")) == Path("/a/mine.desk.calibration.toml")
+    assert calibration_path("other.toml", Path("/a/mine.toml")) == Path("/a/other.toml")
+
+
+def test_faults_of_a_calibration_begin_with_the_robot(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    save_calibration(path, "desk", "other", {"jawOpne": CapturedAngles(min_deg=-4, neutral_deg=3, max_deg=19)})
+    with pytest.raises(ConfigError) as caught:
+        calibrated(load_robot(HEAD, PARAMETERS), path)
+    lines = str(caught.value).splitlines()
+    assert lines[1].startswith("  robot: is a calibration of 'other'") and lines[2].startswith("  channels.jawOpne: ")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.base.parameters import PARAMETERS
-from controller.robot.channels import ChannelTable, build_table, limiter_of, servo_specs
+from controller.robot.channels import ChannelTable, PiecewiseLinear, build_table, servo_specs
 from controller.robot.settings import Calibration, ChannelSettings
 
 
@@ -68,7 +68,7 @@ def test_equals_interpolation_between_the_points(mixed: float, at: list[float]) 
 def test_motion_keeps_speed_and_acceleration_for_hostile_targets() -> None:
     table = build_table([channel()], PARAMETERS)
     period = 0.02
-    limiter = limiter_of(table, period)
+    limiter = table.limiter(period)
     rng = np.random.default_rng(1)
     before = out = np.zeros(1)
     speed = 0.0
@@ -88,3 +88,66 @@ def test_specs_are_in_radians() -> None:
     assert spec.min_rad == pytest.approx(np.radians(-25))
     assert spec.zero_rad == pytest.approx(np.pi / 2)
     assert spec.max_accel_rad_s2 == pytest.approx(np.radians(3000))
+
+
+def test_a_trim_is_added_to_every_angle_before_the_limits() -> None:
+    table = build_table([channel(trim_deg=4.0)], PARAMETERS)
+    assert angle(table) == (pytest.approx(9.0), 0)
+    assert angle(table, mouthFrownLeft=1.0) == (pytest.approx(-16.0), 0)
+    assert angle(table, mouthSmileLeft=0.8) == (pytest.approx(30.0), 1)
+    assert angle(build_table([channel(trim_deg=-4.0)], PARAMETERS)) == (pytest.approx(1.0), 0)
+    assert np.degrees(table.neutral_rad) == pytest.approx([9.0])
+
+
+def test_the_table_holds_every_limit_in_radians() -> None:
+    settings = {"max_jerk_deg_s3": 50_000, "dead_band_deg": 0.5, "slack_deg": 2.0}
+    table = build_table([channel(**settings), channel(name="free")], PARAMETERS)
+    assert table.names == ("lip", "free")
+    assert np.degrees(table.low_rad) == pytest.approx([-25, -25])
+    assert np.degrees(table.high_rad) == pytest.approx([30, 30])
+    assert np.degrees(table.max_speed_rad_s) == pytest.approx([300, 300])
+    assert np.degrees(table.max_accel_rad_s2) == pytest.approx([3000, 3000])
+    assert np.degrees(table.max_jerk_rad_s3) == pytest.approx([50_000, np.inf])
+    assert np.degrees(table.dead_band_rad) == pytest.approx([0.5, 0.0])
+    assert np.degrees(table.slack_rad) == pytest.approx([2.0, 0.0])
+
+
+def test_the_slope_of_a_mix_is_the_weights_and_the_mean_slopes_of_terms() -> None:
+    mix = {
+        "jawOpen": 0.5,
+        "headYaw": {"at": [-1, 0, 1], "gives": [0, 0, 3]},
+        "mouthFunnel": {"by": 2, "in": [0.2, 0.7]},
+    }
+    plain = channel(name="plain", mix={"jawOpen": -1.0})
+    linear = build_table([channel(mix=mix), plain], PARAMETERS).linear
+    assert linear.shape == (2, len(PARAMETERS))
+    found = {PARAMETERS.names[i]: linear[0, i] for i in np.flatnonzero(linear[0])}
+    assert found == pytest.approx({"jawOpen": 0.5, "headYaw": 1.5, "mouthFunnel": 2.0})
+    assert linear[1, PARAMETERS.index("jawOpen")] == -1.0 and np.count_nonzero(linear[1]) == 1
+
+
+def test_weights_of_a_channel_that_takes_the_least_are_terms() -> None:
+    table = build_table(
+        [channel(join="min", mix={"jawOpen": 1.0, "mouthFunnel": 1.0}), channel(name="sum")], PARAMETERS
+    )
+    assert not table.mix[0].any() and table.terms is not None
+    assert table.terms.target.tolist() == [0] and table.terms.channel.tolist() == [0, 0]
+    assert build_table([channel()], PARAMETERS).terms is None
+
+
+def test_functions_with_different_numbers_of_pieces_are_constant_outside() -> None:
+    curves = PiecewiseLinear.through(
+        [(np.array([0.0, 1.0, 3.0]), np.array([2.0, 4.0, 0.0])), (np.array([-1.0, 1.0]), np.array([5.0, -5.0]))]
+    )
+    for x, wanted in ((-9.0, (2.0, 5.0)), (0.5, (3.0, -2.5)), (2.0, (2.0, -5.0)), (9.0, (0.0, -5.0))):
+        assert curves(np.array([x, x])) == pytest.approx(wanted)
+
+
+def test_specs_carry_what_the_driver_needs() -> None:
+    pulse = {"deg": [-25, 30], "us": [1000, 2000]}
+    one, two = servo_specs([channel(pulse=pulse, wire_name="lip_l"), channel(name="b", id=8)], np.array([0.1, -0.2]))
+    assert (one.name, one.wire_name, two.name, two.wire_name) == ("lip", "lip_l", "b", "")
+    assert one.pulse_us == ((pytest.approx(np.radians(-25)), 1000), (pytest.approx(np.radians(30)), 2000))
+    assert two.pulse_us == () and (one.rest_rad, two.rest_rad) == (0.1, -0.2)
+    assert one.max_rad == pytest.approx(np.radians(30)) and one.max_speed_rad_s == pytest.approx(np.radians(300))
+    assert servo_specs([channel()])[0].rest_rad == 0.0 and servo_specs([channel()])[0].reverse is False

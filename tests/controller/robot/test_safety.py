@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
-from controller.robot.channels import ChannelTable, build_table, limiter_of, play
+from controller.robot.channels import ChannelTable, build_table
 from controller.robot.robot import load_robot
-from controller.robot.rules import LoadRule, PreventRule, RuleSettings, TimingRule
 from controller.robot.safety import Guard
-from controller.robot.settings import ChannelSettings
+from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
 
 DT = 0.02
@@ -51,8 +52,8 @@ def measured(position_rad: np.ndarray, current_a: np.ndarray, fresh: bool = True
 class Line:
     """Guard and limiter as a bus has them; degrees in and out."""
 
-    def __init__(self, rules: RuleSettings, table: ChannelTable, **takeup: np.ndarray) -> None:
-        self.guard, self.limiter = Guard(rules, table, **takeup), limiter_of(table, DT)
+    def __init__(self, rules: RuleSettings, table: ChannelTable) -> None:
+        self.guard, self.limiter = Guard(rules, table), table.limiter(DT)
         self.sent = np.zeros(len(table.names))
 
     def step(self, *target_deg: float, state: BusState | None = None) -> np.ndarray:
@@ -148,7 +149,7 @@ def test_slack_is_taken_up_on_both_ways() -> None:
     worst = {True: 0.0, False: 0.0}
     for compensated in (True, False):
         slack = np.radians([play_deg if compensated else 0.0])
-        line = Line(RuleSettings(), table_of("a"), dead_rad=np.zeros(1), slack_rad=slack)
+        line = Line(RuleSettings(), replace(table_of("a"), slack_rad=slack))
         for i in range(2000):
             wanted = 20.0 * np.sin(i * DT)
             (near,) = line.step(wanted)
@@ -159,7 +160,7 @@ def test_slack_is_taken_up_on_both_ways() -> None:
 
 
 def test_a_dead_band_keeps_small_changes_away() -> None:
-    line = Line(RuleSettings(), table_of("a"), dead_rad=np.radians([1.0]), slack_rad=np.zeros(1))
+    line = Line(RuleSettings(), replace(table_of("a"), dead_band_rad=np.radians([1.0])))
     line.run(1.0, 10.0)
     assert line.run(1.0, 10.9)[-1, 0] == pytest.approx(10.0)
     assert line.run(1.0, 11.1)[-1, 0] == pytest.approx(11.1)
@@ -168,7 +169,7 @@ def test_a_dead_band_keeps_small_changes_away() -> None:
 def test_no_hostile_target_gets_past_a_limit_of_the_shipped_head() -> None:
     robot = load_robot(find_config("robots", "head24"), P)
     table = build_table(robot.channels, P)
-    guard, limiter = Guard(robot.rules, table, *play(robot.channels)), limiter_of(table, DT)
+    guard, limiter = Guard(robot.rules, table), table.limiter(DT)
     rng = np.random.default_rng(0)
     values = P.neutral()
     way = np.zeros((3002, 24))  # two rows at rest first

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.robot.channels import ChannelTable, build_table
-from controller.robot.mirror import Mirror
+from controller.robot.following import Mirror
 from controller.robot.robot import load_robot
-from controller.robot.terms import bend
+from controller.robot.terms import TermSettings, curve_corners
 
 ROBOT = """
 name = "r"
@@ -71,10 +71,11 @@ def test_the_mirror_reads_a_channel_of_terms(tmp_path: Path) -> None:
     assert Mirror(table, P).read(table.angles(face)[0])[P.index("jawOpen")] == pytest.approx(0.6, abs=0.01)
 
 
+@settings(deadline=None)  # the first call imports scipy
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=6), st.integers(0, 2**32 - 1))
 def test_a_smooth_curve_meets_its_points_and_overshoots_nowhere(gives: list[float], seed: int) -> None:
     at = np.cumsum(np.random.default_rng(seed).uniform(0.1, 1.0, len(gives)))
-    corners, values = bend(at, np.array(gives), "smooth")
+    corners, values = curve_corners(at, np.array(gives), "smooth")
     assert np.interp(at, corners, values) == pytest.approx(gives)
     for i in range(len(at) - 1):
         inside = values[(corners >= at[i]) & (corners <= at[i + 1])]
@@ -85,7 +86,9 @@ def test_a_smooth_curve_meets_its_points_and_overshoots_nowhere(gives: list[floa
 def test_a_smooth_curve_is_smoother_than_a_straight_one() -> None:
     at = np.linspace(0, np.pi / 2, 5)
     x = np.linspace(0, np.pi / 2, 200)
-    worst = {c: np.abs(np.interp(x, *bend(at, np.sin(at), c)) - np.sin(x)).max() for c in ("straight", "smooth")}
+    worst = {
+        c: np.abs(np.interp(x, *curve_corners(at, np.sin(at), c)) - np.sin(x)).max() for c in ("straight", "smooth")
+    }
     assert worst["smooth"] < 0.5 * worst["straight"]
 
 
@@ -107,3 +110,23 @@ def test_a_faulty_term_is_named_with_its_key(tmp_path: Path, mix: str, fault: st
     with pytest.raises(ConfigError) as caught:
         table_of(tmp_path, mix)
     assert fault in str(caught.value)
+
+
+def test_terms_are_described_for_people() -> None:
+    plain, kept = TermSettings(by=-0.4), TermSettings.model_validate({"by": 2, "in": [0.25, 1]})
+    curve = TermSettings(at=[0, 0.5, 1], gives=[0, 0, 1])
+    found = [term.describe("jawOpen") for term in (plain, kept, curve)]
+    assert found == ["-0.4 jawOpen", "+2 jawOpen in 0.25..1", "+jawOpen through 3 points"]
+    assert [term.is_weight for term in (plain, kept, curve)] == [True, False, False]
+
+
+def test_a_smooth_curve_is_the_monotone_cubic_through_its_points() -> None:
+    """By hand (Fritsch and Butland 1984): slopes 0.75, 0 and 1 for points that rise by 1 and rest, then rise by 1."""
+    x, y = curve_corners(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 1.0, 2.0]), "smooth")
+    assert len(x) == 3 * 8 + 1 and x[1] == pytest.approx(1 / 8) and (x[-1], y[-1]) == (3.0, 2.0)
+    assert y[(x > 1.0) & (x < 2.0)] == pytest.approx(1.0)
+    t = 0.5
+    hermite = t * (1 - t) ** 2 * 1.5 + t**2 * (3 - 2 * t)  # the end's slope, three points long, is 1.5
+    assert np.interp(0.5, x, y) == pytest.approx(hermite)
+    two = curve_corners(np.array([0.0, 1.0]), np.array([0.0, 1.0]), "smooth")
+    assert two[0].tolist() == [0.0, 1.0]

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import sys
 from pathlib import Path
+from types import ModuleType
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
 from controller.cli.app import make_app
+from controller.layers.commands import CommandState
 from controller.robot.robot import load_robot
-from controller.stage.dry_run import dry_run, plan_rows
+from controller.stage.dry_run import OfflineRun, dry_run
 from controller.stage.stage import load_stage
-from controller.tools.stage_run import StageRun
+from controller.takes.recording import Recorder
 
 
 def stage_file(tmp_path: Path, text: str = "") -> Path:
@@ -24,7 +30,9 @@ def stage_file(tmp_path: Path, text: str = "") -> Path:
 
 def test_every_channel_has_a_row_with_its_mix(root: Path) -> None:
     robot = load_robot(root / "configs/robots/head24.toml", PARAMETERS)
-    rows = {row["channel"]: row for row in plan_rows(robot, PARAMETERS)}
+    offline = OfflineRun(robot, CommandState(PARAMETERS), lambda now_ns: None)
+    offline.run(0.0)
+    rows = {row["channel"]: row for row in offline.rows()}
     assert list(rows) == [channel.name for channel in robot.channels]
     assert rows["jawOpen"]["servo"] == "head id 4, xl330-m288"
     assert rows["jawOpen"]["mix"] == "1 jawOpen -0.4 mouthClose"
@@ -70,7 +78,7 @@ def test_the_command_opens_no_port_and_writes_every_angle(tmp_path: Path) -> Non
 
 
 def test_a_stage_without_a_robot_sends_nothing() -> None:
-    assert StageRun.load("serial").plan() == ([], [])
+    assert dry_run(load_stage("serial", PARAMETERS), None, None, PARAMETERS) == ([], [])
 
 
 def test_the_show_of_a_stage_lies_beside_it_and_is_played(tmp_path: Path) -> None:
@@ -79,3 +87,106 @@ def test_the_show_of_a_stage_lies_beside_it_and_is_played(tmp_path: Path) -> Non
     sent = dict(zip(report[0]["channels"], zip(*report[0]["sent_deg"], strict=True), strict=True))
     assert sent["neckYaw"][-1] == pytest.approx(30.0, abs=0.1)
     assert max(sent["lipCornerUpLeft"]) < 0.1
+
+
+@pytest.fixture(scope="module")
+def ticks(root: Path) -> ModuleType:
+    """benchmarks/control_tick.py: the chain with 8 layers and what attacks it; a million ticks with --soak."""
+    spec = importlib.util.spec_from_file_location("control_tick", root / "benchmarks/control_tick.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["control_tick"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_no_hostile_layer_breaks_a_limit_at_the_bus(ticks: ModuleType) -> None:
+    chain = ticks.Chain(0)
+    counts = ticks.faults(chain, range(3800))
+    assert counts == dict.fromkeys(("not a number", "position", "speed", "acceleration", "jerk"), 0)
+    assert len(chain.goals.guard.report()) >= 3  # rules came to act
+    assert np.ptp(chain.sent) > 0.0
+
+
+def test_the_check_of_limits_finds_broken_ones(ticks: ModuleType) -> None:
+    chain = ticks.Chain(0)
+    chain.table.max_speed_rad_s[:] /= 4
+    chain.table.max_accel_rad_s2[:] /= 4
+    counts = ticks.faults(chain, range(2000, 2600))
+    assert counts["acceleration"] > 0 and counts["speed"] > 0
+
+
+def test_eight_layers_are_active_and_memory_does_not_grow(ticks: ModuleType) -> None:
+    chain = ticks.Chain(1)
+    assert ticks.growth(chain, 400) < 4096
+    assert len(chain.state.mixer.active) == 8
+
+
+def test_a_command_reaches_the_bus_with_the_next_tick(ticks: ModuleType) -> None:
+    assert ticks.ticks_to_output(ticks.Chain(2)) == 1
+
+
+def test_each_bus_has_its_own_pace() -> None:
+    robot = load_robot(find_config("robots", "head24"), PARAMETERS)
+    state = CommandState(PARAMETERS)
+    jaw = PARAMETERS.index("jawOpen")
+    offline = OfflineRun(robot, state, lambda now_ns: state.set_parameters([jaw], [0.5], now_ns))
+    offline.run(1.0)
+    sent = offline.sent_rad["head"]
+    assert sent.shape == (51, 24)
+    assert np.degrees(sent[-1, 3]) == pytest.approx(14.0, abs=0.05)
+    assert next(iter(offline.rows()))["held by"] == "nothing"
+
+
+def sent_of(report: list[dict[str, object]], name: str) -> list[float]:
+    bus = report[0]
+    return [row[bus["channels"].index(name)] for row in bus["sent_deg"]]  # type: ignore[attr-defined, index, union-attr]
+
+
+def test_a_script_without_a_loop_runs_a_moment_longer_than_its_last_step(tmp_path: Path) -> None:
+    (tmp_path / "act.toml").write_text('steps = ["0 SET jawOpen 0.5", "1 NEUTRAL"]')
+    stage = load_stage(str(stage_file(tmp_path, 'show = "act.toml"\n')), PARAMETERS)
+    _, report = dry_run(stage, None, None, PARAMETERS)
+    assert len(sent_of(report, "jawOpen")) == round(2.5 * 50) + 1
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_time_at_a_limit_of_position_is_told_on_both_sides(tmp_path: Path, side: float) -> None:
+    stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
+    channels = [
+        channel.model_copy(update={"limit_deg": (-10.0, 10.0)}) if channel.name == "neckYaw" else channel
+        for channel in stage.robots[0].channels
+    ]
+    robot, state = stage.robots[0].model_copy(update={"channels": channels}), stage.state(PARAMETERS)
+    yaw = PARAMETERS.index("headYaw")
+    offline = OfflineRun(robot, state, lambda now_ns: state.set_parameters([yaw], [side], now_ns))
+    offline.run(3.0)
+    rows = {row["channel"]: row for row in offline.rows()}
+    kind, seconds, unit = rows["neckYaw"]["held by"].split()
+    assert (kind, unit) == ("limit", "s") and 1.5 < float(seconds) < 3.0
+    assert rows["jawOpen"]["held by"] == "nothing"
+    low, _, high = map(str, rows["neckYaw"]["sent (deg)"].split())
+    assert sorted([abs(float(low)), abs(float(high))]) == [0.0, 10.0]
+
+
+def test_a_recording_is_played_from_its_first_face(tmp_path: Path) -> None:
+    stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
+    with Recorder(stage.state(PARAMETERS), tmp_path / "a.rec") as state:
+        for i in range(150):
+            if i == 50:
+                state.set_parameters([PARAMETERS.index("jawOpen")], [1.0], 10**9 + i * 10_000_000)
+            state.tick(10**9 + i * 10_000_000, 0.01, PARAMETERS.neutral())
+    _, report = dry_run(stage, tmp_path / "a.rec", None, PARAMETERS)
+    jaw = sent_of(report, "jawOpen")
+    assert len(jaw) == pytest.approx(1.5 * 50, abs=2)
+    assert max(jaw[:20]) < 0.1 and jaw[-1] == pytest.approx(28.0, abs=0.5)
+
+
+def test_a_lively_stage_moves_by_itself(tmp_path: Path) -> None:
+    (tmp_path / "act.toml").write_text('steps = ["0 NEUTRAL"]')
+    still = 'show = "act.toml"\n'
+    moved = []
+    for text in (still, f"liveliness = 1.0\n{still}"):
+        _, report = dry_run(load_stage(str(stage_file(tmp_path, text)), PARAMETERS), None, 6.0, PARAMETERS)
+        moved.append(max(np.ptp(np.array(report[0]["sent_deg"]), axis=0)))
+    assert moved[0] < 0.01 < 1.0 < moved[1]

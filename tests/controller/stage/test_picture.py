@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from controller.base.errors import ParameterError
-from controller.stage.picture import LightSettings, PictureSettings, checked, parse_background
+from controller.stage.picture import LightSettings, PictureSettings, parse_background, with_options
 from surface.view.scene.camera import PRESETS
 from surface.view.scene.theme import THEMES
 
 
 @pytest.mark.parametrize("theme", THEMES)
 def test_without_words_a_theme_is_as_it_is(theme: str) -> None:
-    assert checked(PictureSettings(), {"theme": theme}).make_theme() == THEMES[theme]
+    assert with_options(PictureSettings(), {"theme": theme}).make_theme() == THEMES[theme]
 
 
 def test_background_and_lights() -> None:
@@ -36,7 +36,7 @@ def test_background_and_lights() -> None:
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_camera_can_be_named(name: str) -> None:
     for word in (name, name.replace("-", "_")):
-        assert checked(PictureSettings(), {"camera": word}).make_camera() == PRESETS[name]()
+        assert with_options(PictureSettings(), {"camera": word}).make_camera() == PRESETS[name]()
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_every_camera_can_be_named(name: str) -> None:
 )
 def test_a_wrong_word_is_told(wanted: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        checked(PictureSettings(), wanted)
+        with_options(PictureSettings(), wanted)
     assert message in str(caught.value)
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from controller.base.errors import ConfigError
+from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS
-from controller.stage.stage import load_stage, with_picture
+from controller.stage.stage import load_stage, parse_identity, with_picture
 
 
 def stage_file(tmp_path: Path, text: str) -> str:
@@ -98,3 +98,11 @@ def test_options_lie_over_the_stage() -> None:
     assert (face.kiosk, face.quality, face.theme) == (True, "fast", "skin")
     assert (face.size, face.fps) == (stage.settings.face.size, stage.settings.face.fps)
     assert stage.settings.face.quality == "full"
+
+
+def test_identities_are_names_and_amounts():
+    assert parse_identity("broad=0.6, young") == {"broad": 0.6, "young": 1.0}
+    assert parse_identity(None) == {}
+    for wrong in ("broad=2", "broad=-0.1", "broad=x", "=1", "broad=nan"):
+        with pytest.raises(ParameterError, match="--identity"):
+            parse_identity(wrong)

@@ -18,12 +18,12 @@ CHANNELS = load_robot(find_config("robots", "head24"), PARAMETERS).channels[:3]
 
 def pressed(state: CalibrationScreen, *keys: str) -> CalibrationScreen:
     for key in keys:
-        state.press(key)
+        state.handle_key(key)
     return state
 
 
 def seen(state: CalibrationScreen, *angles: float) -> CalibrationScreen:
-    state.see(np.array(angles))
+    state.set_angles(np.array(angles))
     return state
 
 
@@ -56,7 +56,7 @@ def test_nothing_moves_before_the_motors_hold_and_never_past_the_limits() -> Non
     assert state.target_deg[0] == STEP_DEG
     pressed(state, *["right"] * 1000)
     assert state.target_deg[0] == CHANNELS[0].limit_deg[1]
-    assert "limit_deg" in state.told
+    assert "limit_deg" in state.message
     pressed(state, "h")
     assert not state.holding
 
@@ -80,16 +80,16 @@ def test_servos_that_tell_nothing_are_moved_from_where_they_begin() -> None:
 def test_what_is_missing_is_told_and_nothing_is_saved() -> None:
     state = pressed(seen(CalibrationScreen(CHANNELS), 0.0, 0.0, 0.0), "n", "s")
     assert not state.saving
-    assert "lowest, highest" in state.told
+    assert "lowest, highest" in state.message
 
 
 @pytest.mark.parametrize(("answer", "done"), [("y", True), ("n", False)])
 def test_leaving_with_something_captured_is_asked_about(answer: str, done: bool) -> None:
     state = pressed(seen(CalibrationScreen(CHANNELS), 0.0, 0.0, 0.0), "n", "q")
-    assert state.asking
+    assert state.question
     assert not state.done
     assert pressed(state, "x", answer).done is done
-    assert not state.asking
+    assert not state.question
 
 
 def test_a_file_in_the_way_is_replaced_only_after_yes() -> None:

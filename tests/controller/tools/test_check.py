@@ -5,17 +5,24 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from controller.base.errors import ControllerError, TakeError
+from controller.base.errors import ConfigError, ControllerError, TakeError
 from controller.base.parameters import PARAMETERS
+from controller.base.paths import config_dir
 from controller.cli.app import make_app
 from controller.layers.commands import CommandState
+from controller.robot.calibration import CapturedAngles, save_calibration
 from controller.takes.recording import recorded
 from controller.tools.check import check_anything
+from controller.vocabulary.vocabulary import Vocabulary
 from surface import DCPSurface, Domain, Slit, SurfaceFileError
+from surface.head import Head
+from surface.head.model.file import save_data
 from surface.readers import NamedSurface, write_surfaces
+from tests.surface.small_head import part, small_head
 
 KNOTS = '<KnotVector degree="1">0 0 1 1</KnotVector>'
 SIDE = f'<Basis type="BSplineBasis">{KNOTS}</Basis>'
@@ -75,3 +82,32 @@ def test_every_kind_of_file_is_told_apart(tmp_path: Path) -> None:
     (tmp_path / "b.rec").write_text(text)
     with pytest.raises(ControllerError, match="came out differently"):
         check_anything(str(tmp_path / "b.rec"))
+
+
+def test_a_head_whose_vertices_leave_space_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_data(tmp_path, small_head(parts=[part("face", -40)], seams=[], paint=[]))
+    (line,) = check_anything(str(tmp_path))
+    assert line.startswith("head small: 1 parts, ") or ": 1 parts, " in line
+    assert check_anything(str(tmp_path / "head.toml")) == [line]
+    pose = Head.pose
+
+    def broken(head: Head, values: np.ndarray) -> None:
+        pose(head, values)
+        if values[head.parameters.index(head.parameters[1])]:
+            head.parts[0].vertices[3, 1] = np.inf
+
+    monkeypatch.setattr(Head, "pose", broken)
+    with pytest.raises(ConfigError, match="= 1 throws vertices of face out of space"):
+        check_anything(str(tmp_path))
+
+
+def test_calibrations_and_expressions_that_are_shipped_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "c.calibration.toml"
+    save_calibration(path, "desk", "head24", {"jawOpen": CapturedAngles(min_deg=0, neutral_deg=1, max_deg=9)})
+    assert check_anything(str(path)) == ["calibration desk of robot head24: 1 channels: good"]
+    shipped = config_dir() / "vocabularies" / "expressions.toml"
+    names = len(Vocabulary.load(PARAMETERS).names)
+    assert check_anything(str(shipped)) == [f"expressions expressions.toml: {names}: good"]
+    (tmp_path / "stage.toml").write_text("name = 3")
+    with pytest.raises(ConfigError, match="name: "):
+        check_anything(str(tmp_path / "stage.toml"))

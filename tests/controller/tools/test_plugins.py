@@ -11,8 +11,7 @@ import pytest
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS
 from controller.takes.reader import TAKES, load_take, reader_of
-from controller.tools.export import EXPORTERS
-from controller.tools.plugins import SORTS, listed
+from controller.tools.plugins import EXPORTERS, SORTS, listed
 from drivers import open_bus
 from drivers.base.bus import ServoSpec
 from drivers.base.errors import PluginError

@@ -158,9 +158,9 @@ def test_back_faces_and_materials_that_are_unknown(tmp_path, material, two_sided
 def test_the_source_of_the_head_is_named(tmp_path):
     plain = exported(tmp_path, Head(small_head())).document["asset"]
     assert plain == {"version": "2.0", "generator": "omote", "extras": {"made": "for tests"}}
-    source = {"source_name": "Face", "year": 2020, "source_licence": "MIT"}
+    source = {"source_name": "CommandState", "year": 2020, "source_licence": "MIT"}
     asset = exported(tmp_path, Head(small_head(provenance=source))).document["asset"]
-    assert asset["copyright"] == "Face; MIT" and asset["extras"]["year"] == "2020"
+    assert asset["copyright"] == "CommandState; MIT" and asset["extras"]["year"] == "2020"
 
 
 def test_weights_hold_the_pose_and_zero_angles_are_allowed(tmp_path):

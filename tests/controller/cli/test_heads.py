@@ -8,7 +8,6 @@ from typer.testing import CliRunner
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.cli.app import make_app
-from controller.stage.identity import parse_identity
 from surface.base.errors import ExportError, FitError, HeadFileError
 
 SURFACE = str(Path(__file__).parents[2] / "surface")
@@ -73,11 +72,3 @@ def test_a_damaged_mesh_leaves_the_old_head(sheet, tmp_path):
     said = CliRunner().invoke(make_app(), ["fit", str(bad), "-o", str(head), "--report", str(tmp_path / "r")])
     assert isinstance(said.exception, FitError) and "bad.glb" in str(said.exception)
     assert (head / "head.npz").read_bytes() == before and not (tmp_path / "r").exists()
-
-
-def test_identities_are_names_and_amounts():
-    assert parse_identity("broad=0.6, young") == {"broad": 0.6, "young": 1.0}
-    assert parse_identity(None) == {}
-    for wrong in ("broad=2", "broad=-0.1", "broad=x", "=1", "broad=nan"):
-        with pytest.raises(ParameterError, match="--identity"):
-            parse_identity(wrong)

@@ -1,0 +1,209 @@
+"""``omote render``, ``fit`` and ``export``: pictures of heads, heads from meshes, heads for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from controller.base.errors import ConfigError
+from controller.cli.console import console, show_table
+
+if TYPE_CHECKING:
+    from surface.fit.points.report import FitReport  # start-up: --help does without it
+
+_NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
+Identity = Annotated[
+    str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
+]
+
+
+def render(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Picture to write (PNG).")],
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated.")
+    ] = None,
+    expression: Annotated[
+        list[str] | None,
+        typer.Option("--expression", "-e", metavar="NAME[=INTENSITY]", help="Add a named expression."),
+    ] = None,
+    size: Annotated[str | None, typer.Option(help="Width x height in pixels.", show_default="800x800")] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(help="front, three-quarter, three-quarter-right, profile or profile-right.", show_default="front"),
+    ] = None,
+    quality: Annotated[str | None, typer.Option(help="full or fast.", show_default="full")] = None,
+    theme: Annotated[str | None, typer.Option(help="skin or mask.", show_default="skin")] = None,
+    background: Annotated[
+        str | None, typer.Option(metavar="#RRGGBB[,#RRGGBB]", help="One colour, or a gradient from top to bottom.")
+    ] = None,
+    evaluator: Annotated[
+        str | None, typer.Option(help="Who works out the vertices: auto, cpu or gpu.", show_default="auto")
+    ] = None,
+    head: Annotated[
+        str | None, typer.Option(help="Head: a name from configs/heads or a folder.", show_default="ict")
+    ] = None,
+    identity: Identity = None,
+    stage: Annotated[
+        str | None, typer.Option(help="Stage whose head, groups, expressions and look are taken where nothing is said.")
+    ] = None,
+    vocabulary: Annotated[
+        list[str] | None, typer.Option(metavar="FILE", help="Expressions of your own; may be repeated.")
+    ] = None,
+    group: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FILE[=AMOUNT]", help="Group the head wears, by -1 to 1; may be repeated."),
+    ] = None,
+    sheet: Annotated[
+        bool, typer.Option("--sheet", help="Draw every parameter at its end and every named expression.")
+    ] = False,
+) -> None:
+    """Draw one picture of the face, without a display.
+
+    Example: omote render --set jawOpen=0.8 --size 800x800 -o out.png
+    """
+    from controller.face.still import Still, draw_sheet, draw_still  # start-up: --help does without it
+    from controller.stage.picture import parse_background  # start-up: --help does without it
+
+    look = {
+        "camera": camera, "quality": quality, "theme": theme, "background": parse_background(background),
+        "evaluator": evaluator,
+    }  # fmt: skip
+    still = Still.parse(
+        settings or [], expression or [], size, look, head, identity,
+        stage=stage, vocabularies=vocabulary or (), groups=group or (),
+    )  # fmt: skip
+    if sheet:
+        with console.status("drawing") as status:
+            draw_sheet(still, out, lambda done, total: status.update(f"drawing {done} of {total}"))
+    else:
+        draw_still(still, out)
+    console.print(f"wrote {out}", soft_wrap=True)
+
+
+def fit(
+    mesh: Annotated[
+        Path, typer.Argument(help="Mesh with UVs and shapes: .glb, .gltf, .obj, a folder of .obj files, or .npz.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the head to write.")],
+    name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
+    shapes: Annotated[Path | None, typer.Option(help="Folder with one .obj a shape, for an .obj mesh.")] = None,
+    names: Annotated[Path | None, typer.Option(help="TOML table of shape names: [names] theirs = ARKit's.")] = None,
+    unit: Annotated[str | None, typer.Option(help="mm, cm, m or in; guessed by the head's size without it.")] = None,
+    up: Annotated[str | None, typer.Option(help="Axis that points up: x, y, z, -x, -y or -z.")] = None,
+    forward: Annotated[str | None, typer.Option(help="Axis that the face looks along.")] = None,
+    without: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Leave out an object or material; may be repeated.")
+    ] = None,
+    identities: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Identity modes of the mesh (.npz): adds named variations.")
+    ] = None,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep the head that is there; only add --identities.")] = False,
+    report: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for a report: figures, tables, error drawn on the face.")
+    ] = None,
+) -> None:
+    """Turn a mesh with UVs and expression shapes into a head of control points.
+
+    Example: omote fit me.glb -o heads/me --report report
+    """
+    # start-up: --help does without any of these
+    from surface.fit.api import fit_head
+    from surface.fit.identities import add_identities
+    from surface.fit.points.report import face_bounds
+    from surface.fit.source.load import LoadOptions
+
+    if keep and identities is None:
+        raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
+    if not keep:
+        options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
+        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+        with Progress(*columns, console=console, transient=True) as bar:
+            task = bar.add_task("reading", total=1.0)
+
+            def progress(part: str, done: float) -> None:
+                step = "writing the report" if part == "report" else f"fitting {part}"
+                bar.update(task, description=step, completed=done)
+
+            title = name or out.resolve().name
+            found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report)
+        shaded = _decimate_and_shade(out)
+        show_table(_error_table(found))
+        missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)
+        remarks = [face_bounds(found), *found.notes]
+        remarks += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
+        remarks += [f"left out, not ARKit's: {left_out}"] if left_out else []
+        remarks += [] if shaded else [_NO_SHADE]
+        for line in remarks:
+            console.print(line, soft_wrap=True, markup=False)
+        console.print(f"wrote {out}", soft_wrap=True)
+    if identities is not None:
+        with console.status("fitting identities"):
+            added = add_identities(out, mesh, identities)
+        console.print(f"identities: {', '.join(added)}", soft_wrap=True)
+
+
+def _decimate_and_shade(out: Path) -> bool:
+    """Add to a head's folder its decimated triangles and how much light reaches each vertex; False without OpenGL."""
+    # start-up: --help does without any of these
+    from surface.base.errors import ViewError
+    from surface.view.draw.decimate import decimate_head
+    from surface.view.pictures.occlusion import shade_head
+
+    with console.status("finding fewer triangles for live pictures"):
+        decimate_head(out)
+    try:
+        with console.status("baking shade"):
+            shade_head(out)
+    except ViewError:
+        return False
+    return True
+
+
+def _error_table(report: FitReport) -> Table:
+    """Control points and errors (mm) of every fitted part."""
+    title = f"{report.name}: {report.points} control points, {len(report.parameters)} shapes"
+    table = Table("part", "control points", "RMS", "99 %", "max", "mean RMS of shapes", title=title)
+    for part in report.parts:
+        neutral = part.neutral
+        errors = [f"{value:.3f}" for value in (neutral.rms, neutral.p99, neutral.max, part.mean_shape_rms)]
+        table.add_row(part.name, str(part.points), *errors)
+    return table
+
+
+def export(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write: .glb, .obj or what a plug-in adds.")],
+    head: Annotated[str, typer.Option("--head", help="Head: a name from configs/heads or a folder.")] = "ict",
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Pose it: set a parameter; may be repeated.")
+    ] = None,
+    expression: Annotated[
+        list[str] | None,
+        typer.Option("--expression", "-e", metavar="NAME[=INTENSITY]", help="Pose it: add a named expression."),
+    ] = None,
+    identity: Identity = None,
+) -> None:
+    """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.
+
+    Example: omote export head.glb
+    """
+    # start-up: --help does without any of these
+    from controller.base.parameters import PARAMETERS
+    from controller.face.still import Still
+    from controller.tools.plugins import EXPORTERS, added_exporters
+    from surface.export import export_head
+
+    still = Still.parse(settings or [], expression or [], head=head, identity=identity)
+    with console.status("exporting"):
+        loaded = still.load_head()
+        values = zip(PARAMETERS.names, still.values, strict=True)
+        pose = {name: float(value) for name, value in values if value and name in loaded.parameters}
+        added = added_exporters()
+        kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
+        with EXPORTERS.blaming(kind):
+            written = export_head(loaded, out, pose, added)
+    for path in written:
+        console.print(f"wrote {path}", soft_wrap=True)

@@ -1,0 +1,205 @@
+"""controller.body.body in this process: what plays, what is published, and what its process answers."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import LinkError
+from controller.base.mailboxes import Mailbox
+from controller.base.parameters import PARAMETERS as P
+from controller.body import messages
+from controller.body.body import Body, _handle, _wait
+from controller.body.messages import RunOptions
+from controller.body.panel_state import PanelState
+from controller.body.sources import Voice
+from controller.stage.stage import Stage, load_stage
+from controller.takes.recording import replay
+
+JAW = P.index("jawOpen")
+TAKE = "0.0\taa\n0.2\tsil\n"
+
+
+def until(condition: Callable[[], object]) -> None:
+    for _ in range(2000):
+        if condition():
+            return
+        time.sleep(0.01)
+    raise AssertionError("waited in vain")
+
+
+def stage_of(tmp_path: Path, text: str = "") -> Stage:
+    path = tmp_path / "stage.toml"
+    path.write_text(f'name = "mine"\n{text}')
+    return load_stage(str(path), P)
+
+
+@contextmanager
+def running(stage: Stage, options: RunOptions = RunOptions()) -> Iterator[tuple[Body, Mailbox]]:
+    with Mailbox.create(len(P)) as mailbox:
+        body = Body(stage, P, mailbox, options)
+        body.start()
+        try:
+            yield body, mailbox
+        finally:
+            body.stop()
+
+
+def published(mailbox: Mailbox) -> np.ndarray:
+    values = np.zeros(len(P))
+    mailbox.read(values)
+    return values
+
+
+def test_commands_are_published_with_the_time_they_came(tmp_path: Path) -> None:
+    with running(stage_of(tmp_path, "control_hz = 200")) as (body, mailbox):
+        stamp = time.monotonic_ns()
+        body.state.set_parameters([JAW], [1.0], stamp)
+        until(lambda: published(mailbox)[JAW] > 0.99)
+        assert body.newest()[0][JAW] > 0.99
+        assert body.newest()[1] == stamp
+        report = body.report()
+        assert report["control"]["wanted_hz"] == pytest.approx(200.0)  # type: ignore[index]
+        assert (report["take"], report["voice"], report["links"], report["buses"]) == (None, None, [], [])
+        assert body.live and not body.finished and body.measured_face is None
+        body.check()
+
+
+def test_a_take_waits_for_the_face_and_ends_the_run(tmp_path: Path) -> None:
+    (tmp_path / "a.tsv").write_text(TAKE)
+    with running(stage_of(tmp_path), RunOptions(tmp_path / "a.tsv")) as (body, _):
+        until(lambda: body.clock.ticks > 10)
+        assert body.newest()[0][JAW] < 0.01 and not body.live
+        body.begin()
+        until(lambda: body.newest()[0][JAW] > 0.05)
+        until(lambda: body.finished)
+        assert body.report()["take"]["played_s"] > 0.0  # type: ignore[index]
+
+
+def test_a_run_is_recorded_and_its_recording_played_again(tmp_path: Path) -> None:
+    stage, file = stage_of(tmp_path), tmp_path / "a.rec"
+    with running(stage, RunOptions(record=file)) as (body, _):
+        body.begin()
+        body.state.set_parameters([JAW], [0.5], time.monotonic_ns())
+        until(lambda: body.newest()[0][JAW] > 0.49)
+    assert max(values[JAW] for _, values in replay(file, P)) > 0.49
+    with running(stage, RunOptions(file)) as (body, _):
+        until(lambda: body.clock.ticks > 5)
+        assert body.newest()[0][JAW] == 0.0 and not body.finished
+        body.begin()
+        until(lambda: body.newest()[0][JAW] > 0.49)
+        until(lambda: body.finished)
+        assert body.report()["take"] is None
+
+
+def test_a_voice_of_the_command_line_goes_before_that_of_the_stage(tmp_path: Path) -> None:
+    (tmp_path / "a.raw").write_bytes(b"\0" * 4000)
+    stage = stage_of(tmp_path, 'voice = "a.raw"\nvoice_hz = 8000\n')
+    with Mailbox.create(len(P)) as mailbox:
+        own = Body(stage, P, mailbox).sources._voice
+        other = Body(stage, P, mailbox, RunOptions(voice=Voice("b.raw"))).sources._voice
+    assert own == Voice(str(tmp_path / "a.raw"), 8000) and other == Voice("b.raw")
+
+
+def test_a_link_that_does_not_come_up_is_raised_and_an_error_of_a_source_is_kept(tmp_path: Path) -> None:
+    with (
+        running(stage_of(tmp_path, '[[links]]\nport = "/dev/none"\n')) as (body, _),
+        pytest.raises(Exception) as caught,
+    ):
+        body.begin()
+    assert "/dev/none" in str(caught.value)
+    with running(stage_of(tmp_path, 'voice = "none.wav"\n')) as (body, _):
+        body.begin()
+        until(lambda: body.sources.error is not None)
+        with pytest.raises(Exception, match=r"none\.wav"):
+            body.check()
+
+
+def test_a_stage_mirrors_its_servos_and_leaves_simulated_links_out(tmp_path: Path) -> None:
+    stage = stage_of(
+        tmp_path, 'robots = ["head24"]\nliveliness = 1.0\n[[links]]\nport = "simulated"\nscript = "tour"\n'
+    )
+    with Mailbox.create(len(P)) as mailbox:
+        plain, mirror = Body(stage, P, mailbox), Body(stage, P, mailbox, RunOptions(mirror=True))
+    assert not plain.follows_servos and mirror.follows_servos
+    assert plain.state.servo_monitor is plain.measured_face is not None
+    assert [loop.limp for loop in (*plain.buses, *mirror.buses)] == [False, True]
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[Connection, Connection]]:
+    ours, theirs = multiprocessing.Pipe()
+    yield ours, theirs
+    ours.close()
+    theirs.close()
+
+
+def test_requests_of_the_panel_reach_the_layers(tmp_path: Path, pipe: tuple[Connection, Connection]) -> None:
+    main, end = pipe
+    with running(stage_of(tmp_path)) as (body, _):
+
+        def ask(request: object) -> bool:
+            main.send(request)
+            return _handle(body, end)
+
+        assert ask(messages.Hold(JAW, 0.5))
+        until(lambda: body.state.holder(JAW) == "manual")
+        assert ask(messages.Hold(JAW, None))
+        until(lambda: body.state.holder(JAW) != "manual")
+        assert ask(messages.Show("happiness", 1.0))
+        until(lambda: body.newest()[0][P.index("mouthSmileLeft")] > 0.3)
+        assert ask(messages.Neutral(0.05))
+        until(lambda: body.newest()[0][P.index("mouthSmileLeft")] < 0.01)
+        assert ask(messages.Begin()) and body._begun.is_set()
+        assert not ask(messages.Stop())
+        main.close()
+        assert not _handle(body, end)  # main is gone
+
+
+def test_main_hears_once_that_nothing_is_left_and_sees_the_panel_state(
+    tmp_path: Path, pipe: tuple[Connection, Connection]
+) -> None:
+    main, end = pipe
+    (tmp_path / "a.tsv").write_text(TAKE)
+    stop = threading.Event()
+    with (
+        running(stage_of(tmp_path), RunOptions(tmp_path / "a.tsv")) as (body, _),
+        Mailbox.create(PanelState.size(P)) as box,
+    ):
+        body.begin()
+        writer = PanelState(box, body.state.layer_names(), P)
+        thread = threading.Thread(target=_wait, args=(body, end, stop, writer))
+        thread.start()
+        try:
+            assert main.poll(30.0) and main.recv() == messages.Finished()
+            sequence = box.sequence
+            until(lambda: box.sequence > sequence + 2)
+            assert not main.poll()
+        finally:
+            stop.set()
+            thread.join(30.0)
+        assert not thread.is_alive()
+
+
+def test_an_error_of_a_loop_ends_the_wait(tmp_path: Path, pipe: tuple[Connection, Connection]) -> None:
+    with running(stage_of(tmp_path)) as (body, _):
+        body._error = LinkError("mine")
+        with pytest.raises(LinkError, match="mine"):
+            _wait(body, pipe[1], threading.Event(), None)
+
+
+def test_the_show_of_a_stage_begins_with_the_run(tmp_path: Path) -> None:
+    (tmp_path / "act.toml").write_text('steps = ["0 SET jawOpen 1"]')
+    with running(stage_of(tmp_path, 'show = "act.toml"\n')) as (body, _):
+        until(lambda: body.clock.ticks > 10)
+        assert body.newest()[0][JAW] < 0.01
+        body.begin()
+        until(lambda: body.newest()[0][JAW] > 0.9)

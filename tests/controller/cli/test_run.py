@@ -1,0 +1,142 @@
+"""``omote run``, ``play`` and ``demo``: a report as rows, and runs from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from controller.cli.app import make_app
+from controller.cli.console import console
+from controller.cli.run import report_rows
+
+SPREAD = {"mean": 1.0, "p50": 1.0, "p95": 2.0, "p99": 3.25, "max": 4.0}
+FACE = {
+    "frames": 300,
+    "seconds": 10.0,
+    "frames_per_second": 30.0,
+    "frames_with_motion": 299,
+    "frame_ms": SPREAD,
+    "size": [1280, 720],
+    "quality": "full",
+    "renderer": "llvmpipe",
+    "start_to_first_frame_s": 2.5,
+}
+LOOP = {"rate_hz": 49.98, "wanted_hz": 50.0, "ticks": 500, "skipped": 2, "jitter_ms": SPREAD}
+
+
+def test_every_part_of_a_run_has_its_rows() -> None:
+    bus = {
+        "name": "head",
+        "servos": 24,
+        **LOOP,
+        "command_to_wire_ms": {},
+        "channels_held_at_limit": 3,
+        "bus": {"errors": {"no_reply": 2}, "limits_hit": 4},
+    }
+    link = {"port": "/dev/x", "accepted": 7, "refused": {"E_NAME": 1}}
+    found = dict(report_rows({"stage": "s", "face": FACE, "control": LOOP, "links": [link], "buses": [bus]}))
+    assert found["frames per second"] == "30.0"
+    assert found["milliseconds a frame"] == "p50 1.00  p95 2.00  p99 3.25  max 4.00"
+    assert found["start to first frame"] == "2.50 s"
+    assert found["link /dev/x"] == "7 lines accepted, 1 refused"
+    assert found["bus head: 24 servos"] == "50.0 Hz of 50 wanted, 2 skipped"
+    assert found["bus head: command to wire (ms)"] == "nothing measured"
+    assert found["bus head: errors"] == "2 no_reply"
+    assert found["bus head: targets held at a limit"] == "7"
+
+
+def test_a_stage_without_body_or_robots_still_reports_its_face() -> None:
+    assert dict(report_rows({"stage": "s", "face": FACE}))["frames"] == "300 in 10.0 s, 299 of them with motion"
+
+
+def test_rules_takes_voices_and_differences_have_rows() -> None:
+    worst = {"channel": "jaw", "rms_deg": 4.0, "max_deg": 9.0}
+    bus = {
+        "name": "head",
+        "servos": 24,
+        **LOOP,
+        "command_to_wire_ms": SPREAD,
+        "channels_held_at_limit": 0,
+        "bus": {"errors": {}, "limits_hit": 0},
+        "face_difference": {"rms_deg": 1.25, "worst": [worst], "regions_rms_deg": {"jaw": 2.0, "mouth": 0.5}},
+        "rules": [{"rule": "timing jaw toward high", "times": 2, "seconds": 3.21}],
+    }
+    take = {"rows": 60, "rate_hz": 60.0, "played_s": 0.5, "duration_s": 1.0}
+    found = report_rows({"stage": "s", "take": take, "voice": {"heard_s": 2.0}, "buses": [bus]})
+    assert found[:2] == [("take", "0.5 of 1.0 s played, 60 rows at 60 Hz"), ("voice", "2.0 s heard")]
+    assert found[-3:] == [
+        ("bus head: measured face is away from the wanted one by", "rms 1.2 deg, most at jaw: rms 4.0 deg"),
+        ("bus head: by region (rms deg)", "jaw 2.0  mouth 0.5"),
+        ("bus head: rule", "timing jaw toward high: 2 times, 3.2 s"),
+    ]
+    assert ("bus head: errors", "none") in found
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> str:
+    (tmp_path / "a.tsv").write_text("0.0\taa\n0.2\tsil\n")
+    (tmp_path / "stage.toml").write_text('name = "mine"\n[face]\nsize = [64, 64]\nquality = "fast"\n')
+    return str(tmp_path / "stage.toml")
+
+
+def omote(*words: str) -> Result:
+    return CliRunner().invoke(make_app(), list(words))
+
+
+def test_a_run_without_a_face_writes_its_report(stage: str, tmp_path: Path) -> None:
+    report = tmp_path / "r.json"
+    result = omote("run", stage, "--no-face", "--seconds", "0.2", "--report", str(report))
+    assert result.exit_code == 0, result.output
+    assert "omote mine" in result.output and "control loop" in result.output
+    assert f"wrote {report}" in result.output
+    measured = json.loads(report.read_text())
+    assert measured["face"] is None and measured["format"] == 1 and measured["written"] == []
+    assert measured["control"]["ticks"] > 0
+
+
+def test_a_take_is_played_to_its_end_and_pictures_are_written(stage: str, tmp_path: Path) -> None:
+    out, report = tmp_path / "pictures", tmp_path / "r.json"
+    words = ["play", str(tmp_path / "a.tsv"), "--stage", stage, "--headless", "--pictures", str(out)]
+    result = omote(*words, "--report", str(report))
+    assert result.exit_code == 0, result.output
+    measured = json.loads(report.read_text())
+    assert measured["take"]["played_s"] == measured["take"]["duration_s"] > 0
+    assert measured["face"]["frames"] > 0 and measured["face"]["size"] == [64, 64]
+    assert sorted(path.name for path in out.iterdir()) == ["face.webp", "sheet.png"]
+    assert measured["written"] == [str(out / "sheet.png"), str(out / "face.webp")]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run", "--identity", "nobody=0.5"], "no identity 'nobody'"),
+        (["run", "--identity", "broad=2"], "expected NAME=AMOUNT, 0 to 1"),
+        (["run", "--mirror"], "nothing to mirror"),
+        (["run", "--theme", "clown"], "--theme clown: must be 'skin' or 'mask'"),
+        (["run", "--voice", "none.wav", "--seconds", "30"], "none.wav: cannot be read"),
+    ],
+)
+def test_what_is_wrong_with_a_run_is_one_error(stage: str, words: list[str], message: str) -> None:
+    command, *options = words
+    result = omote(command, stage, "--no-face", *options)
+    assert result.exit_code == 1 and message in str(result.exception)
+
+
+def test_a_dry_run_says_when_there_is_no_robot(stage: str, tmp_path: Path) -> None:
+    assert omote("run", stage, "--dry-run").output == "This stage has no robot; nothing would be sent.\n"
+    report = tmp_path / "r.json"
+    played = omote("play", str(tmp_path / "a.tsv"), "--stage", stage, "--dry-run", "--report", str(report))
+    assert played.exit_code == 0, played.output
+    assert json.loads(report.read_text()) == {"format": 1, "stage": stage, "dry_run": True, "buses": []}
+    missing = omote("play", "none.tsv", "--stage", "everything", "--dry-run")
+    assert missing.exit_code == 1 and "none.tsv" in str(missing.exception)
+
+
+def test_a_dry_run_lists_every_channel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(console, "width", 250)
+    (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["head24"]\n')
+    text = omote("run", str(tmp_path / "stage.toml"), "--dry-run", "--seconds", "0.1").output
+    assert "dry run: no port was opened" in text and text.count("xl330-m288") == 24 and "neutral (deg)" in text

@@ -1,0 +1,277 @@
+"""controller.robot.busloop on simulated servos: what is sent before, between and after, and what never is."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from controller.base.parameters import PARAMETERS as P
+from controller.robot import busloop as module
+from controller.robot.buses import read_bus
+from controller.robot.busloop import BusLoop
+from controller.robot.settings import ChannelSettings, RuleSettings, TimingRule
+from drivers.base.errors import NoReply
+from drivers.sim import SimulatedBus
+
+JAW, YAW = P.index("jawOpen"), P.index("headYaw")
+TICKS = 4096 / 360
+
+
+def channel(name: str, servo: int, mix: str, deg: float) -> ChannelSettings:
+    return ChannelSettings.model_validate(
+        {
+            "name": name,
+            "bus": "b",
+            "id": servo,
+            "model": "xl330-m288",
+            "mix": {mix: 1.0},
+            "map": {"at": [-1, 1], "deg": [-deg, deg]},
+            "limit_deg": [-40, 40],
+            "max_speed_deg_s": 120,
+            "max_accel_deg_s2": 1200,
+        }
+    )
+
+
+CHANNELS = [channel("jaw", 1, "jawOpen", 30.0), channel("yaw", 2, "headYaw", 60.0)]
+
+
+class Face:
+    """The newest parameters, as the body hands them out."""
+
+    def __init__(self) -> None:
+        self.values, self.stamp = P.neutral(), 0
+
+    def __call__(self) -> tuple[np.ndarray, int]:
+        return self.values, self.stamp
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait by counting: a machine that stood still for a while is no fault of the program."""
+    for _ in range(2000):
+        if condition():
+            return
+        time.sleep(0.01)
+    raise AssertionError("waited in vain")
+
+
+def ticked(loop: BusLoop, count: int) -> None:
+    """Wait until the loop has begun so many more ticks."""
+    before = loop.clock.ticks
+    until(lambda: loop.clock.ticks >= before + count)
+
+
+def make(servos: SimulatedBus, face: Face, **more: Any) -> BusLoop:
+    table = {"name": "b", "kind": "dynamixel", "port": servos.path, "rate_hz": 50, "margin_s": 0.3}
+    return BusLoop(read_bus(table), CHANNELS, P, face, **more)
+
+
+@contextmanager
+def running(servos: SimulatedBus, face: Face, **more: Any) -> Iterator[BusLoop]:
+    loop = make(servos, face, **more)
+    loop.start()
+    try:
+        yield loop
+    finally:
+        loop.stop()
+
+
+@pytest.fixture
+def servos(tmp_path: Path) -> Iterator[SimulatedBus]:
+    with SimulatedBus([1, 2], link=tmp_path / "port") as bus:
+        yield bus
+
+
+def degrees(servos: SimulatedBus, servo: int) -> float:
+    return (servos.servo(servo).goal - 2048) / TICKS
+
+
+def test_servos_are_held_where_they_are_until_the_face_begins(servos: SimulatedBus) -> None:
+    servos.servo(1).place(2048 + 10 * TICKS)
+    servos.servo(2).place(2048 - 50 * TICKS)  # outside of its limits
+    face = Face()
+    face.values[JAW] = 1.0
+    with running(servos, face) as loop:
+        ticked(loop, 5)
+        assert loop._goals.period_s == pytest.approx(0.02) and loop.clock.period_ns == 20_000_000
+        assert degrees(servos, 1) == pytest.approx(10.0, abs=0.2)
+        until(lambda: abs(degrees(servos, 2) + 40.0) < 0.2)
+        assert loop.report()["face_difference"] == {} and loop.held == 0
+        loop.begin()
+        until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
+        until(lambda: abs(degrees(servos, 2)) < 0.2)
+        state = loop.measured()
+        assert state is not None and loop.error is None
+    assert not servos.servo(1).torque and not servos.servo(2).torque
+
+
+def test_the_report_counts_commands_limits_rules_and_differences(servos: SimulatedBus) -> None:
+    face = Face()
+    face.values[[JAW, YAW]] = 1.0
+    face.stamp = time.monotonic_ns()
+    rule = TimingRule(channels=["jaw"], toward="high", extreme=0.1, hold_s=0, fall_s=0.1, rest_s=60, recover_s=1)
+    with running(servos, face, rules=RuleSettings(timing=[rule])) as loop:
+        loop.begin()
+        until(lambda: bool(loop.report()["rules"]))
+        ticked(loop, 5)
+        report = loop.report()
+    assert report["name"] == "b" and report["servos"] == 2 and report["fault"] is None
+    assert 0 < report["channels_held_at_limit"] <= loop.held  # type: ignore[operator]  # the yaw wants 60 of 40 degrees
+    assert loop.latency_ms.count == 1  # one command, however many cycles show it
+    assert report["command_to_wire_ms"]["max"] > 0.0  # type: ignore[index]
+    assert report["rules"][0]["rule"] == "timing jaw toward high"  # type: ignore[index]
+    assert set(report["face_difference"]["regions_rms_deg"]) == {"jaw", "head"}  # type: ignore[index]
+    assert report["bus"]["errors"] == {}  # type: ignore[index]
+
+
+def test_servos_are_led_to_the_neutral_face_before_they_go_limp(servos: SimulatedBus) -> None:
+    face = Face()
+    face.values[JAW] = 1.0
+    with running(servos, face) as loop:
+        loop.begin()
+        until(lambda: servos.servo(1).position_ticks > 2048 + 29 * TICKS)
+    assert servos.servo(1).position_ticks == pytest.approx(2048, abs=2 * TICKS)
+    assert not servos.servo(1).torque
+
+
+def test_nothing_is_sent_while_a_pose_is_not_known(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A servo that came up and then keeps silent: where it is is not known, so no goal is safe."""
+    servos.servo(1).place(2048 + 20 * TICKS)
+    loop = make(servos, Face())
+    real = loop.bus.start
+
+    def start() -> None:
+        real()
+        servos.fault("silent:1")  # it would obey, but does not answer
+
+    def close() -> None:
+        servos.clear()  # so that the motors are confirmed off
+        shut()
+
+    shut, sent = loop.bus.close, []
+    monkeypatch.setattr(loop.bus, "start", start)
+    monkeypatch.setattr(loop.bus, "close", close)
+    monkeypatch.setattr(loop.bus, "write", sent.append)
+    monkeypatch.setattr(module, "_READS", 3)
+    with pytest.raises(NoReply, match="the position of jaw is not known") as caught:
+        loop.start()
+    assert "yaw" not in str(caught.value) and caught.value.hint
+    assert loop._thread is None and sent == []
+    assert not servos.servo(1).torque
+    with running(servos, Face()):  # the port was given back
+        pass
+
+
+def test_a_single_missed_answer_is_asked_for_again(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = make(servos, Face())
+    real = loop.bus.start
+
+    def start() -> None:
+        real()
+        servos.fault("drop:1:count=1")
+
+    monkeypatch.setattr(loop.bus, "start", start)
+    loop.start()
+    loop.stop()
+    assert loop.error is None
+
+
+def test_a_lost_port_comes_back_and_motion_goes_on_from_the_measured_pose(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(module, "_RETRY_NS", 50_000_000)
+    face = Face()
+    with running(servos, face) as loop, caplog.at_level(logging.WARNING):
+        loop.begin()
+        ticked(loop, 3)
+        servos.fault("unplug:for=0.3s")
+        until(lambda: loop._retry_ns is not None)
+        servos.servo(1).put("Torque Enable", 0)
+        servos.servo(1).place(2048 - 25 * TICKS)
+        before = loop._goals.sent[0]
+        until(lambda: loop._retry_ns is None)
+        assert before == pytest.approx(0.0, abs=0.01)
+        first = loop._goals.sent[0]
+        assert first < np.radians(-2.0)  # not a jump back to 0, whatever little of the ramp is over
+        until(lambda: abs(degrees(servos, 1)) < 0.2)
+        assert loop.error is None
+    messages = [record.getMessage() for record in caplog.records]
+    assert any("trying again every 0.05 s" in message for message in messages)
+    assert sum("is not back" in message for message in messages) <= 1  # one reason is logged once
+    assert sum(message == "bus b is back" for message in messages) == 1
+
+
+def test_no_goal_is_sent_after_a_failed_reconnect(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The port is back and takes goals, but one servo does not say where it is: nothing may move."""
+    monkeypatch.setattr(module, "_RETRY_NS", 20_000_000)
+    monkeypatch.setattr(module, "_READS", 2)
+    face, attempts = Face(), []
+    with running(servos, face) as loop, caplog.at_level(logging.WARNING):
+        loop.begin()
+        ticked(loop, 3)
+        real = loop.bus.reconnect
+
+        def reconnect() -> None:
+            servos.clear("silent")
+            real()
+            attempts.append(degrees(servos, 1))
+            if len(attempts) <= 3:
+                servos.fault("silent:2")
+
+        monkeypatch.setattr(loop.bus, "reconnect", reconnect)
+        writes: list[int] = []
+        write = loop.bus.write
+        monkeypatch.setattr(loop.bus, "write", lambda angles: (writes.append(len(attempts)), write(angles))[1])
+        face.values[JAW] = 1.0
+        servos.fault("unplug:for=0.2s")
+        until(lambda: loop._retry_ns is not None)
+        until(lambda: len(attempts) == 4)
+        until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
+        assert set(writes) <= {0, 4}  # none between the loss and the attempt that succeeded
+        assert loop.error is None
+    assert any("bus b is not back: bus b: the position of yaw" in record.getMessage() for record in caplog.records)
+
+
+def test_a_limp_bus_is_only_read(servos: SimulatedBus) -> None:
+    face = Face()
+    face.values[JAW] = 1.0
+    goal = servos.servo(1).goal
+    with running(servos, face, limp=True) as loop:
+        loop.begin()
+        assert not servos.servo(1).torque
+        servos.servo(1).place(2048 + 15 * TICKS)
+        until(lambda: (state := loop.measured()) is not None and state.position_rad[0] > np.radians(14.0))
+        assert servos.servo(1).goal in (goal, 2048) and not servos.servo(1).torque
+    assert servos.servo(1).position_ticks == pytest.approx(2048 + 15 * TICKS, abs=2)  # nothing led it to rest
+
+
+def test_a_limp_bus_that_measures_nothing_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    table = {"name": "b", "kind": "simulated", "simulates": "text", "template": "{us}\n"}
+    loop = BusLoop(read_bus(table), [CHANNELS[0].model_copy(update={"model": "rc-180"})], P, Face(), limp=True)
+    with caplog.at_level(logging.WARNING):
+        loop.start()
+    loop.stop()
+    assert "does not measure its servos" in caplog.text
+
+
+def test_an_error_of_the_loop_is_kept_and_the_servos_are_switched_off(servos: SimulatedBus) -> None:
+    def newest() -> tuple[np.ndarray, int]:
+        raise RuntimeError("mine")
+
+    loop = make(servos, newest)  # type: ignore[arg-type]
+    loop.start()
+    assert servos.servo(1).torque
+    loop.begin()
+    until(lambda: loop.error is not None)
+    loop.stop()
+    assert str(loop.error) == "mine" == loop.report()["fault"]
+    assert not servos.servo(1).torque
