@@ -116,15 +116,24 @@ class Registry(Generic[P]):
         module, _, name = reference.partition(":")
         mine = f"{self.what} {plugin.kind!r}"
         try:
-            found = import_module(module)
-        except ModuleNotFoundError as error:
-            raise self._missing(mine, plugin, error.name or module) from error
+            with self.importing(plugin):
+                found = import_module(module)
+        except PluginError:
+            raise
         except (Exception, SystemExit) as error:  # whatever a module of another package raises
             raise PluginError(f"{mine}: {module} cannot be loaded: {_describe(error)}", hint=_UPDATE) from error
         try:
             return attrgetter(name)(found)
         except AttributeError as error:
             raise PluginError(f"{mine} names {reference}, and there is nothing of that name", hint=_UPDATE) from error
+
+    @contextmanager
+    def importing(self, plugin: P) -> Iterator[None]:
+        """Context of imports for a plug-in; raises PluginError that says what to install where a module is missing."""
+        try:
+            yield
+        except ModuleNotFoundError as error:
+            raise self._missing(f"{self.what} {plugin.kind!r}", plugin, error.name or "a module") from error
 
     @contextmanager
     def blaming(self, kind: str) -> Iterator[None]:

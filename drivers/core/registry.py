@@ -75,7 +75,8 @@ def driver_of(kind: str, servos: Sequence[ServoSpec]) -> type[WireBus]:
             raise
         raise PluginError(str(error), hint=f"use one of: {', '.join(sorted([*known, SIMULATED]))}") from error
     driver: Any = FAMILIES.load(family, family.driver)
-    chosen: type[WireBus] = driver if isinstance(driver, type) else driver(servos)
+    with FAMILIES.importing(family):
+        chosen: type[WireBus] = driver if isinstance(driver, type) else driver(servos)
     return chosen
 
 

@@ -63,7 +63,7 @@ def test_ports_are_a_table_with_hints_below(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(ports_module, "list_ports", list)
     assert said("ports").startswith("No serial port found. Plug the adapter in, or try: omote simulate")
     device, by_id, hint = "/dev/ttyX", "/dev/by-id/x", "sudo usermod"
-    record = ports_module.PortRecord(device, by_id, "0403:6014", "FT1", "adapter", True, False, 0.016, hint)
+    record = ports_module.PortRecord(device, by_id, "0403:6014", "FT1", "adapter", False, 0.016, hint)
     monkeypatch.setattr(ports_module, "list_ports", lambda: [record])
     text = said("ports")
     for word in ("/dev/by-id/x", "0403:6014", "FT1", "adapter", "no", "16 ms", "/dev/ttyX: sudo usermod"):

@@ -19,7 +19,7 @@ from controller.layers.commands import CommandState
 from controller.robot.robot import load_robot
 from controller.stage.dry_run import OfflineRun, dry_run
 from controller.stage.stage import load_stage
-from controller.takes.recording import Recorder
+from controller.takes.recording import recorded
 
 
 def stage_file(tmp_path: Path, text: str = "") -> Path:
@@ -171,7 +171,7 @@ def test_time_at_a_limit_of_position_is_told_on_both_sides(tmp_path: Path, side:
 
 def test_a_recording_is_played_from_its_first_face(tmp_path: Path) -> None:
     stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
-    with Recorder(stage.state(PARAMETERS), tmp_path / "a.rec") as state:
+    with recorded(stage.state(PARAMETERS), tmp_path / "a.rec") as state:
         for i in range(150):
             if i == 50:
                 state.set_parameters([PARAMETERS.index("jawOpen")], [1.0], 10**9 + i * 10_000_000)

@@ -121,7 +121,7 @@ def test_each_servo_is_switched_off_by_itself() -> None:
         data = sent_by(rig)
         bus.stop()
         assert bytes(data) == b"D1\nD2\nD7\n" * 2
-    assert rig.line.told == {1: None, 2: None, 7: None}
+    assert rig.line.values == {1: None, 2: None, 7: None}
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_answers_of_others_are_stray_and_impossible_ones_corrupt() -> None:
         bus.read()
         assert bus.report().stray > 0
         assert bus.report().errors == {}
-        rig.line.answer = lambda packet, now_s: [(2, b"2=1900\n")] if packet.what == "query" else []  # type: ignore[method-assign]
+        rig.line.answer = lambda packet, now_s: [(2, b"2=1900\n")] if packet.kind == "query" else []  # type: ignore[method-assign]
         before = bus.read().position_rad
         assert bus.report().errors_by_servo[2]["corrupt"] >= 1
         np.testing.assert_allclose(before, 0.0, atol=1e-9)
