@@ -133,8 +133,6 @@ class DCPSurface(ControlPoints):
     ) -> Mesh:
         """A watertight mesh by quad tree (paper, 2.3).
 
-        Parameters
-        ----------
         max_points : quarter cells until at most so many control points reach each
         chord_error : quarter cells until the surface is this near to their chords, in units of the points;
             if neither limit is given, a thousandth of the size of the control net

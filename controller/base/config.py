@@ -46,8 +46,6 @@ def read_toml(path: Path) -> dict[str, Any]:
 def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
     """Read ``path`` as ``model``.
 
-    Parameters
-    ----------
     cross_check : returns the faults between values, such as unknown names; of a file that does not fit the model it
         gets the part that does.
 

@@ -47,8 +47,6 @@ def _umask() -> int:
 def format_fault(found: object, newest: int) -> str | None:
     """What is wrong with the version that a file states; None when this omote reads it.
 
-    Parameters
-    ----------
     found : what the file states; it grows when older readers could misread a file. newest : the newest known version.
     """
     if isinstance(found, bool) or not isinstance(found, int) or found < 1:

@@ -28,8 +28,6 @@ class Mailbox:
 
     Create one with :meth:`create`, open it elsewhere with ``Mailbox(path, count)``.
 
-    Parameters
-    ----------
     path : the mapped file.
     count : length of the vector.
     """

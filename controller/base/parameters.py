@@ -37,8 +37,6 @@ _ARRAYS = ("low", "high", "full_scale_rad", "max_speed", "max_acceleration", "ma
 class Parameters:
     """The registry of parameters; all arrays are (P,) float64 and read-only.
 
-    Attributes
-    ----------
     names : canonical names, in the order of the vectors.
     regions : region of each parameter, one of :data:`REGIONS`.
     low, high : range of each parameter.

@@ -19,8 +19,6 @@ Loc = tuple[str | int, ...]
 class PartialConfig(Generic[Model]):
     """The part of a ``table`` that fits ``model`` although the whole does not.
 
-    Attributes
-    ----------
     read : that part as ``model``; None where too little is left.
     """
 

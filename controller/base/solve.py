@@ -125,8 +125,6 @@ def _descend(
 class BoundedSolver:
     """Solves for one matrix and many right-hand sides.
 
-    Parameters
-    ----------
     matrix : (m, n) float64. low, high : (n,) bounds.
     weights : (m,) how much each row counts; all alike without.
     ridge : L2 penalty, which decides what the rows leave open. sparsity : L1 penalty.

@@ -12,8 +12,6 @@ from controller.body.sources import Voice
 class RunOptions:
     """Options of a run besides its stage.
 
-    Attributes
-    ----------
     take : a take or recording to play instead of the links. voice : a voice that moves the mouth.
     mirror : leave the servos limp; the face shows where somebody moves them. record : file for every command and tick.
     """

@@ -27,8 +27,6 @@ _CHUNK = 4096
 class Voice:
     """Where a voice comes from.
 
-    Attributes
-    ----------
     path : file, named pipe or device with WAV of PCM; ``-`` for standard input.
     raw_hz : samples per second of signed 16 bit mono PCM without a header; None for WAV.
     alone : nothing else plays: its end is the end of the run. pipe : carries standard input to the body's process.
@@ -98,8 +96,6 @@ def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
 class Sources:
     """Everything that writes to the layers before they are mixed.
 
-    Parameters
-    ----------
     state : the layers. player : plays a take. follow : the face of a limp head. voice : a voice to listen to.
     beside : the take plays beside the links, and its end is not the end of the run.
     """

@@ -39,8 +39,6 @@ def head_indices(parameters: Parameters, wanted: Sequence[str]) -> NDArray[np.in
 class HeadValues:
     """Selects a head's parameters from the full vector that a mailbox holds; names that omote does not know stay 0.
 
-    Attributes
-    ----------
     full : (p,) float64, the full vector of the last call.
     values : (h,) float64, those of the head.
     """
@@ -59,8 +57,6 @@ class HeadValues:
 class Recorder:
     """Keeps a few small pictures of a run, for a clip and a contact sheet.
 
-    Parameters
-    ----------
     clip_hz : pictures per second in the clip. height : height of the kept pictures (pixels).
     most : pictures kept. A longer run keeps every second one, then every fourth, and so on.
     """

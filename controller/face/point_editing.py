@@ -78,8 +78,6 @@ class PointEditor:
 
     It samples a copy of the head, in a thread of its own, once somebody wants to take a point.
 
-    Parameters
-    ----------
     head : the head that is drawn; sculpting moves its control points. copy : loads the same head again.
     """
 

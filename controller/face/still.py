@@ -27,8 +27,6 @@ from surface.view.pictures.sheet import contact_sheet, write_png
 class Still:
     """A picture to draw.
 
-    Attributes
-    ----------
     values : (p,) float64, the full parameter vector. size : width and height (pixels). look : theme, camera and so on.
     head : folder of the head. identity : its variations, by name. groups : group files and their amounts.
     vocabulary : the named expressions.

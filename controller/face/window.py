@@ -34,8 +34,6 @@ _CALM_S = 0.6
 class WindowFace:
     """Draws the head in a window until it is closed.
 
-    Parameters
-    ----------
     head : the head to draw. settings : size, quality and camera. values : returns the head's newest values.
     send : sends the panel's requests to the body. panel_state : see :class:`Panel`.
     copy : loads the head again, for dragging points with the mouse; without, none can be dragged.

@@ -46,9 +46,7 @@ class Player(Protocol):
 class CommandSink(Protocol):
     """What a link may ask of the face. ``stamp_ns`` is when the command arrived (monotonic clock, ns).
 
-    Attributes
-    ----------
-    parameters : the registry. vocabulary : the named expressions. shows : plays scripts; None where none can be.
+    vocabulary : the named expressions. shows : plays scripts; None where none can be.
     """
 
     parameters: Parameters
@@ -110,7 +108,6 @@ class CommandState:
 
     Parameters
     ----------
-    parameters : the registry.
     vocabulary : the named expressions; the shipped ones without.
     layers : the layers; the shipped ones without. Must have those of :data:`controller.layers.settings.NEEDED`.
     life : settings of idle motion; the natural ones without. seed : the same seed gives the same idle motion.

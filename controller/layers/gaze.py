@@ -75,8 +75,6 @@ class Gaze:
     def update(self, present: Floats, eyes_rad: Pair = (0.0, 0.0), head_rad: Pair = (0.0, 0.0)) -> Floats:
         """Values (6,) for :attr:`indices`.
 
-        Parameters
-        ----------
         present : (P,) parameters the face shows now.
         eyes_rad, head_rad : yaw and pitch of idle motion, added to the direction of the eyes and to the head.
         """

@@ -99,7 +99,7 @@ class IdleMotion:
 
     Parameters
     ----------
-    parameters : the registry. settings : rates and sizes. seed : the same seed gives the same motion.
+    settings : rates and sizes. seed : the same seed gives the same motion.
 
     Attributes
     ----------
@@ -134,8 +134,6 @@ class IdleMotion:
     def update(self, now_s: float, *, looking: bool, blink_block: float = 0.0, gaze_block: float = 0.0) -> Floats:
         """Move to ``now_s``; returns :attr:`values`.
 
-        Parameters
-        ----------
         looking : something is looked at: micro-saccades instead of glances, and no eye angles in ``values``.
         blink_block, gaze_block : how much an expression holds back blinks and glances, 0..1.
         """

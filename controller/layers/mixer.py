@@ -27,8 +27,6 @@ _SHORTEST_S = 1e-9
 class LayerSettings:
     """Name, priority and timing of a layer; :class:`controller.layers.settings.LayerTable` checks those of files.
 
-    Attributes
-    ----------
     name : unique name. priority : higher goes over lower. mode : how it joins what lies below.
     weight : 0..1. fade_in_s, fade_out_s : times to take and to give back a parameter.
     timeout_s : a parameter not written for so long is released; infinity keeps it.
@@ -48,8 +46,6 @@ class LayerSettings:
 class Layer:
     """The values of one source in a :class:`Mixer`; all arrays are rows of the mixer's, (P,) each.
 
-    Attributes
-    ----------
     values : latest values. held : which parameters the source has given and not released.
     gain : factor on the values, for instance per region.
     share : factor on the weight, for what blocks or fades the layer.
@@ -131,9 +127,7 @@ class _Table:
 class Mixer:
     """Mixes layers into one (P,) vector.
 
-    Parameters
-    ----------
-    parameters : the registry. layers : what layers there are; order in priority, not in the list.
+    layers : what layers there are; order in priority, not in the list.
 
     Raises ValueError: two layers of one name. ParameterError: gains of a region that is none.
     """

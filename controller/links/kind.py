@@ -23,8 +23,6 @@ API = 1
 class LinkContext:
     """Where the commands of a link go, and what it may use.
 
-    Attributes
-    ----------
     sink : where accepted commands go, with the time they arrived.
     closers : gets what closes the link and all that was started with it; called in reverse order.
     vocabularies : files of further expressions that the stage names. beside : the stage's file.
@@ -47,8 +45,6 @@ class Link(Protocol):
 class LinkKind:
     """A kind of link.
 
-    Attributes
-    ----------
     api : version of the registry it is made for; see :data:`API`.
     kind : its name in stages. title : its name for people.
     settings : dataclass of its options in a stage (:mod:`drivers.base.options`). It may have a method ``check()``

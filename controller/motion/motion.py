@@ -34,8 +34,6 @@ def minimum_jerk(t: float) -> float:
 class Envelope:
     """Level 0..1 of something that rises, holds and falls along minimum-jerk curves.
 
-    Attributes
-    ----------
     start_s : when it begins. onset_s : time to rise. hold_s : time at 1. offset_s : time to fall.
     """
 

@@ -38,8 +38,6 @@ _LEAST_LIKE_MM = 0.5
 class SkinSamples:
     """Points of one head's skin and how every shape moves them.
 
-    Attributes
-    ----------
     part : the part of the head they lie on. uv : (m, 2). rest : (m, 3) mm.
     moves : (m, 3, s, levels) mm that each of ``s`` shapes adds on each quarter of its way from 0 to 1.
     jaw : (m,) how much of the lower jaw's motion each follows, 0..1.
@@ -149,8 +147,6 @@ def _falloff(points: SkinSamples, centre: Floats, jaw: float, reach_mm: float) -
 class PullRows:
     """The equations to fit: the displacement of some points of the skin along some directions, ``r`` of them.
 
-    Attributes
-    ----------
     point, anchor : (r,) indices of the point and of the anchor. direction : (r, 3) unit direction of that anchor.
     """
 
@@ -179,8 +175,6 @@ class PullRows:
 class AnchorSolver:
     """Solves the pulls of all anchored channels of a robot for a face; returns those of ``names``.
 
-    Attributes
-    ----------
     names : the channels whose pulls it returns. linear : (k, p) mm per unit of each parameter, roughly.
     skin : m points; the first k are the anchors. field : (3 m, k) see :func:`servo_field`.
     """

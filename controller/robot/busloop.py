@@ -43,8 +43,6 @@ _AT_REST_RAD = 0.02
 class BusLoop:
     """Drives the channels of one bus until it is stopped.
 
-    Parameters
-    ----------
     settings : the bus. channels : its channels, one for each servo. parameters : those that the mixes name.
     newest : returns the newest parameter vector (p,) float64 and the time (monotonic ns) at which its command arrived,
         0 for none.

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 class PiecewiseLinear:
     """``n`` functions made of straight pieces, constant on either side of them.
 
-    Attributes
-    ----------
     start : (n,) first value. knots : (n, k) where each piece begins. widths : (n, k) its length, 0 where a function has
     fewer pieces. slopes : (n, k).
     """
@@ -58,8 +56,6 @@ class PiecewiseLinear:
 class Terms:
     """Terms of mixes that are more than a weight, ``t`` of them, those of one channel together.
 
-    Attributes
-    ----------
     parameter, channel : (t,) input and output of each. curves : t functions.
     first : (j,) where each channel's terms begin; target : (j,) the channels. join : (j,) 0 sum, 1 min, 2 max.
     """
@@ -89,8 +85,6 @@ class Terms:
 class ChannelTable:
     """``n`` channels over ``p`` parameters; angles in radians from each servo's centre.
 
-    Attributes
-    ----------
     names : the channels, in order. mix : (n, p) weights of the parameters.
     curves : n functions from mix to angle, the calibrated points. low_rad, high_rad : (n,) limits of position.
     max_speed_rad_s, max_accel_rad_s2, max_jerk_rad_s3 : (n,) limits of motion; infinite jerk for no limit.

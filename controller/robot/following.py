@@ -77,8 +77,6 @@ class Mirror:
     A servo head shows fewer things than a face, so many faces have one pose; the one with few and small values is
     taken. The eyes are read as eye angles, never as eyeLook shapes.
 
-    Attributes
-    ----------
     readable : (n,) bool, the channels that can be inverted; one whose map turns back or is flat cannot.
     """
 
@@ -141,8 +139,6 @@ def _is_monotonic(steps: Floats) -> bool:
 class MeasuredFace:
     """The face that the measured positions of all servos show, whatever moved them; may be read from any thread.
 
-    Parameters
-    ----------
     tables : the channels of each bus. measured : returns the newest measurement of each, None before the first.
     following : the statistics of each bus.
     """

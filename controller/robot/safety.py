@@ -29,8 +29,6 @@ _NEAR_RAD = 1e-3
 class RuleInput:
     """Inputs of the rules in one cycle, the last of ``dt`` s.
 
-    Attributes
-    ----------
     target, position, rest : (n,) rad: the targets, the last goals, and where the servos would come to rest if they
     braked from the next step on. state : the newest measurement.
     """
@@ -252,8 +250,6 @@ class Guard:
     def apply(self, target: Floats, position: Floats, rest: Floats, state: BusState | None, dt: float) -> Floats:
         """Angles (n,) rad that the servos may be sent, inside the limits and every rule.
 
-        Parameters
-        ----------
         target : (n,) rad, what the face asks for. position : (n,) rad, the last goals.
         rest : (n,) rad, where they would come to rest; see :meth:`controller.motion.motion.MotionLimiter.rest`.
         state : the newest measurement. dt : s.
@@ -275,8 +271,6 @@ class Guard:
 class GoalFilter:
     """Turns the angles wanted of one bus's channels into goals: safety rules first, then limits of motion.
 
-    Parameters
-    ----------
     channels : those of the bus. rules, anchors : of the robot. period_s : of the bus.
     """
 

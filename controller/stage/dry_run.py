@@ -56,8 +56,6 @@ def dry_run(
 class OfflineRun:
     """Runs a robot from the layers to the goals of its servos, faster than real time.
 
-    Parameters
-    ----------
     robot : its channels, on any number of buses. state : the layers. feed : writes to them what is due.
     control_hz : ticks of the layers per second. anchors : solver of the robot's anchored channels.
     """

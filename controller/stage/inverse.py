@@ -43,8 +43,6 @@ class PointSolver:
     Most shapes move the skin along straight lines; where they do not (jaw, lids) the solve is repeated with the slopes
     at the face that was found.
 
-    Parameters
-    ----------
     skin : m points. order : see :func:`controller.robot.anchors.head_order`. parameters : all of them, p.
     sparsity : prefers few parameters; mm^2 per unit. weights : (m,) how much each point counts; 1 without.
     start : (p,) parameters to begin from; neutral without.
@@ -105,8 +103,6 @@ class PointSolver:
 class GroupMoves:
     """Control points of one part that move together: what a head calls a group.
 
-    Attributes
-    ----------
     part : the part. ids : (k,) int32 control points. moves : (k, 3) mm per unit.
     """
 
@@ -124,9 +120,7 @@ class SculptSolver:
 
     B being the rational basis at the points. More fairness spreads a pull wider.
 
-    Parameters
-    ----------
-    head : the head. part : one of its skin parts. fairness : relative to the size of the moves.
+    part : one of its skin parts. fairness : relative to the size of the moves.
     """
 
     def __init__(self, head: Head, part: str = "face", *, fairness: float = 10.0) -> None:

@@ -99,8 +99,6 @@ class StageSettings(Settings):
 class Stage:
     """A stage with everything it refers to found and checked.
 
-    Attributes
-    ----------
     path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
     layers : the layers. life : settings of idle life. groups : group files added to the head, each with its amount.
     """

@@ -34,8 +34,6 @@ _HINT = "a Live Link Face take begins with the line Timecode,BlendShapeCount,Eye
 class Take:
     """A recorded take.
 
-    Attributes
-    ----------
     name : file name. times_s : (n,) float64, from 0, rising. values : (n, P) float64, normalised but not clipped.
     mask : (P,) bool, which parameters the take drives. low, high : (P,) range that :meth:`sample` keeps to.
     through : (P,) how much of the layers below shows through, 0..1; None for nothing.
@@ -55,9 +53,6 @@ class Take:
     ) -> Take:
         """Read a CSV take.
 
-        Parameters
-        ----------
-        path : the file. parameters : the registry.
         swap_jaw_mouth_lr : swap the labels left and right of jaw and mouth, which the format has the wrong way round.
         use_eye_angles : take the eyes from the eye angle columns, not from the eyeLook columns, where both carry data.
 

@@ -22,8 +22,6 @@ API = 1
 class TakeReader:
     """One sort of files.
 
-    Attributes
-    ----------
     api : version of the registry it is made for; see :data:`API`.
     kind : a short name. title : the name of such files for people.
     suffixes : how their names end, in small letters; no two readers share one.

@@ -66,7 +66,7 @@ class VoiceEnvelope:
 
     Parameters
     ----------
-    parameters : the registry. rate_hz : samples per second.
+    rate_hz : samples per second.
 
     Attributes
     ----------

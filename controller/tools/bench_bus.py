@@ -83,8 +83,6 @@ class Figure:
 class Loop:
     """Measurements of a loop of one write and one read.
 
-    Attributes
-    ----------
     rate_hz : cycles per second in which every servo answered. processor : share of a core that the thread used.
     cycle_ms : wall time of one write and one read. late_ms : how late each tick began; empty where nothing was paced.
     """

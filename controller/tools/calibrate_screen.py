@@ -43,8 +43,6 @@ class Marks:
 class CalibrationScreen:
     """State of a calibration, from key presses to the captured angles.
 
-    Attributes
-    ----------
     channels : n channels. measures : whether their servos measure their position; others are moved by keys alone.
     margin_deg : kept away from the captured ends, so that nothing is driven into its stop.
     angle_deg : (n,) newest angles, NaN where not known. target_deg : (n,) where the servos shall hold.

@@ -155,8 +155,6 @@ class BusView:
 
     ``tap`` may be called from any thread and only stores the bytes; decoding and drawing happen in :meth:`run`.
 
-    Parameters
-    ----------
     title : of the view. rows : returns one mapping for each servo, values by column. decoder : of the bus's protocol.
     console : to print to; where it is no terminal, lines are printed as they come. lines : lines of traffic shown.
     """

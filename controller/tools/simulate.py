@@ -36,8 +36,6 @@ from drivers.sim.wire.simulator import Setting, Simulator, make_line, simulator_
 class Serving:
     """Options of a server.
 
-    Attributes
-    ----------
     link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT`` to listen at instead.
     wire : bytes take the time they take at the baud rate. latency_s : latency timer of a USB adapter, added to it.
     faults : faults to inject, see docs/simulated-buses.md. control : path of a socket that takes faults while it runs.

@@ -48,8 +48,6 @@ class StageRun:
 
     Finds and checks the stage and the take of ``options``; raises before anything is opened.
 
-    Parameters
-    ----------
     name : of the stage, or its file. identity : replaces the stage's own. look : command-line options over its picture.
     status : called with what is being done, in a few words. preloaded : the body's process, if it was started already.
     """

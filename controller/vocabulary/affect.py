@@ -34,8 +34,6 @@ class _File(Settings):
 class Affect:
     """The space of moods of one file.
 
-    Parameters
-    ----------
     names : expressions at the anchors, ``neutral`` first. points : (n, 3) their valence, arousal and dominance.
     faces : (n, P) their parameters.
     """

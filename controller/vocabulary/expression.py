@@ -25,8 +25,6 @@ _Override = Literal["keep", "block", "blend"]
 class Expression:
     """One named expression.
 
-    Attributes
-    ----------
     name : canonical name. kind : ``"emotion"``, ``"gesture"`` or ``"user"``. source : where it comes from.
     weights : (P,) float64, the parameters at intensity 1; read-only.
     onset_s, offset_s : times to rise and to fall.

@@ -22,9 +22,7 @@ _RIDGE, _SPARSITY = 1e-4, 2e-3
 class Readings:
     """Says what a face shows; can be called from any thread.
 
-    Parameters
-    ----------
-    parameters : the registry. expressions : the named ones.
+    expressions : the named ones.
     """
 
     def __init__(self, parameters: Parameters, expressions: Vocabulary) -> None:

@@ -36,8 +36,6 @@ class _File(Settings):
 class Visemes:
     """The visemes of one file, in wire order.
 
-    Attributes
-    ----------
     names : of the n visemes. matrix : (P, n) float64, parameters of each at full weight.
     hold : (n,) how firmly each keeps its shape, 0..1. duration : (n,) relative lengths.
     through : (P,) how much of the face below shows through speech; 1 where no viseme moves a parameter.

@@ -24,9 +24,7 @@ _MOOD = re.compile(r"(VAD?):(.*)", re.IGNORECASE)
 class Vocabulary:
     """Expressions by name, or by a formula: ``AU1+2+5B``, ``VA:0.6,-0.2`` or ``VAD:-0.5,0.6,0.3``.
 
-    Parameters
-    ----------
-    parameters : the registry. expressions : the named expressions, in file order; moods are blended from them.
+    expressions : the named expressions, in file order; moods are blended from them.
     aliases : folded other names to canonical ones.
     """
 

@@ -35,8 +35,6 @@ Bytes = NDArray[np.uint8]
 class ServoSpec:
     """Configuration of one servo.
 
-    Parameters
-    ----------
     id : number on the bus, 0 to 252.
     name : its name in messages, for example ``"jaw"``.
     model : vendor model name in any case, for example ``"xl330-m288"``.
@@ -48,9 +46,7 @@ class ServoSpec:
     pulse_us : calibrated (angle rad, pulse us) of a hobby servo, two or more; empty: those of the model.
     wire_name : its name on a wire that sends names; empty: ``name``.
 
-    Raises
-    ------
-    ValueError : a value is not finite, empty or out of order; the message names it.
+    Raises ValueError: a value is not finite, empty or out of order; the message names it.
     """
 
     id: int
@@ -96,8 +92,6 @@ class ServoInfo:
 class BusState:
     """State of every servo after one read. All arrays are read-only, shape ``(n,)``.
 
-    Attributes
-    ----------
     time_s : monotonic clock when the read ended.
     position_rad : last good position; NaN before the first one.
     velocity_rad_s, current_a : from the same reply; NaN where the model does not measure it.
@@ -129,8 +123,6 @@ class BusState:
 class BusReport:
     """Counters since the bus was opened.
 
-    Attributes
-    ----------
     cycles, writes : reads and writes done.
     errors : count by kind: ``no_reply``, ``corrupt``, ``refused``, ``alert``, ``torque_lost``, ``watchdog``,
         ``reset`` (a servo lost its settings, as after a dip of its supply), ``port_lost``, ``unkept`` (no dead man's
@@ -179,9 +171,7 @@ class Bus(ABC):
     ----------
     servos : the servos in the order of all arrays.
 
-    Raises
-    ------
-    ValueError : no servo, or two with one id.
+    Raises ValueError: no servo, or two with one id.
 
     Attributes
     ----------

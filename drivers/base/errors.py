@@ -8,8 +8,6 @@ from collections.abc import Mapping
 class DriverError(Exception):
     """Something that a driver cannot do.
 
-    Parameters
-    ----------
     message : what failed, on which port and servo, and why.
     hint : the next thing to type or do; may be empty.
     port : device path, where one is concerned.

@@ -18,8 +18,6 @@ from drivers.base.errors import DriverError
 class Option:
     """Help and limits of one option.
 
-    Attributes
-    ----------
     help : one sentence for people.
     at_least, at_most : limits of a number, both allowed; above : lower limit of a number, itself not allowed.
     choices : the only texts allowed. longest : characters of a text at most.
@@ -40,8 +38,6 @@ REQUIRED: Any = MISSING
 def option(help: str, default: Any = None, **limits: Any) -> Any:
     """A field of a dataclass of options.
 
-    Parameters
-    ----------
     help : one sentence for people.
     default : None where the plug-in's own default applies; :data:`REQUIRED` where a value must be given.
     limits : further fields of :class:`Option`.

@@ -29,8 +29,6 @@ log = logging.getLogger(__name__)
 class Plugin(Protocol):
     """Fields of every definition.
 
-    Attributes
-    ----------
     api : version of the registry it is made for. kind : its name in files and commands.
     install : argument of ``pip install`` where a package that it needs is missing; empty: the package's own name.
     """
@@ -53,8 +51,6 @@ class Registry(Generic[P]):
     A plug-in that cannot be loaded affects no other: :meth:`all` leaves it out and logs it once, and :meth:`get` raises
     what went wrong. Another package cannot replace a built-in kind.
 
-    Parameters
-    ----------
     sort : the dataclass of their definitions.
     what : name of one in messages, as ``"bus kind"``.
     group : entry points of other packages, as ``"omote.drivers"``.

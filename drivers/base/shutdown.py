@@ -29,10 +29,8 @@ SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP"
 def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
     """Context manager that runs ``stop``, as ``bus.close``, exactly once, however the context is left.
 
-    Raises
-    ------
-    KeyboardInterrupt : on SIGINT, after ``stop`` ran.
-    SystemExit : on SIGTERM and SIGHUP with code 128 + signal, after ``stop`` ran.
+    Raises KeyboardInterrupt: on SIGINT, after ``stop`` ran. SystemExit: on SIGTERM and SIGHUP with code 128 + signal,
+    after ``stop`` ran.
 
     Notes
     -----

@@ -35,7 +35,6 @@ class BoardBus(WireBus):
 
     Parameters
     ----------
-    servos : the servos in the order of all arrays.
     port : device path, or URL; or a :class:`~drivers.sim.serving.virtual.VirtualLink`, with its clock.
     baud : rate of the port.
     margin_s : longest wait for an answer beyond its time on the wire; None: by the kind of the port.

@@ -58,13 +58,9 @@ def check_hobby(model: str) -> None:
 class PulseScale:
     """Conversion between angles and pulses of n hobby servos.
 
-    Attributes
-    ----------
     low_us, high_us : (n,) shortest and longest pulse inside the servos' limits. us_per_rad : (n,) steepest slope.
 
-    Raises
-    ------
-    DriverError : unknown model, a calibration that is not monotonic, or pulses that no board can make.
+    Raises DriverError: unknown model, a calibration that is not monotonic, or pulses that no board can make.
     """
 
     def __init__(self, servos: Sequence[ServoSpec]) -> None:
@@ -143,8 +139,6 @@ def _extrapolated(x: Floats, at: Floats, gives: Floats) -> Floats:
 class ValueScale:
     """Conversion between angles of n servos and the values that lines of text have.
 
-    Parameters
-    ----------
     fields : value of each servo: ``us``, ``deg``, ``deg10``, ``angle``, ``unit`` (:mod:`drivers.text.template`), or
         ``parameter`` (1 for 90 degrees of the shaft).
     decimals : of each value on the wire.

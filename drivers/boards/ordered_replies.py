@@ -25,8 +25,6 @@ RETRY_S = 1.0
 class OrderedBus(PulseBus):
     """A board of hobby servos that answers requests for its pulses in order.
 
-    Attributes
-    ----------
     SILENT, SILENT_HINT : error where it does not answer at the start; may name ``path``, ``baud`` and ``channels``.
     """
 

@@ -22,8 +22,6 @@ class PulseTrack:
     A board moves its outputs towards their goals and overshoots only by its braking distance, so a pulse outside of the
     range was damaged or belongs to another request.
 
-    Attributes
-    ----------
     goal_us : (n,) last goal; NaN for none.
     """
 

@@ -42,8 +42,6 @@ _MODULE = "drivers.core.dead_man_switch"  # not __name__, which is __main__ in t
 class DeadManSwitch:
     """Starts the process, waits until it is ready (else raises DriverError), and ends it.
 
-    Parameters
-    ----------
     path, baud : device path and rate of the port.
     frames : packets that switch the motors off and have no answer.
     ready_s : time limit for the process to get ready.

@@ -26,8 +26,6 @@ SERVO_BAUD, BOARD_BAUD = 1_000_000, 115_200
 class Family:
     """One family of servos or boards: its driver, settings and simulator.
 
-    Attributes
-    ----------
     api : version of the interface it is made for; see :data:`API`.
     kind : name in robot files. title : name for people, as "Pololu Maestro boards".
     driver : ``"module:name"`` of a :class:`drivers.core.wirebus.WireBus`, or of a function that returns one for a

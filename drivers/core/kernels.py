@@ -59,8 +59,6 @@ def has_header(data, begin, end):  # type: ignore[no-untyped-def]
 def check_replies(data, spans, heads, states):  # type: ignore[no-untyped-def]
     """Whether `data` holds k valid status packets, one of each servo: heads and CRCs match, nothing is stuffed.
 
-    Parameters
-    ----------
     data : (m,) uint8, not shorter than the replies.
     spans : (k, 3) int64: a servo's id, index of its error byte, end of its reply.
     heads : (k, 8) uint8, first bytes of each packet.
@@ -143,8 +141,6 @@ def to_si(known, axes, now_s, out):  # type: ignore[no-untyped-def]
 def take_replies(data, joint, spans, heads, states, places, fields, scales, axes, now_s, octets, known, out):  # type: ignore[no-untyped-def]
     """Decode the replies of one cycle where all are valid and only motion changed; else return False, all unchanged.
 
-    Parameters
-    ----------
     data, spans, heads, states : see `check_replies` and, with `joint`, `check_joint`.
     places : (k,) int64, index of each servo in the arrays of the bus.
     fields : (k, 7, 3) int64, see `register`: the rows named by `FIELDS`, their offsets from the error byte.
@@ -176,8 +172,6 @@ def take_replies(data, joint, spans, heads, states, places, fields, scales, axes
 def put_goals(frame, at, goals, places, size, state):  # type: ignore[no-untyped-def]
     """Write goals and CRC into a sync write packet; False where they hold FF FF FD and must be stuffed.
 
-    Parameters
-    ----------
     frame : (m,) uint8, the packet.
     at : index of its rows: an id and `size` bytes each.
     goals : (n,) int32 of the bus. places : (k,) int64, indices of the goals in the packet.
@@ -223,8 +217,6 @@ def to_steps(angle_rad, axes, bounds, goals, sent):  # type: ignore[no-untyped-d
 
     A goal outside low to high may only move towards them; none leaves lowest to highest.
 
-    Parameters
-    ----------
     axes : (4, n): sign, zero_rad, center, rad_per_tick.
     bounds : (4, n) int32: low, high, lowest, highest.
     """

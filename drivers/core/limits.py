@@ -19,8 +19,6 @@ BURST_S = 0.05
 class TargetLimits:
     """Applies the limits of n servos to their targets, and counts in a report what it changed.
 
-    Attributes
-    ----------
     target : (n,) last targets, inside the angle limits.
     """
 

@@ -39,16 +39,12 @@ def kinds() -> list[str]:
 def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynamixel", **options: Any) -> Bus:
     """Create the bus of a kind; it opens its port when it is entered or when ``open`` is called.
 
-    Parameters
-    ----------
     kind : one of :func:`kinds`, or ``"simulated"`` (the same driver over a bus simulated in a child process).
     servos : the servos in the order of all arrays.
     simulates : the family that ``"simulated"`` simulates.
     options : options of the driver, for example ``port`` and ``baud``; see docs/drivers.md.
 
-    Raises
-    ------
-    DriverError : unknown kind, or a package is not installed.
+    Raises DriverError: unknown kind, or a package is not installed.
     """
     servos = tuple(servos)
     if kind != SIMULATED:

@@ -20,8 +20,6 @@ class Scale:
 
     ``shaft = (ticks - center) * rad_per_tick`` and ``shaft = zero_rad + sign * angle``.
 
-    Attributes
-    ----------
     axes : (4, n): sign, zero_rad, center and rad_per_tick, which are its rows.
     low, high : limits of goals by the servos' angle limits, steps.
     lowest, highest : limits of goals by the servos' own registers, steps.

@@ -28,8 +28,6 @@ MANY = 8
 class ServoTraffic:
     """What was received from one servo.
 
-    Attributes
-    ----------
     packets : number of answers. error : error byte of the last one.
     values : last value by register name, read or written.
     """
@@ -42,8 +40,6 @@ class ServoTraffic:
 class Decoder(ABC):
     """Turns bytes into lines.
 
-    Attributes
-    ----------
     heard : what was received from each servo, by id.
     """
 
@@ -58,8 +54,6 @@ class Decoder(ABC):
 class PacketDecoder(Decoder):
     """Base of decoders of packet protocols: instructions, registers by name, values by servo.
 
-    Parameters
-    ----------
     tables : control tables by id, as far as known; answers to pings add to them.
     default : table of all other servos, or None.
     """

@@ -36,8 +36,6 @@ MAP_TRIES = 5
 class DynamixelBus(ServoBus):
     """Dynamixel servos on one serial port. See :class:`~drivers.base.bus.Bus` for the contract.
 
-    Parameters
-    ----------
     servos, port, baud, margin_s, clock : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
     feedback : ``"full"`` reads velocity and current with every position, and by indirect addressing temperature,
         hardware error, torque and watchdog too; ``"position"`` reads only the position.

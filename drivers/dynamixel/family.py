@@ -22,12 +22,7 @@ class DynamixelSettings(ServoSettings):
 
 
 def driver_for(servos: Sequence[ServoSpec]) -> type[WireBus]:
-    """The driver for the servos' protocols; only what they need is loaded.
-
-    Raises
-    ------
-    DriverError : unknown model.
-    """
+    """The driver for the servos' protocols; only what they need is loaded. Raises DriverError: unknown model."""
     from drivers.tables.tables import load_table  # start-up: families are listed without their drivers
 
     protocols = {load_table(servo.model).protocol for servo in servos}

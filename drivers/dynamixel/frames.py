@@ -35,8 +35,6 @@ _ROWS_AT = 12
 class GoalFrame:
     """A sync write of one register to the same servos every cycle: only the values change.
 
-    Parameters
-    ----------
     ids : k servo ids.
     address, size : the register; 2 or 4 bytes.
     places : (k,) int64, which of the values given to `encode` are theirs.
@@ -73,8 +71,6 @@ class GroupRead:
 
     Where it is `fast`, all of them answer in one joint packet.
 
-    Attributes
-    ----------
     frame : the instruction.
     wanted : data bytes expected by id, in the order of the replies.
     size : bytes of all replies, not stuffed.

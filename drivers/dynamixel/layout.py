@@ -29,8 +29,6 @@ def _block(table: ControlTable, *names: str) -> Block:
 def layout_of(table: ControlTable, feedback: str = "full", indirect: Block | None = None) -> Layout:
     """Layout of a control table; ValueError where the model has no goal or no present position.
 
-    Parameters
-    ----------
     feedback : ``"full"`` reads velocity and current with the position, ``"position"`` only the position.
     indirect : block to read instead, through pointers that were set up before.
     """

@@ -31,8 +31,6 @@ ONLY_NEW = {"baud", "margin_s", "fast", "indirect"}
 class MixedBus(WireBus):
     """Servos of Protocol 1.0 and 2.0 on one serial port.
 
-    Parameters
-    ----------
     servos : the servos in the order of all arrays; their models decide the protocol.
     options : see :class:`~drivers.dynamixel.bus.DynamixelBus` and :class:`~drivers.dynamixel.legacy.LegacyBus`.
     """

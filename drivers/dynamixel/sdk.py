@@ -51,8 +51,6 @@ Got = Exchange[StatusPacket]
 class SdkExchanges(exchange.Exchanges[R]):
     """Overrides that the SDK's packet handlers of both protocols share: sending, and an instruction with its reply.
 
-    Attributes
-    ----------
     id_at, code_at : where id and instruction lie in a packet that the SDK makes.
     unanswered : instructions that no servo answers.
     """

@@ -27,17 +27,13 @@ MINI, MICRO = "mini", "micro"
 class MaestroBus(OrderedBus):
     """A Maestro on one port.
 
-    Parameters
-    ----------
     servos : the servos; ``id`` is the channel.
     board : ``"mini"`` (12, 18 or 24 channels) sets all targets at once, ``"micro"`` (6 channels) cannot.
     device : device number for the Pololu protocol, as on a wire with several boards; None: compact protocol.
     crc : end every command with a CRC-7; the board must be set to it.
     options : see :class:`~drivers.boards.bus.BoardBus`.
 
-    Raises
-    ------
-    DriverError : unknown model, or an option that does not fit.
+    Raises DriverError: unknown model, or an option that does not fit.
     """
 
     SILENT = "the Maestro on {path} does not report its outputs on channels {channels}"

@@ -54,8 +54,6 @@ def crc7(data: bytes) -> int:
 class Encoder:
     """Commands as bytes.
 
-    Parameters
-    ----------
     device : device number for the Pololu protocol; None: compact protocol, to any board.
     crc : end every command with its CRC-7.
     """

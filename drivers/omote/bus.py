@@ -44,17 +44,13 @@ def check_lineout(model: str) -> None:
 class LineOutBus(BoardBus):
     """A head on one port.
 
-    Parameters
-    ----------
     servos : the servos; ``wire_name`` or ``name`` is the name on the wire. ``model`` selects the value: ``"parameter"``
         (90 degrees are 1), ``"degrees"``, or a hobby servo's model for its pulse in us.
     checksum : end every line with a checksum.
     heartbeat_s : all values are sent again after this time; a head may switch off when nothing comes for longer.
     options : see :class:`~drivers.boards.bus.BoardBus`.
 
-    Raises
-    ------
-    DriverError : unknown model, or a name that cannot be used in a line.
+    Raises DriverError: unknown model, or a name that cannot be used in a line.
     """
 
     tells_torque: ClassVar[bool] = False

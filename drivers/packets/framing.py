@@ -11,8 +11,6 @@ P = TypeVar("P")
 class FrameReader(ABC, Generic[P]):
     """Finds frames whose length and checksum are right in a byte stream, and decodes them to packets.
 
-    Attributes
-    ----------
     MARK : what every frame begins with.
     noise_bytes : bytes thrown away because they belong to no valid frame.
     broken_frames : frames begun whose length or checksum was wrong.

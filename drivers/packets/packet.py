@@ -148,9 +148,7 @@ def _encode(device_id: int, instruction: int, params: bytes) -> bytes:
 def encode_instruction(device_id: int, instruction: int, params: bytes = b"") -> bytes:
     """One instruction packet, stuffed and with its CRC; `params` are the bytes after INST, not stuffed.
 
-    Raises
-    ------
-    ValueError : an id other than 0 to 252 and `BROADCAST_ID`.
+    Raises ValueError: an id other than 0 to 252 and `BROADCAST_ID`.
     """
     if not 0 <= device_id <= BROADCAST_ID or device_id == 0xFD:
         raise ValueError(f"device_id {device_id}: a packet carries 0-252, or 254 for all")
@@ -186,8 +184,6 @@ def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusP
     the decoder goes on from every CRC state that damage can explain (in the data, in the CRC at the device, or in
     the CRC on the wire), so only the damaged device is left out.
 
-    Parameters
-    ----------
     data : received bytes; anything before the joint packet's header is skipped.
     devices : (id, bytes read) in request order; so are the replies, of devices whose id and CRC are right.
     """

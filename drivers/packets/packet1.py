@@ -71,9 +71,7 @@ def checksum(body: bytes) -> int:
 def encode(device_id: int, code: int, params: bytes = b"") -> bytes:
     """One packet of either direction; `code` is an `Instruction1`, or the error byte of a status packet.
 
-    Raises
-    ------
-    ValueError : an id other than 0 to 253 and `BROADCAST_ID`, or more than 253 bytes of parameters.
+    Raises ValueError: an id other than 0 to 253 and `BROADCAST_ID`, or more than 253 bytes of parameters.
     """
     if not 0 <= device_id <= BROADCAST_ID:
         raise ValueError(f"device_id {device_id}: a packet carries 0-253, or 254 for all")

@@ -19,8 +19,6 @@ SLOW_LATENCY_S = 0.0015
 class PortRecord:
     """One serial device.
 
-    Attributes
-    ----------
     device : path, for example ``/dev/ttyUSB0``.
     by_id : path that stays the same after a replug; None where there is none. Use it in configurations.
     vid_pid : USB vendor and product as ``"0403:6014"``; empty when it is not USB.
@@ -53,8 +51,6 @@ def list_ports(
 ) -> list[PortRecord]:
     """Serial devices of this machine, sorted by path; opens none of them.
 
-    Parameters
-    ----------
     dev_root, sys_root : folders of devices and of their settings; changed by tests.
     comports : gives pyserial's port records.
     """

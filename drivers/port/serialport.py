@@ -79,10 +79,8 @@ class SerialPort:
     def open(self) -> None:
         """Open the device exclusively, ask for low latency, and discard its input.
 
-        Raises
-        ------
-        PortMissing, PortBusy, PortPermission : see :mod:`drivers.base.errors`.
-        PortError : the device does not take the baud rate.
+        Raises PortMissing, PortBusy, PortPermission: see :mod:`drivers.base.errors`. PortError: the device does not
+        take the baud rate.
         """
         self.close()
         try:

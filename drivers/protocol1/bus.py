@@ -39,9 +39,6 @@ SWITCH_CHECK_S = 1.0
 class Protocol1Bus(ServoBus):
     """Servos with Protocol 1.0 framing on one serial port. See :class:`~drivers.base.bus.Bus` for the contract.
 
-    Parameters
-    ----------
-    servos : the servos in the order of all arrays.
     port : device path (``/dev/serial/by-id/...`` survives a replug), or a port shared with servos of another protocol.
     baud : rate on the wire.
     feedback : ``"full"`` reads everything that is measured with every position, ``"position"`` position and speed.

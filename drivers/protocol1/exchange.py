@@ -14,8 +14,6 @@ from drivers.servos.port import Port
 class Exchanges(exchange.Exchanges[Packet1]):
     """Transactions of a driver.
 
-    Attributes
-    ----------
     longest : longest packet, in bytes, that its servos take.
     refusals : flags of the error byte that refuse an instruction; the others are about the servo's state.
     """

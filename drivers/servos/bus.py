@@ -22,8 +22,6 @@ from drivers.tables.tables import ControlTable, load_table
 class ServoBus(WireBus):
     """Servos with registers on one port; see :class:`~drivers.core.wirebus.WireBus` for the other hooks.
 
-    Attributes
-    ----------
     scale : conversion between encoder steps and angles.
     """
 

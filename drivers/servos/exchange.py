@@ -32,8 +32,6 @@ R = TypeVar("R", bound=Reply)
 class Exchange(NamedTuple, Generic[R]):
     """The replies to one request.
 
-    Attributes
-    ----------
     replies : by servo id; only those with the right sender, length and checksum.
     missing : ids that were asked and are not in ``replies``.
     corrupt : True when damaged bytes arrived too, so that a missing reply may have been one of them.
@@ -49,8 +47,6 @@ class Exchange(NamedTuple, Generic[R]):
 class Exchanges(ABC, Generic[R]):
     """Transactions of a driver; a protocol sets the attributes and implements the abstract methods.
 
-    Attributes
-    ----------
     status_size : bytes of a reply without data.
     number_size : bytes of an address or a length in a packet.
     refusals : bits of the error byte that refuse the request, so that the reply may be without the data asked for.

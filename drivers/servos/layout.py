@@ -113,8 +113,6 @@ def block_of(table: ControlTable, *names: str) -> Block:
 class Layout:
     """Blocks of one control table that a bus reads and writes; servos whose layouts have equal keys share reads.
 
-    Attributes
-    ----------
     goal : registers written every cycle.
     feedback : block read every cycle (or in turn, where servos are read one by one).
     slow : blocks read in turn: what is not in ``feedback``.

@@ -166,9 +166,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
     def is_using(self) -> bool:
         """True in the middle of a transaction. Setting it begins or ends one.
 
-        Raises
-        ------
-        DriverError : another thread is in the middle of a transaction (S9).
+        Raises DriverError: another thread is in the middle of a transaction (S9).
         """
         return self._busy.locked()
 

@@ -22,8 +22,6 @@ E = TypeVar("E", bound=DriverError)
 class Registers(ABC, Generic[R]):
     """Registers by servo id and short name (see ``layout.NAMES``); a protocol implements the hooks.
 
-    Attributes
-    ----------
     tables : control table by id.
     names : names of servos by id, for messages.
     greeting : what error messages call the request of :meth:`hello`.
@@ -124,13 +122,9 @@ class Registers(ABC, Generic[R]):
     def get_all(self, ids: Sequence[int], name: str) -> dict[int, int]:
         """One register of many servos: in groups where they can, then each missing one by itself.
 
-        Returns
-        -------
-        dict : by id; ids whose model lacks the register are left out.
+        Returns a dict by id; ids whose model lacks the register are left out.
 
-        Raises
-        ------
-        NoReply, CorruptReply : some did not answer; ``servo_ids`` are all of them.
+        Raises NoReply, CorruptReply: some did not answer; ``servo_ids`` are all of them.
         """
         values: dict[int, int] = {}
         for (at, size, manner), group in self._spans(ids, name).items():
@@ -169,9 +163,7 @@ class Registers(ABC, Generic[R]):
     def each(self, ids: Iterable[int], do: Callable[[int], T]) -> dict[int, T]:
         """Do something with every servo, each by itself, and raise one error about all that failed.
 
-        Raises
-        ------
-        BusError : of the kind of the first failure, naming every id that failed.
+        Raises BusError: of the kind of the first failure, naming every id that failed.
         """
         done: dict[int, T] = {}
         failed: dict[int, BusError] = {}

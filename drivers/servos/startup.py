@@ -29,8 +29,6 @@ OFF_RETRIES = 5
 class Policy:
     """What start-up may do, in every family.
 
-    Attributes
-    ----------
     takeover : servos whose torque is on already are kept holding (``"adopt"``), switched off first (``"release"``:
         what they carry may fall), or make start-up fail (``"refuse"``).
     reboot_faulted : bring servos back that had shut down for a hardware error; they lose torque while they reboot.
@@ -52,8 +50,6 @@ class Policy:
 class Started:
     """What start-up found and did.
 
-    Attributes
-    ----------
     ticks : present position by id, read after torque came on.
     limits : lowest and highest step by id that the servo's own registers allow.
     mapped : block that is read through pointers, by id.
@@ -69,8 +65,6 @@ class Started:
 class Startup(ABC, Generic[R]):
     """The steps of start-up and stop; a protocol implements the hooks.
 
-    Attributes
-    ----------
     started : what was found and done.
     out_of_turn_hint, not_on_hint, not_off_hint : what a user can do where a position is not within one turn, or a
         motor does not switch on, or off.
@@ -176,12 +170,7 @@ class Startup(ABC, Generic[R]):
         return self.started
 
     def take_over(self, ids: Sequence[int]) -> list[int]:
-        """Servos whose torque is on and stays on.
-
-        Raises
-        ------
-        ServoRefused : some hold, and that is not allowed.
-        """
+        """Servos whose torque is on and stays on. Raises ServoRefused: some hold, and that is not allowed."""
         held = [servo for servo, torque in self.registers.get_all(ids, "torque").items() if torque]
         if not held or self.policy.takeover == "adopt":
             return held
@@ -241,9 +230,7 @@ class Startup(ABC, Generic[R]):
     def torque_on(self, ids: Sequence[int]) -> None:
         """Write goals at the present positions, right before torque; then switch torque on and read it back.
 
-        Raises
-        ------
-        ServoFault : a motor did not come on, or a position is not within one turn.
+        Raises ServoFault: a motor did not come on, or a position is not within one turn.
         """
         registers = self.registers
         registers.set_all(self.goals_at_present(ids), "goal")
@@ -260,9 +247,7 @@ class Startup(ABC, Generic[R]):
     def goals_at_present(self, ids: Sequence[int]) -> dict[int, int]:
         """The goal by id that keeps every servo where it is.
 
-        Raises
-        ------
-        ServoFault : a position is not within one turn, so a goal there could spin the servo.
+        Raises ServoFault: a position is not within one turn, so a goal there could spin the servo.
         """
         goals = {}
         for servo, value in self.registers.get_all(ids, "position").items():
@@ -281,9 +266,7 @@ class Startup(ABC, Generic[R]):
     def switch_off(self, ids: Sequence[int]) -> None:
         """Switch torque off for every servo that can be reached, each by itself.
 
-        Raises
-        ------
-        PortLost, NoReply : after everything was tried; ``servo_ids`` are those not confirmed off.
+        Raises PortLost, NoReply: after everything was tried; ``servo_ids`` are those not confirmed off.
         """
         registers = self.registers
         known = [servo for servo in ids if servo in registers.tables]

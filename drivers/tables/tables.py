@@ -29,8 +29,6 @@ FEETECH = ("sts", "sm", "scs")
 class Item:
     """One entry of a control table.
 
-    Attributes
-    ----------
     name : vendor's name, for example ``"Goal Position"``.
     address, size : first address and bytes (1, 2 or 4, little-endian).
     signed : two's complement.
@@ -96,8 +94,6 @@ def from_magnitude(raw: int, sign_bit: int) -> int:
 class ControlTable(Mapping[str, Item]):
     """The items of one model and firmware, by name.
 
-    Attributes
-    ----------
     model, number, firmware : ``"xl330-m288"``, 1200, 52.
     protocol : 1 or 2: its framing.
     group_read : how many servos are read at once with Protocol 1.0 framing: ``"sync"``, ``"bulk"``, or ``""`` for
@@ -254,9 +250,7 @@ def check_feetech(model: str) -> None:
 def load_table(model: str | int, firmware: int | None = None) -> ControlTable:
     """Control table of a model (name or number), for a firmware version (None: a current one).
 
-    Raises
-    ------
-    DriverError : there is no such model, its table is not described, or the SDK's files are not installed.
+    Raises DriverError: there is no such model, its table is not described, or the SDK's files are not installed.
     """
     return _load(model_number(model), firmware)
 

@@ -28,8 +28,6 @@ RETRY_S = 1.0
 class TextBus(PulseBus):
     """A text board on one port; a servo's ``id`` is the channel.
 
-    Parameters
-    ----------
     template : one servo's move, with placeholders (:mod:`drivers.text.template`).
     begin, separator, end : text before, between and after the moves of one line; where all are empty each move is a
         line.
@@ -37,9 +35,7 @@ class TextBus(PulseBus):
     query, answer : request for one servo and its answer; ``answer`` must name the servo and end with text.
     options : see :class:`~drivers.boards.bus.BoardBus`.
 
-    Raises
-    ------
-    DriverError : a template that is not valid, named with what is wrong; or an unknown model.
+    Raises DriverError: a template that is not valid, named with what is wrong; or an unknown model.
     """
 
     tells_torque: ClassVar[bool] = False

@@ -47,9 +47,7 @@ class Piece(NamedTuple):
 def pieces_of(key: str, text: str, allowed: Iterable[str]) -> list[Piece]:
     """Parse a template; `key` is its name in the configuration, `allowed` are the placeholders that may occur.
 
-    Raises
-    ------
-    DriverError : it is not ASCII, its braces do not match, a placeholder is unknown, or a format does not fit.
+    Raises DriverError: it is not ASCII, its braces do not match, a placeholder is unknown, or a format does not fit.
     """
     if not text.isascii():
         raise DriverError(
@@ -96,8 +94,6 @@ def decimals(spec: str) -> int:
 class Template:
     """A line, or a part of one, with placeholders; parameters and errors as :func:`pieces_of`.
 
-    Attributes
-    ----------
     fields : the placeholders in it.
     """
 

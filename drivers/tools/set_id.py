@@ -66,16 +66,11 @@ def _write(registers: Registers[Any], servo: int, name: str, value: int) -> None
 def set_id(port: str, baud: int, protocol: int, old: int, new: int, *, release: bool = False) -> ServoInfo:
     """Give the servo ``old`` the id ``new``; returns it under its new id.
 
-    Parameters
-    ----------
     port, baud, protocol : where it is; Protocol 2 or 1 (AX, MX, Feetech).
     release : switch its motor off where it is on.
 
-    Raises
-    ------
-    ValueError : an id that no servo may have.
-    NoReply, CorruptReply : no servo, or more than one, has the old id.
-    ServoRefused : the new id is taken, the motor is on, or the servo kept its id. Nothing was changed.
+    Raises ValueError: an id that no servo may have. NoReply, CorruptReply: no servo, or more than one, has the old id.
+    ServoRefused: the new id is taken, the motor is on, or the servo kept its id. Nothing was changed.
     """
     for name, servo in (("old", old), ("new", new)):
         if not 0 <= servo <= MAX_ID:

@@ -9,8 +9,6 @@ from __future__ import annotations
 class SurfaceError(Exception):
     """Any error of the surface room.
 
-    Parameters
-    ----------
     message : what failed, where (file and key) and why.
     hint : the next thing to type or do; may be empty.
     """

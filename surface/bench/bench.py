@@ -35,8 +35,6 @@ def no_report(text: str) -> None:
 class Measure:
     """One row of a table.
 
-    Attributes
-    ----------
     name : what was measured
     milliseconds : least time of one call; 0 for rows that are a ratio of sizes
     ratio, against : a ratio, or None, and its other side

@@ -27,8 +27,6 @@ STEP = 100_000  # vertices whose weights are computed between two reports of pro
 class Lists:
     """The lists and weights of a mesh.
 
-    Attributes
-    ----------
     cell_start : (c + 1,) int64, first vertex of every cell
     tile_start : (c + 1,) int64, first tile of every cell
     rows, room : (c,) int64, control points of every cell, and rows its block has room for

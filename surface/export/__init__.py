@@ -32,9 +32,7 @@ def __getattr__(name: str) -> Any:
 def exporters(extra: Iterable[Exporter] = ()) -> tuple[Exporter, ...]:
     """The exporters of this folder, by module, and ``extra`` ones after them.
 
-    Raises
-    ------
-    ExportError : an exporter was made for another omote, or two want the same suffix.
+    Raises ExportError: an exporter was made for another omote, or two want the same suffix.
     """
     found = (*_own()[0], *extra)
     owner: dict[str, Exporter] = {}
@@ -69,20 +67,14 @@ def export_head(
 ) -> list[Path]:
     """Write a head to a file for other programs; the suffix chooses the exporter (see :func:`exporters`).
 
-    Parameters
-    ----------
     pose : values by parameter. A .glb opens in this pose and keeps its shapes; an .obj is written in it, without
         shapes.
     extra : exporters from other packages.
 
-    Returns
-    -------
-    The paths written.
+    Returns the paths written.
 
-    Raises
-    ------
-    ExportError : another suffix, a pose that a file of this kind cannot hold, or a place that cannot be written to;
-        nothing is left half-written.
+    Raises ExportError: another suffix, a pose that a file of this kind cannot hold, or a place that cannot be written
+    to; nothing is left half-written.
     """
     path, known = Path(path), exporters(extra)
     for one in known:

@@ -17,8 +17,6 @@ Write = Callable[[Head, Path, Mapping[str, float]], list[Path]]
 class Exporter:
     """One file format.
 
-    Attributes
-    ----------
     api : version of the interface it uses; see :data:`API`
     kind : a short name, as "glb"; the module's own for the exporters of this folder
     title : short description of the file's content

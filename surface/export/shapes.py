@@ -23,8 +23,6 @@ _EYES = ("left_eye", "right_eye")
 class ExportPart:
     """One part for other programs.
 
-    Attributes
-    ----------
     vertices, normals : (m, 3) float32, mm; uv : (m, 2) float32 inside the unit square, v up.
     triangles : (t, 3) int32. pivot : (3,) centre of rotation of an eyeball, else zero.
     colours : (m, 3) float32 linear RGB, or None for a part that is not painted.

@@ -47,19 +47,14 @@ def fit_head(
 ) -> FitReport:  # fmt: skip
     """Fit a head to a mesh and write it.
 
-    Parameters
-    ----------
     mesh_path : .glb or .gltf with morph targets, .obj with a folder of shapes, or .npz.
     out_dir : folder that gets head.toml and head.npz.
     progress : called with the part being fitted and the fraction done, 0..1.
     options : how to interpret the mesh. report_dir : folder that gets the report (see
         :func:`surface.fit.reportfile.write_report`).
 
-    Raises
-    ------
-    FitError : the mesh cannot be read, has no texture coordinates or faces, holds NaN, is no manifold, or does not
-        fit together. Nothing is written then.
-    HeadFileError : a folder cannot be written to.
+    Raises FitError: the mesh cannot be read, has no texture coordinates or faces, holds NaN, is no manifold, or does
+    not fit together. Nothing is written then. HeadFileError: a folder cannot be written to.
     """
     report = progress or no_progress
     for folder in (out_dir, report_dir):

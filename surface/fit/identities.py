@@ -63,10 +63,8 @@ def add_identities(head: str | Path, mesh_path: str | Path, modes_path: str | Pa
     head : a head folder that was fitted to the mesh. mesh_path : that mesh.
     modes_path : .npz with ``deltas (k, n, 3)``, displacements of the mesh's vertices per standard deviation.
 
-    Raises
-    ------
-    FitError : the head was not fitted to this mesh, or the modes do not belong to it. Nothing is written then.
-    HeadFileError : the head cannot be read.
+    Raises FitError: the head was not fitted to this mesh, or the modes do not belong to it. Nothing is written then.
+    HeadFileError: the head cannot be read.
     """
     data, wanted = load_data(head), read_wanted()
     mesh = load_mesh(mesh_path).mesh

@@ -17,8 +17,6 @@ from surface.spline.controlpoints import ControlPoints
 class Slit:
     """A segment of (u, v) across which the surface is cut.
 
-    Attributes
-    ----------
     axis : "u" for a segment that runs along u at v = ``at``, "v" for one that runs along v at u = ``at``
     at : the fixed coordinate
     start, end : the running coordinate, start < end; both end points stay joined
@@ -47,8 +45,6 @@ class Slit:
 class Domain:
     """Where a surface is drawn.
 
-    Parameters
-    ----------
     rect : u0, u1, v0, v1
     loops : closed polylines ``(k, 2)``; (u, v) is inside where it is inside an odd number of them, so outlines,
         holes and several islands may be in any order; the rectangle cuts off what reaches beyond it. No loops:

@@ -16,8 +16,6 @@ from surface.spline.bins import Bins, build_bins
 class Mesh:
     """A tessellated surface; all arrays are read-only.
 
-    Attributes
-    ----------
     vertices, normals : (m, 3) float64, normals of unit length along S_u x S_v (opposite if ``flip``)
     triangles : (t, 3) int32, counter-clockwise seen from where the normals point
     uv : (m, 2) float64

@@ -30,16 +30,10 @@ SUFFIXES = tuple(_READERS)
 def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
     """All surfaces of a file, at least one.
 
-    Parameters
-    ----------
     path : its suffix chooses the format: one of :data:`SUFFIXES`
 
-    Raises
-    ------
-    SurfaceFileError
-        naming file and line or element: another suffix, a damaged file, or one that no DCP surface can be exactly.
-    SurfaceError
-        for .3dm where rhino3dm is not installed.
+    Raises SurfaceFileError: naming file and line or element: another suffix, a damaged file, or one that no DCP surface
+    can be exactly. SurfaceError: for .3dm where rhino3dm is not installed.
     """
     file = Path(path)
     suffix = file.suffix.lower()

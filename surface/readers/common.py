@@ -16,10 +16,7 @@ from surface.mesh.domain import Domain
 class NamedSurface:
     """One surface of a file.
 
-    Attributes
-    ----------
     name : as the file has it, or made from its place in the file
-    surface : the surface
     domain : where to draw it; None for everywhere it is covered
     """
 

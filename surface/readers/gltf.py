@@ -31,13 +31,9 @@ MOST_ELEMENTS = 20_000_000  # of one accessor
 class Gltf:
     """An opened file: its JSON document and the bytes of its buffers.
 
-    Parameters
-    ----------
     path : .glb or .gltf
 
-    Raises
-    ------
-    FitError : missing, damaged, cut short, too large, or in need of an extension that is not read.
+    Raises FitError: missing, damaged, cut short, too large, or in need of an extension that is not read.
     """
 
     def __init__(self, path: Path) -> None:

@@ -35,9 +35,7 @@ class _Primitive:
 def read_gltf(path: Path) -> MeshData:
     """All triangles of the file's scene as one mesh.
 
-    Raises
-    ------
-    FitError : the file is damaged, cut short or too large, or has no triangles; names file and element.
+    Raises FitError: the file is damaged, cut short or too large, or has no triangles; names file and element.
     """
     try:
         return _read(Gltf(path))

@@ -17,8 +17,6 @@ MOST_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
 class MeshData:
     """A mesh in the unit and axes of its file.
 
-    Attributes
-    ----------
     vertices : (n, 3) float64.
     faces : (f, 4) int64, -1 fills the last place of a triangle.
     uv : (t, 2) float64, v up; face_uv : (f, 4) int64 into ``uv``; all -1 where a face has no texture coordinates.
@@ -39,9 +37,7 @@ class MeshData:
 def check_size(where: str, vertices: int, shapes: int) -> None:
     """Refuse a mesh that would not fit into memory, before arrays are allocated for it.
 
-    Raises
-    ------
-    FitError : naming the file and the number that is too large.
+    Raises FitError: naming the file and the number that is too large.
     """
     if vertices > MOST_VERTICES:
         raise FitError(f"{where}: {vertices} vertices; {MOST_VERTICES} are the most", hint="decimate the mesh first")
@@ -51,12 +47,7 @@ def check_size(where: str, vertices: int, shapes: int) -> None:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file that is not too large.
-
-    Raises
-    ------
-    FitError : missing, unreadable or above :data:`MOST_BYTES`.
-    """
+    """The content of a file that is not too large. Raises FitError: missing, unreadable or above :data:`MOST_BYTES`."""
     try:
         size = path.stat().st_size
         if size > MOST_BYTES:

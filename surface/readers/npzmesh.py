@@ -28,9 +28,7 @@ DAMAGED = (
 def read_npz(path: Path) -> MeshData:
     """A mesh in this layout; its indices are checked later, with those of all other meshes.
 
-    Raises
-    ------
-    FitError : the file is missing or damaged, lacks a key, or holds an array of another kind or shape.
+    Raises FitError: the file is missing or damaged, lacks a key, or holds an array of another kind or shape.
     """
     raw = _arrays(path)
     n, f, k, t = (len(np.atleast_1d(raw[key])) for key in ("neutral", "faces", "names", "uv"))

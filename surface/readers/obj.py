@@ -18,14 +18,10 @@ NEUTRAL = ("neutral", "basis", "base", "rest")
 def read_obj(path: Path, shapes: Path | None = None) -> MeshData:
     """An OBJ file and its shapes.
 
-    Parameters
-    ----------
     path : the neutral face; or a folder with neutral.obj (or basis, base, rest) and one OBJ a shape.
     shapes : folder with one OBJ a shape, named as the shape is; if None, FOLDER/NAME_shapes beside FOLDER/NAME.obj.
 
-    Raises
-    ------
-    FitError : a file is missing or damaged, or a shape has other vertices; names file and line.
+    Raises FitError: a file is missing or damaged, or a shape has other vertices; names file and line.
     """
     if path.is_dir():
         neutral = [f for f in _obj_files(path) if f.stem.lower() in NEUTRAL]

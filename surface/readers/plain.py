@@ -149,10 +149,7 @@ def _numbers(here: Location, value: Any, count: int | None = None) -> list[float
 def write_surfaces(path: str | os.PathLike[str], surfaces: Sequence[NamedSurface]) -> None:
     """Write surfaces; reading them back gives the same numbers.
 
-    Raises
-    ------
-    SurfaceFileError
-        if the file cannot be written.
+    Raises SurfaceFileError: if the file cannot be written.
     """
     table = {"format": FORMAT, "version": VERSION, "surfaces": [_row(item) for item in surfaces]}
     text = json.dumps(table, allow_nan=False).replace('{"position"', '\n{"position"')

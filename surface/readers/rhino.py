@@ -176,13 +176,9 @@ def invert(surface: DCPSurface, points: Floats) -> tuple[Floats, Floats]:
     Gauss-Newton steps from the nearest of a grid of samples, in each quarter of the rectangle: where a surface
     closes, the nearest sample may lie at the wrong end.
 
-    Parameters
-    ----------
     points : (k, 3) float64
 
-    Returns
-    -------
-    uv (k, 2), and distances (k,)
+    Returns uv (k, 2), and distances (k,).
     """
     u0, u1, v0, v1 = surface.rect
     found = []

@@ -26,8 +26,6 @@ Pieces = dict[tuple[int, int], Floats]
 class Level:
     """One tensor-product basis.
 
-    Attributes
-    ----------
     degrees : of u and v
     knots : (nu + pu + 1,), (nv + pv + 1,) float64
     """
@@ -55,13 +53,9 @@ def dyadic_refinement(level: Level) -> Level:
 def knot_insertion(coarse: Floats, fine: Floats, degree: int) -> Floats:
     """Coefficients of coarse B-splines in finer ones.
 
-    Parameters
-    ----------
     coarse, fine : knots; the fine ones hold all coarse ones
 
-    Returns
-    -------
-    (nc, nf) float64: B_i = sum over j of a_ij b_j, all a_ij >= 0 (Cohen, Lyche and Riesenfeld 1980, "Oslo")
+    Returns (nc, nf) float64: B_i = sum over j of a_ij b_j, all a_ij >= 0 (Cohen, Lyche and Riesenfeld 1980, "Oslo").
     """
     nf = len(fine) - degree - 1
     here = fine[:nf]
@@ -143,9 +137,7 @@ class Hierarchy:
     def control_points(self, coefficients: Floats) -> tuple[Floats, Floats, list[Floats], list[Floats]]:
         """DCPs of the surface with ``coefficients (n, 3)`` over the truncated basis.
 
-        Returns
-        -------
-        points (m, 3), weights (m,), and m knot vectors for u and for v
+        Returns points (m, 3), weights (m,), and m knot vectors for u and for v.
         """
         pieces: Pieces = {}
         rows: list[Floats] = []

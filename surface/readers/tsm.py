@@ -110,8 +110,6 @@ def _directions(counts: list[int]) -> list[tuple[int, ...]]:
 class TMesh:
     """A T-mesh laid out in the plane; ``SurfaceFileError`` where it is no rectangle with regular vertices.
 
-    Attributes
-    ----------
     uv : (u, v) by vertex
     """
 

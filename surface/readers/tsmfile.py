@@ -34,8 +34,6 @@ class Link:
 class TsmFile:
     """Records by kind; the n-th line of a kind is number n, deleted ones are not kept.
 
-    Attributes
-    ----------
     header : by keyword: its line and the rest of that line
     links, edges : by number: link, knot interval
     vertices : by number: line, link, compass word

@@ -19,8 +19,6 @@ MAX_DEGREE = 7
 def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str = "right") -> Floats:
     """Blending function over ``knots``, or its derivative, at ``x``.
 
-    Parameters
-    ----------
     knots : (p + 2,) float64, not decreasing
     x : (m,) float64
     derivative : 0, 1 or 2

@@ -13,8 +13,6 @@ from surface.base.arrays import Floats, Ints
 class Bins:
     """Lists of control points by bin.
 
-    Attributes
-    ----------
     grid : (6,) float64, u0, v0, bins per unit of u, bins per unit of v, u1, v1
     shape : (2,) int64, bins along u and v
     start : (bins + 1,) int64, where the list of each bin starts in ``ids``

@@ -23,8 +23,6 @@ Pair = tuple[T, T]  # in u and in v
 class ControlPoints:
     """Positions, weights, knots and degrees of n control points; immutable.
 
-    Parameters
-    ----------
     points : (n, 3) float64
     weights : (n,) float64, positive
     knots_u, knots_v : n sequences of degree + 2 knots each, or (n, degree + 2) arrays; the degree may differ

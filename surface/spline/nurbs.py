@@ -21,8 +21,6 @@ def nurbs_arrays(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Control points of a NURBS surface, each with its own slice of the knot vectors.
 
-    Parameters
-    ----------
     degree_u, degree_v : 0 to 7
     knots_u, knots_v : (nu + degree_u + 1,), (nv + degree_v + 1,) float64
     control_points : (nu, nv, 3) float64

@@ -61,8 +61,6 @@ def run_window(
 
     Drag rotates the head, right drag moves it, the wheel zooms, 1 to 5 choose a preset view, 0 resets it.
 
-    Parameters
-    ----------
     source : called once per frame, gives values (P,) in `head.parameters` order.
     gui : draws ImGui panels, once per frame.
     camera : the camera at first; a viewpoint can be changed by the caller later.
@@ -72,10 +70,8 @@ def run_window(
     kiosk : cover a whole monitor, hide the cursor, ignore mouse and keys but for Esc, which closes the window.
     monitor : which one, from 0.
 
-    Raises
-    ------
-    ViewError : no display, no OpenGL, or imgui-bundle is missing. Exceptions of `source` and `gui` are raised again
-        after the window is closed.
+    Raises ViewError: no display, no OpenGL, or imgui-bundle is missing. Exceptions of `source` and `gui` are raised
+    again after the window is closed.
     """
     if not has_display():  # the window library would end the process instead
         raise ViewError("there is no display to open a window on (DISPLAY is not set)", hint=HEADLESS_HINT)

@@ -33,8 +33,6 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 class Command:
     """A command whose names and numbers are right.
 
-    Attributes
-    ----------
     name : its first word, or two for ``GAZE AT`` and ``GAZE OFF``; FRAME becomes SET and VERSION becomes HELLO.
     indices : positions of the parameters it names. values : its numbers, of SET one for each of ``indices``.
     words : other names in it: of an expression, a list, a reading, a script or a mark.
@@ -65,9 +63,7 @@ class Request:
 class Grammar:
     """Parses the lines of one vocabulary.
 
-    Parameters
-    ----------
-    parameters : the registry. find_expression : canonical name of an expression; raises ParameterError.
+    find_expression : canonical name of an expression; raises ParameterError.
     """
 
     def __init__(self, parameters: Parameters, find_expression: Callable[[str], str]) -> None:

@@ -48,8 +48,6 @@ class Code(IntEnum):
 class LineError(LinkError):
     """A line that is refused.
 
-    Attributes
-    ----------
     code : why, for programs. tag : tag of the line, None without one. checked : the line had a checksum.
     """
 
@@ -73,8 +71,6 @@ class Words:
 class Reply:
     """A parsed line from omote.
 
-    Attributes
-    ----------
     kind : ``"OK"``, ``"ERR"``, or ``"P"``/``"F"`` for streamed parameters.
     text : what follows. tag : tag of the line it answers. code : of an ERR. checked : it had a checksum.
     """

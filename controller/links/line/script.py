@@ -33,8 +33,6 @@ class _File(Settings):
 class Script:
     """What a robot host sends, or a show plays.
 
-    Attributes
-    ----------
     steps : (time s, line) in rising time.
     loop_s : after how long it begins again; 0 plays it once.
     frames_hz : how often every parameter is sent besides, 0 for never.

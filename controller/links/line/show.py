@@ -84,8 +84,6 @@ class Show:
 class Shows:
     """The show that plays now; links change it from their threads, the control loop ticks it.
 
-    Parameters
-    ----------
     find : the script of a name; raises ConfigError. sink : the face.
     """
 

@@ -21,11 +21,7 @@ BROWN_OUT_V = 4.0
 class Board(Line):
     """A board with hobby servos on one port.
 
-    Parameters
-    ----------
-    now_s : time.
     faults : specs; see :data:`FAULTS`.
-    seed : of random faults.
     """
 
     def __init__(self, now_s: float = 0.0, faults: Iterable[str | Fault] = (), seed: int = 0) -> None:
@@ -63,8 +59,6 @@ class Board(Line):
 class RcChannel:
     """Pulse width of one output, in any unit; the shaft behind it is not known.
 
-    Attributes
-    ----------
     target : last target; 0 = no pulses.
     """
 
@@ -87,8 +81,6 @@ class RcChannel:
     def go(self, target: float, now_s: float, speed: float = 0.0, acceleration: float = 0.0) -> None:
         """Move to a target (0 = stop the pulses).
 
-        Parameters
-        ----------
         speed, acceleration : units/s and units/s²; 0 = no limit. A channel without pulses does not know where
             its servo is, so its first target is reached at once.
         """

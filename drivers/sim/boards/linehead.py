@@ -39,7 +39,6 @@ class LineHead(Board):
     Parameters
     ----------
     names : its outputs.
-    now_s : time. seed : of random faults.
     simple : it does not know GET.
 
     Attributes

@@ -57,8 +57,6 @@ class Command(NamedTuple):
 class MaestroReader(BufferingReader):
     """Cuts a byte stream into commands. An incomplete one is never given up (the time-out is off by default).
 
-    Parameters
-    ----------
     device : device number; commands of the Pololu protocol to another are passed over.
     crc : each message of the compact and Pololu protocol ends with its CRC-7.
     """
@@ -113,11 +111,9 @@ class Maestro(Board):
     Parameters
     ----------
     channels : 6, 12, 18 or 24 outputs.
-    now_s : time.
     faults : see :data:`drivers.sim.boards.board.FAULTS`.
     device, crc : see `MaestroReader`.
     limits_us : pulse limits of every channel, as set in Pololu's Control Center.
-    seed : of random faults.
 
     Attributes
     ----------

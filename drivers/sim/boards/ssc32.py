@@ -41,7 +41,6 @@ class Ssc32(Board):
 
     Parameters
     ----------
-    now_s : time.
     faults : see :data:`drivers.sim.boards.board.FAULTS`. seed : of random faults.
 
     Attributes

@@ -28,8 +28,6 @@ class Message(NamedTuple):
 class TextReader(BufferingReader):
     """Finds moves, queries and frames in a stream of text.
 
-    Parameters
-    ----------
     forms : kind and pieces of each possible message, the more special before the more general.
     """
 
@@ -76,7 +74,6 @@ class TextBoard(Board):
     ----------
     texts : the templates, as :class:`drivers.text.bus.TextBus` takes them.
     ids, names : its servos.
-    now_s : time. seed : of random faults.
 
     Attributes
     ----------

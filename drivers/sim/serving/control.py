@@ -34,10 +34,6 @@ class Commands:
     """Carries out command lines.
 
     They run in the server's own loop, so a port is never pulled away while it is waited for.
-
-    Parameters
-    ----------
-    line : the bus.
     """
 
     def __init__(self, line: Line) -> None:
@@ -93,15 +89,10 @@ class Lines:
 class ControlSocket:
     """A Unix socket that takes commands from any number of clients and never blocks.
 
-    Parameters
-    ----------
     path : where it listens; a socket without a server is replaced.
     handle : answers one line.
 
-    Raises
-    ------
-    PortBusy : another program listens there, or it is a file.
-    PortError : it cannot be made.
+    Raises PortBusy: another program listens there, or it is a file. PortError: it cannot be made.
     """
 
     def __init__(self, path: str | os.PathLike[str], handle: Callable[[str], str]) -> None:

@@ -33,8 +33,6 @@ Link = str | os.PathLike[str] | None
 class ServedPort(ABC):
     """A port as its server uses it. What a client does not read is lost when there is no more room for it.
 
-    Attributes
-    ----------
     path : what a client opens.
     dropped : bytes lost because the client did not read.
     """
@@ -80,12 +78,7 @@ class ServedPort(ABC):
 
 
 def make_port(link: Link) -> ServedPort:
-    """The port that a link asks for.
-
-    Raises
-    ------
-    PortError : it cannot be made.
-    """
+    """The port that a link asks for. Raises PortError: it cannot be made."""
     text = "" if link is None else os.fspath(link)
     if text.startswith("socket://"):
         return TcpPort(text)
@@ -99,13 +92,9 @@ class PtyPort(ServedPort):
 
     It stays open at both ends, so clients may come and go, and it stays raw between them.
 
-    Parameters
-    ----------
     link : path that shall point at the terminal, or None.
 
-    Raises
-    ------
-    PortError : no pseudo-terminals here, or the link cannot be made.
+    Raises PortError: no pseudo-terminals here, or the link cannot be made.
     """
 
     def __init__(self, link: Link = None) -> None:
@@ -260,9 +249,7 @@ class _SocketPort(ServedPort):
 class TcpPort(_SocketPort):
     """Listens at ``socket://HOST:PORT``; port 0 takes a free one, and ``path`` then names it.
 
-    Raises
-    ------
-    PortError : the address cannot be listened at; PortBusy where another program does.
+    Raises PortError: the address cannot be listened at; PortBusy where another program does.
     """
 
     def _listen(self) -> socket.socket:
@@ -283,12 +270,7 @@ class TcpPort(_SocketPort):
 
 
 class MemoryPort(_SocketPort):
-    """Serves ``memory://NAME`` to this process.
-
-    Raises
-    ------
-    PortBusy : the name is served already.
-    """
+    """Serves ``memory://NAME`` to this process. Raises PortBusy: the name is served already."""
 
     def _listen(self) -> socket.socket:
         self._waiting: deque[socket.socket] = deque()

@@ -159,9 +159,7 @@ class PortServer:
 def make_server(settings: Mapping[str, Any]) -> PortServer:
     """The server of a simulated far end, from the settings of a :class:`~drivers.sim.serving.simulated.SimulatedBus`.
 
-    Raises
-    ------
-    DriverError : unknown family or model, unreadable fault, or the port cannot be made.
+    Raises DriverError: unknown family or model, unreadable fault, or the port cannot be made.
     """
     now_s, baud = time.monotonic(), settings["baud"]
     line = make_line(
@@ -194,8 +192,6 @@ def serve_dynamixel(
 ) -> None:
     """Serve a simulated bus of Dynamixel or Feetech servos until it is interrupted. Prints nothing.
 
-    Parameters
-    ----------
     ids : servo ids, or specs with ``id`` and ``model``.
     model : of the servos given as bare ids, for example ``"xm430-w350"``, ``"ax-12a"``, ``"sts3215"``; it decides
         the protocol.
@@ -206,9 +202,7 @@ def serve_dynamixel(
     seed : of random faults.
     on_server : called with the server before it serves, for access to servos and traffic.
 
-    Raises
-    ------
-    DriverError : unknown model, unreadable fault, or the terminal or link cannot be made.
+    Raises DriverError: unknown model, unreadable fault, or the terminal or link cannot be made.
     """
     now_s = time.monotonic()
     line = make_line("dynamixel", ids_and_models(ids, model), now_s, baud=baud, seed=seed)
@@ -231,9 +225,7 @@ def serve(
 ) -> None:
     """Serve any simulated bus, for example ``Maestro()`` or ``Ssc32()``; parameters as for `serve_dynamixel`.
 
-    Raises
-    ------
-    DriverError : the terminal, link or socket cannot be made.
+    Raises DriverError: the terminal, link or socket cannot be made.
     """
     server = PortServer(line, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
     reading, writing = os.pipe()

@@ -82,8 +82,6 @@ class ServoView:
 class SimulatedBus:
     """A simulated bus of any family behind a port; a context manager.
 
-    Parameters
-    ----------
     servos : ids, or specs with ``id`` and ``model``.
     link : where clients find it: a path that shall point at a pseudo-terminal, ``socket://HOST:PORT`` (port 0 takes a
         free one), or ``memory://NAME`` for programs in this process.
@@ -95,14 +93,7 @@ class SimulatedBus:
     seed : of random faults.
     family, options : see :func:`drivers.sim.wire.simulator.make_line`.
 
-    Attributes
-    ----------
-    path : what a client opens.
-    baud : bit rate.
-
-    Raises
-    ------
-    DriverError : on entering: unknown model, unreadable fault, no terminal, or the child does not start.
+    Raises DriverError: on entering: unknown model, unreadable fault, no terminal, or the child does not start.
     """
 
     def __init__(
@@ -164,12 +155,7 @@ class SimulatedBus:
         return ServoView(self.chain, device_id)
 
     def fault(self, *specs: str) -> None:
-        """Set faults now.
-
-        Raises
-        ------
-        DriverError : a spec cannot be read; then none is set.
-        """
+        """Set faults now. Raises DriverError: a spec cannot be read; then none is set."""
         for spec in specs:
             parse_fault(spec)
         self._send(shlex.join(("fault", *specs)))

@@ -22,8 +22,6 @@ class SimulatedDriver(WireBus):
 
     The bus runs in a child process from ``open`` to ``close`` and keeps its state over ``reconnect``.
 
-    Parameters
-    ----------
     servos : the servos in the order of all arrays; the simulated ones have the same ids and models.
     port : path that shall point at the simulated port, so that other programs can find it; empty: a private one.
     transport : ``"pty"`` (a pseudo-terminal), ``"tcp"`` (this machine's loopback) or ``"memory"`` (a thread of this
@@ -31,9 +29,7 @@ class SimulatedDriver(WireBus):
     faults, wire, latency_s, seed, process : see :class:`drivers.sim.serving.simulated.SimulatedBus`.
     options : see the driver.
 
-    Raises
-    ------
-    DriverError : unknown transport, and what the driver raises.
+    Raises DriverError: unknown transport, and what the driver raises.
     """
 
     family: ClassVar[str]

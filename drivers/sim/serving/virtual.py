@@ -24,8 +24,6 @@ from drivers.sim.wire.timing import WireTiming
 class VirtualClock:
     """A clock that only its methods move.
 
-    Parameters
-    ----------
     now_s : time to begin with.
     """
 
@@ -48,8 +46,6 @@ class VirtualClock:
 class VirtualLink:
     """A wire-timed far end as a driver's port. Same methods as :class:`~drivers.port.serialport.SerialPort`.
 
-    Parameters
-    ----------
     line : what is at the far end.
     clock : the time of driver and far end.
     baud : bit rate.
@@ -139,7 +135,6 @@ class VirtualBus:
 
     Parameters
     ----------
-    servos : the servos.
     family : a kind of bus, as ``drivers.kinds()`` lists them.
     driver : options of the drivers over it, such as ``{"margin_s": 0.05}``.
     faults, baud, latency_s, seed : see :class:`drivers.sim.SimulatedBus`.

@@ -51,9 +51,7 @@ class Chain(Line):
     Parameters
     ----------
     servos : any number; two with one id collide, as they do on a real wire.
-    now_s : time.
     faults : specs as in ``drivers.sim.wire.faults``.
-    seed : of random faults.
 
     Attributes
     ----------
@@ -81,12 +79,7 @@ class Chain(Line):
         self.faults.add(faults, now_s)
 
     def servo(self, device_id: int) -> SimulatedServo:
-        """The first servo that has this id now.
-
-        Raises
-        ------
-        KeyError : none has it.
-        """
+        """The first servo that has this id now. Raises KeyError: none has it."""
         for servo in self.servos:
             if servo.id == device_id:
                 return servo
@@ -107,12 +100,7 @@ class Chain(Line):
         ]
 
     def place(self, device_id: int, position: float, now_s: float) -> None:
-        """Move a limp shaft by hand.
-
-        Raises
-        ------
-        KeyError : no servo has the id. ValueError : the motor holds the shaft.
-        """
+        """Move a limp shaft by hand. Raises KeyError: no servo has the id. ValueError: the motor holds the shaft."""
         self.servo(device_id).place(position, now_s)
 
     def make_reader(self) -> ProtocolReaders:

@@ -24,8 +24,6 @@ CALIBRATE = 128
 class SimulatedServo(ServoState):
     """A servo that carries out instructions.
 
-    Parameters
-    ----------
     device_id, model, settings : see :class:`~drivers.sim.servos.state.ServoState`.
     """
 

@@ -91,8 +91,6 @@ def plan_move(
 ) -> Trajectory:
     """Quickest move to rest at `goal`: a trapezoid, or a triangle where it is too short.
 
-    Parameters
-    ----------
     top_speed, acceleration : above zero, ticks/s and ticks/s².
     profile : number to report; a trapezoid without a constant velocity is reported as triangular.
     """

@@ -12,8 +12,6 @@ from drivers.sim.servos.motion import Motion, hold
 class Skin:
     """Load on the shaft, as shares of the motor's stall torque.
 
-    Attributes
-    ----------
     spring : share per tick away from `rest`: silicone skin pulls back.
     rest : position of the skin at rest, ticks; None = where the servo starts.
     inertia : share per tick/s².

@@ -23,12 +23,6 @@ class Protocol(ABC):
     A packet is (id, instruction number, parameters). One servo answers an instruction with a status packet; one to
     the broadcast id is carried out by all and, except for a ping, answered by none.
 
-    Parameters
-    ----------
-    faults : the faults of the wire.
-
-    Attributes
-    ----------
     by_id, duplicates : the servos that receive packets, by id; further servos with an id that is taken.
     chain_stop : in reads of several servos nobody answers behind a silent one; otherwise the next one does.
     """

@@ -167,12 +167,7 @@ class ServoState:
         return self.registers.get(name)
 
     def place(self, position: float, now_s: float) -> None:
-        """Move the limp shaft by hand to a Present Position.
-
-        Raises
-        ------
-        ValueError : the motor is on and holds the shaft.
-        """
+        """Move the limp shaft by hand to a Present Position. Raises ValueError: the motor is on and holds the shaft."""
         if self.plant.powered:
             raise ValueError(f"servo {self.id} holds its shaft: switch its torque off before moving it by hand")
         self.plant.place(now_s, self.drive.to_shaft(round(position)))

@@ -31,8 +31,6 @@ from drivers.base.errors import DriverError
 class Kind(NamedTuple):
     """One kind of fault.
 
-    Attributes
-    ----------
     scope : ``"reply"`` (corrupts replies), ``"servo"`` (changes a servo) or ``"bus"``.
     value : how the value is read; None: it takes none.
     default : value where none is given; None with `value` set: it must be given.
@@ -120,9 +118,7 @@ def _bad(spec: str, why: str) -> DriverError:
 def parse_fault(spec: str) -> Fault:
     """Read one fault.
 
-    Raises
-    ------
-    DriverError : the message names the spec and what is wrong with it; the hint lists the kinds.
+    Raises DriverError: the message names the spec and what is wrong with it; the hint lists the kinds.
     """
     name, *parts = spec.strip().split(":")
     kind = KINDS.get(name)
@@ -184,9 +180,6 @@ def _with_option(fault: Fault, part: str) -> Fault:
 class ReplyFault:
     """Decides which replies a fault of scope ``"reply"`` hits, and corrupts their bytes.
 
-    Parameters
-    ----------
-    fault : the fault.
     rng : random numbers, shared by the bus so that a run can be repeated.
     """
 
@@ -234,8 +227,6 @@ class ReplyFault:
 class FaultSet:
     """The faults of one bus, with the times at which they begin and end.
 
-    Parameters
-    ----------
     on_change : called with (fault, begins, time) when one begins or ends.
     seed : of the random numbers.
     kinds : faults that the bus can have.
@@ -263,9 +254,7 @@ class FaultSet:
     def add(self, faults: Iterable[str | Fault], now_s: float) -> None:
         """Set faults; their ``at`` counts from now.
 
-        Raises
-        ------
-        DriverError : a spec cannot be read, or this bus has no such fault; then none of them is set.
+        Raises DriverError: a spec cannot be read, or this bus has no such fault; then none of them is set.
         """
         wanted = [parse_fault(item) if isinstance(item, str) else item for item in faults]
         for fault in wanted:
@@ -300,8 +289,6 @@ class FaultSet:
     ) -> tuple[bytes | None, float]:
         """A reply as it arrives (None: it does not), and how late it is, seconds.
 
-        Parameters
-        ----------
         frame : the reply. device_id : who sends it.
         first : the first byte in which a bit may be flipped.
         shorten : gives a frame with only so many data bytes. readdress : gives a frame from another id.

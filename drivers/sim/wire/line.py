@@ -58,8 +58,6 @@ class BufferingReader(ABC):
 class FixedReader(BufferingReader):
     """Cuts a byte stream into packets of one length that begin with the same byte.
 
-    Parameters
-    ----------
     head : first byte of every packet; bytes before one are passed over. length : of a packet, bytes.
     """
 
@@ -170,7 +168,6 @@ class ReplyQueue:
 
     Parameters
     ----------
-    line : the line.
     baud : bit rate while the line knows none.
     timing : time on the wire; None: bytes take no time.
 

@@ -21,9 +21,7 @@ Servos = Sequence[tuple[int, Any]]
 class Setting:
     """What every simulated far end is made with.
 
-    Attributes
-    ----------
-    now_s : time. baud : rate of the wire. seed : of random faults.
+    baud : rate of the wire. seed : of random faults.
     names : names of all parameters, for a head that is served alone; empty for a driver's far end.
     """
 
@@ -36,9 +34,7 @@ class Setting:
 def simulator_of(kind: str) -> Simulator:
     """The simulator of a family.
 
-    Raises
-    ------
-    PluginError : unknown kind, a family that has none, or one that names something else.
+    Raises PluginError: unknown kind, a family that has none, or one that names something else.
     """
     family = FAMILIES.get(kind)
     if not family.simulator:
@@ -67,8 +63,6 @@ class BoardOptions:
 class Simulator:
     """The simulator of a family.
 
-    Attributes
-    ----------
     far_end : makes what a driver of the family expects at the other end of its wire, from the ids and models of its
         servos and from what the driver gives as ``far_end()``, plain values that can travel to another process.
     alone : makes what ``omote simulate KIND`` serves, from an instance of ``options``.
@@ -90,15 +84,11 @@ def make_line(
 ) -> Line:
     """The simulated far end of any family, from plain values, as they travel to a child process.
 
-    Parameters
-    ----------
     family : a kind of bus; the models of Dynamixel and Feetech servos decide their protocol.
     servos : id and model of each. now_s : time.
     baud : rate of the wire. seed : of random faults.
     options : what the family's driver gives as ``far_end()``.
 
-    Raises
-    ------
-    DriverError : unknown family or model, or servos that cannot share a wire.
+    Raises DriverError: unknown family or model, or servos that cannot share a wire.
     """
     return simulator_of(family).far_end(servos, options, Setting(now_s=now_s, baud=baud, seed=seed))

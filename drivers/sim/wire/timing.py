@@ -30,9 +30,6 @@ class Sender(Protocol):
 class Reply(NamedTuple):
     """Bytes one servo puts on the wire.
 
-    Attributes
-    ----------
-    data : the bytes.
     servo : whose Return Delay Time comes before them; None: they follow the bytes before at once.
     late_s : further delay, by a fault.
     """
@@ -56,8 +53,6 @@ def collide(replies: list[Reply]) -> list[Reply]:
 class WireTiming:
     """Keeps track of when the wire is free.
 
-    Parameters
-    ----------
     latency_s : latency timer of the USB bridge (16 ms by default on Linux, 1 ms in low-latency mode, 0 = none).
     """
 

@@ -45,8 +45,6 @@ MOVES_MM = 1.0  # of a head of usual size: what moves less does not count as mov
 class Plan:
     """The parts that a mesh is fitted as.
 
-    Attributes
-    ----------
     parts : recipes and islands, ready to become charts.
     eyes : centres (2, 3), left first, and radius; radius 0 without eyes.
     hinge : about which the jaw turns; jaw : vertices that turn with it as a whole.

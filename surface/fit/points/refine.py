@@ -19,8 +19,6 @@ from surface.fit.source.mesh import FitMesh
 class FitRequest:
     """How finely and how smoothly a chart is fitted.
 
-    Attributes
-    ----------
     points : most control points; coarse : spacing of the first net, in tiles; deepest : its finest level.
     neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
     growth : most factor by which the net grows between two solves.

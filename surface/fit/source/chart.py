@@ -37,8 +37,6 @@ class Cut:
 class Chart:
     """Everything the fit needs of one part.
 
-    Attributes
-    ----------
     uv : (m, 2) float64, the samples.
     mix : (m, n) sparse, the samples out of the mesh's n vertices.
     weight : (m,) float64, of each sample in least squares.

@@ -19,8 +19,6 @@ LARGE, SMALL = 1e7, 1e-7  # in any unit: no vertex of a head lies further out, n
 class FitMesh:
     """A mesh in head space.
 
-    Attributes
-    ----------
     vertices : (n, 3) float64, millimetres, y up, z forward.
     faces : (f, 4) int64, -1 fills the last place of a triangle.
     uv : (t, 2) float64; face_uv : (f, 4) int64 into ``uv``, -1 as in ``faces``.

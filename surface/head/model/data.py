@@ -26,8 +26,6 @@ class Group:
 class PartData:
     """One DCP surface of the head and how it follows the parameters.
 
-    Attributes
-    ----------
     follows : "skin" (control points move one by one), or what it is fixed to: "skull", "jaw", "left_eye",
         "right_eye".
     points (n, 3), weights (n,), knots_u, knots_v (n, w), degrees (n, 2) : the surface, padded as in
@@ -99,8 +97,6 @@ class Neck:
 class Contact:
     """Two sides of an opening that meet and do not pass through each other.
 
-    Attributes
-    ----------
     part : the one with the opening; followers : parts after it that move along with its sides.
     eye : 0 or 1 for the lids of the left or right eye, whose heights are arcs round the eyeball; -1 for lips.
     reach_mm : distance from the rim at which the correction has faded out. share : the upper side's part of it, 0..1.

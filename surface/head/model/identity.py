@@ -23,8 +23,6 @@ FILE = "identities.npz"
 class Identity:
     """One variation, per unit.
 
-    Attributes
-    ----------
     groups : part name -> displacements of control points at rest, mm.
     changes : part name -> what is added to groups of the head, so that lids of another height still close.
     eyes : (2, 3) shift of the eyeballs' centres; jaw : (3,) of the hinge, mm.

@@ -43,8 +43,6 @@ _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
 class Pose:
     """A parameter vector as amounts and angles.
 
-    Attributes
-    ----------
     shapes : (52,) amount of each group; lids already follow the gaze.
     jaw : how far the jaw is open, 0..1; closed : share of it that mouthClose takes back, 0..1.
     head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.

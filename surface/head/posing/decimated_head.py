@@ -27,8 +27,6 @@ from surface.mesh.mesh import Mesh
 class DecimatedPart:
     """A part's vertices among those of a decimated head.
 
-    Attributes
-    ----------
     part : the head's own.
     first, last : its vertices are those from ``first`` to before ``last``.
     kept : (m,) int64, which vertices of the part they are, rising.

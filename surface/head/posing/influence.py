@@ -25,8 +25,6 @@ _RIGID_POINTS = 4
 class Influence:
     """The sums of all vertices of a head at rest.
 
-    Attributes
-    ----------
     points : number of points the sums run over.
     part_start : (parts + 1,) int64, first vertex of every part.
     start : (m + 1,) int64, first entry of every vertex.

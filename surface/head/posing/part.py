@@ -48,8 +48,6 @@ class Turn:
 class HeadPart:
     """One surface of the head, tessellated.
 
-    Attributes
-    ----------
     name, material, follows : str.
     triangles : (t, 3) int32; uv : (m, 2) float32.
     vertices, normals : (m, 3) float32, current, in head space including the head's rotation.

@@ -36,9 +36,7 @@ _PATCH = 341  # triangles that Mesa's software renderer draws at a time
 def decimate_head(folder: str | Path) -> Path:
     """Decimate the triangles of the head in `folder` and keep them beside it; returns the file written.
 
-    Raises
-    ------
-    HeadFileError : the head cannot be read.
+    Raises HeadFileError: the head cannot be read.
     """
     head = Head(load_data(folder), str(folder))  # without the files beside it, which may belong to another head
     return write_decimated(folder, head.parts, decimated_triangles(head))

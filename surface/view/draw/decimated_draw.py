@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 class DecimatedEvaluator(Evaluator):
     """Evaluates only the vertices that are drawn, see :class:`surface.head.posing.decimated_head.DecimatedHead`.
 
-    Parameters
-    ----------
     head : its parts have decimated triangles.
     level : "full" or "fast". openings : whose vertices are evaluated, too. reason : why it was chosen.
     """
@@ -52,8 +50,6 @@ class DecimatedEvaluator(Evaluator):
 class JoinedParts:
     """Neighbouring parts of a decimated head that one program draws, as one part.
 
-    Attributes
-    ----------
     triangles : (t, 3) int32 of the joined vertices.
     """
 

@@ -33,8 +33,6 @@ _IDENTITY = np.eye(3)
 class Evaluator:
     """Evaluates with the head's own engine; changed vertices are uploaded. Base class of the other evaluators.
 
-    Attributes
-    ----------
     name : "cpu" or "gpu". reason : why it was chosen.
     """
 
@@ -69,8 +67,6 @@ class GpuEvaluator(Evaluator):
 
     The head's own vertices and normals keep their last values.
 
-    Parameters
-    ----------
     head : a :class:`surface.head.Head`: its surfaces are needed.
     """
 
@@ -180,10 +176,7 @@ def rotate_by_share(points: np.ndarray, share: np.ndarray, vector: np.ndarray, p
 def choose(ctx: moderngl.Context, head: ViewHead, name: str) -> Evaluator:
     """The evaluator called `name`; "auto" takes the graphics processor if there is one that can evaluate.
 
-    Raises
-    ------
-    ValueError : unknown name.
-    ViewError : "gpu" is asked for and cannot be used.
+    Raises ValueError: unknown name. ViewError: "gpu" is asked for and cannot be used.
     """
     if name not in EVALUATORS:
         raise ValueError(f"evaluator must be one of {', '.join(EVALUATORS)}, not {name!r}")

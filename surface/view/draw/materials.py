@@ -36,8 +36,6 @@ INSIDE = ("eye", "teeth", "gums", "mouth")
 class Material:
     """How one kind of part is drawn.
 
-    Parameters
-    ----------
     program : name in :func:`programs`.
     static : per-vertex data that never changes.
     uniforms : uniforms of this frame.

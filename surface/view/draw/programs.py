@@ -37,15 +37,11 @@ def build(
 ) -> moderngl.Program:
     """Compile and link the named files.
 
-    Parameters
-    ----------
     vertex, fragment : shader files, in order; no fragment files for a program that only fills a buffer.
     outputs : what such a program writes, one after the other.
     defines : macros set before the files.
 
-    Raises
-    ------
-    ViewError : when the driver refuses the shader; the message contains the driver's.
+    Raises ViewError: when the driver refuses the shader; the message contains the driver's.
     """
     import moderngl  # optional
 

@@ -34,18 +34,14 @@ class Renderer:
 
     The head is posed at rest (all parameters 0) once, to find lids and lips.
 
-    Parameters
-    ----------
     ctx : the moderngl context that is current.
     head : anything with the parts of `surface.view.scene.parts.ViewHead`.
     quality : "full" shades skin and mouth per pixel, "fast" per vertex.
     theme : name in `surface.view.scene.theme.THEMES`, or a :class:`Theme`.
     evaluator : what evaluates the vertices: "cpu", "gpu", or "auto" (see :func:`surface.view.draw.evaluator.choose`).
 
-    Raises
-    ------
-    ValueError : unknown quality or evaluator.
-    ViewError : unknown theme, the driver refuses a shader, or evaluator "gpu" cannot be used.
+    Raises ValueError: unknown quality or evaluator. ViewError: unknown theme, the driver refuses a shader, or evaluator
+    "gpu" cannot be used.
     """
 
     def __init__(
@@ -202,8 +198,6 @@ class Renderer:
 class Rectangles:
     """Rectangles of a picture, to run a fragment shader over.
 
-    Parameters
-    ----------
     program : with an input `corner`, as in background.vert.
     """
 

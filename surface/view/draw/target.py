@@ -26,8 +26,6 @@ class Target:
     :meth:`paint` begins a picture, :meth:`complete` ends it. Between the two a software renderer fills its
     pixels on other threads, so the caller's other work belongs there.
 
-    Parameters
-    ----------
     size : (width, height), pixels.
     samples : per pixel; capped at what the driver offers.
     scale : the head is drawn at this share of the size, up to 1, and enlarged; 1 where `samples` > 1.

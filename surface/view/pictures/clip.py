@@ -23,18 +23,12 @@ _MESSAGE_BYTES = 400  # of ffmpeg's output, its end
 def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 25.0) -> int:
     """Write frames as a clip; the suffix chooses the format (.webp, .gif, .mp4).
 
-    Parameters
-    ----------
     frames : (height, width, 3) uint8 each, all of one size; taken one by one.
     fps : frames per second.
 
-    Returns
-    -------
-    Frames written.
+    Returns how many frames were written.
 
-    Raises
-    ------
-    ViewError : unknown suffix, no frames, no ffmpeg for .mp4, or the file cannot be written.
+    Raises ViewError: unknown suffix, no frames, no ffmpeg for .mp4, or the file cannot be written.
     """
     path = Path(path)
     suffix = path.suffix.lower()

@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 
 def as_image(pixels: np.ndarray) -> Image:
-    """Pillow image of (height, width, 3) uint8 pixels.
-
-    Raises
-    ------
-    ViewError : Pillow is missing.
-    """
+    """Pillow image of (height, width, 3) uint8 pixels. Raises ViewError: Pillow is missing."""
     try:
         from PIL import Image as pillow  # optional: the extra view
     except ImportError as error:
@@ -35,9 +30,7 @@ def as_image(pixels: np.ndarray) -> Image:
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` to write to; moved to `path` on success, removed on failure.
 
-    Raises
-    ------
-    ViewError : the folder is missing or cannot be written.
+    Raises ViewError: the folder is missing or cannot be written.
     """
     if not path.parent.is_dir():
         raise ViewError(f"cannot write {path}: there is no folder {path.parent}", hint=f"mkdir -p {path.parent}")

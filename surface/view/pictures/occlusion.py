@@ -93,20 +93,14 @@ def bake(
 ) -> dict[str, np.ndarray]:
     """Cosine-weighted share of the sky that each vertex sees, as the parts are posed now.
 
-    Parameters
-    ----------
     directions : number of views from all around.
     resolution : pixels along the side of each depth picture.
     bias_mm : how far behind the depth picture a vertex still counts as seen.
 
-    Returns
-    -------
-    Part name -> (m, 5) float32: the share, 1 = open, 0 = buried, and the coefficients of :func:`fit_sky`; parts of
-    other materials have 1, 1, 0, 0, 0 throughout.
+    Returns part name -> (m, 5) float32: the share, 1 = open, 0 = buried, and the coefficients of :func:`fit_sky`; parts
+    of other materials have 1, 1, 0, 0, 0 throughout.
 
-    Raises
-    ------
-    ViewError : no OpenGL on this machine.
+    Raises ViewError: no OpenGL on this machine.
     """
     result = {part.name: np.tile(np.array([1, 1, 0, 0, 0], np.float32), (len(part.vertices), 1)) for part in parts}
     ctx = open_context()
@@ -123,8 +117,6 @@ def bake(
 def fit_sky(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Coefficients (m, 4) so that a + (b, c, d) . direction is nearest to what a vertex sees there (least squares).
 
-    Parameters
-    ----------
     normal : (m, 4, 4) sum over directions of weight times the products of (1, direction) with itself.
     right : (m, 4) sum of weight times seen times (1, direction).
     """
@@ -183,9 +175,7 @@ def sphere_directions(count: int) -> np.ndarray:
 def orthographic(points: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """View of `points` (m, 3) from far away along `direction` (3,).
 
-    Returns
-    -------
-    Their coordinates in the unit cube (m, 3), depth last and growing away from the viewer; the matrix (4, 4) to
+    Returns their coordinates in the unit cube (m, 3), depth last and growing away from the viewer; the matrix (4, 4) to
     clip space; and the depth of the cube in mm.
     """
     side = np.cross(direction, (0.0, 1.0, 0.0) if abs(direction[1]) < 0.9 else (1.0, 0.0, 0.0))
@@ -217,10 +207,7 @@ def visibility(box: np.ndarray, picture: np.ndarray, bias: float) -> np.ndarray:
 def shade_head(folder: str | Path) -> Path:
     """Bake the head in `folder` and keep the result beside it; returns the file written.
 
-    Raises
-    ------
-    HeadFileError : the head cannot be read.
-    ViewError : no OpenGL on this machine.
+    Raises HeadFileError: the head cannot be read. ViewError: no OpenGL on this machine.
     """
     shade_path(folder).unlink(missing_ok=True)
     head = Head(load_data(folder), str(folder))  # without the files beside it, which may belong to another head

@@ -24,9 +24,7 @@ NO_OPENGL_HINT = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 def open_context() -> moderngl.Context:
     """A new context: EGL first (no display needed), then the platform's.
 
-    Raises
-    ------
-    ViewError : moderngl is missing, or there is no OpenGL 3.1.
+    Raises ViewError: moderngl is missing, or there is no OpenGL 3.1.
     """
     try:
         import moderngl  # optional
@@ -47,8 +45,6 @@ def open_context() -> moderngl.Context:
 class Offscreen:
     """A head drawn without a display; use as a context manager.
 
-    Parameters
-    ----------
     head : anything with the parts of `surface.view.scene.parts.ViewHead`.
     size : (width, height), pixels.
     samples : per pixel; None = 4 for quality "full" and 1 with smoothed edges for "fast". After the first :meth:`draw`
@@ -56,9 +52,7 @@ class Offscreen:
         drawn at a share of its size (:data:`surface.view.scene.sampling.SCALE`) and enlarged.
     quality, theme, evaluator : see :class:`surface.view.draw.renderer.Renderer`.
 
-    Raises
-    ------
-    ViewError : no OpenGL, or a size that no driver draws.
+    Raises ViewError: no OpenGL, or a size that no driver draws.
     """
 
     def __init__(

@@ -38,17 +38,13 @@ def contact_sheet(
 ) -> Image:
     """Draw one picture per entry and view and put them on one labelled page.
 
-    Parameters
-    ----------
     entries : (label, values (P,)) in `head.parameters` order.
     views : cameras; the front if None. Each entry's views are side by side, zoomed in since tiles are small.
     tile : (width, height) of one picture, pixels.
     columns : entries across; about square if None.
     progress : called with (done, total) after each entry.
 
-    Raises
-    ------
-    ViewError : no entries, no OpenGL, no Pillow.
+    Raises ViewError: no entries, no OpenGL, no Pillow.
     """
     cameras = [zoom_to_head(camera) for camera in views or (Camera.front(),)]
     pictures = []
@@ -70,16 +66,12 @@ def zoom_to_head(camera: Camera) -> Camera:
 def compose(pictures: Sequence[np.ndarray], labels: Sequence[str], *, columns: int | None = None) -> Image:
     """Put pictures on one page, each with its label under it, as a Pillow image.
 
-    Parameters
-    ----------
     pictures : (height, width, 3) uint8 each, all of one size.
     labels : one per picture.
     columns : pictures across; about square if None.
 
-    Raises
-    ------
-    ViewError : no pictures, or Pillow is missing.
-    ValueError : sizes differ, or the numbers of labels and pictures do.
+    Raises ViewError: no pictures, or Pillow is missing. ValueError: sizes differ, or the numbers of labels and pictures
+    do.
     """
     count = len(pictures)
     if count == 0:
@@ -107,9 +99,7 @@ def compose(pictures: Sequence[np.ndarray], labels: Sequence[str], *, columns: i
 def write_png(picture: np.ndarray | Image, path: str | Path) -> None:
     """Write (height, width, 3) uint8 pixels or a Pillow image as PNG, whole or not at all.
 
-    Raises
-    ------
-    ViewError : the file cannot be written, or Pillow is missing.
+    Raises ViewError: the file cannot be written, or Pillow is missing.
     """
     image = as_image(picture) if isinstance(picture, np.ndarray) else picture
     with replacing(Path(path)) as temporary:

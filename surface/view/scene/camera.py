@@ -21,8 +21,6 @@ _MAX_PITCH_DEG = 85.0
 class Camera:
     """A pinhole camera.
 
-    Parameters
-    ----------
     eye, target : (3,) position and point looked at, millimetres, head space (y up, z out of the face).
     fov_deg : vertical field of view, degrees.
     near, far : clipping distances, millimetres.

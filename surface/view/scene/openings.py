@@ -45,8 +45,6 @@ Read = Callable[[ViewPart, np.ndarray], np.ndarray]
 class Aperture:
     """An opening in a part.
 
-    Parameters
-    ----------
     loop : (k,) vertex ids around the opening, in order, first = corner with the least x.
     upper, lower : (LID_POINTS,) vertex ids along either edge, from the corner with the least x to the other.
     """
@@ -60,8 +58,6 @@ class Aperture:
 class EyeFrame:
     """Maps vertices of an eyeball to its rotation.
 
-    Parameters
-    ----------
     local : (m, 3) float32 unit directions in the eye's own frame, +z through the pupil.
     ids : (k,) vertices used.
     solve : (4, k) maps their positions to rotation times radius and centre (least squares).
@@ -77,8 +73,6 @@ class EyeFrame:
 class Openings:
     """Lids, lips and eyeballs of a head.
 
-    Parameters
-    ----------
     parts : the head's parts, at rest.
     read : gives the positions (k, 3) of vertices (k,) of a part as posed now.
     """
@@ -224,8 +218,6 @@ def leading_edge(
     The skin ends behind the lid's margin, out of sight; the margin is lowest (upper lid) or highest (lower lid) seen
     from the eyeball's centre.
 
-    Parameters
-    ----------
     path, other : (k,) vertex ids along the skin's edge, on this lid and on the other one.
     vertices : (m, 3) positions at rest.
     centre : (3,) of the eyeball.

@@ -53,8 +53,6 @@ class ViewHead(Protocol):
 class DynamicBuffers:
     """Vertex buffers of positions and normals that change with the pose.
 
-    Attributes
-    ----------
     content : their entries of a vertex array.
     """
 
@@ -80,7 +78,6 @@ class PartBuffers:
 
     Parameters
     ----------
-    part : the head part.
     program : its material's program, with inputs `position`, `normal` and any of `static`.
     static : per-vertex data that never changes, by shader input name: (m, k) float32, or uint8 read as 0..1.
     on_gpu : positions and normals lie in one buffer, `feedback`, which a shader fills.

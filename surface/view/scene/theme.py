@@ -13,8 +13,6 @@ Colour = tuple[float, float, float]
 class Light:
     """A directional light.
 
-    Parameters
-    ----------
     yaw_deg, pitch_deg : where it comes from, seen from the face; yaw + = subject's left, pitch + = above.
     colour : (3,) linear RGB times intensity.
     """
@@ -28,8 +26,6 @@ class Light:
 class Theme:
     """Colours and lights of a picture; linear RGB unless stated otherwise.
 
-    Parameters
-    ----------
     albedo : skin of heads without a painted albedo.
     use_painted : whether the head's own albedo is used.
     wrap : how far light bends around the terminator per channel, 0..1; red far, blue little, for skin.
