@@ -19,13 +19,15 @@ BROWN_OUT_V = 4.0
 
 
 class Board(Line):
-    """A board with hobby servos on one port.
+    """A board with hobby servos on one port; ``faults`` are specs of :data:`FAULTS`.
 
-    faults : specs; see :data:`FAULTS`.
+    refused : messages that were not understood.
     """
 
     def __init__(self, now_s: float = 0.0, faults: Iterable[str | Fault] = (), seed: int = 0) -> None:
         super().__init__(seed, kinds=FAULTS)
+        self.refused = 0
+        self.reset(now_s)
         self._deaf: list[Fault] = []
         self.faults.add(faults, now_s)
 
@@ -57,10 +59,7 @@ class Board(Line):
 
 
 class RcChannel:
-    """Pulse width of one output, in any unit; the shaft behind it is not known.
-
-    target : last target; 0 = no pulses.
-    """
+    """Pulse width of one output, in any unit, and its last ``target``, 0 for no pulses; the shaft is not known."""
 
     def __init__(self) -> None:
         self.target = 0.0

@@ -36,21 +36,13 @@ class _Refusal(Exception):
 class LineHead(Board):
     """A head with named outputs.
 
-    Parameters
-    ----------
-    names : its outputs.
-    simple : it does not know GET.
-
-    Attributes
-    ----------
+    names : its outputs. simple : it does not know GET.
     values : by name; None while it is released.
     refused : lines answered with ERR.
     """
 
     def __init__(self, names: Sequence[str], now_s: float = 0.0, seed: int = 0, simple: bool = False) -> None:
         self._names, self.simple = list(names), simple
-        self.refused = 0
-        self.reset(now_s)
         super().__init__(now_s, seed=seed)
 
     def reset(self, now_s: float) -> None:

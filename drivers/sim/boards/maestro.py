@@ -108,16 +108,10 @@ class MaestroReader(BufferingReader):
 class Maestro(Board):
     """A Mini Maestro, or with 6 channels a Micro Maestro, on one port.
 
-    Parameters
-    ----------
-    channels : 6, 12, 18 or 24 outputs.
+    channels : 6, 12, 18 or 24 outputs; as an attribute the outputs themselves, quarter microseconds.
     faults : see :data:`drivers.sim.boards.board.FAULTS`.
     device, crc : see `MaestroReader`.
     limits_us : pulse limits of every channel, as set in Pololu's Control Center.
-
-    Attributes
-    ----------
-    channels : the outputs, quarter microseconds.
     errors : bits of Get Errors that were not read yet.
     """
 
@@ -133,7 +127,6 @@ class Maestro(Board):
     ) -> None:
         self._settings = device, crc
         self._count, self._limits = channels, (4 * limits_us[0], 4 * limits_us[1])
-        self.reset(now_s)
         self._handlers: dict[int, Callable[[bytes, float], bytes | None]] = {
             protocol.SET_TARGET: lambda data, now_s: self._go(data[0], _word(data[1:]), now_s),
             protocol.SET_MULTIPLE: self._set_multiple,

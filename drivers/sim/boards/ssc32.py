@@ -7,11 +7,9 @@ line that has begun. `PO` is not modelled.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from typing import Any
 
 from drivers.sim.boards.board import Board, RcChannel
-from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import BufferingReader
 from drivers.sim.wire.simulator import BoardOptions, Simulator
 
@@ -39,20 +37,8 @@ class LineReader(BufferingReader):
 class Ssc32(Board):
     """An SSC-32 on one port.
 
-    Parameters
-    ----------
-    faults : see :data:`drivers.sim.boards.board.FAULTS`. seed : of random faults.
-
-    Attributes
-    ----------
-    channels : the outputs, microseconds.
-    refused : lines that were not understood; the board ignores them.
+    channels : the outputs, microseconds. refused : lines that were not understood; the board ignores them.
     """
-
-    def __init__(self, now_s: float = 0.0, faults: Iterable[str | Fault] = (), seed: int = 0) -> None:
-        self.refused = 0
-        self.reset(now_s)
-        super().__init__(now_s, faults, seed)
 
     def reset(self, now_s: float) -> None:
         """The state after power-on: no pulses."""

@@ -70,15 +70,9 @@ class TextReader(BufferingReader):
 class TextBoard(Board):
     """A text board on one port.
 
-    Parameters
-    ----------
     texts : the templates, as :class:`drivers.text.bus.TextBus` takes them.
     ids, names : its servos.
-
-    Attributes
-    ----------
     values : last value by servo id; None while it is off.
-    refused : messages it did not understand.
     """
 
     def __init__(
@@ -93,8 +87,6 @@ class TextBoard(Board):
         self._value = next(piece.field for piece in move.pieces if piece.field in VALUES)
         self._by_name = dict(zip(names, ids, strict=True))
         self._names = dict(zip(ids, names, strict=True))
-        self.refused = 0
-        self.reset(now_s)
         super().__init__(now_s, seed=seed)
 
     def reset(self, now_s: float) -> None:
