@@ -167,14 +167,7 @@ class Bus(ABC):
     (SIGKILL), servos with a bus watchdog stop by themselves, ``drivers/core/dead_man_switch.py`` switches off those
     without one, and pulses of hobby servos go on.
 
-    Parameters
-    ----------
-    servos : the servos in the order of all arrays.
-
-    Raises ValueError: no servo, or two with one id.
-
-    Attributes
-    ----------
+    servos : the servos in the order of all arrays. Raises ValueError: no servo, or two with one id.
     measures : positions are measured at the shafts; False for hobby servos, whose states are never fresh.
     """
 
@@ -278,6 +271,36 @@ class Bus(ABC):
 
 def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
     """A read-only copy of an array."""
-    out = np.array(values, dtype=dtype)
-    out.flags.writeable = False
-    return out
+    return read_only(np.array(values, dtype=dtype))
+
+
+def make_state(
+    time_s: float, measured: Floats, fresh: Flags, silent: Flags, slow_values: Sequence[NDArray[Any]]
+) -> BusState:
+    """A state of read-only arrays.
+
+    `measured` is (4, n): position, velocity, current and age. `slow_values` are error, supply, temperature, hardware
+    error and torque, (n,) each; they, `fresh` and `silent` are read-only already.
+    """
+    position, velocity, current, age = (read_only(row) for row in measured)
+    error, volts, celsius, hardware, torque = slow_values
+    return BusState(
+        time_s=time_s,
+        position_rad=position,
+        velocity_rad_s=velocity,
+        current_a=current,
+        fresh=fresh,
+        age_s=age,
+        error=error,
+        silent=silent,
+        voltage_v=volts,
+        temperature_c=celsius,
+        hardware_error=hardware,
+        torque=torque,
+    )
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """The array itself, read-only from now on."""
+    array.flags.writeable = False
+    return array

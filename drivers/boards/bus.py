@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec, frozen
+from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec, frozen, make_state, read_only
 from drivers.base.errors import BusError, DriverError, NoReply, PortLost
 from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.core.wirebus import WireBus
@@ -33,21 +33,16 @@ class BoardBus(WireBus):
     ``start`` continues from the pulses that the board puts out already; a servo without pulses starts at its last known
     position, or at its ``rest_rad``.
 
-    Parameters
-    ----------
     port : device path, or URL; or a :class:`~drivers.sim.serving.virtual.VirtualLink`, with its clock.
     baud : rate of the port.
     margin_s : longest wait for an answer beyond its time on the wire; None: by the kind of the port.
     stagger_s : pause between switching servos on.
     clock : monotonic seconds.
-
-    Attributes
-    ----------
-    tells_torque : the board can be asked which servos get pulses.
     """
 
     measures: ClassVar[bool] = False
     tells_torque: ClassVar[bool] = True
+    """Whether the board can be asked which servos get pulses."""
 
     def __init__(
         self,
@@ -179,20 +174,9 @@ class BoardBus(WireBus):
         silent = np.full(n, self._silent)
         silent[self._mute] = True
         self._report.silent = tuple(servo for servo, mute in zip(self.ids, silent, strict=True) if mute)
-        return BusState(
-            time_s=now,
-            position_rad=frozen(self._position),
-            velocity_rad_s=unknown,
-            current_a=unknown,
-            fresh=frozen(np.zeros(n), bool),
-            age_s=frozen(now - self._position_s),
-            error=none,
-            silent=frozen(silent, bool),
-            voltage_v=unknown,
-            temperature_c=unknown,
-            hardware_error=none,
-            torque=frozen(self._on, bool),
-        )
+        measured = np.array([self._position, unknown, unknown, now - self._position_s])
+        slow = none, unknown, unknown, none, frozen(self._on, bool)
+        return make_state(now, measured, frozen(np.zeros(n), bool), read_only(silent), slow)
 
     def _note(self, index: int, angle_rad: float) -> None:
         """Store what the board reports of one servo; NaN is no pulses."""

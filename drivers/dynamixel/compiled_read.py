@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.base.bus import BusState, Floats
+from drivers.base.bus import BusState, Floats, make_state, read_only
 from drivers.dynamixel.frames import GroupRead
 from drivers.servos.layout import ReadRequest
-from drivers.servos.telemetry import Octets, make_state, read_only
+from drivers.servos.telemetry import Octets
 
 
 class CompiledRead:

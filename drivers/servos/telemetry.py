@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.base.bus import BusReport, BusState, Flags, Floats
+from drivers.base.bus import BusReport, BusState, make_state, read_only
 from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.core.scale import Scale
 from drivers.packets.packet import ALERT
@@ -34,19 +34,14 @@ Values = Mapping[str, NDArray[np.int64]]
 class Telemetry(ABC):
     """Reads the servos of a bus and stores what they measured. A protocol adds how they are read.
 
-    Parameters
-    ----------
     ids : n servo ids in the order of all arrays.
     slow_group : servos that are asked at once for a slow value; 0 asks only servos that raise an alert.
-
-    Attributes
-    ----------
-    slow_s : every slow value of every servo is read within this time; 0: one request a cycle.
-    checked_first : registers that are read out of turn after an alert or a silence.
     """
 
     slow_s: ClassVar[float] = 0.0
+    """Every slow value of every servo is read within this time; 0: one request a cycle."""
     checked_first: ClassVar[frozenset[str]] = frozenset({"torque"})
+    """Registers that are read out of turn after an alert or a silence."""
 
     def __init__(self, registers: Registers[Any], ids: Sequence[int], report: BusReport, slow_group: int) -> None:
         self._registers, self._packets, self._port = registers, registers.packets, registers.port
@@ -248,35 +243,3 @@ class Telemetry(ABC):
         for servo in [servo for servo, off in zip(ids, lost, strict=True) if off and running]:
             self.report.count("torque_lost", servo)
             self._log("servo %s switched its torque off by itself", self._registers.label(servo))
-
-
-def make_state(
-    time_s: float, measured: Floats, fresh: Flags, silent: Flags, slow_values: Sequence[NDArray[Any]]
-) -> BusState:
-    """A state of read-only arrays.
-
-    `measured` is (4, n): position, velocity, current and age. `slow_values` are error, supply, temperature, hardware
-    error and torque, (n,) each; they, `fresh` and `silent` are read-only already.
-    """
-    position, velocity, current, age = (read_only(row) for row in measured)
-    error, volts, celsius, hardware, torque = slow_values
-    return BusState(
-        time_s=time_s,
-        position_rad=position,
-        velocity_rad_s=velocity,
-        current_a=current,
-        fresh=fresh,
-        age_s=age,
-        error=error,
-        silent=silent,
-        voltage_v=volts,
-        temperature_c=celsius,
-        hardware_error=hardware,
-        torque=torque,
-    )
-
-
-def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """The array itself, read-only from now on."""
-    array.flags.writeable = False
-    return array
