@@ -11,11 +11,12 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from drivers.base.errors import DriverError
 from drivers.packets import packet as v2
 from drivers.packets import packet1 as v1
+from drivers.packets.framing import FrameReader
 from drivers.tables.tables import ControlTable, Item, load_table
 
 TO, FROM = "->", "<-"
@@ -38,10 +39,7 @@ class ServoTraffic:
 
 
 class Decoder(ABC):
-    """Turns bytes into lines.
-
-    heard : what was received from each servo, by id.
-    """
+    """Turns bytes into lines; ``heard`` is what was received from each servo, by id."""
 
     def __init__(self) -> None:
         self.heard: dict[int, ServoTraffic] = {}
@@ -61,15 +59,25 @@ class PacketDecoder(Decoder):
     INSTRUCTIONS: ClassVar[type[IntEnum]]
     WORD: ClassVar[int]
     """Bytes of an address and of a size."""
+    READER: ClassVar[type[FrameReader[Any]]]
 
     def __init__(self, tables: Mapping[int, ControlTable] = {}, default: ControlTable | None = None) -> None:
         super().__init__()
         self.tables, self._default = dict(tables), default
+        self._readers = {True: self.READER(), False: self.READER()}
         self._asked: dict[int, tuple[int, int]] = {}
         self._group: list[tuple[int, int, int]] = []  # servo, address and size of each read of the last group
 
-    def _with_noise(self, lines: list[str], noise: int) -> list[str]:
+    def feed(self, sent: bool | None, data: bytes) -> list[str]:
+        reader = self._readers[bool(sent)]
+        before = reader.noise_bytes
+        lines = [line for frame in reader.feed_frames(data) for line in self._frame(sent, frame)]
+        noise = reader.noise_bytes - before
         return lines + ([f"?? {noise} bytes that are no packet"] if noise else [])
+
+    @abstractmethod
+    def _frame(self, sent: bool | None, frame: bytes) -> list[str]:
+        """Lines on one frame, which the host sent, or received; None: it is not known which."""
 
     def _count(self, servo: int, error: int) -> None:
         heard = self.heard.setdefault(servo, ServoTraffic())
@@ -148,20 +156,13 @@ class PacketDecoder(Decoder):
 class Decoder2(PacketDecoder):
     """Dynamixel Protocol 2.0."""
 
-    INSTRUCTIONS, WORD = v2.Instruction, 2
+    INSTRUCTIONS, WORD, READER = v2.Instruction, 2, v2.StatusReader
 
     def __init__(self, tables: Mapping[int, ControlTable] = {}, default: ControlTable | None = None) -> None:
         super().__init__(tables, default)
-        self._readers = {True: v2.StatusReader(), False: v2.StatusReader()}
         self._pinged = False
 
-    def feed(self, sent: bool | None, data: bytes) -> list[str]:
-        reader = self._readers[bool(sent)]
-        before = reader.noise_bytes
-        lines = [line for frame in reader.feed_frames(data) for line in self._frame(frame)]
-        return self._with_noise(lines, reader.noise_bytes - before)
-
-    def _frame(self, frame: bytes) -> list[str]:
+    def _frame(self, sent: bool | None, frame: bytes) -> list[str]:
         servo, code = frame[4], frame[7]
         if code != v2.Instruction.STATUS:
             self._pinged = code == v2.Instruction.PING
@@ -191,21 +192,14 @@ class Decoder2(PacketDecoder):
 class Decoder1(PacketDecoder):
     """Protocol 1.0 framing: Dynamixel AX and MX, Feetech STS and SCS."""
 
-    INSTRUCTIONS, WORD = v1.Instruction1, 1
+    INSTRUCTIONS, WORD, READER = v1.Instruction1, 1, v1.Reader1
 
     def __init__(self, tables: Mapping[int, ControlTable] = {}, default: ControlTable | None = None) -> None:
         super().__init__(tables, default)
-        self._readers = {True: v1.Reader1(), False: v1.Reader1()}
         self._waiting: list[int] = []
 
-    def feed(self, sent: bool | None, data: bytes) -> list[str]:
-        reader = self._readers[bool(sent)]
-        before = reader.noise_bytes
-        lines = [self._packet(sent, packet) for packet in reader.feed(data)]
-        return self._with_noise(lines, reader.noise_bytes - before)
-
-    def _packet(self, sent: bool | None, packet: v1.Packet1) -> str:
-        servo, code, params = packet
+    def _frame(self, sent: bool | None, frame: bytes) -> list[str]:
+        servo, code, params = frame[2], frame[4], frame[5:-1]
         is_answer = servo in self._waiting if sent is None else not sent
         if is_answer:
             if servo in self._waiting:
@@ -213,13 +207,13 @@ class Decoder1(PacketDecoder):
             self._count(servo, code)
             flags = " ".join(flag.name or "" for flag in v1.Error1 if flag and code & flag)
             error = f" {flags.lower().replace('_', ' ')}" if flags else ""
-            return f"{FROM} {servo}{error} {self._data(servo, params)}"
+            return [f"{FROM} {servo}{error} {self._data(servo, params)}"]
         line = f"{TO} {_who(servo)} {self._instruction(servo, code, params)}"
         if self._group:
             self._waiting = [each for each, _, _ in self._group]
         elif servo != v1.BROADCAST_ID:
             self._waiting = [servo]
-        return line
+        return [line]
 
 
 class TextDecoder(Decoder):
