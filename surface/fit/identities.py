@@ -165,8 +165,7 @@ def _part_moves(
 
 def _rims(mesh: FitMesh, chart: Chart, eye: Floats) -> tuple[Floats, Floats]:
     """(u, v), (c, ROWS, 2), of the upper and the lower lid: columns by x, rows from the edge of the hole outwards."""
-    middles = [np.linalg.norm(mesh.vertices[ids].mean(axis=0) - eye) for ids in chart.loop_vertices]
-    hole = int(np.argmin(middles))
+    hole = chart.hole_near(mesh.vertices, eye)
     uv = chart.loops[hole][np.argsort(mesh.vertices[chart.loop_vertices[hole], 0])]
     above = uv[:, 1] > 0.5 * (uv[:, 1].min() + uv[:, 1].max())
     rows = np.column_stack([np.zeros(ROWS), np.linspace(0.0, LID_V, ROWS)])

@@ -190,10 +190,12 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], rig
     brows, lashes = [], []
     for ids, eye, is_left in zip((left, mirrored(chart, mesh, left)), rig.eyes, (True, False), strict=True):
         brows.append(brow_strip(skin, _brow_patch(chart, mesh, ids), hairs=40))
-        rim = _rim_near(chart, mesh, eye)
+        rim = chart.loops[chart.hole_near(mesh.vertices, eye)]
         for upper in (True, False):
             root, along = _lid_line(rim, upper=upper, inner_first=is_left)
-            length = (LASH_MM if upper else LOWER_LASH_MM) * _length_profile(along)
+            length = (LASH_MM if upper else LOWER_LASH_MM) * (  # longest beyond the middle, short at the inner corner
+                0.45 + 0.55 * np.sin(np.pi * np.clip(0.12 + 0.62 * along, 0, 1))
+            )
             lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=LASHES if upper else LOWER_LASHES))
     return [_strips_part(n, m, s, rig) for n, m, s in (("brows", "brow", brows), ("lashes", "lash", lashes))]
 
@@ -206,17 +208,6 @@ def _brow_patch(chart: Chart, mesh: FitMesh, ids: Ints) -> Floats:
     heights = np.linspace(-BROW_MM[0], BROW_MM[1], 5)
     points = line[:, None, :] + (width[:, None] * heights)[..., None] * np.array([0.0, 1.0, 0.0])
     return uv_of(chart, mesh, points.reshape(-1, 3)).reshape(len(line), len(heights), 2)
-
-
-def _length_profile(along: Floats) -> Floats:
-    """Lashes are longest beyond the middle, short at the inner corner."""
-    return 0.45 + 0.55 * np.sin(np.pi * np.clip(0.12 + 0.62 * along, 0, 1))
-
-
-def _rim_near(chart: Chart, mesh: FitMesh, eye: Floats) -> Floats:
-    """(k, 2) the hole of the face whose rim lies nearest to an eyeball."""
-    middles = [np.linalg.norm(mesh.vertices[ids].mean(axis=0) - eye) for ids in chart.loop_vertices]
-    return chart.loops[int(np.argmin(middles))]
 
 
 def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, Floats]:

@@ -56,6 +56,10 @@ class Chart:
     cuts: list[Cut] = field(default_factory=list)
     slopes: Slopes | None = None
 
+    def hole_near(self, vertices: Floats, eye: Floats) -> int:
+        """Which of the loops has its rim, on a mesh's vertices (n, 3), nearest to an eyeball's centre (3,)."""
+        return int(np.argmin([np.linalg.norm(vertices[ids].mean(axis=0) - eye) for ids in self.loop_vertices]))
+
 
 def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True, doubt_slivers: bool = False) -> Chart:
     """Lay the islands side by side and sample them.
