@@ -59,10 +59,7 @@ class Parameters:
 
     @classmethod
     def load(cls, path: Path | None = None) -> Parameters:
-        """Read a base vocabulary; the shipped one without ``path``.
-
-        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
-        """
+        """Read a base vocabulary; the shipped one without ``path``. Raises ConfigError with every fault."""
         path = path or config_dir() / "vocabularies" / "arkit.toml"
         return _build(load(path, _File, _unknown_aliases))
 

@@ -48,13 +48,9 @@ def find_config(kind: str, name: str, *, beside: Path | None = None) -> Path:
     if beside is not None:
         places.insert(0, beside.parent / name)
     for place in places:
-        if _fits(kind, place):
+        if (place / "head.toml" if kind == "heads" else place).is_file():
             return place
     raise _unknown(kind, name, folder)
-
-
-def _fits(kind: str, place: Path) -> bool:
-    return (place / "head.toml").is_file() if kind == "heads" else place.is_file()
 
 
 def _unknown(kind: str, name: str, folder: Path) -> ConfigError:

@@ -28,13 +28,8 @@ class Gaze:
     """Turns a direction or a point into head and eye parameters.
 
     Directions are relative to the head's zero pose: yaw + to the subject's left, pitch + down.
+    The registry of parameters must have the head's and the eyes' angles.
 
-    Parameters
-    ----------
-    parameters : the registry; must have the head's and the eyes' angles.
-
-    Attributes
-    ----------
     indices : (6,) positions of the parameters it drives. active : whether there is anything to look at.
     shift_rad : how far the last command moved the gaze.
     """

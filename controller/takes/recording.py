@@ -99,14 +99,8 @@ def replay(path: Path, parameters: Parameters, *, make: Maker = _default_state) 
 
 
 class Replay:
-    """Plays a recording at its own pace; ticks where a command state would, and takes no commands.
+    """Plays a recording, see :func:`replay`, at its own pace; ticks where a command state would, takes no commands.
 
-    Parameters
-    ----------
-    path, parameters, make : see :func:`replay`.
-
-    Attributes
-    ----------
     finished : the last tick has been given. ticks : how many were. played_s : how far it is.
     """
 

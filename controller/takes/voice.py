@@ -62,14 +62,8 @@ def wav_take(path: Path, parameters: Parameters) -> Take:
 
 
 class VoiceEnvelope:
-    """Turns sound into a mouth, a hop of 10 ms at a time.
+    """Turns sound of ``rate_hz`` samples per second into a mouth, a hop of 10 ms at a time.
 
-    Parameters
-    ----------
-    rate_hz : samples per second.
-
-    Attributes
-    ----------
     mask : (P,) bool, the parameters it moves.
     """
 

@@ -53,13 +53,9 @@ def listen_to_bus(
     link.open()
     link.tap = lambda sent, data: view.tap(None, data)
     try:
-        view.run(keep_going, lambda: _read_for_a_moment(link))
+        view.run(keep_going, lambda: link.read(time.monotonic() + WAIT_S))
     finally:
         link.close()
-
-
-def _read_for_a_moment(link: SerialPort) -> None:
-    link.read(time.monotonic() + WAIT_S)
 
 
 def poll_servos(
@@ -180,7 +176,7 @@ class BusView:
             new += [f"{time_s - self._begun_s:9.3f}  {line}" for line in self._decoder.feed(sent, data)]
         return new
 
-    def run(self, keep_going: Callable[[], bool], step: Callable[[], None] = lambda: time.sleep(REFRESH_S)) -> None:
+    def run(self, keep_going: Callable[[], bool], step: Callable[[], object] = lambda: time.sleep(REFRESH_S)) -> None:
         """Show until ``keep_going()`` is false; calls ``step`` in a loop, which waits a moment each time."""
         if self._console.is_terminal:
             with Live(self._picture(), console=self._console, auto_refresh=False, screen=True) as live:
@@ -189,7 +185,7 @@ class BusView:
             self._loop(keep_going, step, self._print)
             self._print()
 
-    def _loop(self, keep_going: Callable[[], bool], step: Callable[[], None], show: Callable[[], None]) -> None:
+    def _loop(self, keep_going: Callable[[], bool], step: Callable[[], object], show: Callable[[], None]) -> None:
         next_s = 0.0
         while keep_going():
             step()

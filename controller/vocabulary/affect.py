@@ -45,10 +45,7 @@ class Affect:
 
     @classmethod
     def load(cls, expressions: Expressions, path: Path | None = None) -> Affect:
-        """Read a space of moods; the shipped one without ``path``.
-
-        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
-        """
+        """Read a space of moods; the shipped one without ``path``. Raises ConfigError with every fault."""
 
         def faults(file: _File) -> list[str]:
             return [f"anchors.{name}: unknown expression{did_you_mean(name, expressions.names)}"

@@ -93,10 +93,7 @@ class Facs:
 
     @classmethod
     def load(cls, parameters: Parameters, path: Path | None = None) -> Facs:
-        """Read action units; the shipped ones without ``path``.
-
-        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
-        """
+        """Read action units; the shipped ones without ``path``. Raises ConfigError with every fault."""
         path = path or config_dir() / "vocabularies" / "facs.toml"
         return cls._build(parameters, load(path, _File, lambda file: cls._faults(parameters, file)))
 

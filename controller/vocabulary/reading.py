@@ -20,10 +20,7 @@ _RIDGE, _SPARSITY = 1e-4, 2e-3
 
 
 class Readings:
-    """Says what a face shows; can be called from any thread.
-
-    expressions : the named ones.
-    """
+    """Says what a face shows in named expressions; can be called from any thread."""
 
     def __init__(self, parameters: Parameters, expressions: Vocabulary) -> None:
         self._parameters, self._expressions = parameters, expressions

@@ -53,10 +53,7 @@ class Visemes:
 
     @classmethod
     def load(cls, parameters: Parameters, path: Path | None = None) -> Visemes:
-        """Read visemes; the shipped ones without ``path``.
-
-        Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
-        """
+        """Read visemes; the shipped ones without ``path``. Raises ConfigError with every fault."""
         path = path or config_dir() / "vocabularies" / "visemes.toml"
         return _build(parameters, load(path, _File, lambda file: _faults(parameters, file)))
 

@@ -57,12 +57,10 @@ class MixedBus(WireBus):
 
     @property
     def is_open(self) -> bool:
-        """True while the port is held."""
         return self._new.is_open
 
     @property
     def path(self) -> str:
-        """Device path in use."""
         return self._new.path
 
     def _use_path(self, path: str) -> None:

@@ -27,14 +27,8 @@ JOINT_FAILURES = 2
 
 
 class Telemetry(telemetry.Telemetry):
-    """Reads the servos of a bus and stores what they measured.
+    """Reads the servos of a bus and stores what they measured, as :class:`~drivers.dynamixel.bus.DynamixelBus` says.
 
-    Parameters
-    ----------
-    feedback, fast : see :class:`~drivers.dynamixel.bus.DynamixelBus`.
-
-    Attributes
-    ----------
     tripped, unmapped : servos whose watchdog was found tripped, and those that lost their pointers because they were
         rebooted or without power; the bus removes those that it has seen to.
     """

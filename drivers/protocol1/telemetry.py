@@ -52,14 +52,8 @@ class GoalRows:
 
 
 class Telemetry(telemetry.Telemetry):
-    """Reads the servos of a bus and stores what they measured.
+    """Reads the servos of a bus and stores what they measured, as :class:`~drivers.protocol1.bus.Protocol1Bus` says.
 
-    Parameters
-    ----------
-    feedback, singles : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
-
-    Attributes
-    ----------
     load : (n,) share of the stall torque, positive where it pushes towards greater angles; NaN before the first.
     moving : (n,) the servo reported that it moves.
     """

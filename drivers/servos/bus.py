@@ -46,12 +46,10 @@ class ServoBus(WireBus):
 
     @property
     def is_open(self) -> bool:
-        """True while the port is held."""
         return self._port.link.is_open
 
     @property
     def path(self) -> str:
-        """Device path in use."""
         return self._port.link.path
 
     def _use_path(self, path: str) -> None:
@@ -121,7 +119,6 @@ class ServoBus(WireBus):
         self._limits.reset_one(index, float(self.scale.radians(full)[index]))
 
     def report(self) -> BusReport:
-        """A copy of the counters."""
         self._report.stray = self._port.stray
         self._report.silent = self._telemetry.silent_ids()
         return super().report()

@@ -219,8 +219,6 @@ class Deformation(Generic[Table]):
 def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[str, np.ndarray]:
     """The arrays of an update that are not in the lists, by their names in :data:`.apply.NAMES`.
 
-    Returns
-    -------
     origin : (c, 3) float64, which positions within a cell are relative to
     inv_w, dw, numerators : (8 t,), (16 t,) or (0,), (72 t,) or (24 t,) float32 by tile, see :mod:`.apply`
     points : (n, 3) float64, current, shifted copies included

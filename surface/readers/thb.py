@@ -24,11 +24,7 @@ Pieces = dict[tuple[int, int], Floats]
 
 @dataclass(frozen=True)
 class Level:
-    """One tensor-product basis.
-
-    degrees : of u and v
-    knots : (nu + pu + 1,), (nv + pv + 1,) float64
-    """
+    """One tensor-product basis: degrees of u and v, and knots (nu + pu + 1,), (nv + pv + 1,) float64."""
 
     degrees: tuple[int, int]
     knots: tuple[Floats, Floats]

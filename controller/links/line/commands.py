@@ -61,10 +61,7 @@ class Request:
 
 
 class Grammar:
-    """Parses the lines of one vocabulary.
-
-    find_expression : canonical name of an expression; raises ParameterError.
-    """
+    """Parses lines; ``find_expression`` gives the canonical name of an expression, or raises ParameterError."""
 
     def __init__(self, parameters: Parameters, find_expression: Callable[[str], str]) -> None:
         self._parameters = parameters

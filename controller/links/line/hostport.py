@@ -11,18 +11,7 @@ _WRITE_LIMIT_S = 0.2
 
 
 class HostPort(PtyPort):
-    """A pseudo-terminal that waits for bytes, and for room to write.
-
-    Parameters
-    ----------
-    link : where to make a symbolic link to the other end; None for none.
-
-    Attributes
-    ----------
-    path : what the controller opens. dropped : bytes that the other side did not take in time.
-
-    Raises PortError: the system has no pseudo-terminals, or ``link`` cannot be made.
-    """
+    """A pseudo-terminal that waits for bytes, and for room to write; parameters and errors as in the base class."""
 
     def open(self, link: Link = None) -> None:
         """Make the pseudo-terminal; ``path`` is its own name, with a link too."""

@@ -22,10 +22,7 @@ from drivers.sim.wire.timing import WireTiming
 
 
 class VirtualClock:
-    """A clock that only its methods move.
-
-    now_s : time to begin with.
-    """
+    """A clock that only its methods move, from ``now_s`` on."""
 
     def __init__(self, now_s: float = 0.0) -> None:
         self.now_s = now_s

@@ -48,14 +48,8 @@ class Chain(Line):
 
     An id may be there once in each protocol.
 
-    Parameters
-    ----------
     servos : any number; two with one id collide, as they do on a real wire.
     faults : specs as in ``drivers.sim.wire.faults``.
-
-    Attributes
-    ----------
-    servos : the servos, in the order given.
     protocols : the protocols that the servos speak; Protocol 2.0 where there are none.
     """
 

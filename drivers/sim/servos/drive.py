@@ -19,16 +19,8 @@ def speed_unit(table: ControlTable) -> float:
 
 
 class Drive(ABC):
-    """Turns goal registers into a trajectory and what the shaft does into registers, for one servo.
+    """Turns goal registers into a trajectory and what the shaft does into registers, for one servo on from ``now_s``.
 
-    Parameters
-    ----------
-    registers : its memory.
-    plant : its shaft.
-    now_s : when it is switched on.
-
-    Attributes
-    ----------
     goals : names of the registers that move the motor in the present mode.
     offset : Present Position less the shaft's, ticks; `side` and `mirror` reverse the direction.
     ticks_s : one step of the speed register, ticks/s.

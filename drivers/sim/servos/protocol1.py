@@ -40,7 +40,6 @@ class Protocol1(Protocol):
         return Reader1()
 
     def size(self, packet: Packet1) -> int:
-        """Bytes of an instruction packet on the wire."""
         return 6 + len(packet.params)
 
     def encode_status(self, device_id: int, error: int, data: bytes) -> bytes:

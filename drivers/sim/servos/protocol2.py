@@ -70,7 +70,6 @@ class Protocol2(Protocol):
 
     @cached_property
     def handlers(self) -> dict[int, Callable[[Any, float], list[Reply]]]:
-        """What carries out an instruction, by its number."""
         return super().handlers | {
             Instruction.CLEAR: lambda packet, now_s: self._act(
                 packet, now_s, lambda servo: servo.clear(packet.params, now_s)

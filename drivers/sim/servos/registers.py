@@ -23,12 +23,6 @@ _CODES = {1: "B", 2: "H", 4: "I"}
 class Registers:
     """Bytes of a control table.
 
-    Parameters
-    ----------
-    table : the model's control table.
-
-    Attributes
-    ----------
     memory : (table.size,) bytes as a host reads them, except for the indirect area.
     locked : nothing below ``table.eeprom_end`` may be written (torque is on, or Lock is set).
     goals_locked : the bus watchdog has tripped, so goals may not be written.

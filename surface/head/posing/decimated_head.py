@@ -55,16 +55,10 @@ class DecimatedHead:
 
     The head itself keeps its pose; changes to its rigs' points at rest are seen.
 
-    Parameters
-    ----------
-    parts : the head's, in the order of their vertices here.
+    parts : the head's, in the order of their vertices here; as an attribute who has which of them.
     level : "full" or "fast"; a part without decimated triangles keeps all.
     wanted : other vertices to pose, by part.
-
-    Attributes
-    ----------
     vertices, normals : (m, 3) float32, as posed last.
-    parts : who has which of them.
     """
 
     def __init__(self, head: Head, parts: Sequence[HeadPart], level: str, wanted: Mapping[str, Ints]) -> None:

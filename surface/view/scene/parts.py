@@ -51,10 +51,7 @@ class ViewHead(Protocol):
 
 
 class DynamicBuffers:
-    """Vertex buffers of positions and normals that change with the pose.
-
-    content : their entries of a vertex array.
-    """
+    """Vertex buffers of positions and normals that change with the pose; ``content`` : entries of a vertex array."""
 
     def __init__(self, ctx: moderngl.Context, count: int) -> None:
         self.positions, self.normals = (ctx.buffer(reserve=count * _VERTEX_BYTES, dynamic=True) for _ in range(2))
