@@ -17,6 +17,7 @@ from multiprocessing.context import SpawnProcess
 from typing import TYPE_CHECKING
 
 from controller.base.signals import interrupts_blocked
+from drivers.base.permission import check_ports_allowed
 
 if TYPE_CHECKING:
     from controller.body.messages import BodyOrders  # start-up: it loads numpy
@@ -32,6 +33,7 @@ class PreloadedBody:
     """
 
     def __init__(self) -> None:
+        check_ports_allowed("start the process that drives the servos")
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         voice, self.voice = context.Pipe(duplex=False)

@@ -9,7 +9,7 @@ import threading
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, TextIO
 
 from controller.base.errors import TakeError
 from controller.layers.commands import CommandState
@@ -41,6 +41,8 @@ class Voice:
         """Open the stream; raises TakeError when that fails."""
         if self.pipe is not None:
             return io.BufferedReader(PipeStream(self.pipe), _CHUNK)
+        if self.path == "-":
+            return standard_input().buffer
         try:
             return open(self.path, "rb")
         except OSError as error:
@@ -71,16 +73,20 @@ class PipeStream(io.RawIOBase):
         return count
 
 
+def standard_input() -> TextIO:
+    """Standard input; raises TakeError where it is closed."""
+    if sys.stdin is None:
+        hint = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le - | omote play -"
+        raise TakeError("standard input is closed: no voice can come from it", hint=hint)
+    return sys.stdin
+
+
 def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
     """Copy a stream, by default standard input, to a pipe in a thread, and close the pipe at the end.
 
     Raises TakeError when standard input is closed.
     """
-    found = stream or sys.stdin
-    if found is None:
-        hint = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le - | omote play -"
-        raise TakeError("standard input is closed: no voice can come from it", hint=hint)
-    source = found.fileno()
+    source = (stream or standard_input()).fileno()
 
     def run() -> None:
         with suppress(OSError):  # the body is gone, or the stream was closed

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from controller.cli.console import console, show_table
 from controller.cli.heads import Identity
+from drivers.base.permission import ports_forbidden
 
 Seconds = Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write what was measured to this JSON file.")]
@@ -80,7 +81,7 @@ def run(
     Example: omote run everything --headless --seconds 20 --report r.json
     """
     if dry_run:
-        _dry_run(stage, None, seconds, report)
+        _dry_run(stage, None, seconds, report, voice, voice_hz)
         return
     look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "theme": theme, "camera": camera,
             "evaluator": evaluator}  # fmt: skip
@@ -107,11 +108,12 @@ def play(
 
     Example: omote play alex_rom_3.csv --headless --report r.json
     """
-    if str(take) == "-":
+    if dry_run:
+        given = (None, "-") if str(take) == "-" else (take, None)
+        _dry_run(stage, given[0], seconds, report, given[1], voice_hz, alone=True)
+    elif str(take) == "-":
         _run(stage, seconds, headless, no_face, pictures, report, voice="-", voice_hz=voice_hz, alone=True,
              record=record)  # fmt: skip
-    elif dry_run:
-        _dry_run(stage, take, seconds, report)
     else:
         _run(stage, seconds, headless, no_face, pictures, report, take=take, record=record)
 
@@ -162,15 +164,30 @@ def _run(
         console.print(f"wrote {path}", soft_wrap=True)
 
 
-def _dry_run(stage: str, take: Path | None, seconds: float | None, report: Path | None) -> None:
+def _dry_run(
+    stage: str,
+    take: Path | None,
+    seconds: float | None,
+    report: Path | None,
+    voice: str | None = None,
+    voice_hz: int | None = None,
+    *,
+    alone: bool = False,
+) -> None:
     # start-up: --help does without any of these
     from controller.base.parameters import PARAMETERS
+    from controller.body.sources import Voice
     from controller.stage.dry_run import dry_run
     from controller.stage.stage import load_stage
+    from controller.takes.voice import voice_take
     from controller.tools.stage_run import write_report
 
-    with console.status("computing what would be sent"):
-        channels, sent = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS)
+    with console.status("computing what would be sent"), ports_forbidden("a dry run"):
+        heard = None
+        if voice is not None:
+            with Voice(voice, voice_hz).open() as stream:
+                heard = voice_take(stream, "voice", PARAMETERS, raw_hz=voice_hz, longest_s=seconds)
+        channels, sent = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS, heard, alone=alone)
     if channels:
         table = Table(*channels[0], title="dry run: no port was opened", title_justify="left")
         for channel in channels:

@@ -19,7 +19,7 @@ from controller.robot.anchors import AnchorSolver, load_anchors
 from controller.robot.safety import GoalFilter
 from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.stage.stage import Stage
-from controller.takes.livelink import TakePlayer
+from controller.takes.livelink import Take, TakePlayer
 from controller.takes.reader import load_take, reader_of
 from controller.takes.recording import SUFFIX, replay
 
@@ -27,16 +27,29 @@ Feed = Callable[[int], object]
 """Writes to the layers what is due at a time (ns)."""
 
 _FIRST_NS = 1_000_000_000
-_LONGEST_S = 30.0
+_LONGEST_S = 600.0
 _EACH_S = 1.5
 
 
 def dry_run(
-    stage: Stage, take: Path | None, seconds: float | None, parameters: Parameters
+    stage: Stage,
+    take: Path | None,
+    seconds: float | None,
+    parameters: Parameters,
+    voice: Take | None = None,
+    *,
+    alone: bool = False,
 ) -> tuple[list[dict[str, str]], list[dict[str, object]]]:
-    """Play a stage's take, its simulated hosts' scripts or else every named expression to each of its robots.
+    """Play a take, or what a stage plays by itself, to each of the stage's robots.
 
-    ``seconds`` : how much of it; without, all of the take or one round of the script, 30 s at most.
+    Without a take that is the scripts of its simulated hosts, its show, its take and its voice, or else every named
+    expression in turn.
+
+    Parameters
+    ----------
+    take : a take or a recording. voice : plays as well; only it where ``alone``.
+    seconds : how much of it; without, the longest of what plays, a script that repeats once, 10 minutes at most.
+
     Returns a row for each channel, and for each bus every angle of every cycle (deg).
     """
     rows: list[dict[str, str]] = []
@@ -44,7 +57,7 @@ def dry_run(
     for robot in stage.robots:
         state = stage.state(parameters)
         state.live(stage.settings.liveliness, 0)
-        feed, length_s = _feed(stage, take, state)
+        feed, length_s = _feed(stage, take, state, voice, alone)
         anchors = load_anchors(robot, stage.head, parameters)
         offline = OfflineRun(robot, state, feed, stage.settings.control_hz, anchors)
         offline.run(min(length_s, _LONGEST_S) if seconds is None else seconds)
@@ -142,28 +155,48 @@ def _mix(channel: ChannelSettings) -> str:
     return terms if channel.join == "sum" else f"{channel.join} of {terms}"
 
 
-def _feed(stage: Stage, take: Path | None, state: CommandState) -> tuple[Feed, float]:
+def _feed(stage: Stage, take: Path | None, state: CommandState, voice: Take | None, alone: bool) -> tuple[Feed, float]:
     """A function that writes to the layers what is due, and for how long it does (s)."""
     if take is not None and take.suffix == SUFFIX:
         return _recording_feed(stage, take, state)
+    feeds: list[tuple[Feed, float]] = []
+    settings = stage.settings
+    if take is None and not alone:
+        feeds = [_script_feed(script, state) for script in _scripts(stage, state)]
+        take = None if settings.take is None else stage.file(settings.take)
+        if voice is None and settings.voice is not None and settings.voice_hz is None:
+            voice = load_take(stage.file(settings.voice), state.parameters)
     if take is not None:
-        loaded = load_take(take, state.parameters)
-        return TakePlayer(loaded, state, reader_of(take).layer).tick, loaded.duration_s
-    names = [script for link in stage.settings.links if (script := link.simulated) is not None]
-    names += [stage.settings.show] if stage.settings.show is not None else []
-    scripts = [load_script(name, state.parameters, stage.vocabulary, beside=stage.path) for name in names]
-    if not scripts:  # each named expression in turn
+        feeds.append(_take_feed(load_take(take, state.parameters), state, reader_of(take).layer))
+    if voice is not None:
+        feeds.append(_take_feed(voice, state, "speech"))
+    if not feeds:  # nothing plays by itself: each named expression in turn
         expressions = [*state.vocabulary.names, "neutral"]
-        scripts = [Script(tuple((i * _EACH_S, f"EXPR {name}") for i, name in enumerate(expressions)))]
-    shows = [Show(script, state) for script in scripts]
-    for show in shows:
-        show.playing = True
+        script = Script(tuple((i * _EACH_S, f"EXPR {name}") for i, name in enumerate(expressions)))
+        feeds = [_script_feed(script, state)]
 
     def feed(now_ns: int) -> None:
-        for show in shows:
-            show.tick(now_ns)
+        for each, _ in feeds:
+            each(now_ns)
 
-    return feed, max(script.loop_s or (script.steps[-1][0] if script.steps else 0.0) + _EACH_S for script in scripts)
+    return feed, max(length_s for _, length_s in feeds)
+
+
+def _scripts(stage: Stage, state: CommandState) -> list[Script]:
+    """The scripts of a stage's simulated hosts, and its show."""
+    names = [script for link in stage.settings.links if (script := link.simulated) is not None]
+    names += [stage.settings.show] if stage.settings.show is not None else []
+    return [load_script(name, state.parameters, stage.vocabulary, beside=stage.path) for name in names]
+
+
+def _script_feed(script: Script, state: CommandState) -> tuple[Feed, float]:
+    show = Show(script, state)
+    show.playing = True
+    return show.tick, script.loop_s or (script.steps[-1][0] if script.steps else 0.0) + _EACH_S
+
+
+def _take_feed(take: Take, state: CommandState, layer: str) -> tuple[Feed, float]:
+    return TakePlayer(take, state, layer).tick, take.duration_s
 
 
 def _recording_feed(stage: Stage, path: Path, state: CommandState) -> tuple[Feed, float]:

@@ -30,6 +30,7 @@ _WINDOW_S = 0.03
 _GATE = 0.06
 _RISE_S, _FALL_S = 0.03, 0.09
 _MEMORY_S = 4.0
+_LONGEST_S = 3600.0
 _QUIET = 0.003  # rms of what counts as silence whatever came before
 _LOUD_PERCENTILE = 95.0
 _FORMATS = {1: "u1", 2: "<i2", 4: "<i4"}
@@ -40,13 +41,30 @@ def wav_take(path: Path, parameters: Parameters) -> Take:
     """A take of a WAV file, a row every 10 ms. Raises TakeError: not a WAV file of PCM, or an empty one."""
     try:
         with path.open("rb") as stream:
-            file = _open(stream, str(path))
-            rate = file.getframerate()
-            sound = samples(file.readframes(file.getnframes()), file.getsampwidth(), file.getnchannels())
+            return voice_take(stream, str(path), parameters)
     except OSError as error:
         raise TakeError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+
+
+def voice_take(
+    stream: IO[bytes], name: str, parameters: Parameters, *, raw_hz: int | None = None, longest_s: float | None = None
+) -> Take:
+    """A take of a voice, a row every 10 ms, of the first ``longest_s`` (at most an hour).
+
+    ``raw_hz``: samples per second of signed 16 bit mono PCM without a header; None for WAV. ``name`` : for errors.
+    Raises TakeError: not WAV of PCM, or empty. OSError: the stream cannot be read.
+    """
+    seconds = min(longest_s or _LONGEST_S, _LONGEST_S)
+    if raw_hz is None:
+        file = _open(stream, name)
+        rate = file.getframerate()
+        frames = min(file.getnframes(), math.ceil(seconds * rate))
+        sound = samples(file.readframes(frames), file.getsampwidth(), file.getnchannels())
+    else:
+        rate = raw_hz
+        sound = samples(stream.read(2 * math.ceil(seconds * rate)), 2, 1)
     if not len(sound):
-        raise TakeError(f"{path}: no sound in it", hint=_HINT)
+        raise TakeError(f"{name}: no sound in it", hint=_HINT)
     size = int(_WINDOW_S * rate)
     starts = np.arange(max(len(sound) * _RATE_HZ // rate, 1)) * rate // _RATE_HZ
     loudness = _loudness(np.concatenate([sound, np.zeros(size)])[starts[:, None] + np.arange(size)], rate)
@@ -58,7 +76,7 @@ def wav_take(path: Path, parameters: Parameters) -> Take:
     shapes, through = _mouth_shapes(parameters), Visemes.load(parameters).through
     times: Floats = np.arange(len(levels)) / _RATE_HZ
     mask = shapes.sum(axis=0) > 0
-    return Take(path.name, times, _mouth(levels, shapes), mask, parameters.low, parameters.high, through)
+    return Take(Path(name).name, times, _mouth(levels, shapes), mask, parameters.low, parameters.high, through)
 
 
 class VoiceEnvelope:

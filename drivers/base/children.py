@@ -8,9 +8,15 @@ from __future__ import annotations
 import os
 import sys
 
+from drivers.base.permission import check_ports_allowed
+
 
 def command(module: str, *words: str, bare: bool = False) -> list[str]:
-    """The command line that runs a module, by its dotted name, with arguments; `bare` skips the ``site`` module."""
+    """The command line that runs a module, by its dotted name, with arguments; `bare` skips the ``site`` module.
+
+    Raises PortError where ports are forbidden, because the child does not know of that.
+    """
+    check_ports_allowed(f"start {module}")
     return [sys.executable or "python3", "-P", *(["-S"] if bare else []), "-m", module, *words]
 
 

@@ -19,6 +19,8 @@ from urllib.parse import urlsplit
 
 import serial
 
+from drivers.base.permission import check_ports_allowed
+
 try:
     import termios
     from termios import error as TermiosError
@@ -63,7 +65,11 @@ class Endpoint(ABC):
 
 
 def open_endpoint(path: str, baud: int) -> Endpoint:
-    """Open what a path or URL names; raises OSError, SerialException or ValueError where that fails."""
+    """Open what a path or URL names; raises OSError, SerialException or ValueError where that fails.
+
+    Raises PortError where ports are forbidden (:mod:`drivers.base.permission`).
+    """
+    check_ports_allowed(f"open port {path}")
     scheme = urlsplit(path).scheme if "://" in path else ""
     if scheme == "socket":
         device = socket.create_connection(address_of(path), timeout=CONNECT_S)

@@ -68,11 +68,11 @@ class SimulatedDriver(WireBus):
 
     def open(self) -> None:
         """Start the simulated bus if it does not run yet, and open its port."""
-        if self.simulation is None:
-            simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
-            self.simulation = simulation.__enter__()
-            self._use_path(simulation.path)
         try:
+            if self.simulation is None:
+                simulation = SimulatedBus(self.servos, link=self._link or self._private_link(), **self._settings)
+                self.simulation = simulation.__enter__()
+                self._use_path(simulation.path)
             super().open()
         except BaseException:
             if not self.running:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -190,3 +191,45 @@ def test_a_lively_stage_moves_by_itself(tmp_path: Path) -> None:
         _, report = dry_run(load_stage(str(stage_file(tmp_path, text)), PARAMETERS), None, 6.0, PARAMETERS)
         moved.append(max(np.ptp(np.array(report[0]["sent_deg"]), axis=0)))
     assert moved[0] < 0.01 < 1.0 < moved[1]
+
+
+def test_a_voice_on_standard_input_is_computed_without_a_port(tmp_path: Path) -> None:
+    far, near = os.openpty()
+    os.set_blocking(far, False)
+    robot = find_config("robots", "head24").read_text(encoding="utf-8")
+    simulated = '[[buses]]\nname = "head"\nkind = "simulated"'
+    assert simulated in robot
+    real = simulated.replace("simulated", "dynamixel") + f'\nport = "{os.ttyname(near)}"'
+    (tmp_path / "real.toml").write_text(robot.replace(simulated, real))
+    stage = tmp_path / "mine.toml"
+    stage.write_text(f'name = "mine"\nrobots = ["{tmp_path / "real.toml"}"]\n')
+    sound = (12_000 * np.sin(np.arange(22_050) * 2 * np.pi * 300 / 22_050)).astype("<i2").tobytes()
+    for words in (["play", "-", "--voice-rate", "22050"], ["run", str(stage), "--voice", "-", "--voice-rate", "22050"]):
+        more = ["--stage", str(stage)] if words[0] == "play" else []
+        report = tmp_path / "r.json"
+        command = [*words, *more, "--dry-run", "--report", str(report)]
+        result = CliRunner().invoke(make_app(), command, input=sound)
+        assert result.exit_code == 0, result.output
+        assert "dry run: no port was opened" in result.output
+        found = json.loads(report.read_text())["buses"][0]
+        jaw = [row[found["channels"].index("jawOpen")] for row in found["sent_deg"]]
+        assert len(jaw) == pytest.approx(50, abs=2) and max(jaw) - min(jaw) > 5.0
+    with pytest.raises(BlockingIOError):
+        os.read(far, 1)
+    os.close(far)
+    os.close(near)
+
+
+def test_a_long_take_is_computed_to_its_end(tmp_path: Path) -> None:
+    (tmp_path / "long.tsv").write_text("0.0\taa\n40.0\tsil\n")
+    stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
+    _, report = dry_run(stage, tmp_path / "long.tsv", None, PARAMETERS)
+    assert len(sent_of(report, "jawOpen")) > 40 * 50
+
+
+def test_the_stages_own_take_and_voice_are_played_too(tmp_path: Path) -> None:
+    (tmp_path / "own.tsv").write_text("0.0\taa\n2.0\tsil\n")
+    stage = load_stage(str(stage_file(tmp_path, 'take = "own.tsv"\n')), PARAMETERS)
+    _, report = dry_run(stage, None, None, PARAMETERS)
+    jaw = sent_of(report, "jawOpen")
+    assert len(jaw) == pytest.approx(2.1 * 50, abs=5) and max(jaw) > 10.0
