@@ -9,6 +9,8 @@ import pytest
 
 from drivers.sim import SimulatedBus
 
+pytestmark = pytest.mark.usefixtures("patient_sdk")
+
 scs = pytest.importorskip("scservo_sdk", reason="needs feetech-servo-sdk")
 
 TORQUE, ACCELERATION, GOAL, PRESENT, LOCK, OFFSET = 40, 41, 42, 56, 55, 31

@@ -28,6 +28,8 @@ from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusPacket, StatusReader, encode_instruction
 from drivers.sim import SimulatedBus
 
+pytestmark = pytest.mark.usefixtures("patient_sdk")
+
 PING_1 = bytes.fromhex("FFFFFD0001030001194E")
 packets = PacketHandler(2.0)
 

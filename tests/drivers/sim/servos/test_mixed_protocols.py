@@ -11,6 +11,8 @@ from drivers.sim import SimulatedBus
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 
+pytestmark = pytest.mark.usefixtures("patient_sdk")
+
 PING1 = one.encode(1, one.Instruction1.PING)
 PING2 = two.encode_instruction(2, two.Instruction.PING)
 BOTH = (PING1 + PING2, PING2 + PING1)

@@ -14,6 +14,8 @@ from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.plant import Skin
 from drivers.sim.wire.simulator import make_line
 
+pytestmark = pytest.mark.usefixtures("patient_sdk")
+
 NO_LOAD = Skin(spring=0.0, inertia=0.0, friction=0.0)
 
 
