@@ -1,8 +1,8 @@
-"""The body: runs links, layers, motion limits and buses of a stage, in a process of its own.
+"""The body: runs links, layers, motion limits and buses of a stage, in a separate process.
 
 The control loop turns commands into parameters at ``control_hz`` and publishes them; each bus drives its servos at its
 own rate from the newest ones. The process stops its servos safely however it ends: a request to stop, the end of the
-main process, SIGTERM, or an error of its own.
+main process, SIGTERM, or an error in this process.
 """
 
 from __future__ import annotations

@@ -124,7 +124,7 @@ class BodyProcess:
                 return
             try:
                 self.stop()
-            except ControllerError:  # the other error, which is on its way out, is the one to report
+            except ControllerError:  # the error already being raised is the one to report
                 self._end_process()
         finally:
             self._pipe.close()

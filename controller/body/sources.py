@@ -1,4 +1,4 @@
-"""Sources of the layers besides the links: a take, a voice, a limp head that is moved by hand."""
+"""Sources of the layers besides the links: a take, a voice, a head that is moved by hand."""
 
 from __future__ import annotations
 
@@ -100,7 +100,8 @@ class Sources:
 
     Parameters
     ----------
-    state : the layers. player : plays a take. follow : the face of a limp head. voice : a voice to listen to.
+    state : the layers. player : plays a take. follow : the measured face of a head that is moved by hand.
+    voice : a voice to listen to.
     beside : the take plays beside the links, and its end is not the end of the run.
     """
 
@@ -147,7 +148,7 @@ class Sources:
             self._state.shows.tick(now_ns)
 
     def report(self) -> dict[str, object]:
-        """How much of a take was played and of a voice was heard (s); None without."""
+        """How much of a take was played and of a voice was received (s); None without."""
         take, voice = None, None
         if self._player is not None:
             played = self._player.take

@@ -76,7 +76,7 @@ class _Model:
 class PointEditor:
     """Takes points of a head in a picture and drags them.
 
-    It samples a copy of the head, in a thread of its own, once somebody wants to take a point.
+    It samples a copy of the head, in a separate thread, when the user first picks a point.
 
     Parameters
     ----------

@@ -149,7 +149,7 @@ class Registry(Generic[P]):
                 raise
             raise PluginError(
                 f"{self.what} {kind!r} of the package {package} failed: {_describe(error)}",
-                hint="update that package, or tell its maker; OMOTE_DEBUG=1 shows where it was",
+                hint="update that package, or report it to its maker; OMOTE_DEBUG=1 prints the traceback",
             ) from error
 
     def package_of(self, kind: str) -> str:

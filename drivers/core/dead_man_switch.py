@@ -125,7 +125,7 @@ def _not_ready(path: str, why: str) -> Exception:
 
     return DriverError(
         f"no process waits to switch the servos on {path} off if this program is killed: {why}",
-        hint="the servos are driven without one; mend that and start again, or set watchdog_ms = 0 if it is meant",
+        hint="the servos are driven without one; fix that and start again, or set watchdog_ms = 0 if that is intended",
         port=path,
     )
 

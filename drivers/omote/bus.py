@@ -72,7 +72,7 @@ class LineOutBus(BoardBus):
                 )
         twice = sorted({name for name in self._names if self._names.count(name) > 1})
         if twice:
-            raise DriverError(f"two servos are called {', '.join(twice)}", hint="give each a wire_name of its own")
+            raise DriverError(f"two servos are called {', '.join(twice)}", hint="give each a different wire_name")
         for servo in self.servos:
             check_lineout(servo.model)
         fields = [MODELS.get(servo.model, ("us", 1)) for servo in self.servos]

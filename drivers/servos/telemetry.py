@@ -37,7 +37,7 @@ class Telemetry(ABC):
     Parameters
     ----------
     ids : n servo ids in the order of all arrays.
-    slow_group : servos that are asked at once for a slow value; 0 asks only servos that raise an alert.
+    slow_group : servos from which a slow value is read at once; 0 reads only servos that raise an alert.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ class Telemetry(ABC):
     # ------------------------------------------------------------------ replies
 
     def _accept(self, requests: Sequence[ReadRequest], got: Exchange[Any], now: float, running: bool) -> None:
-        """Store the replies to requests, and count servos without one and replies without the data asked for."""
+        """Store the replies to requests, and count servos without one and replies without the requested data."""
         for servo in [servo for request in requests for servo in request.ids if servo in self._port.suspects]:
             if servo not in self._missed:
                 self._missed.add(servo)

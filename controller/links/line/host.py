@@ -156,7 +156,7 @@ class RobotHost:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Serve a script in a process of its own; see the module's text."""
+    """Serve a script in a separate process; see the module's docstring."""
     parser = argparse.ArgumentParser(prog="controller.links.line.host", description="simulated robot host")
     parser.add_argument("--script", default="tour", help="a path, or a name in configs/scripts")
     parser.add_argument("--vocabulary", type=Path, action="append", default=[], help="file of further expressions")

@@ -107,7 +107,7 @@ class Chain(Line):
         ]
 
     def place(self, device_id: int, position: float, now_s: float) -> None:
-        """Move a limp shaft by hand.
+        """Move a shaft as by hand, with torque off.
 
         Raises
         ------

@@ -167,7 +167,7 @@ class ServoState:
         return self.registers.get(name)
 
     def place(self, position: float, now_s: float) -> None:
-        """Move the limp shaft by hand to a Present Position.
+        """Move the shaft to a Present Position, as by hand with torque off.
 
         Raises
         ------

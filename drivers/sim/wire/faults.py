@@ -2,7 +2,7 @@
 
 A fault is written ``kind[:ids][:value][:key=value ...]``, for example::
 
-    mute:7                 servo 7 neither hears nor answers (loose cable)
+    mute:7                 servo 7 neither receives nor answers (loose cable)
     late:7:45ms            its replies come 45 ms late
     crc:3:every=5          every fifth reply of servo 3 has a wrong CRC
     drop:*:p=0.01          one reply in a hundred is lost, of all servos
@@ -54,8 +54,8 @@ def _integer(text: str) -> int:
 
 
 KINDS: dict[str, Kind] = {
-    "mute": Kind("servo"),  # neither hears nor answers (loose cable)
-    "silent": Kind("reply"),  # hears and obeys, but its answers are lost
+    "mute": Kind("servo"),  # neither receives nor answers (loose cable)
+    "silent": Kind("reply"),  # receives and executes instructions, but its answers are lost
     "late": Kind("reply", _seconds, 0.045),  # answers late by the value
     "drop": Kind("reply"),  # loses a reply (use every= or p=)
     "crc": Kind("reply"),  # answers with a wrong CRC
@@ -73,15 +73,15 @@ KINDS: dict[str, Kind] = {
     "baud": Kind("servo", _integer),  # listens at so many bits per second
     "eeprom-busy": Kind("servo", _seconds, 0.02),  # deaf for so long after each permanent write
     "echo": Kind("bus"),  # the adapter gives back every byte it was sent
-    "chain-stop": Kind("bus"),  # nobody answers behind a silent servo
+    "chain-stop": Kind("bus"),  # no servo after a silent one answers
     "slow-reader": Kind("bus", _seconds, 0.2),  # replies reach the host in bursts, one every so long
-    "unplug": Kind("bus"),  # the port goes away; for= brings it back, as=PATH under another name
+    "unplug": Kind("bus"),  # the port disappears; for= restores it, as=PATH under another name
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault as it was asked for; `ids` None means every servo."""
+    """A fault as it was requested; `ids` None means every servo."""
 
     kind: str
     ids: frozenset[int] | None = None

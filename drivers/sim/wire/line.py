@@ -146,7 +146,7 @@ class Line(ABC):
             self.faults.advance(now_s)
 
     def heard(self, timed: list[Timed]) -> list[Timed]:
-        """When the host can read bytes that arrive at these times."""
+        """Times at which the host can read bytes that arrive at `timed`; later where it reads in bursts."""
         if not self.burst_s:
             return timed
         return [(math.ceil(time_s / self.burst_s) * self.burst_s, data) for time_s, data in timed]

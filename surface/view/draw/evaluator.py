@@ -183,7 +183,7 @@ def choose(ctx: moderngl.Context, head: ViewHead, name: str) -> Evaluator:
     Raises
     ------
     ValueError : unknown name.
-    ViewError : "gpu" is asked for and cannot be used.
+    ViewError : "gpu" is requested and cannot be used.
     """
     if name not in EVALUATORS:
         raise ValueError(f"evaluator must be one of {', '.join(EVALUATORS)}, not {name!r}")
