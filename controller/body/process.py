@@ -70,7 +70,7 @@ class BodyProcess:
 
     def send(self, request: messages.Begin | messages.PanelRequest) -> None:
         """Send a request of main or its panel."""
-        with suppress(OSError):  # alive() reports a body that is gone
+        with suppress(OSError):  # alive() reports a body that has ended
             self._pipe.send(request)
 
     def stop(self) -> None:

@@ -85,7 +85,7 @@ def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
     source = found.fileno()
 
     def run() -> None:
-        with suppress(OSError):  # the body is gone, or the stream was closed
+        with suppress(OSError):  # the body has ended, or the stream was closed
             while data := os.read(source, _CHUNK):
                 pipe.send_bytes(data)
         pipe.close()

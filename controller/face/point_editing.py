@@ -182,7 +182,7 @@ class PointEditor:
         model = _Model(copy(), self._parameters)
         _PointDrag(model, 0, np.zeros(3), np.zeros(3), self._parameters, self._parameters.neutral(), np.zeros(3)).solve(
             model.skin.rest[0]
-        )  # the solver is compiled before anybody waits for it
+        )  # compile the solver before the first drag needs it
         self._model = model
 
 

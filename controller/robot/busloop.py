@@ -84,7 +84,7 @@ class BusLoop:
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Open the bus, bring the servos up safely and begin to drive them.
+        """Open the bus, start the servos safely and begin to drive them.
 
         Raises DriverError when the port or a servo does not come up; the bus is closed again.
         """

@@ -129,7 +129,7 @@ class Registry(Generic[P]):
 
     @contextmanager
     def importing(self, plugin: P) -> Iterator[None]:
-        """Context of imports for a plug-in; raises PluginError that says what to install where a module is missing."""
+        """Context of imports for a plug-in; PluginError names the package to install where a module is missing."""
         try:
             yield
         except ModuleNotFoundError as error:

@@ -244,7 +244,7 @@ def switch_off(path: str, baud: int, frames: Iterable[str], repeats: int = REPEA
 
 
 def _print(descriptor: int, line: str) -> None:
-    """Write a line without waiting for the reader, which may be gone."""
+    """Write a line without waiting for the reader, which may have ended."""
     with suppress(OSError, ValueError):
         if select.select([], [descriptor], [], 0.0)[1]:
             os.write(descriptor, (" ".join(line.split()) + "\n").encode(errors="replace"))

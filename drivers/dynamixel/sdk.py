@@ -236,7 +236,7 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
         return settled(port, group.wanted, {reply.id: reply for reply in replies}, len(raw) >= group.size)
 
     def _read_behind(self, port: Port, group: GroupRead, got: Got) -> Got:
-        """Read servos behind the first silent one again, plainly: it cut them off from the joint reply (S14).
+        """Read servos after the first silent one again, one reply each: it cut them off from the joint reply (S14).
 
         Late bytes of that reply are no packet, so they cannot be taken for one.
         """

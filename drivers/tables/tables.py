@@ -63,7 +63,7 @@ class Item:
 
     @property
     def end(self) -> int:
-        """First address behind the item."""
+        """First address after the item."""
         return self.address + self.size
 
     def encode(self, value: int) -> bytes:

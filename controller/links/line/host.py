@@ -182,11 +182,11 @@ def _say(line: str) -> None:
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
     except BrokenPipeError:
-        pass  # the process that started it is gone
+        pass  # the process that started it has ended
 
 
 def _stdin_open() -> bool:
-    """False once standard input has ended, which happens when the starter closes it or dies."""
+    """False once standard input has ended, which happens when the parent process closes it or ends."""
     ready, _, _ = select.select([sys.stdin], [], [], 0.0)
     return not ready or bool(os.read(sys.stdin.fileno(), 1024))
 

@@ -158,7 +158,7 @@ class ControlSocket:
 
 
 def _remove_dead(path: Path) -> None:
-    """Remove a socket whose server is gone; raises PortBusy for any other file."""
+    """Remove a socket whose server has ended; raises PortBusy for any other file."""
     if not path.exists():
         return
     if not stat.S_ISSOCK(path.stat().st_mode):

@@ -66,7 +66,7 @@ class DecimatedHead:
     Attributes
     ----------
     vertices, normals : (m, 3) float32, as posed last.
-    parts : who has which of them.
+    parts : which of them belong to which part.
     """
 
     def __init__(self, head: Head, parts: Sequence[HeadPart], level: str, wanted: Mapping[str, Ints]) -> None:
