@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 .DEFAULT_GOAL := help
 .PHONY: help demo test check mutate bench setup api lock clean
 
-help: ## this list
+help: ## print this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
 
 demo: setup ## set up, then drive the face and the simulated servo head
@@ -23,18 +23,18 @@ demo: setup ## set up, then drive the face and the simulated servo head
 test: setup ## set up, then run the tests (no display, graphics processor or servo needed)
 	@$(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile
 
-check: setup ## style and types
+check: setup ## check style and types
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy
 
-# Not in the lock: nothing else needs it, and it brings a dozen packages.
-mutate: setup ## break 50 lines of a room on purpose and count what its tests notice: make mutate ROOM=drivers SEED=1
+# Not in requirements.lock: only this target needs it, and it depends on a dozen packages.
+mutate: setup ## mutation testing of a room, 50 changed lines: make mutate ROOM=drivers SEED=1
 	@$(PY) -c 'import cosmic_ray' 2>/dev/null || $(if $(UV),$(UV) pip install --python $(PY),$(PY) -m pip install) --quiet 'cosmic-ray>=8.4'
 	@$(PY) -m tests.mutate $(ROOM) --seed $(or $(SEED),1)
 
 bench: setup ## measure the engine on this machine
 	@$(BIN)/omote bench
 
-setup: $(VENV)/.installed $(VENV)/.opengl $(VENV)/.compiled ## set up only
+setup: $(VENV)/.installed $(VENV)/.opengl $(VENV)/.compiled ## install and compile everything
 
 $(VENV)/.installed: requirements.lock pyproject.toml
 	@test -n "$(UV)$(PYTHON)" || { echo "omote needs Python 3.11 or newer. Debian, Ubuntu: sudo apt-get install python3 python3-venv"; exit 1; }
@@ -76,13 +76,13 @@ $(VENV)/.compiled: $(VENV)/.installed
 	@$(BIN)/omote run everything --headless --seconds 1 >$(VENV)/first-run.log 2>&1 || true # pictures, links and mirror
 	@touch $@
 
-api: setup ## renew the snapshot of the public API, where a change of it is meant
+api: setup ## update the snapshot of the public API after an intended change
 	@$(PY) -m tests.public_api > tests/public_api.new && mv tests/public_api.new tests/public_api.txt
 
-lock: ## renew requirements.lock (needs uv)
+lock: ## update requirements.lock (needs uv)
 	@uv pip compile pyproject.toml --extra all --group dev --universal --python-version 3.11 \
 		--generate-hashes --no-emit-index-url --no-header --no-annotate --quiet --upgrade -o requirements.lock
 
-clean: ## remove what setting up and running made
+clean: ## remove the files that setting up and running created
 	@rm -rf $(VENV) out dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

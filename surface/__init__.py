@@ -4,7 +4,7 @@ In: control points, surface files, head folders, meshes to fit, values of parame
 follow, pictures, heads, files for other programs. Imports numpy, numba and scipy, OpenGL under ``view`` alone, and
 neither ``drivers`` nor ``controller``.
 
-The errors are here at once; the rest is loaded when it is first asked for, for it brings numpy.
+The errors are imported at once; the rest is imported on first use, because it imports numpy.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # start-up: whoever only needs an error does not wait for numpy
+    # start-up: code that only needs an error does not wait for numpy
     from surface.dcp import DCPSurface
     from surface.mesh.domain import Domain, Slit
     from surface.mesh.mesh import Mesh

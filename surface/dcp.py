@@ -143,7 +143,7 @@ class DCPSurface(ControlPoints):
         flip : reverse normals and triangles against S_u x S_v
         progress : is called with the name of a stage and the part of the whole that is done, 0 to 1
 
-        ``ValueError`` for limits out of range, or where they ask for millions of cells.
+        ``ValueError`` for limits out of range, or where they need millions of cells.
         """
         from surface.mesh.splitting import Limits  # compiled: loaded when first used
         from surface.mesh.tessellate import tessellate

@@ -98,17 +98,17 @@ def test_every_simulator_is_listed_with_its_options(page: Page) -> None:
     assert written == {kind: options_of(simulator_of(kind).options) for kind in simulated}
 
 
-def test_every_default_of_a_simulator_is_the_one_that_is_told(page: Page) -> None:
+def test_every_default_of_a_simulator_matches_the_page(page: Page) -> None:
     for first, last in rows(page("docs/simulated-buses.md"), "`omote simulate`"):
         (kind,) = words(first)
         given = dict(re.findall(r"`--(\w+)` \(([\w-]+)", last))
         defaults = {entry.name: str(entry.default) for entry in entries(simulator_of(kind).options) if entry.default}
-        assert {name: told for name, told in given.items() if told != defaults.get(name, told)} == {}, kind
+        assert {name: written for name, written in given.items() if written != defaults.get(name, written)} == {}, kind
 
 
 def test_the_readme_names_every_simulator(page: Page) -> None:
-    (told,) = re.findall(r"`omote simulate ([a-z]\w*`(?:(?:, | and )`\w+`)+) stand in", page("README.md"))
-    assert sorted(words(f"`{told}")) == sorted(kind for kind in own(FAMILIES) if FAMILIES.get(kind).simulator)
+    (listed,) = re.findall(r"`omote simulate ([a-z]\w*`(?:(?:, | and )`\w+`)+) simulate", page("README.md"))
+    assert sorted(words(f"`{listed}")) == sorted(kind for kind in own(FAMILIES) if FAMILIES.get(kind).simulator)
 
 
 def test_every_link_is_listed_with_its_options(page: Page) -> None:
@@ -127,6 +127,6 @@ def test_every_kind_of_take_is_listed_with_its_layer(page: Page) -> None:
     assert {suffix for suffix, _ in written} <= set(suffixes())
 
 
-def test_every_kind_of_exported_file_is_told_of(page: Page) -> None:
+def test_every_kind_of_exported_file_is_listed(page: Page) -> None:
     section = page("docs/heads.md").partition("## For other programs\n")[2].partition("\n## ")[0]
     assert sorted(re.findall(r"`omote export head(\.\w+)`", section)) == sorted(SUFFIXES)

@@ -93,7 +93,7 @@ def test_the_examples_are_short(page: str) -> None:
 
 
 def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, root: Path, tmp_path: Path) -> None:
-    block = page.partition("## Proving a driver")[2].partition("```python\n")[2].partition("```")[0]
+    block = page.partition("## Testing a driver")[2].partition("```python\n")[2].partition("```")[0]
     test = tmp_path / "test_puppet8.py"
     test.write_text(block, encoding="utf-8")
     done = subprocess.run(

@@ -40,7 +40,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}", hint="mend the line named above") from error
+        raise ConfigError(f"{path}: not valid TOML: {error}", hint="correct the line named above") from error
 
 
 def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
@@ -75,7 +75,7 @@ def config_error(path: Path, faults: list[str]) -> ConfigError:
     listing = "\n".join(f"  {fault}" for fault in faults)
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     newer = any(NEWER in fault for fault in faults)
-    hint = "pip install --upgrade omote" if newer else f"mend the file, then: omote check {path}"
+    hint = "pip install --upgrade omote" if newer else f"correct the file, then: omote check {path}"
     return ConfigError(f"{path}: {count}\n{listing}", hint=hint)
 
 

@@ -59,7 +59,7 @@ class PartialConfig(Generic[Model]):
 
 
 def _existing(table: Any, loc: Loc) -> Loc:
-    """The longest part of ``loc`` that exists; pydantic adds names of its own, and keys that are missing."""
+    """The longest part of ``loc`` that exists; pydantic adds internal names, and keys that are missing."""
     for depth, part in enumerate(loc):
         keys: Any = table if isinstance(table, dict) else range(len(table)) if isinstance(table, list) else ()
         if part not in keys:

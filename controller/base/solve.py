@@ -1,4 +1,4 @@
-"""Solves bounded, sparse least squares problems: from what a face shows back to the values that show it.
+"""Solves bounded, sparse least squares problems: finds the values, as of parameters, that reproduce a given face.
 
 Minimises over ``low <= x <= high``
 

@@ -1,4 +1,4 @@
-"""The process that holds links, layers, limits and buses, and the wires to it.
+"""The body's process, which runs links, layers, motion limits and buses, and the pipe and mailbox to it.
 
 In: a stage and orders. Out: parameters in a mailbox, goals on buses. Imports base to stage.
 """

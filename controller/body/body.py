@@ -1,8 +1,8 @@
-"""The body: runs links, layers, motion limits and buses of a stage, in a process of its own.
+"""The body: runs links, layers, motion limits and buses of a stage, in a separate process.
 
 The control loop turns commands into parameters at ``control_hz`` and publishes them; each bus drives its servos at its
 own rate from the newest ones. The process stops its servos safely however it ends: a request to stop, the end of the
-main process, SIGTERM, or an error of its own.
+main process, SIGTERM, or an error in this process.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class Body:
         ]
 
     def newest(self) -> tuple[Floats, int]:
-        """The newest parameters and the arrival time (monotonic ns) of the command behind them."""
+        """The newest parameters and the arrival time (monotonic ns) of the command that caused them."""
         return self._newest
 
     @property
@@ -219,7 +219,7 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event)
         panel = _open_mailbox(orders.panel_mailbox, PanelState.size(PARAMETERS))
         panel_state = PanelState(panel, [layer.name for layer in by_priority(stage.layers)], PARAMETERS)
     body = Body(stage, PARAMETERS, mailbox, orders.options)
-    shorten_thread_switches()  # before torque: what collects garbage later finds little to look at
+    shorten_thread_switches()  # before torque: later garbage collections have few objects to check
     body.start()
     try:
         _send(pipe, messages.Ready())
@@ -230,14 +230,14 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event)
 
 
 def _open_mailbox(path: str, count: int) -> Mailbox:
-    """Open a mailbox of main and remove its name, as nobody else has to find it from now on."""
+    """Open a mailbox of main and remove its name, because no other process has to find it."""
     mailbox = Mailbox(path, count)
     mailbox.unlink()
     return mailbox
 
 
 def _wait(body: Body, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
-    """Serve main until it asks to stop or is gone, a signal comes, or a bus gave up."""
+    """Serve main until it requests a stop or has ended, a signal arrives, or a bus failed for good."""
     finished = False
     while not stop.is_set():
         if pipe.poll(_POLL_S) and not _handle(body, pipe):
@@ -251,7 +251,7 @@ def _wait(body: Body, pipe: Connection, stop: threading.Event, panel_state: Pane
 
 
 def _handle(body: Body, pipe: Connection) -> bool:
-    """Carry out a request of main or its panel; False when it asks to stop or is gone."""
+    """Carry out a request of main or its panel; False when it requests a stop or has ended."""
     try:
         request = pipe.recv()
     except (EOFError, OSError):
@@ -276,5 +276,5 @@ def _handle(body: Body, pipe: Connection) -> bool:
 
 
 def _send(pipe: Connection, message: object) -> None:
-    with suppress(OSError):  # main is gone; the servos are stopped all the same
+    with suppress(OSError):  # main has ended; the servos are still stopped
         pipe.send(message)

@@ -13,7 +13,8 @@ class RunOptions:
     """Options of a run besides its stage.
 
     take : a take or recording to play instead of the links. voice : a voice that moves the mouth.
-    mirror : leave the servos limp; the face shows where somebody moves them. record : file for every command and tick.
+    mirror : leave the servos' torque off; the face follows a head that is moved by hand.
+    record : file for every command and tick.
     """
 
     take: Path | None = None

@@ -47,7 +47,7 @@ class PreloadedBody:
     def send(self, orders: BodyOrders) -> None:
         """Send the process its orders; from now on the caller has to end it."""
         self._sent = True
-        with suppress(OSError):  # whoever waits for its answer reports a process that is gone
+        with suppress(OSError):  # the caller that waits for its answer reports a process that has ended
             self.pipe.send(orders)
 
     def __enter__(self) -> PreloadedBody:

@@ -70,7 +70,7 @@ class BodyProcess:
 
     def send(self, request: messages.Begin | messages.PanelRequest) -> None:
         """Send a request of main or its panel."""
-        with suppress(OSError):  # alive() reports a body that is gone
+        with suppress(OSError):  # alive() reports a body that has ended
             self._pipe.send(request)
 
     def stop(self) -> None:
@@ -124,7 +124,7 @@ class BodyProcess:
                 return
             try:
                 self.stop()
-            except ControllerError:  # the other error, which is on its way out, is the one to report
+            except ControllerError:  # the error already being raised is the one to report
                 self._end_process()
         finally:
             self._pipe.close()

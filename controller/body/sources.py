@@ -1,4 +1,4 @@
-"""Sources of the layers besides the links: a take, a voice, a limp head that is moved by hand."""
+"""Sources of the layers besides the links: a take, a voice, a head that is moved by hand."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
     source = (stream or standard_input()).fileno()
 
     def run() -> None:
-        with suppress(OSError):  # the body is gone, or the stream was closed
+        with suppress(OSError):  # the body has ended, or the stream was closed
             while data := os.read(source, _CHUNK):
                 pipe.send_bytes(data)
         pipe.close()
@@ -102,7 +102,10 @@ def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
 class Sources:
     """Everything that writes to the layers before they are mixed.
 
-    state : the layers. player : plays a take. follow : the face of a limp head. voice : a voice to listen to.
+    Parameters
+    ----------
+    state : the layers. player : plays a take. follow : the measured face of a head that is moved by hand.
+    voice : a voice to listen to.
     beside : the take plays beside the links, and its end is not the end of the run.
     """
 
@@ -149,7 +152,7 @@ class Sources:
             self._state.shows.tick(now_ns)
 
     def report(self) -> dict[str, object]:
-        """How much of a take was played and of a voice was heard (s); None without."""
+        """How much of a take was played and of a voice was received (s); None without."""
         take, voice = None, None
         if self._player is not None:
             played = self._player.take

@@ -42,14 +42,15 @@ def bench(
         Path | None, typer.Option(help="Also growth with size, drawn as this SVG (surface only).")
     ] = None,
     vertices: Annotated[
-        int, typer.Option(help="About how many; --large takes ten times that (surface only).", min=1_000)
+        int,
+        typer.Option(help="Number of vertices, about; --large takes ten times that (surface only).", min=1_000),
     ] = 100_000,
-    level: Annotated[int, typer.Option(help="Quarterings of the uniform mesh (quadtree only).", min=0, max=9)] = 7,
-    updates: Annotated[int, typer.Option(help="How many (drift only).", min=1)] = 1_000_000,
-    face: Annotated[bool, typer.Option("--face", help="Also beside the face (bus only).")] = False,
+    level: Annotated[int, typer.Option(help="Levels of the uniform mesh (quadtree only).", min=0, max=9)] = 7,
+    updates: Annotated[int, typer.Option(help="Number of updates (drift only).", min=1)] = 1_000_000,
+    face: Annotated[bool, typer.Option("--face", help="Also while the face is drawn (bus only).")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON (bus only).")] = False,
 ) -> None:
-    """Measure full evaluation and incremental updates on this machine, and peers in the same run.
+    """Measure the engine (full evaluation, incremental updates), other libraries, or a servo bus, in one run.
 
     Example: omote bench surface --large --growth growth.svg
     """

@@ -18,7 +18,7 @@ Protocol = Annotated[int, typer.Option(min=1, max=2, help="2 for Dynamixel X and
 
 
 def ports() -> None:
-    """List the serial ports of this machine, and what to type where one cannot be used.
+    """List the serial ports of this machine, and the command that fixes one that cannot be used.
 
     Example: omote ports
     """
@@ -45,11 +45,11 @@ def ports() -> None:
 def scan(
     port: Port,
     baud: Annotated[
-        list[int] | None, typer.Option("--baud", help="Baud rate to try; may be repeated. All without it.")
+        list[int] | None, typer.Option("--baud", help="Baud rate to try; may be repeated. Default: all.")
     ] = None,
     protocol: Annotated[
         list[int] | None,
-        typer.Option("--protocol", min=1, max=2, help="2 (Dynamixel X, XL-320) or 1 (AX, MX, Feetech). Both without."),
+        typer.Option("--protocol", min=1, max=2, help="2 (Dynamixel X, XL-320) or 1 (AX, MX, Feetech). Default: both."),
     ] = None,
 ) -> None:
     """Look for Dynamixel and Feetech servos on a port, at all rates and in both protocols; nothing moves.
@@ -77,14 +77,14 @@ def scan(
 def set_id(
     port: Port,
     old: Annotated[int, typer.Argument(min=0, max=252, help="Id that the servo has.")],
-    new: Annotated[int, typer.Argument(min=0, max=252, help="Id that it shall have.")],
-    baud: Annotated[int, typer.Option(help="Baud rate it listens at; omote scan finds it.")] = 1_000_000,
+    new: Annotated[int, typer.Argument(min=0, max=252, help="New id of the servo.")],
+    baud: Annotated[int, typer.Option(help="Baud rate of the servo; omote scan finds it.")] = 1_000_000,
     protocol: Protocol = 2,
     release: Annotated[
         bool, typer.Option("--release", help="Switch its motor off first; support what it holds.")
     ] = False,
 ) -> None:
-    """Give a servo another id. It is checked that nobody else has it, and that the change was kept.
+    """Change the id of a servo. Checks that no other servo has the new id, and reads the change back.
 
     Example: omote set-id /dev/ttyUSB0 1 12
     """
@@ -102,7 +102,7 @@ def monitor(
         bool, typer.Option("--listen", help="Only listen: for a second adapter on a wire that another program drives.")
     ] = False,
     model: Annotated[str, typer.Option(help="With --listen: the servos' model, so that registers have names.")] = "",
-    rate: Annotated[float, typer.Option(min=0.1, max=200, help="How often the servos are asked, per second.")] = 10.0,
+    rate: Annotated[float, typer.Option(min=0.1, max=200, help="How often the servos are read, per second.")] = 10.0,
     seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
 ) -> None:
     """Show the servos of a bus and the decoded packets that pass, live; nothing is switched on or moved.
@@ -132,14 +132,14 @@ def calibrate(
     robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],
     name: Annotated[str, typer.Option("--name", "-n", help="Name of the calibration.")] = "default",
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; beside the robot file without it.")
+        Path | None, typer.Option("--out", "-o", help="File to write; default: beside the robot file.")
     ] = None,
     channel: Annotated[
         list[str] | None, typer.Option("--channel", "-c", help="Only this channel; may be repeated.")
     ] = None,
     margin: Annotated[float, typer.Option(min=0, max=20, help="Degrees kept away from the captured ends.")] = 1.0,
 ) -> None:
-    """Capture where each servo of a head has its neutral and its ends, by hand or by keys, and save it by name.
+    """Capture the neutral and end positions of each servo of a head, by hand or by keys, and save them by name.
 
     The motors are off until h is pressed: support what they hold. A file that exists is only replaced after a question.
 

@@ -41,24 +41,24 @@ def render(
         str | None, typer.Option(metavar="#RRGGBB[,#RRGGBB]", help="One colour, or a gradient from top to bottom.")
     ] = None,
     evaluator: Annotated[
-        str | None, typer.Option(help="Who works out the vertices: auto, cpu or gpu.", show_default="auto")
+        str | None, typer.Option(help="Where vertices are computed: auto, cpu or gpu.", show_default="auto")
     ] = None,
     head: Annotated[
         str | None, typer.Option(help="Head: a name from configs/heads or a folder.", show_default="ict")
     ] = None,
     identity: Identity = None,
     stage: Annotated[
-        str | None, typer.Option(help="Stage whose head, groups, expressions and look are taken where nothing is said.")
+        str | None, typer.Option(help="Stage that gives head, groups, expressions and look unless other options do.")
     ] = None,
     vocabulary: Annotated[
         list[str] | None, typer.Option(metavar="FILE", help="Expressions of your own; may be repeated.")
     ] = None,
     group: Annotated[
         list[str] | None,
-        typer.Option(metavar="FILE[=AMOUNT]", help="Group the head wears, by -1 to 1; may be repeated."),
+        typer.Option(metavar="FILE[=AMOUNT]", help="Group added to the head, by -1 to 1; may be repeated."),
     ] = None,
     sheet: Annotated[
-        bool, typer.Option("--sheet", help="Draw every parameter at its end and every named expression.")
+        bool, typer.Option("--sheet", help="Draw every parameter at its limit and every named expression.")
     ] = False,
 ) -> None:
     """Draw one picture of the face, without a display.
@@ -92,7 +92,7 @@ def fit(
     name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
     shapes: Annotated[Path | None, typer.Option(help="Folder with one .obj a shape, for an .obj mesh.")] = None,
     names: Annotated[Path | None, typer.Option(help="TOML table of shape names: [names] theirs = ARKit's.")] = None,
-    unit: Annotated[str | None, typer.Option(help="mm, cm, m or in; guessed by the head's size without it.")] = None,
+    unit: Annotated[str | None, typer.Option(help="mm, cm, m or in; default: guessed from the head's size.")] = None,
     up: Annotated[str | None, typer.Option(help="Axis that points up: x, y, z, -x, -y or -z.")] = None,
     forward: Annotated[str | None, typer.Option(help="Axis that the face looks along.")] = None,
     without: Annotated[

@@ -39,7 +39,7 @@ def demo(
     headless: Headless = False,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures and report.")] = Path("out"),
 ) -> None:
-    """A simulated robot host tells a story; the CG face and a simulated 24-servo head act it.
+    """Play a demonstration: a simulated robot host sends commands to the CG face and a simulated 24-servo head.
 
     With a display a window opens. Without one it runs for 15 seconds and writes a contact sheet, a clip and a
     report.
@@ -74,7 +74,7 @@ def run(
     quality: Annotated[str | None, typer.Option(help="full or fast.")] = None,
     theme: Annotated[str | None, typer.Option(help="skin or mask.")] = None,
     camera: Annotated[str | None, typer.Option(help="front, three-quarter, profile and so on.")] = None,
-    evaluator: Annotated[str | None, typer.Option(help="Who works out the vertices: auto, cpu or gpu.")] = None,
+    evaluator: Annotated[str | None, typer.Option(help="Where vertices are computed: auto, cpu or gpu.")] = None,
 ) -> None:
     """Run a stage until it is stopped (Ctrl-C) or its time is up.
 

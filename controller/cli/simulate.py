@@ -54,7 +54,7 @@ class _Simulators(TyperGroup):
 
 def make_app() -> typer.Typer:
     """The group of all these commands."""
-    simulators = typer.Typer(cls=_Simulators, no_args_is_help=True, help="Stand in for hardware on a pseudo-terminal.")
+    simulators = typer.Typer(cls=_Simulators, no_args_is_help=True, help="Simulate hardware on a pseudo-terminal.")
     simulators.command("robot")(simulate_robot)
     simulators.command("host")(simulate_host)
     return simulators
@@ -74,7 +74,7 @@ Faults = Annotated[
 ]
 Look = Annotated[bool, typer.Option("--watch", help="Show the servos and the decoded traffic while it runs.")]
 Control = Annotated[
-    Path | None, typer.Option("--control", help="Socket that takes faults, and says how the servos are, while it runs.")
+    Path | None, typer.Option("--control", help="Unix socket for faults and the state of the servos while it runs.")
 ]
 
 

@@ -76,7 +76,7 @@ class _Model:
 class PointEditor:
     """Takes points of a head in a picture and drags them.
 
-    It samples a copy of the head, in a thread of its own, once somebody wants to take a point.
+    It samples a copy of the head, in a separate thread, when the user first picks a point.
 
     head : the head that is drawn; sculpting moves its control points. copy : loads the same head again.
     """
@@ -180,7 +180,7 @@ class PointEditor:
         model = _Model(copy(), self._parameters)
         _PointDrag(model, 0, np.zeros(3), np.zeros(3), self._parameters, self._parameters.neutral(), np.zeros(3)).solve(
             model.skin.rest[0]
-        )  # the solver is compiled before anybody waits for it
+        )  # compile the solver before the first drag needs it
         self._model = model
 
 

@@ -126,7 +126,7 @@ class IdleMotion:
         self._next_blink_s = self._next_eye_s = self._next_fidget_s = -math.inf
 
     def shift(self, angle_rad: float, now_s: float) -> None:
-        """The gaze jumps by an angle; a large jump may bring a blink along."""
+        """The gaze jumps by an angle; a large jump may trigger a blink."""
         blink = self._settings.blink
         if math.degrees(abs(angle_rad)) >= blink.shift_deg and self._random.random() < blink.shift_share:
             self._next_blink_s = min(self._next_blink_s, now_s)

@@ -28,7 +28,7 @@ class LayerSettings:
     """Name, priority and timing of a layer; :class:`controller.layers.settings.LayerTable` checks those of files.
 
     name : unique name. priority : higher goes over lower. mode : how it joins what lies below.
-    weight : 0..1. fade_in_s, fade_out_s : times to take and to give back a parameter.
+    weight : 0..1. fade_in_s, fade_out_s : times to fade a parameter in and to release it.
     timeout_s : a parameter not written for so long is released; infinity keeps it.
     gains : factors on its values by region, 1 where none is given.
     """

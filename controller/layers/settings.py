@@ -47,7 +47,7 @@ class LayersTable(Settings):
 def load_layers(
     changes: Mapping[str, Mapping[str, Any]] | None = None, *, where: Path | None = None
 ) -> tuple[LayerSettings, ...]:
-    """The shipped layers, with the ``changes`` of a stage: single keys of them, or layers of its own.
+    """The shipped layers, with the ``changes`` of a stage: single keys of them, or added layers.
 
     ``where`` : the file the changes are from, for messages.
 

@@ -35,7 +35,7 @@ class LinkContext:
 
 
 class Link(Protocol):
-    """A link that is open; it takes commands in a thread of its own until it is closed."""
+    """A link that is open; it takes commands in its own thread until it is closed."""
 
     def report(self) -> dict[str, object]:
         """Counts: ``port`` (the name of its far end), ``accepted``, ``refused`` (counts by reason)."""

@@ -47,7 +47,7 @@ class BusLoop:
     newest : returns the newest parameter vector (p,) float64 and the time (monotonic ns) at which its command arrived,
         0 for none.
     rules : the robot's safety rules. anchors : solver of the robot's anchored channels, on this bus or another.
-    limp : switch the motors off and only read where the servos are.
+    limp : switch the motors off and only read the positions of the servos.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class BusLoop:
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Open the bus, bring the servos up safely and begin to drive them.
+        """Open the bus, start the servos safely and begin to drive them.
 
         Raises DriverError when the port or a servo does not come up; the bus is closed again.
         """
@@ -173,7 +173,7 @@ class BusLoop:
         self.following.add(angles, self._state)
 
     def _come_to_rest(self) -> None:
-        """Lead the servos to the neutral face before they go limp, so that no part of the head drops."""
+        """Move the servos to the neutral face before torque is switched off, so that no part of the head drops."""
         rest = self.table.neutral_rad
         end_ns = time.monotonic_ns() + _REST_LIMIT_NS
         with suppress(DriverError):  # a bus that does not work is stopped as it is

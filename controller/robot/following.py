@@ -175,7 +175,7 @@ class MeasuredFace:
         return self.read(out, np.zeros(len(out), dtype=bool))
 
     def capture(self, state: CommandState, now_ns: int) -> None:
-        """Write the face to the capture layer, so that the picture follows a limp head that is moved by hand."""
+        """Write the face to the capture layer, so that the picture follows a head that is moved by hand."""
         values, mask = state.parameters.neutral(), np.zeros(len(state.parameters), dtype=bool)
         if self.read(values, mask):
             state.capture(values, mask, now_ns, now_ns)

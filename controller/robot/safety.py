@@ -1,4 +1,4 @@
-"""Safety rules and limits of motion between the angles that a face asks for and the goals sent to a bus.
+"""Safety rules and limits of motion between the angles of a face's channels and the goals sent to a bus.
 
 The chain is dead band -> slack -> rules -> limiter of motion. Rules only narrow the range [low, high] of positions that
 each servo may be sent; several rules combine by intersection, so their order does not matter. All of them act on
@@ -224,7 +224,7 @@ class DeadBandAndSlack:
         """(n,) rad: the angles to send for ``target`` : (n,) rad."""
         moved = ~(np.abs(target - self._held) <= self._dead)
         self._held[moved] = target[moved]
-        # the direction turns when the target comes back from its furthest point
+        # the direction turns when the target returns from its furthest point
         came = (self._held - self._peak) * np.where(self._direction == 0.0, 1.0, self._direction)
         turned = (came < -self._turn) | ((self._direction == 0.0) & (came > self._turn))
         self._direction = np.where(turned, np.sign(self._held - self._peak), self._direction)
@@ -250,7 +250,9 @@ class Guard:
     def apply(self, target: Floats, position: Floats, rest: Floats, state: BusState | None, dt: float) -> Floats:
         """Angles (n,) rad that the servos may be sent, inside the limits and every rule.
 
-        target : (n,) rad, what the face asks for. position : (n,) rad, the last goals.
+        Parameters
+        ----------
+        target : (n,) rad, the angles of the face. position : (n,) rad, the last goals.
         rest : (n,) rad, where they would come to rest; see :meth:`controller.motion.motion.MotionLimiter.rest`.
         state : the newest measurement. dt : s.
         """

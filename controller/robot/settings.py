@@ -145,7 +145,7 @@ class PreventRule(Settings):
 
 
 class TimingRule(Settings):
-    """Time at an extreme: after ``hold_s`` past ``extreme`` the limit falls to it, stays there, and comes back."""
+    """Time at an extreme: after ``hold_s`` past ``extreme`` the limit falls to it, stays there, and returns."""
 
     channels: Names
     toward: Side
@@ -159,8 +159,8 @@ class TimingRule(Settings):
 class LoadRule(Settings):
     """Load: after ``after_s`` above ``current_a`` the servo gives way from its measured position.
 
-    It gives way at ``fall_deg_s`` while overloaded, by at most ``most_deg``; ``rest_s`` after the load has gone the
-    limit comes back at ``rise_deg_s``.
+    It moves back at ``fall_deg_s`` while overloaded, by at most ``most_deg``; ``rest_s`` after the load has gone the
+    limit returns at ``rise_deg_s``.
     """
 
     channels: Names

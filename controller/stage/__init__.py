@@ -1,4 +1,4 @@
-"""Stages: which head, links, layers and robots belong together, and what of that would be sent.
+"""Stages: files that name the head, links, layers and robots of a run; and the dry run of a stage.
 
 In: a stage's file. Out: checked settings and plans. Imports base to robot.
 """

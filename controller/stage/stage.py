@@ -100,7 +100,7 @@ class Stage:
     """A stage with everything it refers to found and checked.
 
     path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
-    layers : the layers. life : settings of idle life. groups : group files added to the head, each with its amount.
+    layers : the layers. life : settings of idle motion. groups : group files added to the head, each with its amount.
     """
 
     path: Path

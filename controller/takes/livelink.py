@@ -169,7 +169,7 @@ def _number(path: Path, line: int, column: str, text: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise TakeError(
-            f"{path}, line {line}, column {column}: {text!r} is not a finite number", hint="mend or remove that line"
+            f"{path}, line {line}, column {column}: {text!r} is not a finite number", hint="correct or remove that line"
         )
     return value
 
@@ -181,7 +181,7 @@ def _times(path: Path, lines: list[tuple[int, str]]) -> Floats:
         match = _TIMECODE.fullmatch(text)
         if match is None:
             message = f"{path}, line {number}, column Timecode: {text!r} is not HH:MM:SS:FF.fff"
-            raise TakeError(message, hint="mend or remove that line")
+            raise TakeError(message, hint="correct or remove that line")
         hours, minutes, whole = map(int, match.groups()[:3])
         seconds[i] = 3600 * hours + 60 * minutes + whole + float(match[4]) / _FRAMES_PER_S
     seconds += _DAY_S * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -_DAY_S / 2)

@@ -20,7 +20,7 @@ STEP_DEG = 0.5
 BAR = 44
 HELP = (
     "up/down channel   n neutral   N neutral of all   [ lowest   ] highest   t follow the extremes\n"
-    "h hold / let go   left/right move while it holds   c clear   s save   q leave"
+    "h hold / release   left/right move while it holds   c clear   s save   q leave"
 )
 
 

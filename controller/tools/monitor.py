@@ -72,7 +72,7 @@ def poll_servos(
             tables[info.id] = load_table(info.model_number, info.firmware)
     known = [info for info in found if info.id in tables]
     if not known:
-        which = f": {', '.join(info.model for info in found)} cannot be asked" if found else ""
+        which = f": {', '.join(info.model for info in found)} cannot be read" if found else ""
         raise NoReply(f"no servo to ask on {port} at {baud} baud{which}", hint=f"omote scan {port}", port=port)
     decoder = make_decoder(protocol, tables)
     view = BusView(f"{port} at {baud} baud", lambda: (), decoder, console)
@@ -138,7 +138,7 @@ def _state(state: BusState, i: int) -> str:
 
 
 def _heard_rows(decoder: Decoder) -> list[dict[str, Any]]:
-    """One row a servo whose answers were heard."""
+    """One row for each servo whose answers were received."""
     return [
         {"id": servo, "answers": heard.packets, "error": heard.error}
         | {name: heard.values[name] for name in SHOWN if name in heard.values}

@@ -91,16 +91,19 @@ def _serve(line: Line, baud: int, how: Serving, console: Console, simulator: Sim
 
 @contextmanager
 def _stop_socket() -> Iterator[socket.socket]:
-    """A socket that becomes readable on SIGINT or SIGTERM."""
+    """A socket that becomes readable on SIGINT or SIGTERM.
+
+    The interpreter writes to it at the moment of the signal. A handler in Python would run only after the call that
+    waits for the socket, which waits for ever when the signal comes just before it.
+    """
     reading, writing = socket.socketpair()
-
-    def stop(_number: int, _frame: object) -> None:
-        writing.send(b"x")
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    writing.setblocking(False)
+    before = {number: signal.signal(number, lambda *_: None) for number in (signal.SIGINT, signal.SIGTERM)}
+    wakeup = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
     try:
         yield reading
     finally:
+        signal.set_wakeup_fd(wakeup)
         for number, handler in before.items():
             signal.signal(number, handler)
         reading.close()

@@ -124,7 +124,7 @@ class StageRun:
     def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:
         """Wait for the servos and let commands in; returns a function that is true while the run shall go on."""
         gc.enable()
-        gc.freeze()  # nothing that was loaded is garbage: no collection has to look at it while pictures are drawn
+        gc.freeze()  # loaded objects are not garbage: no collection has to check them while pictures are drawn
         body.wait_ready()
         body.begin()
         self._status("running" + (f" for {seconds:g} s" if seconds else ""))

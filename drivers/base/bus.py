@@ -76,7 +76,7 @@ class ServoSpec:
 
 @dataclass(frozen=True, slots=True)
 class ServoInfo:
-    """What discovery found out about a servo; None where the servo cannot be asked."""
+    """What discovery found out about a servo; None where the servo cannot report it."""
 
     id: int
     model_number: int
@@ -97,7 +97,7 @@ class BusState:
     velocity_rad_s, current_a : from the same reply; NaN where the model does not measure it.
     fresh : True where this cycle measured the position. Never use a position that is not fresh as a pose. Always False
         on a bus that does not measure; the position is then what the board reports it puts out, or what was sent.
-    age_s : seconds since the position arrived; inf before the first one, and where nothing can be asked.
+    age_s : seconds since the position arrived; inf before the first one, and where nothing can be read.
     error : error byte of the last reply (bit 7: alert, a hardware error is latched; bits 0-6: a number).
     silent : True where the servo stopped answering and is only probed now and then.
     voltage_v, temperature_c : polled in turn; NaN before the first poll.
@@ -130,7 +130,7 @@ class BusReport:
         board reports). Kinds that never occurred are missing.
     errors_by_servo : the same by servo id.
     limits_hit : targets clipped to an angle limit.
-    speed_limited : targets shortened because they asked for more than the servo's top speed.
+    speed_limited : targets shortened because they needed more than the servo's top speed.
     refused_targets : targets that were not a number.
     stray : replies discarded because they answer no request (late, duplicated, echo or noise).
     eeprom_writes : one line for every permanent register written.

@@ -48,7 +48,7 @@ class PortLost(PortError):
 
 
 class BusError(DriverError):
-    """The wire behind an open port does not work as it should."""
+    """The bus at an open port does not work as it should."""
 
 
 class NoReply(BusError):

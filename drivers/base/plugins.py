@@ -125,7 +125,7 @@ class Registry(Generic[P]):
 
     @contextmanager
     def importing(self, plugin: P) -> Iterator[None]:
-        """Context of imports for a plug-in; raises PluginError that says what to install where a module is missing."""
+        """Context of imports for a plug-in; PluginError names the package to install where a module is missing."""
         try:
             yield
         except ModuleNotFoundError as error:
@@ -145,7 +145,7 @@ class Registry(Generic[P]):
                 raise
             raise PluginError(
                 f"{self.what} {kind!r} of the package {package} failed: {_describe(error)}",
-                hint="update that package, or tell its maker; OMOTE_DEBUG=1 shows where it was",
+                hint="update that package, or report it to its maker; OMOTE_DEBUG=1 prints the traceback",
             ) from error
 
     def package_of(self, kind: str) -> str:

@@ -10,7 +10,7 @@ import struct
 import sys
 
 NO_REALTIME = "OMOTE_ORDINARY_PRIORITY"
-"""Environment variable: where it is set, no thread asks for real-time scheduling."""
+"""Environment variable: where it is set, no thread requests real-time scheduling."""
 _REALTIME_PRIORITY = 10
 _PR_SET_TIMERSLACK = 29
 _SWITCH_S = 0.2e-3

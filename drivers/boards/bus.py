@@ -1,6 +1,6 @@
 """Base class of drivers for boards whose servos measure nothing: open loop, and no state is ever fresh.
 
-A position is what the board reports it puts out, or what was sent where the board cannot be asked.
+A position is what the board reports it puts out, or what was sent where the board reports nothing.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class BoardBus(WireBus):
         self._position, self._position_s = np.full(n, math.nan), np.full(n, -math.inf)
         self._on = np.zeros(n, dtype=bool)
         self._silent = False
-        self._mute: list[int] = []  # servos without answers, the one asked longest ago first
+        self._mute: list[int] = []  # servos without answers, the one polled longest ago first
         self._warn = RateLimitedLogger(log, clock)
 
     @abstractmethod
@@ -82,7 +82,7 @@ class BoardBus(WireBus):
         """Switch one servo off, without waiting."""
 
     def _off_confirmed(self, index: int) -> bool:
-        """Whether the board reports that a servo is off; True where it cannot be asked."""
+        """Whether the board reports that a servo is off; True where it cannot report that."""
         return True
 
     @property

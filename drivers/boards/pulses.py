@@ -13,7 +13,7 @@ from drivers.boards.bus import BoardBus
 from drivers.boards.hobby import PulseScale
 
 GROUP = 8
-"""Channels asked in one cycle: boards have small input buffers."""
+"""Channels polled in one cycle: boards have small input buffers."""
 
 
 class PulseTrack:

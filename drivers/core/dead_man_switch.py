@@ -123,7 +123,7 @@ def _not_ready(path: str, why: str) -> Exception:
 
     return DriverError(
         f"no process waits to switch the servos on {path} off if this program is killed: {why}",
-        hint="the servos are driven without one; mend that and start again, or set watchdog_ms = 0 if it is meant",
+        hint="the servos are driven without one; fix that and start again, or set watchdog_ms = 0 if that is intended",
         port=path,
     )
 
@@ -242,7 +242,7 @@ def switch_off(path: str, baud: int, frames: Iterable[str], repeats: int = REPEA
 
 
 def _print(descriptor: int, line: str) -> None:
-    """Write a line without waiting for the reader, which may be gone."""
+    """Write a line without waiting for the reader, which may have ended."""
     with suppress(OSError, ValueError):
         if select.select([], [descriptor], [], 0.0)[1]:
             os.write(descriptor, (" ".join(line.split()) + "\n").encode(errors="replace"))

@@ -69,14 +69,14 @@ class ServoSettings(AnySettings):
     """Options of drivers of servos with control tables."""
 
     watchdog_ms: int | None = option(
-        "Servos stop when nothing was heard for this time; 0 is never (ms).", at_least=0, at_most=2540
+        "Servos stop when they receive nothing for this time; 0 is never (ms).", at_least=0, at_most=2540
     )
     takeover: str | None = option("What becomes of servos that are on already.", choices=("adopt", "release", "refuse"))
     reboot_faulted: bool | None = option("Reboot servos that latched a hardware error.")
     min_voltage_v: float | None = option("Supply below which servos are not switched on (V).", above=0, at_most=60)
     voltage_wait_s: float | None = option("How long to wait for that supply (s).", at_least=0, at_most=600)
     feedback: str | None = option("What is read every cycle.", choices=("full", "position"))
-    slow_group: int | None = option("Servos asked for slow values in one cycle.", at_least=0, at_most=252)
+    slow_group: int | None = option("Servos from which slow values are read in one cycle.", at_least=0, at_most=252)
 
     def check(self, rate_hz: float) -> None:
         """Raises ValueError for a watchdog that would trip between two cycles."""

@@ -23,7 +23,7 @@ class TargetLimits:
     """
 
     def __init__(self, servos: Sequence[ServoSpec], report: BusReport) -> None:
-        from drivers.core.kernels import limit_targets  # compiled: only who drives servos pays for it
+        from drivers.core.kernels import limit_targets  # compiled: imported only where servos are driven
 
         self._limit = limit_targets
         self._low, self._high, self._speed = np.array(

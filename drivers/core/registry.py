@@ -13,7 +13,7 @@ from drivers.base.options import check_options
 from drivers.base.plugins import Registry, folders_with
 from drivers.core.families import API, RESERVED, Family
 
-if TYPE_CHECKING:  # start-up: they bring numpy, which listing the kinds does without
+if TYPE_CHECKING:  # start-up: they import numpy, which listing the kinds does not need
     from drivers.base.bus import Bus, ServoSpec
     from drivers.core.wirebus import WireBus
 

@@ -108,7 +108,7 @@ class PacketDecoder(Decoder):
         return ", ".join(f"{name} = {value}" for name, value in values.items())
 
     def _data(self, servo: int, data: bytes) -> str:
-        """Data of an answer, by what the servo was asked for."""
+        """Data of an answer, by the request to the servo."""
         address, size = self._asked.pop(servo, (-1, -1))
         if size == len(data):
             return self._values(servo, address, data)

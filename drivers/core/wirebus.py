@@ -101,7 +101,7 @@ class WireBus(Bus):
 
     @contextmanager
     def _losing(self) -> Iterator[None]:
-        """Context that closes the port and counts the loss when it goes away."""
+        """Context that closes the port and counts the loss when it disappears."""
         self._raise_if_lost()
         try:
             yield

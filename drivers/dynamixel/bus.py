@@ -41,8 +41,8 @@ class DynamixelBus(ServoBus):
         hardware error, torque and watchdog too; ``"position"`` reads only the position.
     fast : use fast reads where every servo's firmware has them.
     indirect : use indirect addressing where the model has it.
-    slow_group : servos asked at once for what is not in the feedback (supply, and torque, error and watchdog where
-        they are not), so that each is asked every half second; 0 asks only about servos that raise an alert.
+    slow_group : servos read at once for values that are not in the feedback (supply, and torque, error and watchdog
+        where they are not), so that each is read every half second; 0 reads only servos that raise an alert.
     policy : fields of :class:`~drivers.dynamixel.startup.Policy`, such as ``watchdog_ms``.
 
     Raises DriverError for an unknown model or an option that does not fit.

@@ -101,7 +101,7 @@ class GroupRead:
         return Instruction.FAST_BULK_READ if self.fast else Instruction.BULK_READ, b"".join(entries)
 
     def decode(self, data: bytes) -> dict[int, StatusPacket] | None:
-        """Replies by servo id, where `data` is exactly what was asked for; else None."""
+        """Replies by servo id, where `data` is exactly what was requested; else None."""
         octets = np.frombuffer(data, np.uint8)
         if len(data) != self.size or not self._check(octets, self.spans, self.heads, self.states):
             return None

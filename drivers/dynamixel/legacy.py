@@ -5,8 +5,8 @@ given to any SDK code. The numbers are those of ``drivers/dynamixel/sdk.py``, wh
 each has a test in tests/drivers/dynamixel/test_legacy.py that shows it on the bare SDK:
 
 ====  ========================================================================================================
-S4    a reply must have the id **and the length** that was asked for, and a servo that missed its time must
-      answer a greeting before it is asked for data again; the SDK takes any packet of the servo, so also the
+S4    a reply must have the id **and the length** that was requested, and a servo that missed its deadline must
+      answer a greeting before data are read from it again; the SDK takes any packet of the servo, so also the
       adapter's echo of the request itself, whose parameters it then returns as register values
 S5    ``is_using`` is reset on every way out of a transaction
 S10   the error flags of every reply are kept, also of bulk reads

@@ -80,7 +80,7 @@ class MixedBus(WireBus):
     # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
-        """Servos that answer: each id is asked in the protocol it is configured for, then in the other."""
+        """Servos that answer: each id is pinged in the protocol it is configured for, then in the other."""
         with self._losing():
             found: dict[int, ServoInfo] = {}
             if ids is None:
@@ -94,7 +94,7 @@ class MixedBus(WireBus):
 
     def _bring_up(self) -> Floats:
         here = np.zeros(len(self.ids))
-        self._old._keep &= not hasattr(self, "simulation")  # a simulated bus dies with its program
+        self._old._keep &= not hasattr(self, "simulation")  # a simulated bus ends with its program
         for half, index in zip(self._halves, self._index, strict=True):
             try:
                 half._start()

@@ -20,7 +20,7 @@ class Registers(registers.Registers[StatusPacket]):
     port: Port
 
     def refusal(self, reply: StatusPacket) -> str:
-        """Why a servo refused what it was asked; empty where it did not."""
+        """Why a servo refused an instruction; empty where it did not."""
         number = reply.error_number
         return _REASONS.get(number, f"error {number}") if number else ""
 

@@ -7,8 +7,8 @@ code. What is overridden; each fault has a test in tests/drivers/dynamixel/test_
 S1    transmitted packets are byte-stuffed (the SDK builds the stuffed packet and throws it away)
 S2    unstuffing scans the bytes as received, so it is the inverse of stuffing
 S3    input left over from before is thrown away ahead of every instruction
-S4    a reply must have the id **and the length** that was asked for; a servo that missed its time must answer
-      a ping before it is asked for data again, so a late reply never answers another request
+S4    a reply must have the id **and the length** that was requested; a servo that missed its deadline must
+      answer a ping before data are read from it again, so a late reply never answers another request
 S5    ``is_using`` is reset on every way out of a transaction
 S6    everything an unplugged device raises becomes PortLost
 S7    the timeout is wire time plus a margin from the adapter's latency timer, not 34 ms
@@ -79,7 +79,7 @@ class SdkExchanges(exchange.Exchanges[R]):
         return int(robotis_def.COMM_SUCCESS)
 
     def txRxPacket(self, port: Port, txpacket: list[int]) -> tuple[list[int] | None, int, int]:
-        """One instruction and its reply; the reply's id and length must be those asked for (S4)."""
+        """One instruction and its reply; the reply's id and length must be the requested ones (S4)."""
         if port.is_using:
             return None, robotis_def.COMM_PORT_BUSY, 0
         servo, code = txpacket[self.id_at], txpacket[self.code_at]
@@ -234,7 +234,7 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
         return settled(port, group.wanted, {reply.id: reply for reply in replies}, len(raw) >= group.size)
 
     def _read_behind(self, port: Port, group: GroupRead, got: Got) -> Got:
-        """Read servos behind the first silent one again, plainly: it cut them off from the joint reply (S14).
+        """Read servos after the first silent one again, one reply each: it cut them off from the joint reply (S14).
 
         Late bytes of that reply are no packet, so they cannot be taken for one.
         """

@@ -96,7 +96,7 @@ class Startup(startup.Startup[StatusPacket]):
         registers, table = self.registers, self.registers.tables[servo]
         wanted: dict[str, int] = {"mode": 2 if table.model == "xl320" else 3}
         keep = {"drive_mode": ~(REVERSE | TIME_PROFILE | TORQUE_BY_GOAL)}
-        if table.goal_torque:  # older firmware has no Startup Configuration and refuses to be asked
+        if table.goal_torque:  # older firmware has no Startup Configuration and refuses to read it
             keep["startup"] = ~1
         names = [name for name in ("mode", *keep) if registers.item(servo, name) is not None]
         present = {name: registers.get(servo, name) for name in names}

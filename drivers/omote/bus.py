@@ -68,7 +68,7 @@ class LineOutBus(BoardBus):
                 )
         twice = sorted({name for name in self._names if self._names.count(name) > 1})
         if twice:
-            raise DriverError(f"two servos are called {', '.join(twice)}", hint="give each a wire_name of its own")
+            raise DriverError(f"two servos are called {', '.join(twice)}", hint="give each a different wire_name")
         for servo in self.servos:
             check_lineout(servo.model)
         fields = [MODELS.get(servo.model, ("us", 1)) for servo in self.servos]
@@ -94,7 +94,7 @@ class LineOutBus(BoardBus):
         self._reset()
 
     def _begin(self) -> Floats:
-        """Send HELLO and ask for the present values; NaN where the head does not report them."""
+        """Send HELLO and request the present values; NaN where the head does not report them."""
         hello = dict(word.partition("=")[::2] for word in self._greet().text.split() if "=" in word)
         if hello.get("max_line", "").isdecimal():
             self._max_line = min(int(hello["max_line"]), protocol.MAX_LINE)
@@ -126,7 +126,7 @@ class LineOutBus(BoardBus):
                 )
 
     def _refusal(self, group: Sequence[str], answer: Answer) -> BusError:
-        """The error for names that a head refuses; asks for each by itself to find the wrong one."""
+        """The error for names that a head refuses; requests each separately to find the wrong one."""
         for name in group:
             single = self._insist(["GET", name])
             if not single.ok:

@@ -50,7 +50,7 @@ class Error1(IntFlag):
 class Packet1(NamedTuple):
     """One packet: `id`, `code` (the instruction, or the error byte of a status packet), `params`.
 
-    Both directions have one format: only the sender tells which one it is.
+    Both directions have one format: only the sender distinguishes them.
     """
 
     id: int

@@ -1,7 +1,7 @@
 """Non-blocking byte streams behind a port: serial device, TCP socket, socket in this process, or any URL of pyserial.
 
-:class:`drivers.port.serialport.SerialPort` adds deadlines and one error tree. What a device raises when it goes away is
-in :data:`UNPLUGGED`.
+:class:`drivers.port.serialport.SerialPort` adds deadlines and one error tree. :data:`UNPLUGGED` is what a device raises
+when it disappears.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ except ImportError:  # no termios outside POSIX
 
 
 UNPLUGGED = (OSError, serial.SerialException, TermiosError)
-"""Everything that pyserial and the system raise when a device goes away."""
+"""Everything that pyserial and the system raise when a device disappears."""
 
 CONNECT_S = 3.0
 """Time limit for a TCP connection."""
@@ -48,7 +48,7 @@ class Endpoint(ABC):
 
     @abstractmethod
     def take(self) -> bytes:
-        """The bytes that have arrived; raises BlockingIOError when there are none, OSError when it is gone."""
+        """The bytes that have arrived; raises BlockingIOError when there are none, OSError when it has disappeared."""
 
     @abstractmethod
     def put(self, data: memoryview) -> int:

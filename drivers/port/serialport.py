@@ -77,7 +77,7 @@ class SerialPort:
         return None if self._end is None else self._end.device
 
     def open(self) -> None:
-        """Open the device exclusively, ask for low latency, and discard its input.
+        """Open the device exclusively, request low latency, and discard its input.
 
         Raises PortMissing, PortBusy, PortPermission: see :mod:`drivers.base.errors`. PortError: the device does not
         take the baud rate.

@@ -43,7 +43,7 @@ class Protocol1Bus(ServoBus):
     baud : rate on the wire.
     feedback : ``"full"`` reads everything that is measured with every position, ``"position"`` position and speed.
     singles : of servos that must be read one by one, how many are read a cycle, in turn.
-    slow_group : servos asked for one slow value (torque) each cycle; 0 asks only those that raise an alert.
+    slow_group : servos from which one slow value (torque) is read each cycle; 0 reads only those that raise an alert.
     margin_s : longest wait for a reply beyond its time on the wire; None takes it from the latency timer.
     watchdog_ms : 0: servos may hold their position when this program is killed. Any other time starts a small process
         that switches them off then (:mod:`drivers.core.dead_man_switch`); where that process is missing, it is

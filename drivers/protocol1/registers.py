@@ -32,7 +32,7 @@ class Registers(registers.Registers[Packet1]):
         return self.causes(servo, self.flags[servo])
 
     def refusal(self, reply: Packet1) -> str:
-        """Why a servo refused what it was asked; empty where it did not."""
+        """Why a servo refused an instruction; empty where it did not."""
         if reply.params:  # flags about an earlier instruction come with data that is good
             return ""
         refusal = Error1(reply.code & self.packets.refusals)

@@ -106,7 +106,7 @@ class Startup(startup.Startup[Packet1]):
         return super()._least_voltage(ids) if self.policy.min_voltage_v is None else {}
 
     def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
-        """Look at hardware errors; torque brings servos back that shut down, where that is allowed."""
+        """Check hardware errors; `torque_on` starts servos that shut down again, where the policy allows it."""
         self._faulted = self._faults(ids)
         if self._faulted and not self.policy.reboot_faulted:
             raise self.fault("report", self._faulted)

@@ -86,7 +86,7 @@ class ServoBus(WireBus):
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that switched off or were rebooted, where they are; ``ids`` None means all of them.
 
-        Raises BusError where one does not come back; see the policy of the family's start-up for what is allowed.
+        Raises BusError where one stays off; see the policy of the family's start-up for what is allowed.
         """
         chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
         with self._losing():

@@ -33,7 +33,7 @@ class Exchange(NamedTuple, Generic[R]):
     """The replies to one request.
 
     replies : by servo id; only those with the right sender, length and checksum.
-    missing : ids that were asked and are not in ``replies``.
+    missing : ids that were addressed and are not in ``replies``.
     corrupt : True when damaged bytes arrived too, so that a missing reply may have been one of them.
     joint_lost : True when no servo answered a fast read, whatever the plain read after it brought.
     """
@@ -49,7 +49,7 @@ class Exchanges(ABC, Generic[R]):
 
     status_size : bytes of a reply without data.
     number_size : bytes of an address or a length in a packet.
-    refusals : bits of the error byte that refuse the request, so that the reply may be without the data asked for.
+    refusals : bits of the error byte that refuse the request, so that the reply may be without the requested data.
     reader : finds replies in received bytes.
     greeting : instruction that a servo in ``port.suspects`` may be sent at once, where it is not a plain read.
     """
@@ -68,7 +68,7 @@ class Exchanges(ABC, Generic[R]):
 
     @abstractmethod
     def hello(self, port: Port, servo: int) -> Exchange[R]:
-        """Send the greeting, a request whose reply has a length of its own. The servo may be in ``port.suspects``."""
+        """Send the greeting, a request whose reply has a unique length. The servo may be in ``port.suspects``."""
 
     @abstractmethod
     def _read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[R]:
@@ -125,7 +125,7 @@ class Exchanges(ABC, Generic[R]):
     def read_group(self, port: Port, ids: Sequence[int], address: int, size: int, manner: str = "sync") -> Exchange[R]:
         """Read the same registers of many servos, keeping every reply that arrived.
 
-        Servos in ``port.suspects`` are not asked and count as missing until they answered :meth:`revive`. `manner` is
+        Servos in ``port.suspects`` are left out and count as missing until they answered :meth:`revive`. `manner` is
         the protocol's name of the kind of read, such as ``"sync"``.
         """
         left_out = tuple(servo for servo in ids if servo in port.suspects)
@@ -193,7 +193,7 @@ class Exchanges(ABC, Generic[R]):
 
 
 class _Sorter(Generic[R]):
-    """Sorts replies into those asked for and strays; two under one id are both discarded.
+    """Sorts replies into requested ones and strays; two under one id are both discarded.
 
     `wanted` holds the data bytes expected by servo id, `refusals` the error bits with which a reply may lack them.
     """

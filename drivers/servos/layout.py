@@ -100,7 +100,7 @@ def _signed(raw: NDArray[np.int64], sign_bit: int | None) -> NDArray[np.int64]:
 
 
 def format_of(item: Item) -> str:
-    """numpy's type code of a register's bytes; a sign in a bit of its own is not decoded by it."""
+    """numpy's type code of a register's bytes; a sign in a separate bit is not decoded by it."""
     return f"{'>' if item.big_endian else '<'}{'i' if item.signed else 'u'}{item.size}"
 
 

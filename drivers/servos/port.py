@@ -153,7 +153,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self.deadline_s = self.clock() + msec / 1000.0
 
     def isPacketTimeout(self) -> bool:
-        """True behind the deadline."""
+        """True after the deadline."""
         return self.clock() > self.deadline_s
 
     def getCurrentTime(self) -> float:

@@ -38,7 +38,7 @@ class Registers(ABC, Generic[R]):
 
     @abstractmethod
     def refusal(self, reply: R) -> str:
-        """Why a servo refused what it was asked; empty where it did not."""
+        """Why a servo refused an instruction; empty where it did not."""
 
     def span(self, table: ControlTable, item: Item) -> tuple[int, int, str]:
         """(address, size, manner) of the read that contains a register, see ``Exchanges.read_group``."""

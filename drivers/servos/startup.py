@@ -31,7 +31,7 @@ class Policy:
 
     takeover : servos whose torque is on already are kept holding (``"adopt"``), switched off first (``"release"``:
         what they carry may fall), or make start-up fail (``"refuse"``).
-    reboot_faulted : bring servos back that had shut down for a hardware error; they lose torque while they reboot.
+    reboot_faulted : reboot servos that had shut down for a hardware error; they have no torque meanwhile.
     min_voltage_v : wait until every servo has at least this supply; None takes each servo's own limit.
     voltage_wait_s : how long to wait for it.
     """
@@ -104,7 +104,7 @@ class Startup(ABC, Generic[R]):
     def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
         """Look at hardware errors; returns servos that were rebooted.
 
-        Raises ServoFault where a servo has an error and the policy does not allow to bring it back.
+        Raises ServoFault where a servo has an error and the policy does not allow to reboot it.
         """
 
     @abstractmethod

@@ -35,7 +35,12 @@ class Telemetry(ABC):
     """Reads the servos of a bus and stores what they measured. A protocol adds how they are read.
 
     ids : n servo ids in the order of all arrays.
-    slow_group : servos that are asked at once for a slow value; 0 asks only servos that raise an alert.
+    slow_group : servos from which a slow value is read at once; 0 reads only servos that raise an alert.
+
+    Attributes
+    ----------
+    slow_s : every slow value of every servo is read within this time; 0: one request a cycle.
+    checked_first : registers that are read out of turn after an alert or a silence.
     """
 
     slow_s: ClassVar[float] = 0.0
@@ -186,7 +191,7 @@ class Telemetry(ABC):
     # ------------------------------------------------------------------ replies
 
     def _accept(self, requests: Sequence[ReadRequest], got: Exchange[Any], now: float, running: bool) -> None:
-        """Store the replies to requests, and count servos without one and replies without the data asked for."""
+        """Store the replies to requests, and count servos without one and replies without the requested data."""
         for servo in [servo for request in requests for servo in request.ids if servo in self._port.suspects]:
             if servo not in self._missed:
                 self._missed.add(servo)

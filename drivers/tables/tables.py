@@ -2,7 +2,7 @@
 
 Addresses and sizes of Protocol 2.0 models come from the table files that ship with dynamixel-sdk; `tables.toml` adds
 what they lack (initial values, access, ranges, signs, units) and corrects their mistakes; `legacy.toml` holds the
-models with Protocol 1.0 framing. Each table is built when it is first asked for.
+models with Protocol 1.0 framing. Each table is built when it is first used.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Item:
 
     @property
     def end(self) -> int:
-        """First address behind the item."""
+        """First address after the item."""
         return self.address + self.size
 
     def encode(self, value: int) -> bytes:
@@ -80,7 +80,7 @@ class Item:
 
 
 def to_magnitude(value: int, sign_bit: int) -> int:
-    """Magnitude with the sign in a bit of its own; a magnitude that does not fit is cut to the largest."""
+    """Magnitude with the sign in a separate bit; a magnitude that does not fit is cut to the largest."""
     magnitude = min(abs(value), (1 << sign_bit) - 1)
     return magnitude | 1 << sign_bit if value < 0 else magnitude
 

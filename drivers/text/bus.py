@@ -134,7 +134,7 @@ class TextBus(PulseBus):
             self._take([index], [pulse])
 
     def _asked_now(self) -> list[int]:
-        """Indices of the servos to ask in this cycle; silent ones in cycles of their own, every ``RETRY_S``."""
+        """Indices of the servos to poll in this cycle; silent servos in separate cycles, every ``RETRY_S``."""
         now = self._clock()
         if self._mute and now >= self._retry_s:
             self._retry_s = now + RETRY_S

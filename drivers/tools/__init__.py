@@ -1,4 +1,4 @@
-"""Tools that look at servos on a port without driving them: scanning, and changing an id.
+"""Tools for servos on a port that is not being driven: scanning, and changing an id.
 
 In: a port. Out: findings. Imports any room left of it.
 """

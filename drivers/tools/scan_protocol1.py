@@ -1,7 +1,7 @@
 """Scan for servos with Protocol 1.0 framing: Dynamixel AX and MX, Feetech STS and SCS. Nothing is written to them.
 
 There is no broadcast ping that all of them answer, so each id is pinged, as fast as the wire allows, and replies are
-told apart by the id they carry.
+distinguished by the id they carry.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ class Heard(NamedTuple):
     noise: bool
 
 
-def ping_all(link: SerialPort, tell: Callable[[int], None] = lambda servo: None) -> Heard:
-    """Ping every id of an open port once; `tell` is called with each id. Raises PortLost."""
+def ping_all(link: SerialPort, progress: Callable[[int], None] = lambda servo: None) -> Heard:
+    """Ping every id of an open port once; `progress` is called with each id. Raises PortLost."""
     reader, heard = Reader1(), Counter[int]()
     gap_s = PING_BYTES * 10.0 / link.baud + RETURN_DELAY_S + SLACK_S
     last_s = WAIT_S + (latency_s(link.path) or 0.0)
     for servo in range(MAX_ID + 1):
-        tell(servo)
+        progress(servo)
         link.write(encode(servo, Instruction1.PING))
         end_s = time.monotonic() + gap_s + last_s * (servo == MAX_ID)
         while time.monotonic() < end_s:

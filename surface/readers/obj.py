@@ -59,7 +59,7 @@ def _shape_files(folder: Path, neutral: Path) -> list[Path]:
         raise FitError(f"{folder}: no such folder of shapes", hint="give the folder that holds one .obj a shape")
     files = [f for f in _obj_files(folder) if f != neutral]
     if not files:
-        raise FitError(f"{folder}: holds no .obj shape", hint="export every shape as an .obj of its own")
+        raise FitError(f"{folder}: holds no .obj shape", hint="export every shape as a separate .obj")
     return files
 
 

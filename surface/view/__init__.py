@@ -3,7 +3,7 @@
 In: a head, poses, a camera and a theme. Out: pixels, image files, a window. Imports base, mesh and head.
 
 Nothing here imports moderngl, Pillow or imgui-bundle before it is used, so a machine without them can still
-import the package; what needs one of them raises a :class:`surface.base.errors.ViewError` that says so.
+import the package; what needs one of them raises a :class:`surface.base.errors.ViewError` that names what is missing.
 """
 
 from surface.view.draw.renderer import Renderer

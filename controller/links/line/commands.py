@@ -47,7 +47,7 @@ class Command:
 
     @property
     def measured(self) -> bool:
-        """Whether it asks for what the servos show."""
+        """Whether it requests the measured values of the servos."""
         return self.name == "MEASURED" or (self.name == "READ" and len(self.words) > 1)
 
 

@@ -156,7 +156,7 @@ class RobotHost:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Serve a script in a process of its own; see the module's text."""
+    """Serve a script in a separate process; see the module's docstring."""
     parser = argparse.ArgumentParser(prog="controller.links.line.host", description="simulated robot host")
     parser.add_argument("--script", default="tour", help="a path, or a name in configs/scripts")
     parser.add_argument("--vocabulary", type=Path, action="append", default=[], help="file of further expressions")
@@ -182,11 +182,11 @@ def _say(line: str) -> None:
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
     except BrokenPipeError:
-        pass  # the process that started it is gone
+        pass  # the process that started it has ended
 
 
 def _stdin_open() -> bool:
-    """False once standard input has ended, which happens when the starter closes it or dies."""
+    """False once standard input has ended, which happens when the parent process closes it or ends."""
     ready, _, _ = select.select([sys.stdin], [], [], 0.0)
     return not ready or bool(os.read(sys.stdin.fileno(), 1024))
 

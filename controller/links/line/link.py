@@ -1,4 +1,4 @@
-"""Serves the line protocol on a serial port, in a thread of its own.
+"""Serves the line protocol on a serial port, in its own thread.
 
 Replies and streamed lines are written without waiting: a peer that does not read loses lines, and never holds up the
 face. A port that vanishes is opened again when it comes back, and a subscription goes on then. Only its owner ends the

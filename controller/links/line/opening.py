@@ -39,7 +39,7 @@ def open_line(settings: LineSettings, context: LinkContext) -> LineLink:
 
 
 class HostProcess:
-    """A simulated robot host in a process of its own, which ends with this one.
+    """A simulated robot host in a child process, which ends with this one.
 
     Parameters
     ----------

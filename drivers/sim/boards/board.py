@@ -15,7 +15,7 @@ FAULTS = ("echo", "slow-reader", "unplug", "mute", "silent", "late", "drop", "fl
 """Faults of a board. Ids are channels; ``mute`` and ``volts`` are the board's, so write ``*``."""
 NO_LIMIT = 1e9
 BROWN_OUT_V = 4.0
-"""Supply below which a board is deaf; it starts again when the supply comes back."""
+"""Supply voltage below which a board stops; it restarts when the supply returns."""
 
 
 class Board(Line):
@@ -40,7 +40,7 @@ class Board(Line):
         """The state after power-on."""
 
     def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
-        """Do a packet, unless the board is deaf; returns the replies that arrive."""
+        """Execute a packet, unless the supply is too low; returns the replies that arrive."""
         if self._deaf:
             return []
         replies = []

@@ -132,11 +132,11 @@ class TextOptions:
 
     template: str = option(r"One servo's move, as in a robot file; \n and \r end a line.", r"#{ch}P{us}\r")
     off: str = option("What switches one servo off.", r"#{ch}P0\r")
-    query: str = option("What asks for one servo.", "")
-    answer: str = option("The answer to it; it goes with --query.", "")
+    query: str = option("Request for the pulse of one servo.", "")
+    answer: str = option("The board's answer to --query.", "")
     begin: str = option("Text before the moves of one line.", "")
-    separator: str = option("Text between them.", "")
-    end: str = option("Text behind them.", "")
+    separator: str = option("Text between the moves.", "")
+    end: str = option("Text after the moves.", "")
     ids: str = option("Ids of the servos: 1-24 or 1,3,7-9.", "1-16")
     baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
 

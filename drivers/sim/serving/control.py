@@ -5,7 +5,7 @@
 ``clear [KIND]``                  ends the faults of a kind, or all
 ``faults``                        answers with the faults that are set
 ``servos``                        answers with a JSON list of the states of servos (or channels)
-``place ID TICKS``                moves a limp shaft by hand
+``place ID TICKS``                moves a shaft as by hand, with torque off
 ================================  =====================================================================
 
 A word with spaces is put in quotes, as in a shell. Every line is answered by one line: ``ok``, ``ok VALUE`` or
@@ -149,7 +149,7 @@ class ControlSocket:
 
 
 def _remove_dead(path: Path) -> None:
-    """Remove a socket whose server is gone; raises PortBusy for any other file."""
+    """Remove a socket whose server has ended; raises PortBusy for any other file."""
     if not path.exists():
         return
     if not stat.S_ISSOCK(path.stat().st_mode):

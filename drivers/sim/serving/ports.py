@@ -21,7 +21,7 @@ from drivers.port.endpoints import MEMORY_PORTS, address_of
 _CHUNK = 65536
 
 DEFAULT_SPEED = 38_400
-"""Speed of a terminal that nobody has set; no Dynamixel speaks it, so it is taken for "not set"."""
+"""Speed of a terminal that no client has set; no Dynamixel speaks it, so it is taken for "not set"."""
 
 _TCGETS2 = 0x802C542A
 _TERMIOS2 = struct.Struct("4IB19B2I")
@@ -201,7 +201,7 @@ class _SocketPort(ServedPort):
         return [end.fileno() for end in (self._listener, self._client) if end and self._listener]
 
     def read(self) -> bytes:
-        """What the client has written; accepts the next one when it has gone."""
+        """What the client has written; accepts the next one when it has disconnected."""
         data = self._receive()
         with suppress(OSError):
             while True:
@@ -288,7 +288,7 @@ class MemoryPort(_SocketPort):
         return self.path.partition("://")[2]
 
     def _connect(self, client: socket.socket) -> None:
-        """A client comes, in its own thread: one byte wakes the server."""
+        """A client connects, in its own thread: one byte wakes the server."""
         self._waiting.append(client)
         self._wake.send(b"x")
 

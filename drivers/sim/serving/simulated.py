@@ -68,7 +68,7 @@ class ServoView:
             self._servo.force(name, value, self._clock())
 
     def place(self, position: float) -> None:
-        """Move the limp shaft by hand, ticks; ValueError while the motor holds it."""
+        """Move the shaft as by hand, ticks; ValueError while its torque is on."""
         with self._chain.lock:
             self._servo.place(position, self._clock())
 

@@ -98,5 +98,5 @@ class SimulatedDriver(WireBus):
 
 @cache
 def simulated(driver: type[WireBus], family: str) -> type[WireBus]:
-    """The driver of a family over a simulated bus of its own."""
+    """The driver of a family with its own simulated bus."""
     return type(f"Simulated{driver.__name__}", (SimulatedDriver, driver), {"family": family})

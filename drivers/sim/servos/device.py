@@ -78,7 +78,7 @@ class SimulatedServo(ServoState):
         return self.alert
 
     def reboot(self, now_s: float) -> None:
-        """RAM to its initial values, errors cleared, deaf for `BOOT_S`."""
+        """Set RAM to its initial values and clear errors; the servo receives nothing for `BOOT_S`."""
         self._boot(now_s)
         self.deaf_until = now_s + BOOT_S
 
@@ -141,7 +141,7 @@ class SimulatedServo(ServoState):
             effect(value, now_s)
 
     def _recover(self) -> bool:
-        """Whether torque comes back after a shutdown: with Protocol 2.0 only a reboot gives it, older servos obey."""
+        """Whether writing Torque Enable ends a shutdown; with Protocol 2.0 only a reboot does."""
         if self.table.protocol == 2:
             return False
         self.shut_down, self.hardware_error = False, 0

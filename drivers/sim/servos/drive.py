@@ -25,7 +25,7 @@ class Drive(ABC):
     offset : Present Position less the shaft's, ticks; `side` and `mirror` reverse the direction.
     ticks_s : one step of the speed register, ticks/s.
     first_sensed, last_sensed : first and last-plus-one address that `sense` writes.
-    motion_at, motion_end : the same for `sense_motion`; empty where it has no part of its own.
+    motion_at, motion_end : the same for `sense_motion`; empty where it has no separate part.
     """
 
     goals: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Physics of one simulated servo: shaft, load by the skin, heat and supply, all computed at the time of a look-up."""
+"""Physics of one simulated servo: shaft, load by the skin, heat and supply, computed when they are read."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Plant:
             self.jammed_at = self.jammed_since = None
 
     def place(self, now_s: float, position: float) -> None:
-        """Put the shaft somewhere, as a hand does with a limp one."""
+        """Put the shaft somewhere, as by hand with torque off."""
         self.trajectory = hold(now_s, position)
         if self.jammed_at is not None:
             self.jammed_at = position

@@ -24,7 +24,7 @@ class Protocol(ABC):
     the broadcast id is carried out by all and, except for a ping, answered by none.
 
     by_id, duplicates : the servos that receive packets, by id; further servos with an id that is taken.
-    chain_stop : in reads of several servos nobody answers behind a silent one; otherwise the next one does.
+    chain_stop : in reads of several servos no servo after a silent one answers; otherwise the next one does.
     """
 
     NUMBER: ClassVar[int]

@@ -86,7 +86,7 @@ class Protocol1(Protocol):
         return self._read_many(requests.values(), now_s, "bulk")
 
     def _read_many(self, requests: Iterable[ReadRequest], now_s: float, kind: str) -> list[Reply]:
-        """One status each, in the order asked for; a silent servo may silence those behind it."""
+        """One status each, in the requested order; servos after a silent one may not answer either."""
         replies: list[Reply] = []
         for device_id, address, length in requests:
             servo = self.find(device_id, now_s)

@@ -93,7 +93,7 @@ class Protocol2(Protocol):
         return [(params[at], self._word(params, at + 1), self._word(params, at + 3)) for at in range(0, len(params), 5)]
 
     def _read_many(self, requests: list[ReadRequest], now_s: float) -> list[Reply]:
-        """One status each, in the order asked for; a silent servo may silence those behind it."""
+        """One status each, in the requested order; servos after a silent one may not answer either."""
         replies: list[Reply] = []
         for device_id, address, length in requests:
             servo = self.find(device_id, now_s)

@@ -22,7 +22,7 @@ TRIPPED = 0xFF
 WATCHDOG_STEP_S = 0.02
 HEALTH_PERIOD_S = 0.1
 BOOT_S = 0.25
-"""How long a servo is deaf after a reboot."""
+"""Time in which a servo receives nothing after a reboot."""
 
 
 def same_rate(first: int, second: int) -> bool:
@@ -55,7 +55,7 @@ class ServoState:
     eeprom_writes : number of writes by register name (wear).
     watchdog_ignored : keeps turning when its bus watchdog trips (330-size firmware does, in current mode).
     forced_alert : sets the alert bit without a hardware error.
-    eeprom_busy_s : how long it is deaf after a write below ``table.eeprom_end``.
+    eeprom_busy_s : time in which it receives nothing after a write below ``table.eeprom_end``.
     next_health_s : when heat, supply and load are checked again.
     last_instruction : when the last instruction went over the wire; a bus gives all its servos the same object.
     on_change : called when id, secondary id or baud rate changed.

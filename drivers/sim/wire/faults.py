@@ -2,12 +2,12 @@
 
 A fault is written ``kind[:ids][:value][:key=value ...]``, for example::
 
-    mute:7                 servo 7 neither hears nor answers (loose cable)
+    mute:7                 servo 7 neither receives nor answers (loose cable)
     late:7:45ms            its replies come 45 ms late
     crc:3:every=5          every fifth reply of servo 3 has a wrong CRC
     drop:*:p=0.01          one reply in a hundred is lost, of all servos
     hw:4:0x20:at=2s        servo 4 latches an overload two seconds after the start
-    unplug:at=5s:for=1s    the port goes away for a second
+    unplug:at=5s:for=1s    the port disappears for a second
 
 ids: ``7``, ``1-5``, ``1,3,9`` or ``*``. Keys: ``every=K`` (each K-th reply), ``p=0.1`` (chance), ``count=N`` (at
 most N times), ``at=T`` and ``for=T`` (time from when it was set). Times: ``45ms``, ``1.5s``; a bare number is
@@ -52,8 +52,8 @@ def _integer(text: str) -> int:
 
 
 KINDS: dict[str, Kind] = {
-    "mute": Kind("servo"),  # neither hears nor answers (loose cable)
-    "silent": Kind("reply"),  # hears and obeys, but its answers are lost
+    "mute": Kind("servo"),  # neither receives nor answers (loose cable)
+    "silent": Kind("reply"),  # receives and executes instructions, but its answers are lost
     "late": Kind("reply", _seconds, 0.045),  # answers late by the value
     "drop": Kind("reply"),  # loses a reply (use every= or p=)
     "crc": Kind("reply"),  # answers with a wrong CRC
@@ -69,17 +69,17 @@ KINDS: dict[str, Kind] = {
     "watchdog-ignored": Kind("servo"),  # keeps turning when its bus watchdog trips
     "dup": Kind("servo"),  # a second servo has the same id; their replies collide
     "baud": Kind("servo", _integer),  # listens at so many bits per second
-    "eeprom-busy": Kind("servo", _seconds, 0.02),  # deaf for so long after each permanent write
-    "echo": Kind("bus"),  # the adapter gives back every byte it was sent
-    "chain-stop": Kind("bus"),  # nobody answers behind a silent servo
+    "eeprom-busy": Kind("servo", _seconds, 0.02),  # receives nothing for this time after each permanent write
+    "echo": Kind("bus"),  # the adapter echoes every byte it was sent
+    "chain-stop": Kind("bus"),  # no servo after a silent one answers
     "slow-reader": Kind("bus", _seconds, 0.2),  # replies reach the host in bursts, one every so long
-    "unplug": Kind("bus"),  # the port goes away; for= brings it back, as=PATH under another name
+    "unplug": Kind("bus"),  # the port disappears; for= restores it, as=PATH under another name
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault as it was asked for; `ids` None means every servo."""
+    """A fault as it was requested; `ids` None means every servo."""
 
     kind: str
     ids: frozenset[int] | None = None

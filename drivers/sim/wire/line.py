@@ -90,11 +90,11 @@ class Line(ABC):
     ----------
     faults : the faults that are set.
     line_baud : bit rate of the port, or None while unknown.
-    echo : the adapter gives back what it was sent.
+    echo : the adapter echoes what it was sent.
     burst_s : replies reach the host in bursts so far apart, seconds; 0: at once.
-    on_unplug : called with (fault, begins) when the port goes away or comes back.
+    on_unplug : called with (fault, begins) when the port disappears or returns.
     packets : packets handled.
-    lock : held while a packet is handled; hold it to look at the devices from another thread.
+    lock : held while a packet is handled; hold it to read the devices from another thread.
     """
 
     def __init__(self, seed: int = 0, kinds: Iterable[str] = KINDS) -> None:
@@ -144,7 +144,7 @@ class Line(ABC):
             self.faults.advance(now_s)
 
     def heard(self, timed: list[Timed]) -> list[Timed]:
-        """When the host can read bytes that arrive at these times."""
+        """Times at which the host can read bytes that arrive at `timed`; later where it reads in bursts."""
         if not self.burst_s:
             return timed
         return [(math.ceil(time_s / self.burst_s) * self.burst_s, data) for time_s, data in timed]

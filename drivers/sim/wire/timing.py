@@ -76,7 +76,7 @@ class WireTiming:
 
 
 def without_timing(replies: Sequence[Reply], now_s: float) -> list[Timed]:
-    """(time, bytes) on a wire that takes no time; a late reply still delays those behind it."""
+    """(time, bytes) on a wire that takes no time; a late reply still delays those after it."""
     timed = []
     for reply in replies:
         now_s += reply.late_s

@@ -23,7 +23,7 @@ TALL_MM = 10.0  # of a tooth, only this much below its tip is a crown
 
 
 def crown_chart(mesh: FitMesh, teeth: list[Ints], upper: bool) -> tuple[Chart, FitMesh]:
-    """A chart with one tile per tooth, and the sampled points as a mesh of its own.
+    """A chart with one tile per tooth, and the sampled points as a separate mesh.
 
     teeth : face indices of each tooth.
     upper : upper teeth point down, lower ones up.

@@ -88,7 +88,7 @@ def _pieces(mesh: FitMesh) -> tuple[Ints, Floats]:
 
 
 def _kind(name: str) -> str:
-    """What an object's or material's name says it is made of."""
+    """Part of a head that an object's or material's name stands for; skin without a known word."""
     return next((m for word, m in WORDS.items() if word in name.lower()), "skin")
 
 

@@ -223,7 +223,7 @@ def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, F
 
 
 def _strips_part(name: str, material: str, strips: list[Strip], rig: HeadRig) -> PartData:
-    """Strips as one part, each in a tile of its own."""
+    """Strips as one part, each in its own tile."""
     points = np.concatenate([s.points for s in strips])
     moves = np.concatenate([s.moves for s in strips], axis=1)
     groups, share = make_groups(points, moves, rig.sources, rig.jaw)

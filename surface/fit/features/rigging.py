@@ -78,7 +78,7 @@ def make_groups(points: Floats, moves: Floats, sources: dict[str, list[int]], ja
 
 def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
     """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_NEEDS`: ``tongueOut``, straight
-    ahead, and :data:`DROOP`, which lets it hang once it is out.
+    ahead, and :data:`DROOP`, which bends it down once it is out.
 
     points : (n, 3) control points of the tongue at rest.
     path : (k, 7) rows: z of a cross-section at rest, y of its middle at rest, y and z where its middle goes, how much

@@ -1,4 +1,4 @@
-"""Measure how well a fit fits: errors per part and per shape, and what a fit returns."""
+"""Measure the errors of a fit, per part and per shape; and the record that a fit returns."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Split a mesh into islands in (u, v), and find the loops around them.
 
 An island is a set of faces joined through corners that share both vertex and texture coordinate. Every island is a
-chart of its own: control points of one never reach another.
+separate chart: control points of one never reach another.
 """
 
 from __future__ import annotations

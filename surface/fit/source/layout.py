@@ -1,6 +1,6 @@
 """Lay out islands of an unknown mesh so that they can be charts.
 
-A mirrored half that lies on the other one in (u, v) becomes an island of its own. Every island is turned so that up on
+A mirrored half that lies on the other one in (u, v) becomes a separate island. Every island is turned so that up on
 the head is up in (u, v), since slits run along u, and scaled so that, on average, lengths in (u, v) are lengths on the
 surface. Holes that are squeezed flat are opened, so that (u, v) is about as long across a lid as along it.
 """

@@ -72,7 +72,7 @@ def map_names(names: tuple[str, ...], own: Mapping[str, str] | None = None) -> N
 
 
 def _made(shape: str, found: dict[str, dict[str, int]]) -> list[Source]:
-    """Sources of a parameter: a shape of its own, two halves, or a half of a shape for both sides."""
+    """Sources of a parameter: one shape, two halves, or a half of a shape for both sides."""
     side = next((s for s in ("Left", "Right") if shape.endswith(s)), "")
     key = shape.removesuffix(side)
     by_side = found.get(key, {})

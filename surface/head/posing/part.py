@@ -100,7 +100,7 @@ class HeadPart:
         return self._share
 
     def append(self, like: Ints, triangles: NDArray[np.int32]) -> None:
-        """Add copies of vertices ``like (k,)`` behind the part's own, and triangles that may use them; the caller moves
+        """Add copies of vertices ``like (k,)`` after the part's own, and triangles that may use them; the caller moves
         the copies."""
         for name in ("vertices", "normals", "uv"):
             array = getattr(self, name)

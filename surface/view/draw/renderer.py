@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from surface.view.draw.decimated_draw import DrawCall
 
 QUALITIES = ("full", "fast")
-_LOW_DEG = -12.0  # a camera from further below, as one from behind, sees that the bust is hollow
+_LOW_DEG = -12.0  # from further below, as from behind, the picture shows that the bust is hollow
 
 
 class Renderer:
@@ -83,9 +83,9 @@ class Renderer:
         return PartBuffers(self.ctx, part, program, self._static[part.name], on_gpu=on_gpu)
 
     def hurry(self) -> None:
-        """From now on draw decimated triangles and simpler shading: for live pictures drawn in software.
+        """Switch to decimated triangles and simpler shading, for live pictures drawn in software.
 
-        From then on the head's own vertices keep their last values, as with evaluator "gpu".
+        Afterwards the head's own vertices keep their last values, as with evaluator "gpu".
         """
         if self._simplified or self.evaluator.name != "cpu":
             return

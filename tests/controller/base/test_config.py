@@ -102,7 +102,7 @@ def test_faults_between_values_are_found_beside_others(tmp_path: Path) -> None:
 
     with pytest.raises(ConfigError, match=r"2 faults\n  a\.share: .*\n  b\.size: is 2$") as caught:
         load(write(tmp_path, "[a]\nshare = 7\n[b]\nsize = 2"), Store, no_twos)
-    assert caught.value.hint.startswith("mend the file")
+    assert caught.value.hint.startswith("correct the file")
     with pytest.raises(ConfigError, match=r"1 fault\n  b\.size: is 2$"):
         load(write(tmp_path, "[b]\nsize = 2"), Store, no_twos)
 

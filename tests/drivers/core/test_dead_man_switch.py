@@ -217,7 +217,7 @@ def test_a_bus_without_its_dead_man_switch_says_so_once_and_goes_on(
         assert "watchdog_ms = 0" in caplog.text
         assert bus.report().errors["unkept"] == 1
         bus.start()
-        assert bus._switch is not None, "mended, it has one at the next start"
+        assert bus._switch is not None, "after the fault is fixed, the next start has one"
 
 
 def test_a_dead_man_switch_that_ends_while_the_bus_runs_is_told_and_replaced(

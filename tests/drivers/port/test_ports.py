@@ -1,4 +1,4 @@
-"""drivers.port.ports: what stands in the way of each port, and the line that mends it."""
+"""drivers.port.ports: the problem of each port, and the command that fixes it."""
 
 from __future__ import annotations
 
