@@ -18,6 +18,7 @@ from controller.links.line.session import LineSession
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import NoReply, WrongModel
+from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import settle
 
 QUARTER = np.pi / 2  # 90 degrees are 1 of a parameter
@@ -136,3 +137,20 @@ def test_silence_at_the_far_end_is_told(monkeypatch: pytest.MonkeyPatch) -> None
     assert "baud" in caught.value.hint
     os.close(master)
     os.close(slave)
+
+
+def test_values_have_the_decimals_of_their_model() -> None:
+    models = ("parameter", "degrees", "rc-180")
+    servos = [ServoSpec(i, f"s{i}", model, -1.0, 1.0, 50.0, 900.0) for i, model in enumerate(models)]
+    board = VirtualBus(servos, "omote", baud=115_200)
+    with board.bus() as bus:
+        bus.start()
+        for _ in range(200):
+            bus.write([0.123456789] * 3)
+            bus.read()
+            board.clock.sleep(0.01)
+        parameter, degrees, pulse = (row["value"] for row in board.line.describe(board.clock()))
+        assert parameter == pytest.approx(round(0.123456789 / QUARTER, 4), abs=1e-9)
+        assert degrees == pytest.approx(round(np.degrees(0.123456789), 2), abs=1e-9)
+        assert pulse == pytest.approx(round(pulse, 1), abs=1e-9)
+        assert pulse != round(pulse), "tenths of a microsecond are sent"
