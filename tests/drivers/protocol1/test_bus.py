@@ -203,3 +203,10 @@ def test_servos_outlive_a_program_behind_a_serial_port_and_not_in_its_memory() -
     assert module._outlives_us(SerialPort("/dev/ttyUSB0"))
     assert not module._outlives_us(SerialPort("memory://head"))
     assert not module._outlives_us(VirtualBus(servos_of(*("sts3215",) * 3), "feetech").link)
+
+
+def test_six_servos_that_must_be_read_one_by_one_are_read_a_cycle() -> None:
+    servos = tuple(contract.ServoSpec(i, f"s{i}", "ax-12a", -0.5, 0.5, 8.0, 200.0) for i in range(1, 9))
+    with VirtualBus(servos, "dynamixel").bus(**CALM) as bus:
+        bus.start()
+        assert [int(bus.read().fresh.sum()) for _ in range(4)] == [6] * 4
