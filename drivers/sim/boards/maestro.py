@@ -199,8 +199,9 @@ class Maestro(Board):
 
     def _get_position(self, data: bytes, now_s: float) -> bytes | None:
         """The pulse that is put out, not the shaft: two full bytes, low first."""
-        if data[0] < self._count:
-            return round(self.channels[data[0]].position(now_s)).to_bytes(2, "little")
+        (number,) = data
+        if number < self._count:
+            return round(self.channels[number].position(now_s)).to_bytes(2, "little")
         self._refuse(MaestroError.PROTOCOL, now_s)
         return None
 

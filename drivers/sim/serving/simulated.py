@@ -178,10 +178,11 @@ class SimulatedBus:
         if self._child:
             _end_child(self._child)
             self._child = None
-        if self._thread and self._stop:
+        if self._stop is not None:
             self._stop.close()
+        if self._thread is not None:
             self._thread.join()
-            self._thread = self._server = self._stop = None
+        self._thread = self._server = self._stop = None
 
     def _start_thread(self) -> None:
         server = make_server(self._settings)
@@ -222,7 +223,7 @@ class SimulatedBus:
         if self._child and self._child.stdin:
             self._child.stdin.write(line)
             self._child.stdin.flush()
-        elif self._thread and self._stop:
+        elif self._stop is not None:
             self._done.clear()
             self._stop.sendall(line)
             self._done.wait(START_S)

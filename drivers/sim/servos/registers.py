@@ -133,7 +133,8 @@ class Registers:
             return ErrorNumber.ACCESS
         if self.goals_locked and item.name in GOALS:
             return ErrorNumber.DATA_RANGE
-        if item.minimum is not None and not item.minimum <= value <= (item.maximum or 0):
+        low, high = item.minimum, item.maximum
+        if low is not None and high is not None and not low <= value <= high:
             return ErrorNumber.DATA_RANGE
         if item.values is not None and value not in item.values:
             return ErrorNumber.DATA_RANGE

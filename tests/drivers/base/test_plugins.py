@@ -22,10 +22,12 @@ class Trial:
     kind: str
     work: str = "json:dumps"
     install: str = ""
+    words: tuple[str, ...] = ()
+    count: int = 0
 
 
 HEAD = "from tests.drivers.base.test_plugins import Trial\n"
-GOOD = HEAD + "THING = Trial(api=1, kind='good')\n"
+GOOD = HEAD + "THING = Trial(api=1, kind='good', words=('a', 'b'), count=3)\n"
 
 Install = Callable[..., Registry[Trial]]
 
@@ -72,6 +74,9 @@ def test_a_built_in_kind_cannot_be_replaced(install: Install) -> None:
         (HEAD + "THING = Trial(api=0, kind='bad')", "made for version 0 of omote.trials; this omote has version 1"),
         (HEAD + "THING = Trial(api=1, kind='worse')", "says that its kind is 'worse'"),
         (HEAD + "THING = Trial(api=1, kind='bad', work=3)", "work must be str, not 3"),
+        (HEAD + "THING = Trial(api=1, kind='bad', words=['a'])", "words must be a tuple of texts, not ['a']"),
+        (HEAD + "THING = Trial(api=1, kind='bad', words=('a', 1))", "words must be a tuple of texts, not ('a', 1)"),
+        (HEAD + "THING = Trial(api=1, kind='bad', count='3')", "count must be int, not '3'"),
         (HEAD + "THING = Trial(api=1, kind='bad', colour='red')", "TypeError"),
         ("THING = 3", "must be a Trial, not 3"),
         ("THING = 1 / 0", "ZeroDivisionError"),

@@ -69,3 +69,10 @@ def test_short_turns_are_asked_for_instead(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_machine_nobody_knows_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(priority.platform, "machine", lambda: "pdp11")
     assert not priority.request_short_time_slice()
+
+
+def test_the_system_call_has_its_number_on_each_machine() -> None:
+    """Numbers of sched_setattr in the system call tables of Linux; arm64 and riscv share the generic one."""
+    generic, arm, x86_32, x86_64 = 274, 380, 351, 314
+    numbers = {"x86_64": x86_64, "aarch64": generic, "riscv64": generic, "armv7l": arm, "armv6l": arm, "i686": x86_32}
+    assert numbers == priority._SCHED_SETATTR

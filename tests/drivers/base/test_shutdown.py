@@ -155,3 +155,40 @@ def test_an_error_on_the_way_out_does_not_hide_what_led_there() -> None:
     assert str(told) == "2 things failed: servo 3 is silent; port lost: cable"
     assert isinstance(told, DriverError)
     assert told.hint == "check its cable; plug it in"
+
+
+class Dropped:
+    """Raises an error in its destructor, where Python drops it."""
+
+    def __init__(self, error: BaseException) -> None:
+        self.error = error
+
+    def __del__(self) -> None:
+        raise self.error
+
+
+def test_only_what_a_signal_raised_in_the_main_thread_is_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda dropped: told.append(dropped.exc_value))
+    hook = sys.unraisablehook
+    errors = [ValueError("no signal"), SystemExit(5), SystemExit("128"), SystemExit(128)]
+    with stop_on_signals(lambda: None):
+        for error in errors:
+            Dropped(error)
+        thread = threading.Thread(target=lambda: Dropped(KeyboardInterrupt()) and None)
+        thread.start()
+        thread.join()
+    assert told[:4] == errors
+    assert [type(error) for error in told[4:]] == [KeyboardInterrupt]
+    assert sys.unraisablehook is hook
+
+
+@pytest.mark.parametrize("code", [128 + signal.SIGTERM, 128 + signal.SIGHUP])
+def test_an_exit_for_a_signal_that_was_dropped_is_raised_again(code: int) -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    calls: list[int] = []
+    with pytest.raises(SystemExit) as caught, stop_on_signals(lambda: calls.append(1)):
+        Dropped(SystemExit(code))
+        calls.append(0)
+    assert (caught.value.code, calls) == (code, [1])
+    assert signal.getsignal(signal.SIGTERM) is before

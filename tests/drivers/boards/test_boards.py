@@ -17,7 +17,7 @@ import pytest
 
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
-from drivers.base.errors import BusError, DriverError, NoReply, PortBusy, PortLost, PortMissing, WrongModel
+from drivers.base.errors import BusError, NoReply, PortBusy, PortLost, PortMissing
 from drivers.sim import SimulatedBus
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import BusContract, pause, settle
@@ -121,13 +121,6 @@ class TestTextBus(BoardContract):
 
 class TestTextBusThatAsks(TestTextBus):
     FAMILY = "asked"
-
-
-class TestLineOutBus(BoardContract):
-    FAMILY = "omote"
-    SERVOS = NAMED
-    MODELS = ("parameter",) * 3
-    TORQUE = False
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -299,17 +292,6 @@ def test_4_a_channel_that_cannot_be_confirmed_leaves_no_other_on(family: str) ->
     assert not bus.is_open
 
 
-def test_4_a_name_that_a_head_keeps_leaves_no_other_on() -> None:
-    board = far_end("omote", margin_s=0.02)
-    bus = board.bus()
-    with pytest.raises(NoReply, match=r"not confirmed off.*: 2 \(brow\)") as caught, bus:
-        bus.start()
-        cycle(bus, [0.1, 0.1, 0.1], 5)
-        del board.line.values["brow"]
-    assert caught.value.servo_ids == (2,)
-    assert outputs(board) == []
-
-
 def test_4_a_mute_text_board_is_told_to_let_go_of_every_servo() -> None:
     board = far_end("asked", margin_s=0.02)
     with board.bus() as bus:
@@ -381,82 +363,3 @@ def test_text_lines_hold_what_changed_and_one_more_in_turn() -> None:
 def test_a_text_board_without_off_is_warned_about(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING), rig("text", off=""):
         assert "cannot be switched off" in caplog.text
-
-
-def test_a_line_head_that_does_not_know_a_name_is_told() -> None:
-    driver = open_bus("omote", NAMED, port="", **QUICK)
-    names = [*driver.far_end()["names"][:2], "other"]
-    with SimulatedBus(NAMED, family="omote", options={"names": names}) as board:
-        bus = open_bus("omote", NAMED, port=board.path, **QUICK)
-        with bus, pytest.raises(WrongModel, match="does not take 'neck'") as caught:
-            bus.start()
-        assert caught.value.servo_ids == (7,)
-        assert "wire_name" in caught.value.hint
-
-
-def test_a_simple_line_head_starts_at_rest_and_takes_lines_it_has_room_for() -> None:
-    servos = [ServoSpec(i, f"channelNumber{i}", "degrees", -0.5, 0.5, 8.0, 200.0, rest_rad=0.2) for i in range(30)]
-    names = [servo.name for servo in servos]
-    with SimulatedBus(servos, family="omote", options={"names": names, "simple": True}) as board:
-        with open_bus("omote", servos, port=board.path, **QUICK) as bus:
-            bus.start()
-            settle(bus, np.full(30, 0.3), 3e-4, measured=False)
-            assert board.line.refused == 1  # GET, which it does not know
-            assert [row["value"] for row in board.line.describe(0.0)] == pytest.approx(
-                [math.degrees(0.3)] * 30, abs=0.01
-            )
-        assert outputs(board) == []
-
-
-def test_a_name_that_cannot_stand_in_a_line_is_told() -> None:
-    with pytest.raises(DriverError, match="'jaw open' cannot be a name"):
-        open_bus("omote", [replace(NAMED[0], wire_name="jaw open")], port="")
-
-
-def test_two_servos_of_one_name_are_told() -> None:
-    with pytest.raises(DriverError, match="two servos are called jaw"):
-        open_bus("omote", [NAMED[0], replace(NAMED[1], wire_name="jaw")], port="")
-
-
-def test_a_head_gets_all_values_again_after_the_heartbeat() -> None:
-    with rig("omote", heartbeat_s=0.5) as (bus, board):
-        sent = bytearray()
-        cycle(bus, [0.1, 0.1, 0.1], 10)
-        board.clock.sleep(0.6)
-        cycle(bus, [0.1, 0.1, 0.1], 3)  # the refresh
-        board.link.tap = lambda out, data: sent.extend(data) if out else None
-        cycle(bus, [0.1, 0.1, 0.1], 20)  # 0.2 s: nothing is new
-        assert bytes(sent) == b""
-        cycle(bus, [0.1, 0.1, 0.1], 40)
-        assert bytes(sent).count(b" SET jaw 0.0637 brow ") == 1
-        sent.clear()
-        cycle(bus, [0.1, 0.2, 0.1], 1)
-        assert b"jaw" not in sent and b" SET brow -0.1" in sent
-
-
-def test_a_slow_head_gets_two_lines_at_most_and_what_is_held_back_is_counted() -> None:
-    with rig("omote", margin_s=0.02) as (bus, board):
-        cycle(bus, [0.1, 0.1, 0.1], 10)
-        board.fault("mute:*")
-        sent = bytearray()
-        board.link.tap = lambda out, data: sent.extend(data) if out else None
-        for k in range(5):
-            cycle(bus, [0.11 + 0.01 * k] * 3)
-        assert sent.count(b"\n") == 2
-        assert bus.report().errors == {"held_back": 3}
-        board.clock.sleep(0.6)
-        state = bus.read()
-        assert bus.report().errors == {"held_back": 3, "no_reply": 2}
-        np.testing.assert_allclose(state.position_rad, 0.1, atol=0.02)
-        board.clear()
-        sent.clear()
-        cycle(bus, [0.1, 0.1, 0.1], 2)
-        assert b"jaw" in sent and b"brow" in sent and b"neck" in sent  # what was lost is said again
-
-
-@pytest.mark.parametrize("model", ["nothing", "xl330-m288"])
-def test_models_of_the_line_protocol(model: str) -> None:
-    with pytest.raises(DriverError, match=f"there is no model '{model}' for the line protocol") as caught:
-        open_bus("omote", [replace(NAMED[0], model=model)], port="")
-    assert "parameter, degrees, rc-120, rc-180" in caught.value.hint
-    assert open_bus("omote", [replace(NAMED[0], model="rc-90")], port="")._heartbeat_s == 0.25

@@ -155,3 +155,13 @@ def test_curves_with_different_numbers_of_points_go_on_straight_beyond_their_end
     assert scale.pulses(np.full(3, 0.9))[1] == pytest.approx(2020.0)
     assert scale.pulses(np.full(3, -0.9))[1] == pytest.approx(950.0)
     assert scale.radians(np.array([1500.0, 2020.0, 0.0]))[:2] == pytest.approx([0.0, 0.9])
+
+
+def test_an_unknown_model_is_told_with_the_three_nearest_or_all() -> None:
+    for name, names in (("rc-100", ["rc-120", "rc-180", "rc-90"]), ("mg996", ["rc-120", "rc-180", "rc-270", "rc-60"])):
+        with pytest.raises(DriverError, match=f"there is no hobby servo model '{name}'") as caught:
+            hobby_model(name)
+        told = caught.value.hint.removeprefix("use one of ").split(", ")
+        assert len(told) == (3 if name == "rc-100" else len(known_models()))
+        assert set(names) <= set(told)
+    assert hobby_model(" RC_180 ") == known_models()["rc-180"]

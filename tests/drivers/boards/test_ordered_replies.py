@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import ServoSpec
+from drivers.base.errors import NoReply
 from drivers.boards.ordered_replies import OrderedBus
-from drivers.sim.serving.virtual import VirtualClock
+from drivers.sim.serving.virtual import VirtualBus, VirtualClock
 
 
 class Script:
@@ -146,3 +147,28 @@ def test_a_slow_wire_has_the_time_that_its_bytes_take() -> None:
     port.baud = 1000
     assert conversation.ask(b"ABC", 3) == b"abc"
     assert port.clock() == pytest.approx(0.008 + 0.01 + 0.032)
+
+
+@pytest.mark.parametrize("family", ["ssc32", "maestro"])
+def test_a_board_that_does_not_answer_is_told_at_the_start_and_counted_later(family: str) -> None:
+    servos = [ServoSpec(i, f"s{i}", "rc-180", -0.5, 0.5, 8.0, 200.0) for i in (1, 2)]
+    board = VirtualBus(servos, family, driver={"stagger_s": 0.0, "margin_s": 0.02}, baud=115_200)
+    with board.bus() as bus:
+        board.fault("mute:*")
+        with pytest.raises(NoReply) as caught:
+            bus.start()
+        assert caught.value.servo_ids == (1, 2)
+        board.clear()
+        board.clock.sleep(2.0)
+        bus.start()
+        for _ in range(3):
+            bus.write([0.1, 0.1])
+            state = bus.read()
+        assert bus.report().errors == {}
+        assert not state.silent.any()
+        board.fault("mute:*")
+        assert bus.read().silent.all()
+        assert bus.report().errors == {"no_reply": 1}
+        board.clear()
+        board.clock.sleep(2.0)
+        assert not bus.read().silent.any()

@@ -290,3 +290,25 @@ def test_after_a_kill_the_servos_are_let_go(wire: SimulatedBus, root: Path, tmp_
         command = ["/bin/sh", "-c", 'exec "$@" 2>&-', "sh", *command]
     environment = {"HOME": str(tmp_path), "PATH": os.environ["PATH"]}
     assert torque_after_kill(wire, tmp_path, command, env=environment) == [False, False]
+
+
+def test_a_line_is_waited_for_until_its_time_and_not_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    waited: list[float | None] = []
+
+    class Selector(module.selectors.SelectSelector):
+        def select(self, timeout: float | None = None) -> list[object]:
+            waited.append(timeout)
+            return super().select(0.0)
+
+    monkeypatch.setattr(module.selectors, "DefaultSelector", Selector)
+    reading, writing = os.pipe()
+    assert module._read_line(reading, time.monotonic() - 1.0) is None
+    assert module._read_line(reading, time.monotonic() + 60.0) is None
+    assert waited[0] == 0.0
+    assert 0.0 < waited[1] <= 60.0
+    os.write(writing, b"one\ntw")
+    assert module._read_line(reading) == b"one\n"
+    assert waited[2:] == [None] * 4
+    os.close(writing)
+    assert module._read_line(reading) == b"tw", "the end of the input ends a line"
+    os.close(reading)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from typing import Any
 
 import pytest
@@ -70,3 +71,15 @@ def test_a_family_is_one_of_boards_unless_it_says_otherwise() -> None:
     assert (family.baud, family.hobby, family.simulator, family.install) == (115_200, False, "", "")
     assert (SERVO_BAUD, BOARD_BAUD) == (1_000_000, 115_200)
     assert FAMILIES.get("dynamixel").baud == SERVO_BAUD
+
+
+@pytest.mark.parametrize("settings", [AnySettings, ServoSettings, PulseSettings])
+def test_definitions_are_made_by_name_and_kept(settings: Any) -> None:
+    with pytest.raises(TypeError, match="positional"):
+        settings(0.1)
+    with pytest.raises(FrozenInstanceError):
+        settings().margin_s = 0.1
+    with pytest.raises(TypeError, match="positional"):
+        Family(API, "kind", "title", "a:b", AnySettings, "a:c", "a:d")  # type: ignore[misc]
+    with pytest.raises(FrozenInstanceError):
+        FAMILIES.get("maestro").kind = "other"  # type: ignore[misc]

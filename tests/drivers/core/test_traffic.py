@@ -127,3 +127,101 @@ def test_no_packet_breaks_a_decoder(code: int, params: bytes) -> None:
     for servo in (1, 0xFE):
         assert decoder.feed(True, v2.encode_instruction(servo, code, params)) or code == v2.Instruction.STATUS
     assert Decoder1({1: load_table("ax-12a")}).feed(True, v1.encode(1, code, params))
+
+
+def row(servo: int, address: int, size: int) -> bytes:
+    return struct.pack("<BHH", servo, address, size)
+
+
+def test_a_bulk_read_names_each_servo_and_its_register_and_so_do_the_answers() -> None:
+    decoder = Decoder2({1: X, 2: X})
+    rows = row(1, POSITION, 4) + row(2, GOAL, 4)
+    lines = both(
+        decoder,
+        (True, ask(0xFE, v2.Instruction.BULK_READ, rows + b"\x03\x84\0")),
+        (False, v2.encode_status(2, 0, struct.pack("<i", 7)) + v2.encode_status(1, 0, struct.pack("<i", -8))),
+    )
+    assert lines == [
+        "-> all bulk read 1: Present Position, 2: Goal Position",
+        "<- 2 Goal Position = 7",
+        "<- 1 Present Position = -8",
+    ]
+    assert {servo: heard.packets for servo, heard in decoder.heard.items()} == {1: 1, 2: 1}
+    frame, crc = v2.encode_fast_head([4, 4]), 0
+    decoder.feed(True, ask(0xFE, v2.Instruction.FAST_BULK_READ, rows))
+    crc = v2.crc16(frame)
+    for servo in (1, 2):
+        part, crc = v2.encode_fast_part(servo, 0, struct.pack("<i", servo), crc)
+        frame += part
+    assert decoder.feed(False, frame) == ["<- 1 Present Position = 1", "<- 2 Goal Position = 2"]
+    assert decoder.feed(False, frame) == [f"<- joint reply of {len(frame)} bytes"], "nobody has asked for it"
+
+
+@pytest.mark.parametrize(
+    ("code", "params", "line"),
+    [
+        (4, struct.pack("<HI", GOAL, 5), "-> 1 reg write Goal Position = 5"),
+        (3, struct.pack("<H", GOAL), "-> 1 write 74 00"),
+        (2, struct.pack("<HHB", POSITION, 4, 0), "-> 1 read 84 00 04 00 00"),
+        (2, struct.pack("<HH", POSITION, 4), "-> 1 read Present Position"),
+        (2, struct.pack("<HH", POSITION, 3), "-> 1 read 3 bytes at 132"),
+        (0x82, struct.pack("<HH", POSITION, 4), "-> 1 sync read 84 00 04 00"),
+        (0x83, struct.pack("<HH", GOAL, 4), "-> 1 sync write 74 00 04 00"),
+        (5, b"", "-> 1 action"),
+        (0x33, b"\x09", "-> 1 number 51 09"),
+    ],
+)
+def test_every_instruction_is_told_as_far_as_it_makes_sense(code: int, params: bytes, line: str) -> None:
+    assert Decoder2({1: X}).feed(True, ask(1, code, params)) == [line]
+    assert Decoder2(default=X).feed(True, ask(1, code, params)) == [line]
+
+
+def test_eight_servos_are_named_and_the_others_counted() -> None:
+    for count, end in ((8, "6, 7, 8"), (9, "6, 7, 8 and 1 more")):
+        ids = bytes(range(1, count + 1))
+        (line,) = Decoder2(default=X).feed(True, ask(0xFE, 0x82, struct.pack("<HH", POSITION, 4) + ids))
+        assert line == f"-> all sync read Present Position of 1, 2, 3, 4, 5, {end}"
+
+
+def test_errors_alerts_and_unknown_models() -> None:
+    decoder = Decoder2({9: X})
+    assert decoder.feed(False, v2.encode_status(9, 0x87)) == ["<- 9 refused: access ALERT"]
+    assert decoder.feed(False, v2.encode_status(9, 0x50)) == ["<- 9 refused: number 80"]
+    assert decoder.feed(False, v2.encode_status(9, 0x80, b"\x01")) == ["<- 9 ALERT 01"]
+    assert (decoder.heard[9].packets, decoder.heard[9].error) == (3, 0x80)
+    decoder.feed(True, ask(9, 2, struct.pack("<HH", POSITION, 4)))
+    assert decoder.feed(False, v2.encode_status(9, 4)) == ["<- 9 refused: data range"]
+    assert decoder.feed(False, v2.encode_status(9, 0, b"\1\0\0\0")) == ["<- 9 01 00 00 00"], "it was answered"
+    decoder.feed(True, ask(5, 1))
+    assert decoder.feed(False, v2.encode_status(5, 0, struct.pack("<HB", 9999, 7))) == [
+        "<- 5 is model 9999, firmware 7"
+    ]
+    decoder.feed(True, ask(5, 5))
+    assert decoder.feed(False, v2.encode_status(5, 0, b"\1\2\3")) == ["<- 5 01 02 03"], "no ping"
+    decoder.feed(True, ask(9, 1))
+    decoder.feed(True, ask(9, 2, struct.pack("<HH", 144, 3)))
+    assert "firmware" not in decoder.feed(False, v2.encode_status(9, 0, b"\1\2\3"))[0], "it was asked to read"
+
+
+def test_on_a_wire_that_is_only_heard_the_order_tells_answers_from_questions() -> None:
+    ax = load_table("ax-12a")
+    decoder = Decoder1({1: ax, 2: ax})
+    feed = lambda *packet: decoder.feed(None, v1.encode(*packet))  # noqa: E731
+    assert feed(0xFE, v1.Instruction1.SYNC_READ, bytes((36, 2, 1, 2))) == ["-> all sync read Present Position of 1, 2"]
+    assert feed(2, 0, b"\1\0") == ["<- 2 Present Position = 1"]
+    assert feed(1, 0, b"\2\0") == ["<- 1 Present Position = 2"]
+    assert feed(1, v1.Instruction1.PING) == ["-> 1 ping"]
+    assert feed(0xFE, v1.Instruction1.SYNC_WRITE, bytes((30, 2, 1, 9, 0))) == [
+        "-> all sync write Goal Position of 1: 9"
+    ]
+    assert feed(1, v1.Error1.OVERLOAD | v1.Error1.INPUT_VOLTAGE) == ["<- 1 input voltage overload ok"]
+    assert feed(1, v1.Instruction1.WRITE, bytes((24, 1))) == ["-> 1 write Torque Enable = 1"]
+    assert {servo: heard.packets for servo, heard in decoder.heard.items()} == {1: 2, 2: 1}
+
+
+def test_the_arrows_of_text_and_bytes_and_ends_of_lines_in_pieces() -> None:
+    text, raw = TextDecoder(), HexDecoder()
+    assert [text.feed(sent, b"a\n")[0] for sent in (True, False, None)] == ["-> a", "<- a", "-- a"]
+    assert [raw.feed(sent, b"\1\2")[0] for sent in (True, False, None)] == ["-> 01 02", "<- 01 02", "-- 01 02"]
+    assert text.feed(True, b"b") == [] and text.feed(False, b"c\rd\r\n\n") == ["<- c", "<- d"]
+    assert text.feed(True, b"\xff\n") == ["-> b\\xff"]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import struct
 from collections.abc import Iterator
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from drivers.dynamixel.indirect import pointers_of
 from drivers.dynamixel.layout import INDIRECT, item_of
 from drivers.packets.packet import Instruction
 from drivers.sim import SimulatedBus
-from drivers.tables.tables import load_table
+from drivers.tables.tables import ControlTable, Item, load_table
 from tests.drivers.contract import SERVOS, read_until, settle
 
 CALM = {"margin_s": 0.1, "watchdog_ms": 0}
@@ -118,3 +120,33 @@ def test_mixed_models_are_read_with_one_bulk_read(monkeypatch: pytest.MonkeyPatc
     assert [packet.instruction for packet in seen[:1]] == [Instruction.BULK_READ]
     reads = {Instruction.SYNC_READ, Instruction.BULK_READ, Instruction.FAST_SYNC_READ}
     assert [packet.instruction in reads for packet in seen[:2]] != [True, True], "and no second one"
+
+
+def test_pointers_need_room_for_all_registers_and_must_reach_them() -> None:
+    table = load_table("xl330-m288")
+    needed = sum(item.size for name in INDIRECT if (item := item_of(table, name)) is not None)
+    for room, fits in ((needed - 1, False), (needed, True), (needed + 1, True)):
+        smaller = copy(table)
+        smaller.indirect = ((168, 208, room),)
+        assert (pointers_of(smaller) is not None) is fits
+    smaller.indirect = ((1, 2, needed - 1), (168, 208, needed))
+    found = pointers_of(smaller)
+    assert found is not None and found.address == 168, "the first area with room"
+    items = dict(table)
+    targets = [at for name in INDIRECT if (item := item_of(table, name)) for at in range(item.address, item.end)]
+    first = table["Indirect Address 1"]
+    for low, high, reached in (
+        (min(targets), max(targets), True),
+        (min(targets) + 1, max(targets), False),
+        (min(targets), max(targets) - 1, False),
+    ):
+        items["Indirect Address 1"] = replace(first, minimum=low, maximum=high)
+        assert (pointers_of(_with(table, items)) is not None) is reached
+    del items["Indirect Address 1"]
+    assert pointers_of(_with(table, items)) is None
+
+
+def _with(table: ControlTable, items: dict[str, Item]) -> ControlTable:
+    changed = copy(table)
+    changed.items_by_name = items
+    return changed

@@ -348,3 +348,18 @@ def test_old_firmware_is_not_asked_for_what_it_lacks(wire: VirtualBus, monkeypat
         with bus_on(wire) as bus:
             bus.start()
         assert ("startup" in asked) is expected
+
+
+def test_limits_of_speed_and_acceleration_are_a_step_at_least_and_what_fits_at_most(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    models, most = ("xl330-m288", "xl320"), {"speed_limit": [32767, 1023], "accel_limit": [32767]}
+    for limit, steps in ((1e-9, {"speed_limit": [1, 1], "accel_limit": [1]}), (1e9, most)):
+        servos = [ServoSpec(i, f"s{i}", model, -0.5, 0.5, limit, limit) for i, model in enumerate(models)]
+        with VirtualBus(servos, driver=CALM | {"indirect": False}).bus() as bus:
+            written: dict[str, dict[int, int]] = {}
+            monkeypatch.setattr(
+                bus._registers, "set_all", lambda values, name, into=written: into.update({name: values})
+            )
+            bus._startup()._prepare(servos)
+            assert {name: list(written[name].values()) for name in steps} == steps

@@ -305,3 +305,11 @@ def test_joint_reply_of_another_read_is_refused():
         StatusPacket(4, 0, struct.pack("<I", 1023)),
     ]
     assert decode_fast(b"\x00\xff" + raw(text), [(3, 4), (7, 4), (4, 4)])[1].id == 7
+
+
+def test_a_stuffed_header_is_no_broken_frame_whatever_follows():
+    for tail in ("FF FF FD 00", "01 03 00 55", "FF 03 00 55"):
+        reader = InstructionReader()
+        assert reader.feed(raw("FF FF FD FD " + tail)) == []
+        assert reader.broken_frames == 0
+    assert InstructionReader().feed(raw("FF FF FD")) == []

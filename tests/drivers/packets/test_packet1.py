@@ -106,3 +106,18 @@ def test_a_packet_that_never_ends_is_given_up():
     reader.feed(encode(1, 2, b"\x2b\x01")[:-1])
     assert reader.take_pending() == encode(1, 2, b"\x2b\x01")[:-1]
     assert reader.pending == 0
+
+
+def test_a_third_ff_is_no_id_whatever_length_would_follow():
+    for servo in (0, 1, 2, 5, 253):
+        reader = Reader1()
+        assert reader.feed(b"\xff\xff" + encode(servo, 1)) == [Packet1(servo, 1, b"")]
+        assert (reader.noise_bytes, reader.broken_frames, reader.pending) == (2, 0, 0)
+
+
+def test_the_shortest_length_is_two():
+    reader = Reader1()
+    assert reader.feed(b"\xff\xff\x01\x02\x00") == []
+    assert reader.pending == 5
+    assert reader.feed(b"\xfc") == [Packet1(1, 0, b"")]
+    assert reader.feed(b"\x00\xff") == [] and reader.pending == 1

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import errno
+import importlib.util
 import os
 import socket
+import sys
 import termios
 import threading
 import time
@@ -187,3 +189,16 @@ def test_addresses() -> None:
     for wrong in ("socket://host", "socket://:80", "socket://host:99999", "host:80"):
         with pytest.raises(ValueError):
             address_of(wrong)
+
+
+def test_a_system_without_termios_opens_every_port_with_pyserial(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "termios", None)
+    spec = importlib.util.find_spec("drivers.port.endpoints")
+    assert spec is not None and spec.loader is not None
+    other = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(other)
+    assert other.termios is None
+    assert issubclass(other.TermiosError, Exception) and other.TermiosError in other.UNPLUGGED
+    end = other.open_endpoint("loop://", 9600)
+    assert isinstance(end, other.UrlEnd)
+    end.close()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -12,6 +12,9 @@ import pytest
 
 from drivers import open_bus
 from drivers.base.bus import Bus
+from drivers.packets import packet1 as v1
+from drivers.port.serialport import SerialPort
+from drivers.protocol1 import bus as module
 from drivers.sim import SimulatedBus
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers import contract
@@ -137,3 +140,73 @@ def test_a_servo_in_trouble_is_looked_at_without_waiting_for_its_turn(how: str) 
             wire.clear()
         contract.read_until(bus, lambda state: not state.torque[1])
         assert bus.report().errors_by_servo[2]["torque_lost"] == 1
+
+
+class Switch:
+    """A dead man's switch that only keeps what it was told."""
+
+    made: ClassVar[list[Switch]] = []
+
+    def __init__(self, path: str, baud: int, frames: Iterable[bytes]) -> None:
+        self.orders = (path, baud, list(frames))
+        self.watching, self.dismissed = True, 0
+        self.made.append(self)
+
+    def dismiss(self) -> None:
+        self.dismissed += 1
+
+
+def test_a_dead_mans_switch_is_made_once_checked_and_made_anew_when_it_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "DeadManSwitch", Switch)
+    monkeypatch.setattr(module, "_outlives_us", lambda link: True)
+    monkeypatch.setattr(Switch, "made", [])
+    wire = VirtualBus(servos_of(*("sts3215",) * 3), "feetech")
+    with wire.bus(margin_s=0.5, watchdog_ms=1) as bus:
+        bus.start()
+        bus.stop()
+        bus.start()
+        (first,) = Switch.made
+        path, baud, frames = first.orders
+        assert (path, baud) == ("virtual", 1_000_000)
+        assert [v1.Reader1().feed(frame)[0].params for frame in frames] == [bytes((40, 1, 1, 0, 2, 0, 7, 0))]
+        for _ in range(3):
+            wire.clock.sleep(2.0)
+            bus.read()
+        assert "unkept" not in bus.report().errors
+        first.watching = False
+        wire.clock.sleep(0.5)
+        bus.read()
+        assert "unkept" not in bus.report().errors, "it is checked once a second"
+        for _ in range(3):
+            wire.clock.sleep(1.0)
+            bus.read()
+        assert bus.report().errors["unkept"] == 1
+        bus.stop()
+        bus.start()
+        assert (first.dismissed, len(Switch.made)) == (1, 2)
+    assert Switch.made[1].dismissed == 1
+
+
+@pytest.mark.parametrize(("watchdog_ms", "link"), [(0, True), (200, False)])
+def test_no_dead_mans_switch_where_none_is_wanted_or_nothing_outlives_the_program(
+    monkeypatch: pytest.MonkeyPatch, watchdog_ms: int, link: bool
+) -> None:
+    monkeypatch.setattr(module, "DeadManSwitch", Switch)
+    monkeypatch.setattr(module, "_outlives_us", lambda _: link)
+    monkeypatch.setattr(Switch, "made", [])
+    with VirtualBus(servos_of(*("sts3215",) * 3), "feetech").bus(margin_s=0.5, watchdog_ms=watchdog_ms) as bus:
+        bus.start()
+        assert Switch.made == []
+
+
+def test_servos_outlive_a_program_behind_a_serial_port_and_not_in_its_memory() -> None:
+    assert module._outlives_us(SerialPort("/dev/ttyUSB0"))
+    assert not module._outlives_us(SerialPort("memory://head"))
+    assert not module._outlives_us(VirtualBus(servos_of(*("sts3215",) * 3), "feetech").link)
+
+
+def test_six_servos_that_must_be_read_one_by_one_are_read_a_cycle() -> None:
+    servos = tuple(contract.ServoSpec(i, f"s{i}", "ax-12a", -0.5, 0.5, 8.0, 200.0) for i in range(1, 9))
+    with VirtualBus(servos, "dynamixel").bus(**CALM) as bus:
+        bus.start()
+        assert [int(bus.read().fresh.sum()) for _ in range(4)] == [6] * 4

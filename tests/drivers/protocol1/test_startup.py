@@ -13,6 +13,7 @@ import pytest
 from drivers import check_model, open_bus
 from drivers.base.bus import Bus
 from drivers.base.errors import CorruptReply, DriverError, NoReply, ServoFault, ServoRefused, WrongModel
+from drivers.packets.packet1 import Error1
 from drivers.sim import SimulatedBus
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers import contract
@@ -335,3 +336,33 @@ def test_3_every_way_out_switches_all_servos_off(model: str, how: str) -> None:
         while any(wire.servo(servo.id).torque for servo in servos):
             assert time.monotonic() < end
             time.sleep(0.01)
+
+
+@over("sts3215", "ax-12a")
+def test_the_slowest_servo_still_moves(head: Head) -> None:
+    """A speed of 0 would be the fastest, so a step of 1 is the least."""
+    servos = [replace(servo, max_speed_rad_s=1e-6, max_accel_rad_s2=1e-6) for servo in head.servos]
+    with open_bus(kind_of(head.model), servos, port=head.wire.link, clock=head.wire.clock, **CALM) as bus:
+        bus.start()
+        feetech = head.model == "sts3215"
+        assert head.registers("Goal Velocity" if feetech else "Moving Speed") == [1, 1, 1]
+        if feetech:
+            assert head.registers("Acceleration") == [1, 1, 1]
+
+
+@over("ax-12a")
+def test_input_voltage_alone_is_a_fault_only_where_it_switches_off(head: Head) -> None:
+    volts, heat = Error1.INPUT_VOLTAGE, Error1.OVERHEATING
+    with head.bus() as bus:
+        bus.start()
+        startup = bus._startup()
+        for flags, shutdown, bad in (
+            (volts, heat, {}),
+            (volts, volts, {2: volts}),
+            (heat, 0, {2: heat}),
+            (volts | heat, 0, {2: volts | heat}),
+            (0, volts | heat, {}),
+        ):
+            head.wire.servo(2).put("Shutdown", shutdown)
+            bus._registers.flags[2] = flags
+            assert startup._faults([2]) == bad

@@ -183,3 +183,10 @@ def test_rows_become_as_few_packets_as_a_servo_can_take() -> None:
 def test_numbers_are_as_wide_as_the_protocol_has_them() -> None:
     assert Packets().number(0x1234) == b"\x34\x12"
     assert Exchanges1().number(0x12) == b"\x12"
+
+
+def test_noise_alone_is_damage_where_a_reply_is_missing() -> None:
+    _, port = wire((0.01, b"\1\2\3" + status(1)))
+    assert read(port, 1, 2).corrupt
+    _, port = wire((0.01, status(1)))
+    assert not read(port, 1, 2).corrupt

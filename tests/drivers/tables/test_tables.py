@@ -6,7 +6,7 @@ import pytest
 
 from drivers.base.errors import DriverError
 from drivers.tables import tables
-from drivers.tables.tables import known_models, load_table, model_name, model_number
+from drivers.tables.tables import ControlTable, Item, known_models, load_table, model_name, model_number
 
 # address: (name, size, writable, XL330-M288 initial, XM430-W350 initial), from the e-Manual
 X_SERIES = {
@@ -266,3 +266,13 @@ def test_sdk_without_tables_is_said(monkeypatch):
         assert "dynamixel-sdk" in error.value.hint
     finally:
         tables._folder.cache_clear()
+
+
+@pytest.mark.parametrize("name", ["time_profile", "fast_read", "goal_torque"])
+def test_what_came_with_a_firmware_is_known_from_it_on(name: str) -> None:
+    spec = {"eeprom_end": 1, "ticks_per_turn": 2, "turn_rad": 1.0, "center": 1}
+    spec |= {"voltage": 5, "hardware_error": {}, "baud": [1]}
+    items = [Item("Model Number", 0, 2)]
+    made = [ControlTable("m", 1, firmware, spec | {f"{name}_firmware": 3}, items) for firmware in (0, 2, 3, 4)]
+    assert [getattr(table, name) for table in made] == [False, False, True, True]
+    assert not getattr(ControlTable("m", 1, 9, spec, items), name), "no firmware has it"

@@ -210,3 +210,13 @@ def test_a_board_that_cannot_be_switched_off_is_warned_about_once_a_start(caplog
         bus.stop()
         assert bytes(data) == b""
     assert caplog.text.count("cannot be switched off") == 1
+
+
+def test_the_turn_begins_with_the_first_servo() -> None:
+    rig = board()
+    with rig.bus() as bus:
+        bus.start()
+        data = sent_by(rig)
+        for _ in range(4):
+            bus.write([0.1, 0.1, 0.1])
+        assert [line[:2] for line in bytes(data).splitlines()] == [b"S1", b"S2", b"S7", b"S1"]

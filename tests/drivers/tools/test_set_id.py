@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from drivers.base.bus import ServoInfo
 from drivers.base.errors import CorruptReply, NoReply, ServoRefused
+from drivers.packets.packet import MAX_ID
 from drivers.sim import SimulatedBus
+from drivers.tools import set_id as module
 from drivers.tools.set_id import set_id
 
 FAMILIES = [("xl330-m288", 2), ("xl320", 2), ("ax-12a", 1), ("sts3215", 1), ("scs0009", 1)]
@@ -82,3 +85,28 @@ def test_two_servos_with_the_old_id_are_left_alone(model: str, protocol: int) ->
 def test_ids_that_no_servo_may_have_are_refused(old: int, new: int, name: str) -> None:
     with pytest.raises(ValueError, match=name):
         set_id("/dev/null", 1_000_000, 2, old, new)
+
+
+def test_a_servo_that_keeps_its_id_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    with SimulatedBus([1, 5]) as bus:
+        monkeypatch.setattr(module, "SETTLE_S", 0.0)
+        with pytest.raises(ServoRefused, match=r"servo 1 .* did not take the id 7") as caught:
+            set_id(bus.path, 1_000_000, 2, 1, 7)
+        assert caught.value.servo_ids == (1,)
+        monkeypatch.setattr(module, "_await", lambda registers, servo: ServoInfo(servo, 9999, "other", 1))
+        with pytest.raises(ServoRefused, match=r"servo 5 .* did not take the id 8"):
+            set_id(bus.path, 1_000_000, 2, 5, 8)
+
+
+def test_the_memory_of_an_ax_which_opens_only_without_power_is_not_closed() -> None:
+    with SimulatedBus([1], model="ax-12a") as bus:
+        set_id(bus.path, 1_000_000, 1, 1, 2)
+        assert bus.servo(2).register("Lock") == 0
+
+
+def test_the_first_and_the_last_id_are_allowed_and_its_own_id_is_not_taken() -> None:
+    with SimulatedBus([0, 251]) as bus:
+        assert set_id(bus.path, 1_000_000, 2, 0, MAX_ID).id == MAX_ID
+        assert set_id(bus.path, 1_000_000, 2, 251, 0).id == 0
+        assert set_id(bus.path, 1_000_000, 2, 0, 0).id == 0
+        assert bus.servo(0).register("ID") == 0

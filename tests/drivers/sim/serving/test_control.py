@@ -134,3 +134,10 @@ def test_the_longest_line_is_kept():
     assert lines.feed(b"x" * 4096) == []
     assert lines.feed(b"\n") == ["x" * 4096]
     assert lines.feed(b"\xff\n") == ["\ufffd"]
+
+
+def test_a_socket_that_somebody_removed_is_no_error(tmp_path: Path):
+    control = ControlSocket(tmp_path / "s", str)
+    (tmp_path / "s").unlink()
+    control.close()
+    assert control.descriptors[1:] == []

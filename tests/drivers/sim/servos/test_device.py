@@ -420,3 +420,12 @@ def test_any_bytes_of_the_table_may_be_read_and_none_behind_it():
     assert device.read(tick, 2, 2.0)[1] == (2000).to_bytes(2, "little")
     assert device.read(tick - 1, 2, 3.0)[1][1:] == (3000 & 0xFF).to_bytes(1, "little")
     assert device.read(146, 1, 4.0)[1] == b"\x1e"
+
+
+def test_a_factory_reset_restores_every_permanent_register():
+    device = servo()
+    permanent = [item for item in device.table.values() if item.address < device.table.eeprom_end]
+    for item in permanent:
+        device.registers.put(item.name, item.initial ^ 0x55)
+    assert device.factory_reset(0xFF, 0.0) == 0
+    assert [device.registers.get(item.name) for item in permanent] == [item.initial for item in permanent]

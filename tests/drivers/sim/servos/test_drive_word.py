@@ -158,3 +158,29 @@ def test_sensed_registers_of_an_ax():
     one.plant.powered = False
     one.sense(0.25)
     assert get("Moving") == 0
+
+
+def test_speeds_are_in_the_unit_of_the_models_register():
+    one = drive("sts3215", Operating_Mode=1, Goal_Velocity=100)
+    one.ticks_s = 3.0
+    one.plan(0.0)
+    assert one.plant.motion(9.0).velocity == pytest.approx(300.0)
+    one.registers.put("Goal Velocity", 400)
+    one.plan(9.0)
+    assert one.plant.motion(20.0).velocity == pytest.approx(1000.0), "no faster than the motor"
+    one.registers.put("Operating Mode", 0)
+    one.registers.put("Goal Velocity", -100)
+    one.registers.put("Goal Position", 4000)
+    one.plan(20.0)
+    assert max(abs(one.plant.motion(20.0 + 0.01 * k).velocity) for k in range(50, 800)) == pytest.approx(300.0)
+
+
+@pytest.mark.parametrize(
+    ("volts", "celsius", "shown"),
+    [(30.0, 300.0, (255, 255)), (-1.0, -5.0, (0, 0)), (25.45, 254.6, (254, 255)), (0.1, 1.2, (1, 1))],
+)
+def test_voltage_and_temperature_stay_in_their_byte(volts: float, celsius: float, shown: tuple[int, int]):
+    one = drive("ax-12a")
+    one.plant.supply_v, one.plant.forced_c = volts, celsius
+    one.sense(1.0)
+    assert (one.registers.get("Present Voltage"), one.registers.get("Present Temperature")) == shown

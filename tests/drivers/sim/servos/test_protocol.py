@@ -13,6 +13,7 @@ LED = {"ax-12a": b"\x19", "xl330-m288": b"\x41\x00"}
 """Address of the LED register."""
 WORD = {"ax-12a": 1, "xl330-m288": 2}
 MODELS = list(LED)
+REG_WRITE, ACTION = 4, 5
 PING, READ, WRITE, SYNC_READ, SYNC_WRITE = 1, 2, 3, 0x82, 0x83
 
 
@@ -131,3 +132,14 @@ def test_an_unknown_instruction_is_refused_by_the_one_it_is_for():
     assert ask(chain("xl330-m288"), 1, 0x33) == [(1, two.ErrorNumber.INSTRUCTION, b"")]
     assert ask(chain("ax-12a"), 1, 0x33) == [(1, one.Error1.INSTRUCTION, b"")]
     assert ask(chain("xl330-m288"), 0xFE, 0x33) == []
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_registered_write_needs_data_and_waits_for_its_action(model: str):
+    bus = chain(model)
+    (refused,) = ask(bus, 2, REG_WRITE, LED[model])
+    assert refused[1] != 0
+    assert ask(bus, 2, REG_WRITE, LED[model] + b"\1") == [(2, 0, b"")]
+    assert leds(bus) == [0, 0, 0]
+    ask(bus, 0xFE, ACTION)
+    assert leds(bus) == [0, 1, 0]

@@ -145,3 +145,10 @@ def test_faults_are_due_without_traffic_and_a_clear_drops_everything() -> None:
     queue.receive(PACKET + b"\xa5", 6.0)
     queue.clear()
     assert (list(queue.replies), line.reader.pending) == ([], 0)
+
+
+def test_bytes_without_a_head_are_no_packet_however_many_they_are() -> None:
+    for count in range(1, 12):
+        reader = FixedReader(0xA5, 4)
+        assert reader.feed(b"\x01" * count) == []
+        assert reader.pending == 0
