@@ -11,7 +11,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.robot import load_robot
-from controller.robot.safety import Guard
+from controller.robot.safety import AllowedRange, DeadBandAndSlack, Guard, RuleCounter
 from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
 
@@ -188,3 +188,44 @@ def test_no_hostile_target_gets_past_a_limit_of_the_shipped_head() -> None:
     assert np.all(np.abs(speed) <= table.max_speed_rad_s * (1 + 1e-9))
     assert np.all(np.abs(np.diff(speed, axis=0)) / DT <= table.max_accel_rad_s2 * (1 + 1e-6))
     assert len(guard.report()) >= 8
+
+
+def test_rules_are_counted_when_they_begin_and_timed_while_they_act() -> None:
+    counter = RuleCounter(["a", "b", "c"])
+    for a, b in ((1, 0), (1, 1), (0, 1), (1, 1), (1, 0)):
+        counter.count(np.array([a, b, 0], bool), 0.10006)
+    assert counter.report() == [
+        {"rule": "a", "times": 2, "seconds": 0.4},  # rounded to milliseconds
+        {"rule": "b", "times": 1, "seconds": 0.3},
+    ]
+    counter = RuleCounter(["a"])
+    counter.count(np.array([True]), 1.2345678)
+    assert counter.report()[0]["seconds"] == 1.235
+
+
+def test_a_range_only_becomes_smaller_at_the_side_of_its_sign() -> None:
+    allowed = AllowedRange(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    at, where = np.array([0, 0, 1]), np.array([True, True, False])
+    allowed.narrow(at, np.array([1.0, -1.0, 1.0]), np.array([0.5, -0.25, 0.0]), where)
+    assert (allowed.low.tolist(), allowed.high.tolist()) == ([-0.25, -1.0], [0.5, 1.0])
+    allowed.narrow(at[:2], np.array([1.0, -1.0]), np.array([0.75, -0.5]), where[:2])
+    assert (allowed.low.tolist(), allowed.high.tolist()) == ([-0.25, -1.0], [0.5, 1.0])
+    allowed.narrow(at[:1], np.zeros(1), np.zeros(1), where[:1])
+    assert (allowed.low.tolist(), allowed.high.tolist()) == ([-0.25, -1.0], [0.5, 1.0])
+
+
+def test_half_the_slack_is_added_on_the_way_up_and_taken_away_on_the_way_down() -> None:
+    filter_ = DeadBandAndSlack(np.array([0.0]), np.array([0.5]))
+
+    def sent(*targets: float) -> list[float]:
+        return [float(filter_.apply(np.array([target]))[0]) for target in targets]
+
+    assert sent(0.0, 0.04, 0.0) == [0.0, 0.04, 0.0]  # not yet a direction: less than a tenth of the slack
+    assert sent(0.125, 1.0) == [0.375, 1.25]
+    assert sent(0.96, 1.0) == pytest.approx([1.21, 1.25])  # came back by less than that
+    assert sent(0.9375, 0.5) == [0.6875, 0.25]
+    assert sent(0.54, 0.5625) == pytest.approx([0.29, 0.8125])
+    other = DeadBandAndSlack(np.array([0.25]), np.array([0.0]))
+    assert [float(other.apply(np.array([t]))[0]) for t in (1.0, 1.25, 0.75, 1.2501, 1.1)] == [
+        1.0, 1.0, 1.0, 1.2501, 1.2501
+    ]  # fmt: skip
