@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import pytest
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS
-from controller.stage.stage import load_stage, parse_identity, with_picture
+from controller.stage.stage import Stage, load_stage, parse_identity, with_picture
 
 
 def stage_file(tmp_path: Path, text: str) -> str:
@@ -106,3 +107,8 @@ def test_identities_are_names_and_amounts():
     for wrong in ("broad=2", "broad=-0.1", "broad=x", "=1", "broad=nan"):
         with pytest.raises(ParameterError, match="--identity"):
             parse_identity(wrong)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Stage).anything = 1

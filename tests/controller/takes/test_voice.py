@@ -139,3 +139,10 @@ def test_rates_that_are_no_sound_are_refused(rate: int) -> None:
     with pytest.raises(ValueError, match="rate_hz must be 1000 or more"):
         VoiceEnvelope(P, rate)
     assert VoiceEnvelope(P, 1000).hop == 10
+
+
+def test_a_voice_far_below_the_loudest_closes_the_mouth_and_no_further() -> None:
+    sound = np.concatenate([tone(200, 0.5, 0.8), tone(200, 0.8, 0.03)])  # above silence, below a share of the loudest
+    face = heard(VoiceEnvelope(P, RATE), sound)
+    assert face[45, JAW] > 0.4
+    assert 0.0 <= face[-1, JAW] < 0.01 and face.min() >= 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import nullcontext
+from dataclasses import FrozenInstanceError
 from types import SimpleNamespace
 from typing import Any
 
@@ -302,3 +303,9 @@ def test_json_holds_every_entry_of_a_figure() -> None:
         ]
     }
     assert text.startswith('{\n  "a": [\n    {')
+
+
+def test_records_cannot_be_changed() -> None:
+    for record in (Figure, Loop):
+        with pytest.raises(FrozenInstanceError):
+            object.__new__(record).anything = 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
+
 import pytest
 
 from controller.tools.scan import BAUDS, STEPS, Found, plan_scan, scan_port
@@ -50,3 +52,8 @@ def test_a_missing_port_is_one_error() -> None:
     with pytest.raises(PortMissing) as caught:
         list(scan_port("/dev/not-there", plan_scan([1_000_000], [1])))
     assert caught.value.hint
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Found).anything = 1
