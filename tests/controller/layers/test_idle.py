@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import numpy as np
@@ -200,3 +201,17 @@ def test_the_head_sways_by_three_waves_of_its_periods(settings: IdleSettings) ->
         assert 0.0 < abs(size) <= np.radians(reach) + 1e-12
     life.update(100.0, looking=True)
     np.testing.assert_allclose(life.head_rad, path[0], atol=1e-12)
+
+
+def test_each_axis_has_three_waves_of_its_own(settings: IdleSettings) -> None:
+    breath = settings.breath.model_copy(update={"pitch_deg": 0.0})
+    head = settings.head.model_copy(update={"yaw_deg": 8.0, "pitch_deg": 4.0, "roll_deg": 2.0, "period_s": (3.0, 9.0)})
+    life = IdleMotion(P, settings.model_copy(update={"breath": breath, "head": head}), 5)
+    life.liveliness = 0.5
+    draw = random.Random(5)
+    waves = [(draw.uniform(3.0, 9.0), draw.uniform(0.0, 2 * np.pi)) for _ in range(9)]
+    for time_s in (0.0, 1.7, 44.0):
+        life.update(time_s, looking=True)
+        shares = [np.sin(2 * np.pi * time_s / period + phase) for period, phase in waves]
+        means = np.mean(np.reshape(shares, (3, 3)), axis=1)
+        np.testing.assert_allclose(life.head_rad, 0.5 * np.radians([8.0, 4.0, 2.0]) * means, atol=1e-12)
