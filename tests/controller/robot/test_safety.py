@@ -229,3 +229,26 @@ def test_half_the_slack_is_added_on_the_way_up_and_taken_away_on_the_way_down() 
     assert [float(other.apply(np.array([t]))[0]) for t in (1.0, 1.25, 0.75, 1.2501, 1.1)] == [
         1.0, 1.0, 1.0, 1.2501, 1.2501
     ]  # fmt: skip
+
+
+def test_a_servo_that_gave_way_comes_back_at_its_pace_after_a_rest() -> None:
+    line = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    line.run(1.0, 30.0)
+    stuck, free = (measured(np.radians([10.0]), np.array([current])) for current in (0.9, 0.1))
+    for _ in range(100):
+        line.step(30.0, state=stuck)
+    assert np.degrees(line.sent[0]) == pytest.approx(-2.0, abs=0.1)  # 12 degrees from where it was stuck
+    path = []
+    for _ in range(150):
+        line.step(30.0, state=free)
+        path.append(float(np.degrees(line.sent[0])))
+    waits = next(i for i, angle in enumerate(path) if angle > -1.95) * DT
+    assert waits == pytest.approx(LOAD.rest_s, abs=4 * DT)
+    rising = [angle for angle in path if 0.0 < angle < 25.0]
+    assert np.diff(rising) / DT == pytest.approx(np.full(len(rising) - 1, LOAD.rise_deg_s), rel=0.01)
+    assert path[-1] == pytest.approx(30.0, abs=0.1)
+    short = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    short.run(1.0, 30.0)
+    for i in range(200):  # over for less than after_s at a time
+        short.step(30.0, state=stuck if i % 8 else free)
+    assert np.degrees(short.sent[0]) == pytest.approx(30.0)

@@ -115,3 +115,14 @@ def test_a_process_of_its_own_outlives_interrupts_and_ends_with_its_input(tmp_pa
             assert process.wait(30) == 0
         finally:
             process.kill()
+
+
+def test_tags_have_nine_digits_at_most_and_begin_again_at_one(port: HostPort) -> None:
+    host = RobotHost(port, Script(()), P)
+    host.send("PING")
+    assert list(host._waiting) == [1]
+    host._tag = 999_999_997
+    for _ in range(3):
+        host.send("PING")
+    assert list(host._waiting) == [1, 999_999_998, 999_999_999] and host._tag == 1
+    assert host.counts["sent"] == 4
