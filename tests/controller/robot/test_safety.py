@@ -247,6 +247,15 @@ def test_a_servo_that_gave_way_comes_back_at_its_pace_after_a_rest() -> None:
     rising = [angle for angle in path if 0.0 < angle < 25.0]
     assert np.diff(rising) / DT == pytest.approx(np.full(len(rising) - 1, LOAD.rise_deg_s), rel=0.01)
     assert path[-1] == pytest.approx(30.0, abs=0.1)
+    for _ in range(100):
+        line.step(30.0, state=free)
+    (row,) = line.guard.report()
+    # while it is stuck, from after_s on; the rest; and until the limit has passed the end of the servo's range
+    acted_s = (2.0 - LOAD.after_s) + LOAD.rest_s + (12.0 + 50.0 - 10.0) / LOAD.rise_deg_s
+    assert row["times"] == 1 and row["seconds"] == pytest.approx(acted_s, abs=4 * DT)
+    for _ in range(20):
+        line.step(30.0, state=stuck)
+    assert line.guard.report()[0]["times"] == 2
     short = Line(RuleSettings(load=[LOAD]), table_of("a"))
     short.run(1.0, 30.0)
     for i in range(200):  # over for less than after_s at a time
