@@ -26,8 +26,6 @@ def _sweep(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: 
     """One round over all coordinates, in place on ``x`` and ``gradient``; returns the largest change."""
     largest = 0.0
     for i in range(len(x)):
-        if gram[i, i] <= 0.0:
-            continue
         goal = x[i] - gradient[i] / gram[i, i]
         shrink = sparsity / gram[i, i]
         goal = max(goal - shrink, 0.0) if goal > 0.0 else min(goal + shrink, 0.0)

@@ -193,10 +193,10 @@ def _read(_: Grammar, given: Sequence[str]) -> Command:
 
 
 def _list(_: Grammar, given: Sequence[str]) -> Command:
-    what = given[0].upper()
-    if what not in LISTS:
-        raise LineError(Code.NAME, f"unknown list {given[0][:32]!r}; {_usage('LIST')}")
-    return Command("LIST", words=(what,))
+    (what,) = given
+    if what.upper() not in LISTS:
+        raise LineError(Code.NAME, f"unknown list {what[:32]!r}; {_usage('LIST')}")
+    return Command("LIST", words=(what.upper(),))
 
 
 def _neutral(_: Grammar, given: Sequence[str]) -> Command:
@@ -204,7 +204,8 @@ def _neutral(_: Grammar, given: Sequence[str]) -> Command:
 
 
 def _life(_: Grammar, given: Sequence[str]) -> Command:
-    return Command("LIFE", values=(in_range("amount", given[0], 0.0, 1.0),))
+    (amount,) = given
+    return Command("LIFE", values=(in_range("amount", amount, 0.0, 1.0),))
 
 
 def _named(name: str) -> Callable[[Grammar, Sequence[str]], Command]:

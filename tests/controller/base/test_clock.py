@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from controller.base.clock import Clock, Samples
@@ -98,3 +99,28 @@ def test_report_of_a_clock_that_never_ran_and_of_one_that_skipped() -> None:
     report = clock.report()
     assert (report["ticks"], report["skipped"], report["wanted_hz"]) == (3, 3, 100.0)
     assert report["rate_hz"] == pytest.approx(3 / 0.05)
+
+
+def test_figures_of_a_report_are_exact() -> None:
+    time = Time()
+    clock = Clock(8.0, now_ns=time.now, sleep_s=lambda s: time.sleep(s + 0.0625))
+    run(clock, time, [0] * 9)  # the first tick is on time, the others half a period late
+    report = clock.report()
+    assert report["rate_hz"] == 9 / 1.0625
+    assert report["wanted_hz"] == 8.0
+    assert report["jitter_ms"]["max"] == 62.5 and report["jitter_ms"]["p50"] == 62.5  # type: ignore[index]
+    assert report["jitter_ms"]["mean"] == 8 * 62.5 / 9  # type: ignore[index]
+    waits: list[float] = []
+    clock = Clock(8.0, now_ns=time.now, sleep_s=lambda s: (waits.append(s), time.sleep(s)))
+    run(clock, time, [0, 0])
+    assert waits == [0.125] and Clock(1.0).period_ns == 10**9
+
+
+def test_samples_fill_their_whole_room_and_the_usual_one_is_large() -> None:
+    samples = Samples()
+    for value in (7.0,) * 65536:
+        samples.add(value)
+    assert samples.summary()["p50"] == 7.0
+    samples.add(-1.0)  # in place of the oldest
+    assert samples.count == 65537 and np.isclose(samples.summary()["mean"], 7.0, atol=1e-3)
+    assert samples.summary()["p50"] == 7.0 and samples.maximum == 7.0

@@ -116,3 +116,23 @@ def test_a_file_of_a_newer_omote_says_how_to_update(tmp_path: Path) -> None:
 def test_key_paths() -> None:
     assert key_path(("links", 0, "port")) == "links[0].port"
     assert key_path(()) == "file" and key_path((1,)) == "[1]"
+
+
+class Box(Settings):
+    wide: float = 1.0
+    cart: Cart | None = None
+
+
+def test_unknown_keys_are_compared_with_those_of_their_own_table(tmp_path: Path) -> None:
+    for text, fault in (
+        ("wdie = 1", "wdie: unknown key, did you mean 'wide'?"),
+        ('cart = { name = "a", wheles = [] }', "cart.wheles: unknown key, did you mean 'wheels'?"),
+        ('cart = { name = "a", spare = { radius = 1, raduis = 2 } }',
+         "cart.spare.raduis: unknown key, did you mean 'radius'?"),
+        ('cart = { name = "a", spare = { radius = 1, whels = 2 } }', "cart.spare.whels: unknown key"),
+        ('cart = { name = "a", wheels = [{ radius = 1 }, { radius = 1, radiu = 2 }] }',
+         "cart.wheels[1].radiu: unknown key, did you mean 'radius'?"),
+    ):  # fmt: skip
+        with pytest.raises(ConfigError) as caught:
+            load(write(tmp_path, text), Box)
+        assert str(caught.value).endswith(f"cart.toml: 1 fault\n  {fault}"), text

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from importlib import metadata
+from pathlib import Path, PurePosixPath
 
 import pytest
 
@@ -60,3 +61,49 @@ def test_folders_of_installers_are_looked_through_after_the_checkout(
         assert str(folder) in str(caught.value)
         (folder / "vocabularies").mkdir(parents=True)
         assert config_dir() == folder
+
+
+class Installed(PurePosixPath):
+    """A file in an installer's list, which knows where it lies."""
+
+    base = Path("/")
+
+    def locate(self) -> Path:
+        return self.base / self
+
+
+def test_the_list_of_an_installer_says_where_the_share_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code = tmp_path / "lib" / "site-packages"
+    monkeypatch.setattr(Installed, "base", code)
+    monkeypatch.setattr(paths, "__file__", str(code / "controller" / "base" / "paths.py"))
+    monkeypatch.setattr(paths.sys, "prefix", str(tmp_path / "environment"))
+    monkeypatch.setattr(paths.site, "getuserbase", lambda: str(tmp_path / "user"))
+    names = [
+        "controller/base/paths.py",
+        "vocabularies/a.toml",
+        "other/omote/configs/vocabularies/a.toml",
+        "share/omote/configs/vocabularies/deeper/a.toml",
+        "../../share/omote/configs/vocabularies/arkit.toml",
+        "share/omote/configs/vocabularies/late.toml",
+    ]
+    listed: list[Installed] | None = [Installed(name) for name in names]
+    monkeypatch.setattr(metadata, "files", lambda package: listed if package == "omote" else [])
+    folder = tmp_path / "share" / "omote" / "configs"
+    (folder / "vocabularies").mkdir(parents=True)
+    paths._installed_files.cache_clear()
+    try:
+        assert config_dir() == folder
+        paths._installed_files.cache_clear()
+        listed = None  # a package without a list
+        with pytest.raises(ConfigError, match="is missing"):
+            config_dir()
+
+        def unknown(package: str) -> None:
+            raise metadata.PackageNotFoundError(package)
+
+        paths._installed_files.cache_clear()
+        monkeypatch.setattr(metadata, "files", unknown)
+        with pytest.raises(ConfigError, match="is missing"):
+            config_dir()
+    finally:
+        paths._installed_files.cache_clear()

@@ -76,3 +76,38 @@ def test_wrong_arguments_are_named() -> None:
         BoundedSolver(one * np.nan, np.zeros(2), np.ones(2))
     with pytest.raises(ValueError, match="wanted must be finite"):
         BoundedSolver(one, np.zeros(2), np.ones(2)).solve(np.array([np.nan, 0.0]))
+
+
+def test_rounds_are_few_and_one_from_the_solution_itself() -> None:
+    rounds = []
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        matrix = random.normal(size=(60, 20))
+        matrix[:, 10:] = matrix[:, :10] + 1e-4 * random.normal(size=(60, 10))
+        solver = BoundedSolver(matrix, -np.ones(20), np.ones(20), sparsity=0.01)
+        wanted = matrix @ random.uniform(-1, 1, 20)
+        found = solver.solve(wanted)
+        rounds.append(solver.rounds)
+        np.testing.assert_allclose(solver.solve(wanted, found), found, atol=1e-7)
+        assert solver.rounds == 1
+    assert max(rounds) < 200 and min(rounds) < 30, rounds  # one value at a time would take thousands of them
+    plain = BoundedSolver(np.eye(3), np.zeros(3), np.ones(3), ridge=0.0)
+    np.testing.assert_allclose(plain.solve(np.array([0.25, 2.0, -1.0])), [0.25, 1.0, 0.0], atol=1e-9)
+    assert plain.rounds == 2
+
+
+def test_values_without_a_start_begin_at_the_nearest_bound() -> None:
+    solver = BoundedSolver(np.zeros((1, 2)), np.array([0.25, -1.0]), np.array([0.5, -0.5]))
+    np.testing.assert_allclose(solver.solve(np.zeros(1)), [0.25, -0.5])
+    np.testing.assert_allclose(solver.solve(np.zeros(1), np.array([9.0, -9.0])), [0.25, -0.5])
+
+
+def test_the_ridge_decides_what_rows_leave_open() -> None:
+    one = np.array([[2.0]])
+    for ridge, value in ((0.0, 0.5), (4.0, 0.25), (12.0, 0.125)):
+        solver = BoundedSolver(one, -np.ones(1), np.ones(1), ridge=ridge, tolerance=1e-12)
+        assert solver.solve(np.array([1.0])) == pytest.approx([value], abs=1e-9)
+    for sparsity, value in ((1.0, 0.25), (2.0, 0.0), (3.0, 0.0)):
+        solver = BoundedSolver(one, -np.ones(1), np.ones(1), sparsity=sparsity, tolerance=1e-12)
+        assert solver.solve(np.array([1.0])) == pytest.approx([value], abs=1e-8)
+        assert solver.solve(np.array([-1.0])) == pytest.approx([-value], abs=1e-8)

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -203,3 +205,71 @@ def test_the_show_of_a_stage_begins_with_the_run(tmp_path: Path) -> None:
         assert body.newest()[0][JAW] < 0.01
         body.begin()
         until(lambda: body.newest()[0][JAW] > 0.9)
+
+
+class Main:
+    """The end of a pipe that never asks for anything, and the state of a panel that ends the wait after some rounds."""
+
+    def __init__(self, rounds: int) -> None:
+        self.sent: list[object] = []
+        self.waits: list[float] = []
+        self.published: list[object] = []
+        self.stop = threading.Event()
+        self._rounds = rounds
+
+    def poll(self, seconds: float) -> bool:
+        self.waits.append(seconds)
+        return False
+
+    def send(self, message: object) -> None:
+        self.sent.append(message)
+
+    def publish(self, state: object, face: object) -> None:
+        self.published.append((state, face))
+        if len(self.published) == self._rounds:
+            self.stop.set()
+
+
+@pytest.mark.parametrize(("finished", "sent"), [(True, [messages.Finished()]), (False, [])])
+def test_main_is_told_exactly_once_and_only_when_all_was_played(finished: bool, sent: list[object]) -> None:
+    main, checks = Main(5), list[int]()
+    body: Any = SimpleNamespace(finished=finished, state="s", measured_face="m", check=lambda: checks.append(1))
+    _wait(body, cast(Any, main), main.stop, cast(Any, main))
+    assert main.sent == sent and main.waits == [0.1] * 5  # ten times a second
+    assert main.published == [("s", "m")] * 5 and len(checks) == 5
+
+
+def test_a_message_that_is_no_request_ends_the_wait(pipe: tuple[Connection, Connection]) -> None:
+    main, end = pipe
+    main.send(messages.Hold(JAW, 1))  # a whole number is no value of a parameter
+    body: Any = SimpleNamespace(state=None)
+    assert not _handle(body, end)
+
+
+def test_servos_follow_after_the_links_are_open_and_a_take_needs_no_links(tmp_path: Path) -> None:
+    text = '[[links]]\nport = "simulated"\nscript = "tour"\n'
+    stage = stage_of(tmp_path, text)
+    with running(stage) as (body, _):
+        assert body.links == []
+        body.begin()
+        assert len(body.links) == len(stage.settings.links) == 1
+    (tmp_path / "a.tsv").write_text(TAKE)
+    with running(stage, RunOptions(tmp_path / "a.tsv")) as (body, _):
+        body.begin()
+        assert body.links == [] and not body.live
+
+
+@pytest.mark.parametrize(("mirror", "ports"), [(False, ["simulated", "/dev/x"]), (True, ["/dev/x"])])
+def test_a_limp_head_listens_to_links_that_are_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mirror: bool, ports: list[str]
+) -> None:
+    opened: list[Any] = []
+    monkeypatch.setattr("controller.body.body.open_links", lambda links, context: opened.extend(links) or [])
+    links = '[[links]]\nport = "simulated"\nscript = "tour"\n[[links]]\nport = "/dev/x"\n'
+    stage = stage_of(tmp_path, f'robots = ["head24"]\n{links}')
+    with Mailbox.create(len(P)) as mailbox:
+        body = Body(stage, P, mailbox, RunOptions(mirror=mirror))
+        body.buses.clear()
+        body.begin()
+        body.stop()
+    assert [stage.settings.links.index(link) for link in opened] == [0, 1][2 - len(ports) :]

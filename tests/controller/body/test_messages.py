@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from dataclasses import fields
+from dataclasses import FrozenInstanceError, fields
 from pathlib import Path
 
 import pytest
@@ -48,3 +48,21 @@ def test_messages_are_not_mistaken_for_each_other() -> None:
     assert [field.name for field in fields(messages.Hold)] == ["index", "value"]
     assert messages.Begin() != messages.Stop() and messages.Failed("x").hint == ""
     assert messages.Report().content == {}
+
+
+def test_records_cannot_be_changed() -> None:
+    for record in (
+        messages.RunOptions,
+        messages.BodyOrders,
+        messages.Begin,
+        messages.Stop,
+        messages.Hold,
+        messages.Show,
+        messages.Neutral,
+        messages.Ready,
+        messages.Failed,
+        messages.Finished,
+        messages.Report,
+    ):
+        with pytest.raises(FrozenInstanceError):
+            object.__new__(record).anything = 1

@@ -9,14 +9,17 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS
+from controller.body import messages
 from controller.body.messages import Hold, Neutral, Show
-from controller.body.process import BodyProcess
+from controller.body.process import BodyProcess, deadline
 from controller.stage.stage import Stage, load_stage
 from drivers.sim import SimulatedBus
 
@@ -148,3 +151,109 @@ def test_a_servo_that_does_not_answer_is_named_and_nothing_moves(stage: Stage, s
         body.wait_ready()
     assert caught.value.hint
     assert powered(servos) == []
+
+
+class Ended:
+    """What a body's process and its pipe are asked for, in order; it is alive for so many questions."""
+
+    exitcode = 3
+
+    def __init__(self, alive: int = 0, *messages: object) -> None:
+        self.asked: list[object] = []
+        self._alive, self._messages = alive, list(messages)
+
+    def is_alive(self) -> bool:
+        self._alive -= 1
+        return self._alive >= 0
+
+    def join(self, seconds: float | None = None) -> None:
+        self.asked.append(("join", seconds))
+
+    def terminate(self) -> None:
+        self.asked.append("terminate")
+
+    def kill(self) -> None:
+        self.asked.append("kill")
+
+    def poll(self, seconds: float = 0.0) -> bool:
+        return bool(self._messages)
+
+    def recv(self) -> object:
+        message = self._messages.pop(0)
+        if isinstance(message, Exception):
+            raise message
+        return message
+
+    def send(self, message: object) -> None:
+        self.asked.append(message)
+
+    def close(self) -> None:
+        self.asked.append("close")
+
+
+def body_of(end: Ended) -> BodyProcess:
+    body = BodyProcess.__new__(BodyProcess)
+    body.report, body.finished = {}, False
+    body._pipe = body._process = body.mailbox = body._panel_mailbox = cast(Any, end)
+    return body
+
+
+@pytest.mark.parametrize(
+    ("alive", "asked"),
+    [
+        (0, [("join", 30.0)]),
+        (1, [("join", 30.0), "terminate", ("join", 5.0)]),
+        (2, [("join", 30.0), "terminate", ("join", 5.0), "kill", ("join", None)]),
+    ],
+)
+def test_a_process_that_does_not_end_is_made_to(alive: int, asked: list[object]) -> None:
+    end = Ended(alive)
+    body_of(end)._end_process()
+    assert end.asked == asked
+
+
+def test_the_first_error_is_the_one_that_is_told() -> None:
+    end = Ended(1, messages.Failed("of the body", "hint"))
+    with pytest.raises(RuntimeError, match="mine"), body_of(end):
+        raise RuntimeError("mine")
+    assert end.asked[0] == messages.Stop() and end.asked[-3:] == ["close"] * 3
+    end = Ended(1, messages.Failed("of the body", "a hint"))
+    with pytest.raises(ControllerError, match="of the body") as caught, body_of(end) as body:
+        pass
+    assert caught.value.hint == "a hint" and body.report == {"failed": "of the body"}
+    assert end.asked[-3:] == ["close"] * 3
+
+
+def test_messages_that_come_too_late_or_out_of_order_are_errors() -> None:
+    with pytest.raises(ControllerError, match=r"the body did not answer within 60 s"):
+        body_of(Ended()).wait_ready()
+    with pytest.raises(ControllerError, match=r"the body sent Finished\(\) before it was ready"):
+        body_of(Ended(1, messages.Finished())).wait_ready()
+    for error in (EOFError(), OSError()):
+        end = Ended(1, error)
+        with pytest.raises(ControllerError, match=r"the body process ended by itself \(exit code 3\)"):
+            body_of(end).alive()
+        assert end.asked == [("join", 1.0)]
+    body = body_of(Ended(1, messages.Ready(), messages.Finished(), messages.Report({"a": 1})))
+    assert body.wait_ready() == messages.Ready()
+    assert not body.alive() and body.report == {"a": 1}
+    gone = Ended(0)
+    body_of(gone).stop()
+    assert gone.asked == []  # nobody is there to be asked
+    last = Ended(0, messages.Report({"b": 2}))
+    body = body_of(last)
+    body.stop()
+    assert body.report == {"b": 2} and last.asked == [messages.Stop(), ("join", 30.0)]
+
+
+def test_a_deadline_counts_from_the_first_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("controller.body.process.time", SimpleNamespace(monotonic=lambda: now[0]))
+    in_time = deadline(2.0)
+    now[0] = 500.0
+    assert in_time()
+    now[0] = 501.5
+    assert in_time()
+    now[0] = 502.0
+    assert not in_time()
+    assert deadline(None)() and not deadline(0.0)()

@@ -8,6 +8,7 @@ import os
 import time
 import wave
 from collections.abc import Callable
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -116,3 +117,8 @@ def test_what_is_no_voice_is_told(tmp_path: Path) -> None:
         sources.begin()
         assert until(lambda sources=sources: sources.voice_ended)
         assert isinstance(sources.error, TakeError)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Voice).anything = 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,7 +15,9 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from controller.cli.app import main, make_app
+from controller.base.errors import ConfigError
+from controller.cli import app as module
+from controller.cli.app import main, make_app, report_error
 
 COMMANDS = [
     ("demo",),
@@ -185,3 +189,83 @@ def test_dry_run_opens_nothing_and_lists_every_channel(omote: Omote) -> None:
     assert result.returncode == 0, result.stderr
     assert "no port was opened" in result.stdout
     assert result.stdout.count("xl330") == 24
+
+
+def raising(error: BaseException) -> Callable[[], Callable[[], None]]:
+    """A command line that ends with an error."""
+
+    def command() -> None:
+        raise error
+
+    return lambda: command
+
+
+def test_every_kind_of_end_has_its_exit_code(omote: Omote, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OMOTE_DEBUG", raising=False)
+    remark = "This is a fault in omote. OMOTE_DEBUG=1 shows where."
+    for error, code, said in (
+        (ConfigError("a [b] c", hint="type [d]"), 1, "error: a [b] c\ntry: type [d]\n"),
+        (ConfigError("no hint"), 1, "error: no hint\n"),
+        (KeyboardInterrupt(), 130, ""),
+        (ZeroDivisionError("my fault"), 70, f"error: my fault\n{remark}\n"),
+        (ZeroDivisionError(), 70, f"error: ZeroDivisionError\n{remark}\n"),
+    ):
+        monkeypatch.setattr(module, "make_app", raising(error))
+        assert omote() == Said(code, "", said)
+    monkeypatch.setenv("OMOTE_DEBUG", "1")
+    with pytest.raises(ZeroDivisionError):
+        omote()
+
+
+def test_a_reader_that_is_gone_ends_a_command_quietly() -> None:
+    command = [sys.executable, "-c", "from controller.cli.app import main; main()", "plugins"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_interrupts_that_were_ignored_count_again_and_others_handlers_stay(
+    omote: Omote, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "make_app", lambda: lambda: None)
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        omote()
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+        def own(*_: object) -> None:
+            pass
+
+        signal.signal(signal.SIGINT, own)
+        omote()
+        assert signal.getsignal(signal.SIGINT) is own
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_long_messages_are_not_broken_and_numbers_not_coloured(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    report_error(ConfigError("word 17 " * 20, hint="more 9 " * 20), "remark")
+    text = capsys.readouterr().err
+    assert [line.count(word) for line, word in zip(text.splitlines(), ("word", "more", "remark"), strict=True)] == [
+        20, 20, 1
+    ]  # fmt: skip
+    assert "word 17 word" in text and "\x1b[1;31merror:" in text and "\x1b[2mremark" in text
+
+
+def test_no_words_show_the_help_and_short_help_works(omote: Omote) -> None:
+    for words in ((), ("-h",), ("--help",)):
+        said = omote(*words)
+        assert "Drives a robot's face" in said.stdout + said.stderr
+        for command in ("set-id", "plugins", "export", "simulate"):
+            assert command in said.stdout + said.stderr
+        assert "--install-completion" not in said.stdout + said.stderr
+    for words in (("simulate",), ("run", "-h")):
+        said = omote(*words)
+        assert "Usage" in said.stdout + said.stderr

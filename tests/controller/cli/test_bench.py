@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -12,6 +14,10 @@ from typer.testing import CliRunner
 from controller.base.errors import ControllerError
 from controller.cli.app import make_app
 from controller.cli.bench import console
+from controller.tools import bench_bus as bus_module
+from controller.tools import bench_surface as surface_module
+from controller.tools.bench_bus import Figure
+from surface.bench.bench import Measure
 from surface.head.model.file import save_data
 from tests.surface.small_head import part, small_head
 
@@ -80,3 +86,96 @@ def test_places_that_cannot_be_written_are_refused_at_once(tmp_path: Path, place
     assert isinstance(error, ControllerError)
     assert why in str(error)
     assert error.hint
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
+    """What would be measured, in place of measuring it; every table has three rows."""
+    found: list[tuple[Any, ...]] = []
+    rows = [
+        Measure("one", 1.23456, 2.0, "the other", "<= 1.5"),
+        Measure("two", 0.0, 0.5, "", "<= 1"),
+        Measure("three", 4.0),
+    ]
+
+    def noting(name: str) -> Any:
+        def note(*words: Any) -> list[tuple[str, list[Measure]]]:
+            found.append((name, *(word for word in words if not callable(word))))
+            for word in words:
+                if callable(word) and name != "bench_large":
+                    word("something")
+            return [(f"table of {name}", rows)]
+
+        return note
+
+    for name in ("head", "surface", "large", "growth", "drift", "quadtree"):
+        monkeypatch.setattr(surface_module, f"bench_{name}", noting(f"bench_{name}"))
+    return found
+
+
+def test_without_options_the_shipped_head_is_measured(calls: list[tuple[Any, ...]]) -> None:
+    text = said()
+    assert calls == [("bench_head", "ict", 0.3)]
+    assert "table of bench_head" in text
+    rows = text.replace("│", " ").replace("┃", " ")
+    words = " ".join(rows.split())
+    assert "one 1.235 2.00 the other <= 1.5 missed" in words
+    assert "two 0.50 <= 1 kept" in words  # no time was taken
+    assert "three 4.000" in words and "measure ms ratio to reach" in words
+
+
+def test_every_subject_is_given_its_own_options(calls: list[tuple[Any, ...]], tmp_path: Path) -> None:
+    said("surface")
+    said("drift")
+    said("quadtree")
+    assert calls == [
+        ("bench_surface", 0.3, 100_000), ("bench_drift", "ict", 1_000_000), ("bench_quadtree", "ict", 7, None)
+    ]  # fmt: skip
+    calls.clear()
+    svg, png = tmp_path / "a.svg", tmp_path / "b.PNG"
+    assert "table of bench_large" in said("surface", "--large", "--vertices", "1000", "--seconds", "0.01")
+    said("surface", "--growth", str(svg), "--out", "ignored.doc")
+    said("quadtree", "--out", str(png), "--level", "9", "--head", "me", "--growth", "ignored.doc")
+    said("drift", "--updates", "1", "--head", "me", "--out", "ignored.doc")
+    said("quadtree", "--level", "0")
+    names = [call[:3] for call in calls]
+    assert names == [
+        ("bench_surface", 0.01, 1000), ("bench_large", 0.01, 1000), ("bench_surface", 0.3, 100_000),
+        ("bench_growth", 0.3, calls[3][2]), ("bench_quadtree", "me", 9), ("bench_drift", "me", 1),
+        ("bench_quadtree", "ict", 0),
+    ]  # fmt: skip
+    assert calls[3][3] == 100_000 and Path(calls[3][2]).parent == tmp_path == Path(calls[4][3]).parent
+    assert calls[6][3] is None
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--seconds", "0.009"), ("--vertices", "999"), ("--level", "-1"), ("--level", "10"), ("--updates", "0"),
+        ("nothing",),
+    ],
+)  # fmt: skip
+def test_options_have_limits(calls: list[tuple[Any, ...]], words: tuple[str, ...]) -> None:
+    assert CliRunner().invoke(make_app(), ["bench", *words]).exit_code == 2
+    assert calls == []
+
+
+def test_the_bus_is_measured_for_a_second_at_least_and_told_as_a_table_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[float, bool]] = []
+
+    def bench_bus(seconds: float, log: Any, *, face: bool) -> list[tuple[str, list[Figure]]]:
+        calls.append((seconds, face))
+        log("loops [1 of 3]")
+        row = Figure("  late by", 1.239, "ms", "<= 2 ms", True)
+        return [("24 servos", [row, Figure("ticks", 7.0, "Hz", ">= 9", False), Figure("frames", 5.0, "frames/s")])]
+
+    monkeypatch.setattr(bus_module, "bench_bus", bench_bus)
+    words = said("bus").replace("│", " ").replace("┃", " ")
+    text = " ".join(words.split())
+    assert "24 servos" in text and "measure reach" in text
+    for row in ("late by 1.24 ms <= 2 ms kept", "ticks 7.00 Hz >= 9 missed", "frames 5.00 frames/s"):
+        assert row in text
+    result = CliRunner().invoke(make_app(), ["bench", "bus", "--json", "--face", "--seconds", "2.5"])
+    assert result.stderr.startswith("measuring loops")
+    assert [row["name"] for row in json.loads(result.stdout)["24 servos"]] == ["late by", "ticks", "frames"]
+    assert calls == [(1.0, False), (2.5, True)]

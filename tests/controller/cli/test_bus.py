@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
@@ -11,8 +13,12 @@ from typer.testing import CliRunner, Result
 from controller.base.errors import ConfigError, ControllerError
 from controller.cli.app import make_app
 from controller.cli.console import console
+from controller.tools import calibrate as calibrate_module
+from controller.tools import monitor as monitor_module
+from controller.tools import scan as scan_module
 from drivers.port import ports as ports_module
 from drivers.sim import SimulatedBus
+from drivers.tools import set_id as set_id_module
 
 
 @pytest.fixture(autouse=True)
@@ -77,3 +83,112 @@ def test_calibrate_needs_channels_that_are_there_and_a_terminal(tmp_path: Path) 
     with SimulatedBus([1]):
         refused = omote("calibrate", "head24", "--out", str(tmp_path / "c.toml"))
     assert isinstance(refused.exception, (ControllerError, OSError)) and not (tmp_path / "c.toml").exists()
+
+
+def test_ports_without_a_timer_or_a_fault_have_empty_cells(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = ports_module.PortRecord("/dev/ttyY", None, "", "", "plain", True, None, "")
+    monkeypatch.setattr(ports_module, "list_ports", lambda: [record])
+    text = said("ports").replace("│", " ").replace("┃", " ")
+    words = " ".join(text.split())
+    assert "port usb serial number description usable latency timer" in words
+    assert "/dev/ttyY plain yes" in words and " ms" not in words and "no" not in words.split()
+    assert "/dev/ttyY:" not in words
+
+
+def test_a_scan_tries_all_rates_and_both_protocols_unless_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    plans: list[Any] = []
+
+    def scan_port(port: str, plan: Any, progress: Any) -> Iterator[scan_module.Found]:
+        plans.append((port, plan))
+        progress("trying", 1)
+        yield scan_module.Found(57_600, 1, None)
+
+    monkeypatch.setattr(scan_module, "scan_port", scan_port)
+    assert "57600" in said("scan", "p")
+    said("scan", "p", "--baud", "9600", "--baud", "57600", "--protocol", "1")
+    both = [(2, baud) for baud in scan_module.BAUDS[2]] + [(1, baud) for baud in scan_module.BAUDS[1]]
+    assert plans == [("p", both), ("p", [(1, 9600), (1, 57_600)])]
+    for wrong in ("0", "3"):
+        assert omote("scan", "p", "--protocol", wrong).exit_code == 2
+
+
+class Terminal(io.StringIO):
+    """A file that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_keeps_no_bar_of_a_scan(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = Terminal()
+    monkeypatch.setattr(console, "_file", out)  # its property would bind the standard output of this moment
+    monkeypatch.setattr(console, "is_interactive", True)
+    assert omote("scan", servos.path, "--baud", "57600", "--protocol", "2").exit_code == 0
+    assert "57600 baud" in out.getvalue()
+    assert "baud, Protocol" not in out.getvalue().rpartition("\x1b[2K")[2]  # what stays when the last line is erased
+    assert "xl330-m288" in out.getvalue().rpartition("\x1b[2K")[2]
+
+
+def test_set_id_is_given_the_usual_rate_and_protocol(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Any] = []
+
+    def change(*words: Any, **named: Any) -> Any:
+        calls.append((*words, named))
+        return type("Info", (), {"model": "m", "id": words[-1]})
+
+    monkeypatch.setattr(set_id_module, "set_id", change)
+    assert said("set-id", "p", "0", "252") == "m: permanent id 0 -> 252, written and read back on p"
+    said("set-id", "p", "252", "0", "--protocol", "1", "--baud", "9600", "--release")
+    assert calls == [("p", 1_000_000, 2, 0, 252, {"release": False}), ("p", 9600, 1, 252, 0, {"release": True})]
+    for words in (("253", "1"), ("1", "253"), ("1", "2", "--protocol", "3"), ("1", "2", "--protocol", "0")):
+        assert omote("set-id", "p", *words).exit_code == 2
+
+
+def test_a_monitor_asks_ten_times_a_second_unless_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Any] = []
+
+    def polled(port: str, baud: int, protocol: int, _: Any, going: Any, rate: float) -> None:
+        calls.append((port, baud, protocol, rate, going()))
+
+    def heard(port: str, baud: int, protocol: int, _: Any, going: Any, model: str) -> None:
+        calls.append((port, baud, protocol, model, going()))
+
+    monkeypatch.setattr(monitor_module, "poll_servos", polled)
+    monkeypatch.setattr(monitor_module, "listen_to_bus", heard)
+    said("monitor", "p")
+    said("monitor", "p", "--rate", "0.1", "--baud", "9600", "--protocol", "1")
+    said("monitor", "p", "--rate", "200", "--seconds", "0.1")
+    said("monitor", "p", "--listen")
+    said("monitor", "p", "--listen", "--model", "ax-12a")
+    assert calls == [
+        ("p", 1_000_000, 2, 10.0, True), ("p", 9600, 1, 0.1, True), ("p", 1_000_000, 2, 200.0, True),
+        ("p", 1_000_000, 2, "", True), ("p", 1_000_000, 2, "ax-12a", True),
+    ]  # fmt: skip
+    for words in (("--rate", "0.09"), ("--rate", "200.1"), ("--seconds", "0.09"), ("--protocol", "3")):
+        assert omote("monitor", "p", *words).exit_code == 2
+
+
+def test_a_calibration_is_given_its_channels_and_place(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, root: Path
+) -> None:
+    calls: list[Any] = []
+    written = [True]
+
+    def run(robot: Any, channels: Any, name: str, target: Path, margin: float, _: Any) -> bool:
+        calls.append((robot.name, [channel.name for channel in channels], name, target, margin))
+        return written[0]
+
+    monkeypatch.setattr(calibrate_module, "run_calibration", run)
+    text = said("calibrate", "head24")
+    robot, names, name, target, margin = calls[0]
+    assert (robot, len(names), name, margin) == ("head24", 24, "default", 1.0)
+    assert target == root / "configs/robots/head24.default.calibration.toml"
+    assert text == f'wrote {target} The robot file takes it with: calibration = "default"'
+    out = str(tmp_path / "c.toml")
+    text = said("calibrate", "head24", "-c", "jawOpen", "--out", out, "--margin", "0", "--name", "desk")
+    assert calls[1] == ("head24", ["jawOpen"], "desk", Path(out), 0.0)
+    assert text == f'wrote {out} The robot file takes it with: calibration = "{out}"'
+    written[0] = False
+    assert said("calibrate", "head24", "--margin", "20") == "" and calls[2][-1] == 20.0
+    for wrong in ("-0.1", "20.1"):
+        assert omote("calibrate", "head24", "--margin", wrong).exit_code == 2

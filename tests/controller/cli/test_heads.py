@@ -1,14 +1,20 @@
 """``omote fit`` and ``omote export`` as a user types them."""
 
+import io
 import sys
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
 from controller.base.errors import ConfigError, ParameterError
+from controller.base.parameters import PARAMETERS
 from controller.cli.app import make_app
-from surface.base.errors import ExportError, FitError, HeadFileError
+from controller.cli.console import console
+from surface.base.errors import ExportError, FitError, HeadFileError, ViewError
+from surface.fit.source.load import LoadOptions
 
 SURFACE = str(Path(__file__).parents[2] / "surface")
 
@@ -72,3 +78,132 @@ def test_a_damaged_mesh_leaves_the_old_head(sheet, tmp_path):
     said = CliRunner().invoke(make_app(), ["fit", str(bad), "-o", str(head), "--report", str(tmp_path / "r")])
     assert isinstance(said.exception, FitError) and "bad.glb" in str(said.exception)
     assert (head / "head.npz").read_bytes() == before and not (tmp_path / "r").exists()
+
+
+class Terminal(io.StringIO):
+    """A file that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def fitted(monkeypatch):
+    """Calls of the fit, in place of fitting: what it was given, and a report that a test may change."""
+    neutral = SimpleNamespace(rms=0.1234, p99=0.5678, max=1.2345)
+    part = SimpleNamespace(name="face", points=77, neutral=neutral, mean_shape_rms=0.0456)
+    report = SimpleNamespace(name="me", points=123, parameters=["a", "b"], parts=[part], missing=[], left_out=[],
+                             notes=["a note [x]"])  # fmt: skip
+    calls = []
+
+    def fit_head(mesh, out, *, name, progress, options, report_dir):
+        calls.append((mesh, out, name, options, report_dir))
+        progress("face", 0.5)
+        progress("report", 0.75)
+        return report
+
+    def shade(out):
+        calls.append(("shade", out))
+        if report.notes == []:
+            raise ViewError("no OpenGL")
+
+    monkeypatch.setattr("surface.fit.api.fit_head", fit_head)
+    monkeypatch.setattr("surface.fit.points.report.face_bounds", lambda found: "face: 1.2 mm [max]")
+    monkeypatch.setattr("surface.view.draw.decimate.decimate_head", lambda out: calls.append(("decimate", out)))
+    monkeypatch.setattr("surface.view.pictures.occlusion.shade_head", shade)
+    monkeypatch.setattr(
+        "surface.fit.identities.add_identities",
+        lambda out, mesh, file: calls.append(("identities", out, mesh, file)) or ["broad", "long"],
+    )
+    return calls, report
+
+
+def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path):
+    calls, report = fitted
+    out = tmp_path / "mine"
+    said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out)])
+    assert said.exit_code == 0
+    assert calls == [(Path("a.glb"), out, "mine", LoadOptions(None, None, None, None, None, ()), None),
+                     ("decimate", out), ("shade", out)]  # fmt: skip
+    words = " ".join(said.output.replace("│", " ").replace("┃", " ").split())
+    assert "me: 123 control points, 2 shapes" in words
+    assert "part control points RMS 99 % max mean RMS of shapes" in words
+    assert "face 77 0.123 0.568 1.234 0.046" in words
+    assert words.endswith(f"face: 1.2 mm [max] a note [x] wrote {out}")
+    calls.clear()
+    report.missing, report.left_out, report.notes = ["jawOpen", "noseSneer"], ["x", "y"], []
+    more = ["--name", "you", "--shapes", "s", "--names", "n.toml", "--unit", "cm", "--up", "z", "--forward", "-y"]
+    more += ["--without", "hair", "--without", "hat", "--report", "r", "--identities", "i.npz"]
+    said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out), *more])
+    options = LoadOptions(Path("s"), Path("n.toml"), "cm", "z", "-y", ("hair", "hat"))
+    assert calls[0] == (Path("a.glb"), out, "you", options, Path("r"))
+    assert calls[-1] == ("identities", out, Path("a.glb"), Path("i.npz"))
+    lines = [line for line in said.output.splitlines() if line][-6:]
+    assert lines == [
+        "face: 1.2 mm [max]",
+        "no shape for jawOpen, noseSneer: these parameters will not move this head",
+        "left out, not ARKit's: x, y",
+        "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture",
+        f"wrote {out}",
+        "identities: broad, long",
+    ]
+    calls.clear()
+    said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out), "--keep", "--identities", "i.npz"])
+    assert said.output == "identities: broad, long\n" and [call[0] for call in calls] == ["identities"]
+
+
+def test_a_terminal_keeps_no_bar_of_a_fit(fitted, tmp_path, monkeypatch):
+    out = Terminal()
+    monkeypatch.setattr(console, "_file", out)  # its property would bind the standard output of this moment
+    monkeypatch.setattr(console, "is_interactive", True)
+    assert CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(tmp_path / "mine")]).exit_code == 0
+    text = out.getvalue()
+    assert "writing the report" in text
+    after = text.rpartition("writing the report")[2].partition("finding")[0]
+    assert "\x1b[2K" in after  # the line is erased before the next thing is told
+
+
+def test_render_draws_a_picture_unless_a_sheet_is_asked_for(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("controller.face.still.draw_still", lambda still, out: drawn.append(("still", still, out)))
+    monkeypatch.setattr(
+        "controller.face.still.draw_sheet",
+        lambda still, out, progress: (progress(1, 2), drawn.append(("sheet", still, out))),
+    )
+    out = tmp_path / "a.png"
+    assert CliRunner().invoke(make_app(), ["render", "-o", str(out)]).output.replace("\n", "") == f"wrote {out}"
+    words = ["--sheet", "--size", "64x32", "--theme", "mask", "--quality", "fast", "--background", "#ff0000"]
+    words += ["--set", "jawOpen=0.5", "-e", "happiness=0.5", "--camera", "profile", "--identity", "broad=0.5"]
+    assert CliRunner().invoke(make_app(), ["render", "-o", str(out), *words]).exit_code == 0
+    (first, plain, _), (second, other, target) = drawn
+    assert (first, second, target) == ("still", "sheet", out)
+    assert (plain.size, plain.head.name, plain.identity, plain.groups) == ((800, 800), "ict", {}, ())
+    assert not plain.values.any()
+    assert (other.size, other.look.theme, other.look.quality, other.look.camera) == (
+        (64, 32),
+        "mask",
+        "fast",
+        "profile",
+    )
+    assert other.identity == {"broad": 0.5} and other.values[PARAMETERS.index("jawOpen")] == 0.5
+    assert other.values[PARAMETERS.index("mouthSmileLeft")] > 0.1
+    assert plain.look.background != other.look.background
+
+
+def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeypatch, sheet):
+    calls = []
+    other = SimpleNamespace(kind="odd", suffixes=(".odd",))
+    monkeypatch.setattr("controller.tools.plugins.added_exporters", lambda: [other])
+    monkeypatch.setattr(
+        "surface.export.export_head",
+        lambda head, out, pose, added: calls.append((head.name, out, pose, added)) or [out, tmp_path / "more"],
+    )
+    blamed = []
+    monkeypatch.setattr("controller.tools.plugins.EXPORTERS.blaming", lambda kind: blamed.append(kind) or nullcontext())
+    head = ["--head", str(sheet[1])]
+    said = CliRunner().invoke(make_app(), ["export", "a.ODD", *head, "--set", "jawOpen=0.5", "--set", "headYaw=0"])
+    assert said.exit_code == 0, said.exception
+    assert calls == [("me", Path("a.ODD"), {"jawOpen": 0.5}, [other])]
+    assert said.output.replace("\n", "") == f"wrote a.ODDwrote {tmp_path / 'more'}"
+    assert CliRunner().invoke(make_app(), ["export", "b.glb", *head]).exit_code == 0
+    assert calls[1][2] == {} and blamed == ["odd", ""]

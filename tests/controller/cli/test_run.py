@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
 
+from controller.body.messages import RunOptions
+from controller.body.sources import Voice
 from controller.cli.app import make_app
 from controller.cli.console import console
 from controller.cli.run import report_rows
@@ -140,3 +144,134 @@ def test_a_dry_run_lists_every_channel(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["head24"]\n')
     text = omote("run", str(tmp_path / "stage.toml"), "--dry-run", "--seconds", "0.1").output
     assert "dry run: no port was opened" in text and text.count("xl330-m288") == 24 and "neutral (deg)" in text
+
+
+def test_rows_come_in_the_order_of_a_run_and_name_the_picture() -> None:
+    face = {**FACE, "start_to_first_frame_s": 0.0}
+    bus = {"name": "b", "servos": 2, **LOOP, "command_to_wire_ms": SPREAD, "channels_held_at_limit": 1,
+           "bus": {"errors": {"no_reply": 2, "crc": 3}, "limits_hit": 2}}  # fmt: skip
+    link = {"port": "/dev/x", "accepted": 7, "refused": {"E_NAME": 1, "E_RANGE": 2}}
+    rows = report_rows({"stage": "s", "face": face, "control": LOOP, "links": [link], "buses": [bus]})
+    assert [name for name, _ in rows] == [
+        "picture", "frames", "frames per second", "milliseconds a frame", "control loop", "link /dev/x",
+        "bus b: 2 servos", "bus b: jitter (ms)", "bus b: command to wire (ms)", "bus b: errors",
+        "bus b: targets held at a limit",
+    ]  # fmt: skip
+    found = dict(rows)
+    assert found["picture"] == "1280 x 720, full, llvmpipe"
+    assert found["bus b: errors"] == "2 no_reply, 3 crc" and found["bus b: targets held at a limit"] == "3"
+    assert found["link /dev/x"] == "7 lines accepted, 3 refused"
+    assert report_rows({"stage": "s"}) == []
+    away = {"rms_deg": 1.0, "worst": [{"channel": "a", "rms_deg": 2.0}, {"channel": "b", "rms_deg": 1.0}]}
+    rows = report_rows({"stage": "s", "buses": [{**bus, "face_difference": away}]})
+    assert rows[-2:] == [
+        ("bus b: measured face is away from the wanted one by", "rms 1.0 deg, most at a: rms 2.0 deg"),
+        ("bus b: by region (rms deg)", ""),
+    ]
+
+
+class Session:
+    """Stands in for a run: keeps what it is started with, and reports nothing."""
+
+    def __init__(self, stage: str, options: RunOptions, identity: Any, look: Any, status: Any, preloaded: Any) -> None:
+        self.given = {"stage": stage, "options": options, "identity": identity, "look": look}
+        self.how: tuple[Any, ...] = ()
+        Session.last = self
+        status("starting")
+
+    last: Session
+
+    def _run(self, *how: Any) -> dict[str, Any]:
+        self.how = how
+        return {"stage": self.given["stage"], "face": None, "written": []}
+
+    def run_without_face(self, seconds: float | None) -> dict[str, Any]:
+        return self._run("no face", seconds)
+
+    def run_headless(self, seconds: float | None, pictures: Path | None) -> dict[str, Any]:
+        return self._run("headless", seconds, pictures)
+
+    def run_window(self, seconds: float | None) -> dict[str, Any]:
+        return self._run("window", seconds)
+
+
+@pytest.fixture
+def display(monkeypatch: pytest.MonkeyPatch) -> dict[str, bool]:
+    """Runs are only noted in :class:`Session`; the entry ``there`` says whether there is a display."""
+    found = {"there": True}
+    monkeypatch.setattr("controller.body.preload.PreloadedBody", nullcontext)
+    monkeypatch.setattr("controller.tools.stage_run.StageRun", Session)
+    monkeypatch.setattr("controller.tools.stage_run.has_display", lambda: found["there"])
+    return found
+
+
+def noted(*words: str) -> Session:
+    result = omote(*words)
+    assert result.exit_code == 0, result.output
+    return Session.last
+
+
+LOOK = dict.fromkeys(("kiosk", "monitor", "quality", "theme", "camera", "evaluator"))
+
+
+def test_a_run_without_options_opens_a_window_where_there_is_a_display(display: dict[str, bool]) -> None:
+    session = noted("run", "mine")
+    assert session.how == ("window", None)
+    assert session.given == {"stage": "mine", "options": RunOptions(), "identity": {}, "look": LOOK}
+    display["there"] = False
+    assert noted("run", "mine").how == ("headless", None, None)
+
+
+def test_every_option_of_a_run_arrives(display: dict[str, bool], tmp_path: Path) -> None:
+    session = noted("run", "mine", "--headless", "--pictures", str(tmp_path), "--seconds", "0.1", "--mirror")
+    assert session.how == ("headless", 0.1, tmp_path)
+    assert session.given["options"] == RunOptions(mirror=True)
+    assert noted("run", "mine", "--no-face", "--headless").how == ("no face", None)
+    session = noted("run", "mine", "--voice", "v.wav", "--voice-rate", "1000", "--record", "a.rec")
+    assert session.given["options"] == RunOptions(voice=Voice("v.wav", 1000), record=Path("a.rec"))
+    words = ["--kiosk", "--monitor", "0", "--quality", "fast", "--theme", "mask", "--camera", "front"]
+    session = noted("run", "mine", *words, "--evaluator", "cpu", "--identity", "broad=0.5")
+    assert session.given["look"] == {"kiosk": True, "monitor": 0, "quality": "fast", "theme": "mask",
+                                     "camera": "front", "evaluator": "cpu"}  # fmt: skip
+    assert session.given["identity"] == {"broad": 0.5}
+
+
+def test_what_is_played_arrives_with_its_stage(display: dict[str, bool], tmp_path: Path) -> None:
+    session = noted("play", "a.csv", "--record", "a.rec", "--no-face")
+    assert session.given["stage"] == "play" and session.how == ("no face", None)
+    assert session.given["options"] == RunOptions(Path("a.csv"), record=Path("a.rec"))
+    assert noted("play", "a.csv").how == ("window", None)
+    session = noted("play", "-", "--stage", "mine", "--voice-rate", "8000", "--headless", "--seconds", "2")
+    assert session.given["stage"] == "mine" and session.how == ("headless", 2.0, None)
+    assert session.given["options"] == RunOptions(voice=Voice("-", 8000, alone=True))
+    assert noted("play", "-", "--record", "b.rec").given["options"] == RunOptions(
+        voice=Voice("-", alone=True), record=Path("b.rec")
+    )
+
+
+def test_the_demo_runs_for_a_while_and_leaves_pictures_where_there_is_no_display(
+    display: dict[str, bool], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert noted("demo").how == ("window", None) and Session.last.given["stage"] == "demo"
+    assert noted("demo", "--seconds", "3").how == ("window", 3.0)
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "out").mkdir()
+    assert noted("demo", "--headless").how == ("headless", 15.0, Path("out"))
+    assert json.loads((tmp_path / "out" / "report.json").read_text())["stage"] == "demo"
+    (tmp_path / "other").mkdir()
+    display["there"] = False
+    assert noted("demo", "--seconds", "3", "--out", "other").how == ("headless", 3.0, Path("other"))
+    assert (tmp_path / "other" / "report.json").is_file()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "mine", "--seconds", "0.09"),
+        ("play", "-", "--voice-rate", "999"),
+        ("demo", "--seconds", "0"),
+    ],
+)
+def test_options_have_limits(display: dict[str, bool], words: tuple[str, ...]) -> None:
+    assert omote(*words).exit_code == 2

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import pytest
 from controller.base.errors import ControllerError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS
-from controller.face.face import FrameLog, HeadValues, Recorder
+from controller.face.face import FrameLog, HeadValues, Recorder, head_indices, process_age_s
 from controller.stage.stage import FaceSettings
 
 
@@ -61,3 +63,120 @@ def test_frames_with_motion_are_counted() -> None:
     assert report["frames_with_motion"] == 2
     assert report["seconds"] == pytest.approx(0.085)
     assert report["frame_ms"]["p50"] == pytest.approx(5.0)  # type: ignore[index]
+
+
+def test_unknown_names_stay_zero_whatever_the_mailbox_holds() -> None:
+    names = PARAMETERS.names
+    with Mailbox.create(len(names)) as mailbox:
+        values = HeadValues(mailbox, PARAMETERS, (names[-1], "unheardOf", names[0]))
+        assert values.full.shape == (len(names),) and values.values.tolist() == [0.0] * 3
+        for level in (0.25, 0.75):
+            mailbox.publish(np.full(len(names), level), 7)
+            assert values().tolist() == [level, 0.0, level] and values() is values.values
+            assert (values.full == level).all()
+    assert head_indices(PARAMETERS, ("x", names[1])).tolist() == [len(names), 1]
+
+
+def test_a_kept_picture_is_the_mean_of_squares_of_the_middle() -> None:
+    recorder = Recorder(height=2)
+    picture = np.arange(6 * 10 * 3, dtype=np.uint8).reshape(6, 10, 3)
+    recorder.keep(picture, 0.0)
+    square = picture[:, 2:8].astype(float).reshape(2, 3, 2, 3, 3)
+    np.testing.assert_array_equal(recorder.frames[0], np.floor(square.mean(axis=(1, 3))))
+    tall = np.zeros((9, 4, 3), np.uint8)
+    tall[2:6] = 255
+    recorder = Recorder(height=100)
+    recorder.keep(tall, 0.0)
+    assert recorder.frames[0].shape == (4, 4, 3) and (recorder.frames[0] == 255).all()
+    recorder = Recorder(height=2)
+    recorder.keep(np.full((5, 5, 3), 255, np.uint8), 0.0)
+    assert recorder.frames[0].shape == (2, 2, 3) and (recorder.frames[0] == 255).all()
+
+
+def test_pictures_are_due_on_a_grid() -> None:
+    recorder = Recorder(clip_hz=4.0, height=4)
+    picture = np.zeros((4, 4, 3), np.uint8)
+    assert recorder.wants(0.0)
+    recorder.keep(picture, 0.1)
+    assert not recorder.wants(0.24) and recorder.wants(0.25)
+    recorder.keep(picture, 0.25)
+    assert not recorder.wants(0.49) and recorder.wants(0.5)
+    recorder.keep(picture, 1.1)  # late
+    assert not recorder.wants(1.24) and recorder.wants(1.25)
+    assert recorder.times_s == [0.1, 0.25, 1.1]
+    usual = Recorder()
+    assert (usual.clip_hz, usual.height, usual._most) == (12.5, 360, 400)
+
+
+def test_more_pictures_than_there_is_room_for_are_thinned_out() -> None:
+    recorder, picture = Recorder(clip_hz=8.0, height=4, most=4), np.zeros((4, 4, 3), np.uint8)
+    for i in range(4):
+        recorder.keep(picture, i / 8)
+    assert len(recorder.frames) == 4 and recorder.clip_hz == 8.0
+    recorder.keep(picture, 0.5)
+    assert recorder.times_s == [0.0, 0.25, 0.5] and recorder.clip_hz == 4.0 and len(recorder.frames) == 3
+    assert not recorder.wants(0.74) and recorder.wants(0.75)
+
+
+def test_a_sheet_shows_twelve_moments_of_the_whole_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written: dict[str, Any] = {}
+    monkeypatch.setattr(
+        "surface.view.pictures.sheet.compose",
+        lambda pictures, labels, *, columns: written.update(pictures=pictures, labels=labels, columns=columns),
+    )
+    monkeypatch.setattr("surface.view.pictures.sheet.write_png", lambda page, out: written.update(sheet=out))
+    monkeypatch.setattr(
+        "surface.view.pictures.clip.write_clip",
+        lambda frames, out, *, fps: written.update(frames=len(frames), clip=out, fps=fps),
+    )
+    recorder = Recorder(clip_hz=10.0, height=4)
+    assert recorder.write(tmp_path / "none") == [] and not (tmp_path / "none").exists()
+    for i in range(34):
+        recorder.keep(np.full((4, 4, 3), i, np.uint8), i / 10)
+    folder = tmp_path / "a" / "b"
+    assert recorder.write(folder) == [str(folder / "sheet.png"), str(folder / "face.webp")]
+    assert [int(picture[0, 0, 0]) for picture in written["pictures"]] == list(range(0, 34, 3))
+    assert written["labels"] == [f"{i / 10:.1f} s" for i in range(0, 34, 3)]
+    assert (written["columns"], written["frames"], written["fps"]) == (4, 34, 10.0)
+    assert (written["sheet"], written["clip"]) == (folder / "sheet.png", folder / "face.webp")
+    short = Recorder(height=4)
+    for i in range(3):
+        short.keep(np.full((4, 4, 3), i, np.uint8), i / 10)
+    short.write(folder)
+    assert [int(picture[0, 0, 0]) for picture in written["pictures"]] == [0, 1, 2]
+
+
+def test_a_log_of_frames_is_exact(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("controller.face.face.process_age_s", lambda: 2.5)
+    log, settings = FrameLog(), FaceSettings(size=(64, 32), quality="fast")
+    empty = log.report(settings, "x")
+    assert (empty["frames"], empty["seconds"], empty["frames_per_second"], empty["frame_ms"]) == (0, 0.0, 0.0, {})
+    assert empty["start_to_first_frame_s"] == 0.0
+    values = np.array([0.0, 1.0])
+    for k in range(4):
+        values[0] = k // 2  # the log has to keep a copy
+        log.add(values, 10**9 + k * 250_000_000, 10**9 + k * 250_000_000 + 125_000_000)
+    found = log.report(settings, "x")
+    assert found == {
+        "frames": 4, "seconds": 0.875, "frames_per_second": 4 / 0.875, "frames_with_motion": 1,
+        "frame_ms": dict.fromkeys(("mean", "p50", "p95", "p99", "max"), 125.0), "start_to_first_frame_s": 2.5,
+        "size": [64, 32], "quality": "fast", "renderer": "x",
+    }  # fmt: skip
+
+
+def test_the_age_of_a_process_is_that_of_the_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    ticks = os.sysconf("SC_CLK_TCK")
+    fields = ["S", *(str(i) for i in range(1, 19)), str(5 * ticks), *(str(i) for i in range(20, 50))]
+    texts = {"/proc/self/stat": f"17 (a ) b) {' '.join(fields)}\n", "/proc/uptime": "12.5 99.0\n"}
+    monkeypatch.setattr(Path, "read_text", lambda path: texts[str(path)])
+    assert process_age_s() == 7.5
+    texts["/proc/uptime"] = "x"
+    assert process_age_s() == 0.0
+    texts["/proc/self/stat"] = "17"
+    assert process_age_s() == 0.0
+
+    def missing(path: Path) -> str:
+        raise FileNotFoundError(path)
+
+    monkeypatch.setattr(Path, "read_text", missing)
+    assert process_age_s() == 0.0

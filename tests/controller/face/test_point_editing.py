@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -126,3 +127,8 @@ def test_a_stage_names_groups_that_are_missing(tmp_path: Path) -> None:
     (tmp_path / "stage.toml").write_text('name = "mine"\n[groups]\n"none.json" = 1\n')
     with pytest.raises(ConfigError, match=r"groups\[0\]: no group 'none.json'"):
         load_stage(str(tmp_path / "stage.toml"), P)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Screen).anything = 1

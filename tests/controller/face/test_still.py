@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -134,3 +135,8 @@ def test_the_sheet_names_two_sides_of_angles_only() -> None:
     assert {"headYaw +", "headYaw \N{MINUS SIGN}", "jawOpen"} <= set(labels)
     assert not {"headYaw", "jawOpen +", "jawOpen \N{MINUS SIGN}"} & set(labels)
     assert labels.index("happiness") < labels.index("jawOpen")
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Still).anything = 1

@@ -134,3 +134,9 @@ def test_how_far_a_command_moves_the_gaze() -> None:
     gaze.look(-0.1, 0.1)
     assert gaze.shift_rad == pytest.approx(0.4)
     assert gaze.direction_deg == pytest.approx((math.degrees(-0.1), math.degrees(0.1)))
+
+
+def test_straight_ahead_is_told_without_a_sign() -> None:
+    gaze = Gaze(P)
+    gaze.look(-0.0, -0.0)
+    assert [math.copysign(1.0, angle) for angle in gaze.direction_deg] == [1.0, 1.0]

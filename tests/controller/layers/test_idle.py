@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import numpy as np
@@ -130,3 +131,87 @@ def test_it_goes_on_after_it_was_switched_off(settings: IdleSettings) -> None:
     assert not path[: int(settings.blink.interval_s[0] * 100), LID].any()  # and not at once
     assert len(np.unique(path[:, P.index("leftEyeYaw")])) > 5
     assert (path[:, P.indices(settings.fidget.parameters)].max(axis=0) > 0.05).any()
+
+
+def test_what_expressions_hold_back_is_given_by_name(settings: IdleSettings) -> None:
+    life = IdleMotion(P, settings)
+    assert life.liveliness == 0.0 and not life.values.any()
+    with pytest.raises(TypeError):
+        life.update(0.0, False)  # type: ignore[misc]
+
+
+def test_blocks_scale_blinks_and_glances_and_nothing_else(settings: IdleSettings) -> None:
+    free = live(settings, 60.0)
+    half = live(settings, 60.0, blink_block=0.5, gaze_block=0.25)
+    lids, eyes = P.indices(["eyeBlinkLeft", "eyeBlinkRight"]), P.indices(
+        ["leftEyeYaw", "rightEyeYaw", "leftEyePitch", "rightEyePitch"]
+    )  # fmt: skip
+    np.testing.assert_allclose(half[:, lids], 0.5 * free[:, lids])
+    np.testing.assert_allclose(half[:, eyes], 0.75 * free[:, eyes])
+    others = np.setdiff1d(np.arange(len(P)), [*lids, *eyes])
+    np.testing.assert_array_equal(half[:, others], free[:, others])
+    assert free[:, lids].any() and free[:, eyes].any()
+
+
+def test_angles_of_eyes_and_head_are_the_values_in_rad(settings: IdleSettings) -> None:
+    life = IdleMotion(P, settings, 3)
+    life.liveliness = 0.5
+    for i in range(2000):
+        values = life.update(i * 0.02, looking=False)
+        for name, angle in (
+            ("leftEyeYaw", 0.5 * life.eye_yaw_rad), ("rightEyeYaw", 0.5 * life.eye_yaw_rad),
+            ("leftEyePitch", 0.5 * life.eye_pitch_rad), ("rightEyePitch", 0.5 * life.eye_pitch_rad),
+            ("headYaw", life.head_rad[0]), ("headPitch", life.head_rad[1]), ("headRoll", life.head_rad[2]),
+        ):  # fmt: skip
+            index = P.index(name)
+            assert values[index] == pytest.approx(angle / P.full_scale_rad[index])
+        assert abs(life.eye_yaw_rad) <= np.radians(settings.eyes.yaw_deg) + 1e-12
+        assert abs(life.eye_pitch_rad) <= np.radians(settings.eyes.pitch_deg) + 1e-12
+    life.liveliness = 0.0
+    assert not life.update(41.0, looking=False).any()
+    assert (life.eye_yaw_rad, life.eye_pitch_rad, life.head_rad.tolist()) == (0.0, 0.0, [0.0] * 3)
+
+
+def test_breath_follows_its_four_parts(settings: IdleSettings) -> None:
+    breath = settings.breath.model_copy(
+        update={"inhale_s": 2.0, "hold_s": 1.0, "exhale_s": 4.0, "pause_s": 3.0, "pitch_deg": 5.0}
+    )
+    still = settings.head.model_copy(update={"yaw_deg": 0.0, "pitch_deg": 0.0, "roll_deg": 0.0})
+    life = IdleMotion(P, settings.model_copy(update={"breath": breath, "head": still}))
+    life.liveliness = 1.0
+    full = {0.0: 0.0, 1.0: 0.5, 2.0: 1.0, 2.9: 1.0, 3.0: 1.0, 5.0: 0.5, 7.0: 0.0, 9.9: 0.0, 10.0: 0.0, 11.0: 0.5}
+    for time_s, share in full.items():
+        life.update(time_s, looking=False)
+        assert life.head_rad == pytest.approx([0.0, -np.radians(5.0) * share, 0.0]), time_s
+
+
+def test_the_head_sways_by_three_waves_of_its_periods(settings: IdleSettings) -> None:
+    breath = settings.breath.model_copy(update={"pitch_deg": 0.0})
+    head = settings.head.model_copy(
+        update={"yaw_deg": 8.0, "pitch_deg": 4.0, "roll_deg": 2.0, "period_s": (5.0, 5.0)}
+    )  # fmt: skip
+    life = IdleMotion(P, settings.model_copy(update={"breath": breath, "head": head}), 5)
+    life.liveliness = 1.0
+    times = np.arange(0.0, 5.0, 0.25)
+    path = np.array([(life.update(t, looking=True), life.head_rad.copy())[1] for t in times])
+    for axis, reach in enumerate((8.0, 4.0, 2.0)):
+        wave = np.exp(2j * np.pi * times / 5.0)
+        size = 2 * np.mean(path[:, axis] * wave)
+        np.testing.assert_allclose(path[:, axis], (size * wave.conj()).real, atol=1e-12)  # one period, no offset
+        assert 0.0 < abs(size) <= np.radians(reach) + 1e-12
+    life.update(100.0, looking=True)
+    np.testing.assert_allclose(life.head_rad, path[0], atol=1e-12)
+
+
+def test_each_axis_has_three_waves_of_its_own(settings: IdleSettings) -> None:
+    breath = settings.breath.model_copy(update={"pitch_deg": 0.0})
+    head = settings.head.model_copy(update={"yaw_deg": 8.0, "pitch_deg": 4.0, "roll_deg": 2.0, "period_s": (3.0, 9.0)})
+    life = IdleMotion(P, settings.model_copy(update={"breath": breath, "head": head}), 5)
+    life.liveliness = 0.5
+    draw = random.Random(5)
+    waves = [(draw.uniform(3.0, 9.0), draw.uniform(0.0, 2 * np.pi)) for _ in range(9)]
+    for time_s in (0.0, 1.7, 44.0):
+        life.update(time_s, looking=True)
+        shares = [np.sin(2 * np.pi * time_s / period + phase) for period, phase in waves]
+        means = np.mean(np.reshape(shares, (3, 3)), axis=1)
+        np.testing.assert_allclose(life.head_rad, 0.5 * np.radians([8.0, 4.0, 2.0]) * means, atol=1e-12)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tracemalloc
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
@@ -183,3 +184,8 @@ def test_an_adding_layer_does_not_hide_the_holder_below() -> None:
     mixer["base"].write([JAW], [0.1], 0.0)
     mix(mixer)
     assert (mixer.holder(JAW), mixer.holder(SMILE), mixer.holder(BROW)) == ("base", "high", None)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(LayerSettings).anything = 1

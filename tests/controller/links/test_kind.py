@@ -79,3 +79,9 @@ def test_a_context_has_no_further_files_unless_a_stage_names_them() -> None:
         assert (context.sink, context.closers, context.vocabularies, context.beside) == (state, closers, (), None)
         with pytest.raises(FrozenInstanceError):
             context.beside = Path()  # type: ignore[misc]
+
+
+def test_records_cannot_be_changed() -> None:
+    for record in (LinkContext, LinkKind):
+        with pytest.raises(FrozenInstanceError):
+            object.__new__(record).anything = 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
@@ -224,3 +225,8 @@ def test_envelope_without_a_plateau_and_with_ends_that_are_exact() -> None:
     assert envelope.end_s == 1.75
     assert [envelope.level(t) for t in (1.5, 1.625, 1.75)] == pytest.approx([1.0, 0.5, 0.0])
     assert 0.0 < envelope.level(1.0 + 1e-3) < 1e-5
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Envelope).anything = 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from controller.base.paths import find_config
 from controller.robot.anchors import (
     AnchorSolver,
     PullRows,
+    SkinSamples,
     load_anchors,
     pull_range_mm,
     residual_rows,
@@ -234,3 +236,9 @@ def test_every_fault_of_the_anchors_is_listed_at_once(tmp_path: Path, head: Head
     message = str(caught.value)
     assert message.startswith("mine.toml: ") and "omote check mine.toml" in caught.value.hint
     assert "channels[0].anchor.like: the head has no shape" in message and "channels[1].anchor.part: 'hair'" in message
+
+
+def test_records_cannot_be_changed() -> None:
+    for record in (SkinSamples, PullRows):
+        with pytest.raises(FrozenInstanceError):
+            object.__new__(record).anything = 1

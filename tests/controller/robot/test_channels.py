@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.base.parameters import PARAMETERS
-from controller.robot.channels import ChannelTable, PiecewiseLinear, build_table, servo_specs
+from controller.robot.channels import ChannelTable, PiecewiseLinear, Terms, build_table, servo_specs
 from controller.robot.settings import Calibration, ChannelSettings
 
 
@@ -151,3 +153,9 @@ def test_specs_carry_what_the_driver_needs() -> None:
     assert two.pulse_us == () and (one.rest_rad, two.rest_rad) == (0.1, -0.2)
     assert one.max_rad == pytest.approx(np.radians(30)) and one.max_speed_rad_s == pytest.approx(np.radians(300))
     assert servo_specs([channel()])[0].rest_rad == 0.0 and servo_specs([channel()])[0].reverse is False
+
+
+def test_records_cannot_be_changed() -> None:
+    for record in (PiecewiseLinear, Terms, ChannelTable):
+        with pytest.raises(FrozenInstanceError):
+            object.__new__(record).anything = 1

@@ -11,7 +11,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.robot import load_robot
-from controller.robot.safety import Guard
+from controller.robot.safety import AllowedRange, DeadBandAndSlack, Guard, RuleCounter
 from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
 
@@ -188,3 +188,76 @@ def test_no_hostile_target_gets_past_a_limit_of_the_shipped_head() -> None:
     assert np.all(np.abs(speed) <= table.max_speed_rad_s * (1 + 1e-9))
     assert np.all(np.abs(np.diff(speed, axis=0)) / DT <= table.max_accel_rad_s2 * (1 + 1e-6))
     assert len(guard.report()) >= 8
+
+
+def test_rules_are_counted_when_they_begin_and_timed_while_they_act() -> None:
+    counter = RuleCounter(["a", "b", "c"])
+    for a, b in ((1, 0), (1, 1), (0, 1), (1, 1), (1, 0)):
+        counter.count(np.array([a, b, 0], bool), 0.10006)
+    assert counter.report() == [
+        {"rule": "a", "times": 2, "seconds": 0.4},  # rounded to milliseconds
+        {"rule": "b", "times": 1, "seconds": 0.3},
+    ]
+    counter = RuleCounter(["a"])
+    counter.count(np.array([True]), 1.2345678)
+    assert counter.report()[0]["seconds"] == 1.235
+
+
+def test_a_range_only_becomes_smaller_at_the_side_of_its_sign() -> None:
+    allowed = AllowedRange(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    at, where = np.array([0, 0, 1]), np.array([True, True, False])
+    allowed.narrow(at, np.array([1.0, -1.0, 1.0]), np.array([0.5, -0.25, 0.0]), where)
+    assert (allowed.low.tolist(), allowed.high.tolist()) == ([-0.25, -1.0], [0.5, 1.0])
+    allowed.narrow(at[:2], np.array([1.0, -1.0]), np.array([0.75, -0.5]), where[:2])
+    assert (allowed.low.tolist(), allowed.high.tolist()) == ([-0.25, -1.0], [0.5, 1.0])
+    allowed.narrow(at[:1], np.zeros(1), np.zeros(1), where[:1])
+    assert (allowed.low.tolist(), allowed.high.tolist()) == ([-0.25, -1.0], [0.5, 1.0])
+
+
+def test_half_the_slack_is_added_on_the_way_up_and_taken_away_on_the_way_down() -> None:
+    filter_ = DeadBandAndSlack(np.array([0.0]), np.array([0.5]))
+
+    def sent(*targets: float) -> list[float]:
+        return [float(filter_.apply(np.array([target]))[0]) for target in targets]
+
+    assert sent(0.0, 0.04, 0.0) == [0.0, 0.04, 0.0]  # not yet a direction: less than a tenth of the slack
+    assert sent(0.125, 1.0) == [0.375, 1.25]
+    assert sent(0.96, 1.0) == pytest.approx([1.21, 1.25])  # came back by less than that
+    assert sent(0.9375, 0.5) == [0.6875, 0.25]
+    assert sent(0.54, 0.5625) == pytest.approx([0.29, 0.8125])
+    other = DeadBandAndSlack(np.array([0.25]), np.array([0.0]))
+    assert [float(other.apply(np.array([t]))[0]) for t in (1.0, 1.25, 0.75, 1.2501, 1.1)] == [
+        1.0, 1.0, 1.0, 1.2501, 1.2501
+    ]  # fmt: skip
+
+
+def test_a_servo_that_gave_way_comes_back_at_its_pace_after_a_rest() -> None:
+    line = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    line.run(1.0, 30.0)
+    stuck, free = (measured(np.radians([10.0]), np.array([current])) for current in (0.9, 0.1))
+    for _ in range(100):
+        line.step(30.0, state=stuck)
+    assert np.degrees(line.sent[0]) == pytest.approx(-2.0, abs=0.1)  # 12 degrees from where it was stuck
+    path = []
+    for _ in range(150):
+        line.step(30.0, state=free)
+        path.append(float(np.degrees(line.sent[0])))
+    waits = next(i for i, angle in enumerate(path) if angle > -1.95) * DT
+    assert waits == pytest.approx(LOAD.rest_s, abs=4 * DT)
+    rising = [angle for angle in path if 0.0 < angle < 25.0]
+    assert np.diff(rising) / DT == pytest.approx(np.full(len(rising) - 1, LOAD.rise_deg_s), rel=0.01)
+    assert path[-1] == pytest.approx(30.0, abs=0.1)
+    for _ in range(100):
+        line.step(30.0, state=free)
+    (row,) = line.guard.report()
+    # while it is stuck, from after_s on; the rest; and until the limit has passed the end of the servo's range
+    acted_s = (2.0 - LOAD.after_s) + LOAD.rest_s + (12.0 + 50.0 - 10.0) / LOAD.rise_deg_s
+    assert row["times"] == 1 and row["seconds"] == pytest.approx(acted_s, abs=4 * DT)
+    for _ in range(20):
+        line.step(30.0, state=stuck)
+    assert line.guard.report()[0]["times"] == 2
+    short = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    short.run(1.0, 30.0)
+    for i in range(200):  # over for less than after_s at a time
+        short.step(30.0, state=stuck if i % 8 else free)
+    assert np.degrees(short.sent[0]) == pytest.approx(30.0)

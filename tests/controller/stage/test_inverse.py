@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.anchors import head_order, sample_skin, skin_points
-from controller.stage.inverse import PointSolver, SculptSolver, load_group, save_group
+from controller.stage.inverse import GroupMoves, PointSolver, SculptSolver, load_group, save_group
 from surface.head import Group, Head
 
 
@@ -173,3 +173,8 @@ def test_a_damaged_group_file_names_its_key(head: Head, tmp_path: Path, key: str
     path.write_text("{")
     with pytest.raises(ConfigError, match="cannot be read"):
         load_group(path, head)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(GroupMoves).anything = 1

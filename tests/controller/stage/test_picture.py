@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from pydantic import ValidationError
 
 from controller.base.errors import ParameterError
 from controller.stage.picture import LightSettings, PictureSettings, parse_background, with_options
@@ -60,3 +61,50 @@ def test_backgrounds_on_the_command_line() -> None:
     assert parse_background(None) is None
     assert parse_background("#102030") == "#102030"
     assert parse_background("#102030, #405060") == ("#102030", "#405060")
+
+
+def test_the_usual_picture() -> None:
+    settings = PictureSettings()
+    assert settings.model_dump() == {
+        "quality": "full", "camera": "front", "theme": "skin", "background": None, "evaluator": "auto",
+        "kiosk": False, "monitor": 0,
+        "light": {"yaw_deg": None, "pitch_deg": None, "key": 1.0, "fill": 1.0, "rim": 1.0, "ambient": 1.0,
+                  "warmth": 0.0, "follows_camera": None},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [("yaw_deg", -180, 180), ("pitch_deg", -90, 90), ("warmth", -1, 1), ("follows_camera", 0, 1)],
+)
+def test_lights_have_limits(name: str, low: float, high: float) -> None:
+    for value in (low, high):
+        assert getattr(LightSettings.model_validate({name: value}), name) == value
+    for value in (low - 0.01, high + 0.01):
+        with pytest.raises(ValidationError):
+            LightSettings.model_validate({name: value})
+
+
+def test_monitors_have_limits() -> None:
+    assert [PictureSettings(monitor=number).monitor for number in (0, 63)] == [0, 63]
+    for number in (-1, 64):
+        with pytest.raises(ValidationError):
+            PictureSettings(monitor=number)
+
+
+def test_warmth_and_strength_are_those_of_the_colours() -> None:
+    own = THEMES["skin"]
+    red, green, blue = own.key.colour
+    for warmth in (1.0, -1.0):
+        key = PictureSettings(light=LightSettings(warmth=warmth, key=0.5)).make_theme().key
+        assert key.colour == pytest.approx(
+            (0.5 * red * (1 + 0.35 * warmth), 0.5 * green, 0.5 * blue * (1 - 0.35 * warmth))
+        )
+    theme = PictureSettings(light=LightSettings(pitch_deg=12, rim=2.0, ambient=0.25, fill=0.5)).make_theme()
+    assert (theme.key.pitch_deg, theme.key.yaw_deg, theme.lights_follow) == (12, own.key.yaw_deg, own.lights_follow)
+    assert theme.rim.colour == pytest.approx([2 * x for x in own.rim.colour])
+    assert theme.fill.colour == pytest.approx([0.5 * x for x in own.fill.colour])
+    assert theme.ground == pytest.approx([0.25 * x for x in own.ground])
+    theme = PictureSettings(background=("#336699", "#0a141e")).make_theme()
+    assert theme.background_top == pytest.approx((0x33 / 255, 0x66 / 255, 0x99 / 255))
+    assert theme.background_bottom == pytest.approx((10 / 255, 20 / 255, 30 / 255))

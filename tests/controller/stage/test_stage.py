@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import pytest
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS
-from controller.stage.stage import load_stage, parse_identity, with_picture
+from controller.stage.stage import Stage, load_stage, parse_identity, with_picture
 
 
 def stage_file(tmp_path: Path, text: str) -> str:
@@ -106,3 +107,42 @@ def test_identities_are_names_and_amounts():
     for wrong in ("broad=2", "broad=-0.1", "broad=x", "=1", "broad=nan"):
         with pytest.raises(ParameterError, match="--identity"):
             parse_identity(wrong)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Stage).anything = 1
+
+
+def test_a_stage_that_says_nothing_has_the_usual_settings(tmp_path: Path) -> None:
+    settings = load_stage(stage_file(tmp_path, 'name = "mine"'), PARAMETERS).settings
+    found = settings.model_dump()
+    face = found.pop("face")
+    assert found == {
+        "name": "mine", "description": "", "head": "ict", "identity": {}, "robots": [],
+        "control_hz": 100.0, "liveliness": 0.0, "life": "natural", "seed": 0, "vocabularies": [], "show": None,
+        "take": None, "voice": None, "voice_hz": None, "groups": {}, "layers": {}, "links": [],
+    }  # fmt: skip
+    assert (face["size"], face["fps"]) == ((1280, 720), 60.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "ends", "beyond"),
+    [
+        ("control_hz = {}", (10, 1000), (9.99, 1000.1)),
+        ("liveliness = {}", (0, 1), (-0.01, 1.01)),
+        ("seed = {}", (0, 10**9), (-1,)),
+        ("voice_hz = {}", (1000, 48_000), (999,)),
+        ("identity = {{ broad = {} }}", (0, 1), (-0.01, 1.01)),
+        ("[face]\nfps = {}", (1, 1000), (0.9, 1000.1)),
+        ("[face]\nsize = [{}, 100]", (16, 16384), (15, 16385)),
+    ],
+)
+def test_settings_of_a_stage_have_limits(
+    tmp_path: Path, line: str, ends: tuple[float, ...], beyond: tuple[float, ...]
+) -> None:
+    for value in ends:
+        load_stage(stage_file(tmp_path, f'name = "mine"\n{line.format(value)}'), PARAMETERS)
+    for value in beyond:
+        with pytest.raises(ConfigError, match="1 fault"):
+            load_stage(stage_file(tmp_path, f'name = "mine"\n{line.format(value)}'), PARAMETERS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -151,3 +152,8 @@ def test_playing_follows_the_take_and_releases_the_face_at_the_end(tmp_path: Pat
         player.tick(now)
         state.tick(now, 0.01, out)
     assert out[JAW] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Take).anything = 1

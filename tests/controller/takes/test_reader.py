@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -105,3 +106,8 @@ def test_what_is_no_take_is_refused_and_errors_name_the_package(install: Callabl
     TAKES.forget()
     with pytest.raises(PluginError, match="zero"):
         load_take(Path("a.zero"), P)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(TakeReader).anything = 1

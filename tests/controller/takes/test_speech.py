@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import wave
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -144,3 +145,8 @@ def test_talking_keeps_the_smile_and_the_brows(tmp_path: Path) -> None:
     assert talking[JAW] == pytest.approx(0.55, abs=0.02)
     assert talking[SMILE] > 0.4 and talking[P.index("cheekSquintLeft")] == pytest.approx(0.75, abs=0.01)
     assert state.holder(JAW) == "speech" and state.holder(P.index("browInnerUp")) == "expression"
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Cue).anything = 1

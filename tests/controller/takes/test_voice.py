@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import struct
 import threading
 import wave
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ import pytest
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.takes.voice import VoiceEnvelope, VoiceListener, samples
+from controller.takes.voice import VoiceEnvelope, VoiceListener, samples, wav_take
 
 RATE = 16000
 JAW, STRETCH = P.index("jawOpen"), P.index("mouthStretchLeft")
@@ -139,3 +141,106 @@ def test_rates_that_are_no_sound_are_refused(rate: int) -> None:
     with pytest.raises(ValueError, match="rate_hz must be 1000 or more"):
         VoiceEnvelope(P, rate)
     assert VoiceEnvelope(P, 1000).hop == 10
+
+
+def test_a_voice_far_below_the_loudest_closes_the_mouth_and_no_further() -> None:
+    sound = np.concatenate([tone(200, 0.5, 0.8), tone(200, 0.8, 0.03)])  # above silence, below a share of the loudest
+    face = heard(VoiceEnvelope(P, RATE), sound)
+    assert face[45, JAW] > 0.4
+    assert 0.0 <= face[-1, JAW] < 0.01 and face.min() >= 0.0
+
+
+def followed(loudness: np.ndarray, loud: np.ndarray) -> np.ndarray:
+    """(n, 2) levels of voice and hiss, a row every 10 ms: up in 30 ms, down in 90 ms, nothing below 6 %."""
+    level, rows = [0.0, 0.0], []
+    for row in loudness:
+        for k in range(2):
+            goal = min(max(row[k] / (loud[k] or 1.0) - 0.06, 0.0), 1.0)
+            level[k] += (goal - level[k]) * (1 - math.exp(-0.01 / (0.03 if goal > level[k] else 0.09)))
+        rows.append(list(level))
+    return np.array(rows)
+
+
+def bands(piece: np.ndarray, rate: int) -> list[float]:
+    """Strength of 60 to 2500 Hz and of all above 4000 Hz, by a sum over each frequency alone."""
+    n = len(piece)
+    shaped = piece * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / (n - 1)))
+    found = [0.0, 0.0]
+    for k in range(n // 2 + 1):
+        power = abs(np.sum(shaped * np.exp(-2j * np.pi * k * np.arange(n) / n))) ** 2
+        hz = np.fft.rfftfreq(n, 1 / rate)[k]  # rounds to one side of a band's edge
+        found[0] += power if 60 < hz < 2500 else 0.0
+        found[1] += power if hz > 4000 else 0.0
+    return [math.sqrt(value) for value in found]
+
+
+def mouth(voice: float, hiss: float) -> dict[str, float]:
+    shared = hiss * (1 - 0.7 * voice)
+    return {
+        "jawOpen": 0.55 * voice + 0.06 * shared,
+        "mouthLowerDownLeft": 0.2 * voice + 0.25 * shared,
+        "mouthUpperUpRight": 0.1 * voice,
+        "mouthStretchRight": 0.3 * shared,
+    }
+
+
+EDGES = tone(2500, 0.05, 0.3) + tone(4000, 0.05, 0.3)  # just outside of both bands
+SPOKEN = np.concatenate(
+    [tone(200, 0.1), np.zeros(800), tone(6000, 0.06, 0.2), tone(300, 0.05) + tone(5000, 0.05), EDGES]
+)
+
+
+def test_a_file_becomes_the_take_that_its_sound_gives(tmp_path: Path) -> None:
+    path = tmp_path / "a.wav"
+    path.write_bytes(wav(SPOKEN))
+    take = wav_take(path, P)
+    sound = np.concatenate([(SPOKEN * 32767).astype("<i2") / 32768, np.zeros(480)])
+    count = len(SPOKEN) // 160
+    loudness = np.array([bands(sound[160 * i : 160 * i + 480], RATE) for i in range(count)])
+    levels = followed(loudness, np.percentile(loudness, 95, axis=0))
+    assert take.frames == count and take.rate_hz == pytest.approx(100.0)
+    np.testing.assert_allclose(take.times_s, np.arange(count) / 100)
+    for i, (voice, hiss) in enumerate(levels):
+        for name, value in mouth(voice, hiss).items():
+            assert take.values[i, P.index(name)] == pytest.approx(value, abs=1e-9), (i, name)
+    assert levels.max() > 0.6 and not take.values[:, P.index("mouthSmileLeft")].any()
+    assert take.mask[JAW] and take.mask[STRETCH] and not take.mask[P.index("mouthSmileLeft")]
+
+
+def test_a_stream_gives_what_its_sound_gives() -> None:
+    ear = VoiceEnvelope(P, RATE)
+    face = heard(ear, SPOKEN)
+    window = np.zeros(480)
+    hann = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(480) / 479)
+    least = 0.003 * math.sqrt((hann**2).sum() * 480 / 2)
+    loudest, rows, shares = [least, least], [], []
+    for i in range(len(face)):
+        window = np.concatenate([window[160:], SPOKEN[160 * i : 160 * i + 160]])
+        row = bands(window, RATE)
+        loudest = [max(most * math.exp(-0.01 / 4.0), now, least) for most, now in zip(loudest, row, strict=True)]
+        shares.append([now / most if now > least else 0.0 for now, most in zip(row, loudest, strict=True)])
+    rows = followed(np.array(shares), np.ones(2))
+    for i, (voice, hiss) in enumerate(rows):
+        for name, value in mouth(voice, hiss).items():
+            assert face[i, P.index(name)] == pytest.approx(value, abs=1e-9), (i, name)
+
+
+def test_files_without_sound_are_refused_and_short_ones_have_a_row(tmp_path: Path) -> None:
+    path = tmp_path / "a.wav"
+    path.write_bytes(wav(np.zeros(0)))
+    with pytest.raises(TakeError, match=r"a\.wav: no sound in it") as caught:
+        wav_take(path, P)
+    assert "ffmpeg" in caught.value.hint
+    path.write_bytes(wav(tone(200, 0.005)))
+    assert wav_take(path, P).frames == 1
+    path.write_bytes(wav(np.zeros(1600)))
+    assert not wav_take(path, P).values.any()
+    with pytest.raises(TakeError, match=r"none\.wav: cannot be read: No such file") as caught:
+        wav_take(tmp_path / "none.wav", P)
+    assert caught.value.hint == f"look at: ls -l {tmp_path / 'none.wav'}"
+
+
+def test_every_width_fills_its_range_exactly() -> None:
+    assert samples(bytes([0, 128, 192]), 1, 1).tolist() == [-1.0, 0.0, 0.5]
+    assert samples(np.array([-(2**15), 2**14, 2**14, -(2**14)], "<i2").tobytes(), 2, 2).tolist() == [-0.25, 0.0]
+    assert samples(np.array([-(2**31), 2**29], "<i4").tobytes() + b"abc", 4, 1).tolist() == [-1.0, 0.25]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import subprocess
@@ -9,13 +10,19 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
-from typing import Self
+from types import SimpleNamespace
+from typing import Any, Self
 
+import numpy as np
 import pytest
+from rich.console import Console
 
 from controller.base.errors import ControllerError
+from controller.base.parameters import PARAMETERS
+from controller.robot.robot import load_robot
+from controller.tools import calibrate as module
 from controller.tools.calibrate import keyboard, split_keys
 from drivers.sim import ServoView, SimulatedBus
 
@@ -203,3 +210,113 @@ def test_something_that_is_no_terminal_is_refused() -> None:
         keyboard(reading).__enter__()
     os.close(reading)
     os.close(writing)
+
+
+class Servos:
+    """A bus of a calibration: what it is asked, and angles (deg) of some age for every read."""
+
+    measures = True
+
+    def __init__(self, count: int) -> None:
+        self.asked: list[object] = []
+        self.running = False
+        self.angle_deg, self.age_s = np.full(count, 5.0), np.zeros(count)
+
+    def __enter__(self) -> Servos:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.asked.append("closed")
+
+    def start(self) -> None:
+        self.running = True
+        self.asked.append("start")
+
+    def stop(self) -> None:
+        self.running = False
+        self.asked.append("stop")
+
+    def write(self, angle_rad: np.ndarray) -> None:
+        self.asked.append(np.degrees(angle_rad).round(6).tolist())
+
+    def read(self) -> SimpleNamespace:
+        return SimpleNamespace(age_s=self.age_s, position_rad=np.radians(self.angle_deg))
+
+
+def calibrated(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, keys: list[list[str]], **changes: Any
+) -> tuple[bool, Servos, list[Any], str]:
+    """Run a calibration of jaw and brow, of two servos on one bus; keys come a round at a time, then q and y."""
+    text = ROBOT.format(port="/dev/none")
+    other = text[text.index("[[channels]]") :].replace('"jaw"', '"brow"').replace("id = 1", "id = 2")
+    (tmp_path / "pair.toml").write_text(text + other.replace("max_speed_deg_s = 300", "max_speed_deg_s = 20"))
+    robot = load_robot(tmp_path / "pair.toml", PARAMETERS)
+    servos, opened, left = Servos(2), list[Any](), iter(keys)
+    for name, value in changes.items():
+        setattr(servos, name, value)
+
+    def open_bus(kind: str, specs: Any, **options: Any) -> Servos:
+        opened.append((kind, specs, options))
+        return servos
+
+    def read_keys(wait_s: float) -> list[str]:
+        assert wait_s == 0.03
+        return next(left, ["q", "y"])
+
+    monkeypatch.setattr(module, "open_bus", open_bus)
+    monkeypatch.setattr(module, "keyboard", lambda: nullcontext(read_keys))
+    out = io.StringIO()
+    console = Console(file=out, force_terminal=True, width=140)
+    target = tmp_path / "c.toml"
+    written = module.run_calibration(robot, robot.channels, "desk", target, 0.0, console)
+    return written, servos, opened, out.getvalue()
+
+
+def test_servos_are_slow_while_they_are_calibrated_and_closed_at_the_end(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    written, servos, opened, shown = calibrated(monkeypatch, tmp_path, [["h"], ["right"], ["h"], []])
+    ((kind, specs, options),) = opened
+    assert kind == "dynamixel" and options["port"] == "/dev/none"
+    assert [spec.max_speed_rad_s for spec in specs] == pytest.approx([0.5, np.radians(20)])
+    assert not written and not (tmp_path / "c.toml").exists()
+    assert servos.asked == ["start", [5.0, 5.0], [5.5, 5.0], "stop", "closed"]
+    assert "pair, calibration 'desk'" in shown
+
+
+def test_what_was_captured_is_saved_once_it_is_complete(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    keys = [["t"], ["N"]]
+    angles = iter([-10.0, 3.0, 20.0])
+    read = Servos.read
+
+    def moving(servos: Servos) -> SimpleNamespace:
+        servos.angle_deg = np.array([next(angles, 3.0), 3.0])
+        return read(servos)
+
+    monkeypatch.setattr(Servos, "read", moving)
+    written, _, _, shown = calibrated(monkeypatch, tmp_path, [*keys, [], [], ["s"], []])
+    assert written and "saved 1 channels; not complete: brow" in shown
+    captured = tomllib.loads((tmp_path / "c.toml").read_text())
+    assert captured["channels"] == {"jaw": pytest.approx({"min_deg": 3, "neutral_deg": 3, "max_deg": 20})}
+
+
+@pytest.mark.parametrize(("age_s", "known"), [(0.49, True), (0.5, False)])
+def test_an_angle_is_known_for_half_a_second(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, age_s: float, known: bool
+) -> None:
+    _, servos, _, shown = calibrated(monkeypatch, tmp_path, [["h"], []], age_s=np.array([0.0, age_s]))
+    assert ("start" in servos.asked) is known
+    assert ("not every servo says where it is" in shown) is not known
+
+
+def test_angles_of_servos_that_measure_nothing_count_whatever_their_age(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    _, servos, _, _ = calibrated(monkeypatch, tmp_path, [["h"], ["right"]], age_s=np.full(2, np.inf), measures=False)
+    assert servos.asked == ["start", [5.0, 5.0], [5.5, 5.0], "closed"]  # 5 deg, and a step of the right key
+
+
+def test_keys_of_a_terminal_are_told_apart() -> None:
+    keys = "\x1b[A\x1b[B\x1b[C\x1b[D\x1bOA\x1bOB\x1bOC\x1bOD\nq"
+    assert split_keys(keys) == ["up", "down", "right", "left", "up", "down", "right", "left", "\n", "q"]
+    assert split_keys("\x1b") == [] and split_keys("") == []

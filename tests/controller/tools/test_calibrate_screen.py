@@ -111,3 +111,124 @@ def test_the_screen_shows_every_channel_with_its_bar() -> None:
     assert rows[1].startswith(">")
     assert "●" in rows[0]
     assert "●" not in rows[2]
+
+
+def drawn(state: CalibrationScreen, width: int = 140) -> list[str]:
+    out = io.StringIO()
+    Console(file=out, width=width).print(state.picture("head24"))
+    return out.getvalue().splitlines()
+
+
+def test_a_bar_spans_the_limits_and_marks_every_angle_in_its_place() -> None:
+    low, high = CHANNELS[0].limit_deg
+    span = high - low
+    state = CalibrationScreen(CHANNELS)
+
+    def bar() -> str:
+        row = next(line for line in drawn(state) if f" {CHANNELS[0].name} " in line)
+        return next(word for word in row.split("  ") if "·" in word).strip()
+
+    for key, share in (("[", 0.0), ("n", 10 / 43), ("]", 42 / 43)):
+        pressed(seen(state, low + share * span, 0.0, 0.0), key)
+    seen(state, high, 0.0, 0.0)
+    assert bar() == "[" + "·" * 9 + "|" + "·" * 31 + "]●"
+    seen(state, low, 0.0, 0.0)
+    assert bar() == "●" + "·" * 9 + "|" + "·" * 31 + "]·"
+    seen(state, high + span, 0.0, 0.0)  # a hand moves it past the limits
+    assert bar() == "[" + "·" * 4 + "|" + "·" * 15 + "]" + "·" * 21 + "●"
+    assert len(bar()) == 44
+    seen(state, np.nan, 0.0, 0.0)
+    assert "●" not in bar()
+
+
+def test_the_screen_tells_angles_state_questions_and_keys() -> None:
+    state = seen(CalibrationScreen(CHANNELS), 1.25, -2.04, np.nan)
+    pressed(state, "n", "down", "[")
+    lines = drawn(state)
+    assert lines[0].rstrip() == "head24   motors off: move it by hand"
+    assert lines[1].split() == ["channel", "now", "lowest", "neutral", "highest"]
+    assert lines[2].split()[:2] == [CHANNELS[0].name, "1.2"] and lines[2].split()[-1] == "1.2"
+    assert lines[3].split()[:3] == [">", CHANNELS[1].name, "-2.0"] and lines[3].split()[-1] == "-2.0"
+    assert "up/down channel" in lines[-2] and "q leave" in lines[-1]
+    pressed(seen(state, 0.0, 0.0, 0.0), "t", "h")
+    assert drawn(state)[0].rstrip() == "head24   motors on, following the extremes"
+    pressed(state, "q")
+    assert any("leave without saving? (y/n)" in line for line in drawn(state))
+
+
+def test_steps_limits_and_selection() -> None:
+    state = seen(CalibrationScreen(CHANNELS), 0.0, 1.0, 2.0)
+    assert STEP_DEG == 0.5
+    pressed(state, "up", "h", "left", "left", "right")
+    assert state.selected == 2 and state.target_deg.tolist() == [0.0, 1.0, 1.5]
+    pressed(state, "down", "right")
+    assert state.selected == 0 and state.target_deg[0] == 0.5 and state.message == ""
+    pressed(state, "left", *["left"] * 1000)
+    low = CHANNELS[0].limit_deg[0]
+    assert state.target_deg[0] == low and state.message == f"limit_deg of the robot file ends at {low:g}"
+    pressed(state, "h", "left")
+    assert state.message == "h switches the motors on where they stand; then the arrows move"
+    assert not state.holding
+    pressed(state, "?")
+    assert state.message == ""
+
+
+def test_what_cannot_be_captured_is_named() -> None:
+    state = pressed(seen(CalibrationScreen(CHANNELS), 3.0, np.nan, np.nan), "N")
+    assert state.message == f"no angle from {CHANNELS[1].name}, {CHANNELS[2].name}"
+    assert state.changed and state.marks[0].neutral == 3.0 and np.isnan(state.marks[1].neutral)
+    state = pressed(seen(CalibrationScreen(CHANNELS), np.nan, 0.0, 0.0), "n")
+    assert state.message == f"no angle from {CHANNELS[0].name}" and not state.changed
+    pressed(state, "q")
+    assert state.done  # nothing was captured: nothing is asked
+    assert not CalibrationScreen(CHANNELS).changed and CalibrationScreen(CHANNELS).margin_deg == 1.0
+
+
+def test_a_margin_keeps_neutral_inside_and_a_channel_without_a_way_is_left_out() -> None:
+    state = CalibrationScreen(CHANNELS, margin_deg=2.0)
+    for key, angle in (("n", 1.0), ("[", 0.0), ("]", 10.0)):
+        pressed(seen(state, angle, angle, 5.0), key, "down", key, "down", key, "down")
+    (first, second) = state.captured().values()
+    assert (first.min_deg, first.neutral_deg, first.max_deg) == (1.0, 1.0, 8.0) == (
+        second.min_deg, second.neutral_deg, second.max_deg
+    )  # fmt: skip
+    pressed(state, "s")
+    assert state.saving and state.message == ""
+    state.saved("saved 2 channels")
+    assert not state.saving and not state.changed and state.message == "saved 2 channels"
+    pressed(state, "c", "down", "c")
+    assert list(state.captured()) == []
+    pressed(state, "down", "s")
+    assert not state.saving
+    assert state.message == f"nothing to save yet: {CHANNELS[2].name} lacks a way between its ends"
+
+
+def test_answers_in_capitals_count_and_others_keep_the_question() -> None:
+    state = pressed(seen(CalibrationScreen(CHANNELS), 0.0, 0.0, 0.0), "n", "q", "t", "N")
+    assert not state.done and not state.question and not state.tracking
+    assert pressed(state, "q", "Y").done
+    state = CalibrationScreen(CHANNELS)
+    state.saving = True
+    state.ask("replace desk.toml? (y/n)")
+    assert not state.saving
+    pressed(state, "N")
+    assert (state.message, state.may_replace, state.done) == ("not saved", False, False)
+    state.ask("replace desk.toml? (y/n)")
+    pressed(state, "Y")
+    assert (state.message, state.may_replace, state.saving) == ("", True, True)
+
+
+def test_extremes_are_not_followed_while_the_motors_hold_or_where_nothing_is_measured() -> None:
+    state = pressed(seen(CalibrationScreen(CHANNELS), 0.0, 0.0, 0.0), "t", "h")
+    seen(state, 9.0, 9.0, 9.0)
+    assert np.isnan(state.marks[0].high) and not state.changed
+    pressed(state, "h")
+    seen(state, 7.0, 9.0, np.nan)
+    assert (state.marks[0].low, state.marks[0].high, state.changed) == (7.0, 7.0, True)
+    assert state.marks[2].missing == ["lowest", "neutral", "highest"]
+    pressed(state, "t")
+    assert not state.tracking and state.message == ""
+    silent = pressed(CalibrationScreen(CHANNELS, measures=False), "t")
+    assert silent.message == "these servos do not say where they are: use the arrows"
+    silent = pressed(CalibrationScreen(CHANNELS), "h")
+    assert silent.message == "not every servo says where it is"

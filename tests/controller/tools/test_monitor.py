@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import struct
 import sys
 from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
 import pytest
 from rich.console import Console
 
-from controller.tools.monitor import KEPT, BusView, listen_to_bus, poll_servos, table_of
-from drivers.base.errors import NoReply, PortMissing
-from drivers.core.traffic import Decoder2
+from controller.tools import monitor as module
+from controller.tools.monitor import KEPT, BusView, listen_to_bus, make_decoder, poll_servos, table_of
+from drivers.base.bus import BusState
+from drivers.base.errors import DriverError, NoReply, PortLost, PortMissing
+from drivers.core.traffic import Decoder1, Decoder2
 from drivers.packets.packet import encode_instruction, encode_status
 from drivers.sim import SimulatedBus
 from drivers.tables.tables import load_table
@@ -140,3 +147,145 @@ def test_tables_take_any_columns_and_leave_unknown_cells_empty() -> None:
     table = table_of([{"id": 1, "torque": False}, {"id": 2, "load": 0.25}])
     assert [column.header for column in table.columns] == ["id", "torque", "load"]
     assert [list(column.cells) for column in table.columns] == [["1", "2"], ["off", ""], ["", "0.2"]]
+
+
+class Lossy:
+    """A bus of two servos whose reads give, or raise, one thing after another."""
+
+    servos = (SimpleNamespace(id=3, model="a"), SimpleNamespace(id=5, model="b"))
+
+    def __init__(self, *results: object) -> None:
+        self.results = list(results)
+        self.reconnects: list[object] = []
+
+    def read(self) -> object:
+        found = self.results.pop(0)
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    def reconnect(self) -> None:
+        self.reconnects.append(1)
+        if isinstance(self.results[0], DriverError):
+            raise self.results.pop(0)  # type: ignore[misc]
+
+
+class Hands:
+    """A clock that only sleeping moves on."""
+
+    def __init__(self) -> None:
+        self.now, self.sleeps = 10.0, list[float]()
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.sleeps.append(seconds)
+        self.now += seconds
+
+
+def state_of(**changes: object) -> BusState:
+    none, no = np.zeros(2), np.zeros(2, bool)
+    codes = np.zeros(2, np.uint8)
+    plain = BusState(0.0, none, none, none, ~no, none, codes, no, none, none, codes, no)
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def test_states_are_told_by_servo(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "time", Hands())
+    state = state_of(
+        position_rad=np.radians([90.0, -45.0]), velocity_rad_s=np.radians([10.0, 0.0]),
+        current_a=np.array([0.12345, np.nan]), voltage_v=np.array([5.0, 4.5]), temperature_c=np.array([30.0, 31.0]),
+        torque=np.array([True, False]),
+    )  # fmt: skip
+    reader = module._Reader(cast(Any, Lossy(state)), 0.1)
+    assert reader.rows() == [
+        {"id": 3, "model": "a", "state": "port lost"}, {"id": 5, "model": "b", "state": "port lost"}
+    ]  # fmt: skip
+    reader.step()
+    first, second = reader.rows()
+    assert first == pytest.approx(
+        {"id": 3, "model": "a", "position deg": 90.0, "speed deg/s": 10.0, "current A": "0.123", "supply V": 5.0,
+         "temp. C": 30.0, "torque": True, "state": ""}
+    )  # fmt: skip
+    assert second["position deg"] == pytest.approx(-45.0) and second["current A"] == "" and second["torque"] is False
+    for changes, told in (
+        ({"fresh": np.array([False, True]), "age_s": np.array([1.25, 9.0])}, ["1.2 s old", ""]),
+        ({"silent": np.array([False, True]), "fresh": np.zeros(2, bool)}, ["0.0 s old", "silent"]),
+        ({"hardware_error": np.array([0, 0x2C], np.uint8)}, ["", "hardware error 0x2c"]),
+    ):
+        reader = module._Reader(cast(Any, Lossy(state_of(**changes))), 0.1)
+        reader.step()
+        assert [row["state"] for row in reader.rows()] == told
+
+
+def test_a_bus_is_read_at_its_rate_and_a_lost_port_tried_again_after_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    hands, state = Hands(), state_of()
+    monkeypatch.setattr(module, "time", hands)
+    lost = PortLost("gone", port="p")
+    bus = Lossy(state, state, lost, NoReply("still gone", port="p"), lost, state, state)
+    reader = module._Reader(cast(Any, bus), 0.25)
+    reader.step()
+    reader.step()
+    assert hands.sleeps == [0.0, 0.25] and "position deg" in reader.rows()[0]
+    reader.step()
+    assert reader.rows()[0]["state"] == "port lost" and len(bus.reconnects) == 1
+    reader.step()  # lost again, but it came back
+    reader.step()
+    assert hands.sleeps == [0.0, 0.25, 0.25, 1.0, 1.0] and len(bus.reconnects) == 2
+    assert "position deg" in reader.rows()[0]
+    hands.now += 5.0  # the reader was held up: what it missed is not made up for
+    reader.step()
+    assert hands.sleeps[-1] == 0.0
+
+
+def test_what_was_heard_is_a_row_for_each_servo() -> None:
+    decoder = Decoder2({3: load_table("xl330-m288")})
+    decoder.feed(None, encode_instruction(3, 2, struct.pack("<HH", 132, 4)))
+    decoder.feed(None, encode_status(3, 0, struct.pack("<i", 1234)))
+    decoder.feed(None, encode_status(9, 0x80, b""))
+    decoder.feed(None, encode_status(9, 0, b""))
+    assert module._heard_rows(decoder) == [
+        {"id": 3, "answers": 1, "error": decoder.heard[3].error, "Present Position": 1234},
+        {"id": 9, "answers": 2, "error": decoder.heard[9].error},
+    ]
+
+
+def test_lines_are_shown_every_tenth_of_a_second_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    hands, out = Hands(), io.StringIO()
+    view = watch(Console(file=out))
+    monkeypatch.setattr(module, "time", hands)
+    view._begun_s = 8.75
+    counts: list[int] = []
+
+    def step() -> None:
+        counts.append(out.getvalue().count("write"))
+        view.tap(True, WRITE)
+        hands.now += 0.0625
+
+    view.run(times(5), step)
+    assert counts == [0, 1, 1, 3, 3]
+    assert out.getvalue().count("write") == 5  # what was left is printed at the end
+    assert out.getvalue().startswith("    1.250  -> 3 write Goal Position = 2048\n")
+
+
+def test_cells_of_every_kind() -> None:
+    table = table_of([{"a": None, "b": math.nan, "c": True, "d": False, "e": 1.25, "f": 7, "g": "x"}])
+    assert [list(column.cells) for column in table.columns] == [[""], [""], ["on"], ["off"], ["1.2"], ["7"], ["x"]]
+    assert table_of([]).columns == []
+
+
+def test_a_view_shows_sixteen_lines_of_traffic() -> None:
+    view = BusView("t", list, Decoder2({}), Console(file=io.StringIO()))
+    for i in range(20):
+        view.tap(True, encode_instruction(i + 1, 1))
+    screen = shown(view)
+    assert [f"-> {i} ping" in screen for i in range(3, 7)] == [False, False, True, True]
+
+
+def test_decoders_are_of_their_protocol_and_know_a_usual_model() -> None:
+    assert isinstance(make_decoder(1, {}), Decoder1) and isinstance(make_decoder(2, {}), Decoder2)
+    with pytest.raises(DriverError):
+        make_decoder(2, {}, "nothing")
+    view = watch()
+    assert view._log.maxlen == 16 and KEPT == 4096

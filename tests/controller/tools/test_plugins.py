@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS
 from controller.takes.reader import TAKES, load_take, reader_of
-from controller.tools.plugins import EXPORTERS, SORTS, listed
+from controller.tools.plugins import EXPORTERS, SORTS, Listed, listed
 from drivers import open_bus
 from drivers.base.bus import ServoSpec
 from drivers.base.errors import PluginError
@@ -104,3 +105,8 @@ def test_what_cannot_be_used_is_listed_with_the_reason_and_the_rest_as_ever(inst
     wrong = found["bus", "wrong"]
     assert not wrong.works and "wrong-package must be a Family, not 3" in wrong.title and wrong.hint
     assert all(found[key].works for key in before)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Listed).anything = 1

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError, replace
+
 import pytest
 
 from controller.tools.scan import BAUDS, STEPS, Found, plan_scan, scan_port
+from drivers.base.bus import ServoInfo
 from drivers.base.errors import PortMissing
 from drivers.sim import SimulatedBus
 
@@ -50,3 +53,36 @@ def test_a_missing_port_is_one_error() -> None:
     with pytest.raises(PortMissing) as caught:
         list(scan_port("/dev/not-there", plan_scan([1_000_000], [1])))
     assert caught.value.hint
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Found).anything = 1
+
+
+def test_a_row_tells_what_is_known_and_leaves_the_rest_empty() -> None:
+    plain = ServoInfo(id=7, model="", model_number=999, firmware=3)
+    assert Found(9600, 2, plain).row == ("9600", "2.0", "7", "number 999", "3", "", "", "", "")
+    known = replace(plain, model="ax-12a", voltage_v=11.96, temperature_c=30.6, hardware_error=0x0C, torque=True)
+    assert Found(1, 1, known).row == ("1", "1.0", "7", "ax-12a", "3", "12.0 V", "31 C", "0x0c", "on")
+    assert Found(1, 1, replace(known, hardware_error=0, torque=False)).row[-2:] == ("", "off")
+    assert len(Found(1, 1, None).row) == 9
+
+
+def test_progress_of_protocol_1_goes_on_from_entry_to_entry() -> None:
+    told: list[tuple[str, int]] = []
+    with SimulatedBus([1], model="ax-12a", baud=500_000) as servos:
+        plan = [(2, 500_000), (1, 500_000)]
+        list(scan_port(servos.path, plan, lambda text, step: told.append((text, step))))
+    steps = [step for _, step in told]
+    assert steps[0] == 0 and steps[1] == STEPS == 254 and told[-1] == ("done", 508) and steps == sorted(steps)
+    assert {text for text, step in told if 254 <= step < 508} == {"500000 baud, Protocol 1.0"}
+
+
+def test_rates_are_those_of_the_manuals() -> None:
+    assert plan_scan(None, [1])[0] == (1, 1_000_000)
+    assert sorted(BAUDS[2]) == [9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000]
+    assert sorted(BAUDS[1]) == [
+        9_600, 19_200, 38_400, 57_600, 76_800, 115_200, 128_000, 200_000, 250_000, 400_000, 500_000, 1_000_000
+    ]  # fmt: skip
+    assert plan_scan([7, 8], [1, 2]) == [(1, 7), (1, 8), (2, 7), (2, 8)]

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ import serial
 from typer.testing import CliRunner
 
 from controller.base.errors import ConfigError
-from controller.tools.simulate import robot_bus
+from controller.tools.simulate import Serving, robot_bus
 
 
 @contextmanager
@@ -143,3 +144,8 @@ def test_what_cannot_be_simulated_is_told(words: tuple[str, ...], why: str) -> N
     result = CliRunner().invoke(make_app(), ["simulate", *words])
     assert result.exit_code != 0
     assert why in f"{result.output}{result.exception}"
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Serving).anything = 1

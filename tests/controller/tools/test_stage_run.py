@@ -1,11 +1,23 @@
-"""What a session leaves behind."""
+"""What a session plays, refuses and leaves behind."""
 
 from __future__ import annotations
 
+import gc
 import json
+import sys
+import threading
+import time
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
-from controller.tools.stage_run import REPORT_FORMAT, write_report
+import pytest
+
+from controller.base.errors import ConfigError, ControllerError, TakeError
+from controller.body.messages import RunOptions
+from controller.tools import stage_run as module
+from controller.tools.stage_run import REPORT_FORMAT, StageRun, has_display, write_report
 
 
 def test_a_report_states_the_version_of_its_keys_first(tmp_path: Path) -> None:
@@ -14,3 +26,219 @@ def test_a_report_states_the_version_of_its_keys_first(tmp_path: Path) -> None:
     found = json.loads((tmp_path / "r.json").read_text())
     assert found == {"format": REPORT_FORMAT, **report} and next(iter(found)) == "format"
     assert report == {"stage": "demo", "written": []}
+    assert found["format"] == 1
+    assert (tmp_path / "r.json").read_text() == '{\n  "format": 1,\n  "stage": "demo",\n  "written": []\n}\n'
+
+
+@pytest.mark.parametrize(
+    ("platform", "names", "there"),
+    [
+        ("linux", (), False),
+        ("linux", ("DISPLAY",), True),
+        ("linux", ("WAYLAND_DISPLAY",), True),
+        ("darwin", (), True),
+        ("win32", (), True),
+    ],
+)
+def test_linux_alone_may_have_no_display(
+    monkeypatch: pytest.MonkeyPatch, platform: str, names: tuple[str, ...], there: bool
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    for name in names:
+        monkeypatch.setenv(name, ":1")
+    monkeypatch.setattr(sys, "platform", platform)
+    assert has_display() is there
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> str:
+    """A stage without robots and links, with a small picture."""
+    (tmp_path / "a.tsv").write_text("0.0\taa\n0.2\tsil\n")
+    text = 'name = "mine"\nidentity = { broad = 0.25 }\n[face]\nsize = [64, 48]\nquality = "fast"\n'
+    (tmp_path / "stage.toml").write_text(text)
+    return str(tmp_path / "stage.toml")
+
+
+def test_options_replace_what_the_stage_says(stage: str) -> None:
+    plain = StageRun(stage).stage.settings
+    assert (plain.identity, plain.face.size, plain.face.theme) == ({"broad": 0.25}, (64, 48), "skin")
+    other = StageRun(stage, identity={"broad": 0.5}, look={"theme": "mask", "quality": None}).stage.settings
+    assert (other.identity, other.face.theme, other.face.quality) == ({"broad": 0.5}, "mask", "fast")
+    assert StageRun(stage, identity={}).stage.settings.identity == {"broad": 0.25}
+
+
+def test_what_cannot_be_played_is_refused_before_anything_starts(stage: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="'nobody'"):
+        StageRun(stage, identity={"nobody": 0.5})
+    with pytest.raises(ConfigError, match=r"stage\.toml: robots: a stage without a robot has nothing to mirror"):
+        StageRun(stage, RunOptions(mirror=True))
+    assert StageRun("everything", RunOptions(mirror=True)).stage.robots
+    with pytest.raises(TakeError, match=r"none\.tsv"):
+        StageRun(stage, RunOptions(tmp_path / "none.tsv"))
+    (tmp_path / "bad.rec").write_text("no recording")
+    for name in ("none.rec", "bad.rec"):
+        with pytest.raises(ControllerError, match=name):
+            StageRun(stage, RunOptions(tmp_path / name))
+    StageRun(stage, RunOptions(tmp_path / "a.tsv"))
+
+
+class FakeBody:
+    """The body's process, without a process: it has something to play for as many questions as ``lives``."""
+
+    def __init__(self, told: list[str], lives: int) -> None:
+        self.told, self.lives, self.report = told, lives, {"control": {"ticks": 3}}
+        self.flag = threading.Event()
+
+    def __call__(self, stage: Any, parameters: Any, options: RunOptions, *, preloaded: object) -> FakeBody:
+        self.options, self.preloaded = options, preloaded
+        return self
+
+    def __enter__(self) -> FakeBody:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.told.append("left")
+
+    def wait_ready(self) -> None:
+        self.told.append("ready")
+
+    def begin(self) -> None:
+        self.told.append("begin")
+
+    def alive(self) -> bool:
+        self.lives -= 1
+        return self.lives >= 0
+
+    def stop(self) -> None:
+        self.told.append("stop")
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """What was done, in order; waits are told instead of waited."""
+    found: list[str] = []
+    monkeypatch.setattr(module, "time", SimpleNamespace(sleep=lambda seconds: found.append(f"sleep {seconds}")))
+    yield found
+    gc.unfreeze()
+
+
+def test_a_run_without_a_face_goes_on_while_the_body_plays(
+    stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body = FakeBody(told, 2)
+    monkeypatch.setattr(module, "BodyProcess", body)
+    preloaded: Any = object()
+    gc.disable()
+    report = StageRun(stage, RunOptions(), status=told.append, preloaded=preloaded).run_without_face(60.0)
+    assert told == [
+        "starting", "ready", "begin", "running for 60 s", "sleep 0.05", "sleep 0.05", "bringing the servos to rest",
+        "stop", "left",
+    ]  # fmt: skip
+    assert gc.isenabled()
+    assert gc.get_freeze_count() > 0
+    assert body.preloaded is preloaded
+    assert report == {"stage": "mine", "face": None, "control": {"ticks": 3}, "written": []}
+
+
+def test_a_limp_head_is_not_brought_to_rest(told: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "BodyProcess", FakeBody(told, 1))
+    StageRun("everything", RunOptions(mirror=True), status=told.append).run_without_face(None)
+    assert told == ["starting", "ready", "begin", "running", "sleep 0.05", "stopping", "stop", "left"]
+
+
+def test_a_run_ends_when_its_time_is_over_or_it_is_interrupted(
+    stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "BodyProcess", FakeBody(told, 10**9))
+    began = time.monotonic()
+    StageRun(stage).run_without_face(0.05)
+    assert time.monotonic() - began >= 0.05
+    assert "sleep 0.05" in told
+
+    class Flag:
+        def __enter__(self) -> threading.Event:
+            flag = threading.Event()
+            flag.set()
+            return flag
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+    told.clear()
+    monkeypatch.setattr(module, "stop_flag", Flag)
+    StageRun(stage).run_without_face(None)
+    assert told == ["ready", "begin", "stop", "left"]
+
+
+def test_a_window_is_given_the_head_and_what_the_body_shows(
+    stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import controller.face.window as window
+
+    given: list[Any] = []
+
+    class Window:
+        def __init__(self, *words: Any) -> None:
+            given.extend(words)
+
+        def run(self, keep_going: Any) -> None:
+            while keep_going():
+                told.append("frame")
+
+        def report(self) -> dict[str, object]:
+            return {"frames": 2}
+
+    body: Any = FakeBody(told, 2)
+    body.send, body.panel_state, body.mailbox = object(), object(), object()
+    monkeypatch.setattr(module, "BodyProcess", body)
+    monkeypatch.setattr(module, "HeadValues", lambda mailbox, parameters, names: (mailbox, len(names)))
+    monkeypatch.setattr(module, "lower_process_priority", lambda: told.append("lower"))
+    monkeypatch.setattr(window, "WindowFace", Window)
+    session = StageRun(stage, status=told.append)
+    report = session.run_window(None)
+    head, settings, values, send, panel_state, copy = given
+    assert settings is session.stage.settings.face and (send, panel_state) == (body.send, body.panel_state)
+    assert values == (body.mailbox, len(head.parameters)) and copy == session.stage.load_head
+    assert report["face"] == {"frames": 2} and told.count("frame") == 2
+    assert told.index("lower") < told.index("ready")  # servos start while the head loads
+
+
+def test_pictures_are_kept_only_where_a_folder_is_given(
+    stage: str, told: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorders: list[Any] = []
+
+    class Headless:
+        def __init__(self, head: Any, settings: Any, values: Any, recorder: Any) -> None:
+            recorders.append(recorder)
+
+        def run(self, keep_going: Any) -> None:
+            while keep_going():
+                told.append("frame")
+
+        def report(self) -> dict[str, object]:
+            return {"frames": 3}
+
+        def close(self) -> None:
+            told.append("closed")
+
+    class Recorder:
+        def write(self, folder: Path) -> list[str]:
+            told.append(f"write {folder.name}")
+            return ["a.png"]
+
+    body: Any = FakeBody(told, 3)
+    body.mailbox = None
+    monkeypatch.setattr(module, "BodyProcess", body)
+    monkeypatch.setattr(module, "HeadValues", lambda *_: None)
+    monkeypatch.setattr(module, "lower_process_priority", lambda: None)
+    monkeypatch.setattr(module, "HeadlessFace", Headless)
+    monkeypatch.setattr(module, "Recorder", Recorder)
+    report = StageRun(stage, status=told.append).run_headless(None, tmp_path)
+    assert (report["face"], report["written"]) == ({"frames": 3}, ["a.png"])
+    assert told[-3:] == ["left", "writing the pictures", f"write {tmp_path.name}"]
+    assert told.count("frame") == 3 and told.index("stop") > told.index("closed") > told.index("frame")
+    body.lives = 1
+    report = StageRun(stage).run_headless(None)
+    assert report["written"] == [] and isinstance(recorders[0], Recorder) and recorders[1] is None

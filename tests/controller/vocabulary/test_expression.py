@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.vocabulary.expression import read_expressions
+from controller.vocabulary.expression import Expression, read_expressions
 
 
 def test_a_later_file_mixes_those_before_it(tmp_path: Path) -> None:
@@ -28,3 +29,22 @@ def test_weights_cannot_be_written_over(tmp_path: Path) -> None:
     known, _ = read_expressions(P, (file,))
     with pytest.raises(ValueError):
         known["a"].weights[0] = 1.0
+
+
+def test_faults_of_all_files_are_told_at_once(tmp_path: Path) -> None:
+    files = [tmp_path / f"{name}.toml" for name in ("first", "good", "last")]
+    for file, line in zip(files, ("jawOpn = 1", "jawOpen = 1", "mouthSmle = 1"), strict=True):
+        file.write_text(f"[{file.stem}]\nweights = {{ {line} }}\n")
+    with pytest.raises(ConfigError) as caught:
+        read_expressions(P, files)
+    for words in ("first.toml", "jawOpn", "last.toml", "mouthSmle"):
+        assert words in str(caught.value)
+    assert "good.toml" not in str(caught.value)
+    with pytest.raises(ConfigError, match=r"first\.toml") as caught:
+        read_expressions(P, files[:2])
+    assert "last.toml" not in str(caught.value)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Expression).anything = 1

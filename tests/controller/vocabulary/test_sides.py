@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
+from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS as P
+from controller.base.parameters import Parameters
 from controller.vocabulary.sides import sides, spread, unknown_names
 
 
@@ -27,3 +31,19 @@ def test_unknown_names_are_faults_with_their_place() -> None:
         "here.jawOpn: unknown parameter, did you mean 'jawOpen'?",
         "here.xyz: unknown parameter",
     ]
+
+
+class Both:
+    """A registry in which a name means a parameter that has sides as well."""
+
+    names = ("lipLeft", "lip", "lipRight")
+
+    def index(self, name: str) -> int:
+        if name not in self.names:
+            raise ParameterError(name)
+        return self.names.index(name)
+
+
+def test_a_name_that_is_a_parameter_means_no_sides() -> None:
+    both = cast(Parameters, Both())
+    assert sides(both, "lip") == [1] and sides(both, "lipRight") == [2] and sides(both, "brow") == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -77,3 +78,8 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
     path.write_text("")
     with pytest.raises(ConfigError, match="visemes: missing"):
         Visemes.load(P, path)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Visemes).anything = 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.base.parameters import PARAMETERS as P
-from controller.links.line.commands import COMMANDS, Command, Grammar
+from controller.links.line.commands import COMMANDS, Command, Grammar, Request
 from controller.links.line.protocol import Code, LineError, checksum
 from controller.vocabulary.vocabulary import Vocabulary
 
@@ -183,3 +184,9 @@ def test_any_words_are_a_command_or_a_refusal(words: list[str]) -> None:
 def test_every_command_is_in_the_specification(root: Path) -> None:
     text = (root / "docs" / "line-protocol.md").read_text(encoding="utf-8")
     assert all(f"`{name}" in text for name in COMMANDS)
+
+
+def test_records_cannot_be_changed() -> None:
+    for record in (Command, Request):
+        with pytest.raises(FrozenInstanceError):
+            object.__new__(record).anything = 1

@@ -5,6 +5,9 @@ from __future__ import annotations
 import io
 import itertools
 import json
+import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -96,3 +99,30 @@ def test_input_that_ended_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     with (tmp_path / "empty").open("w+") as file:
         monkeypatch.setattr("sys.stdin", io.TextIOWrapper(file.buffer))
         assert not host_module._stdin_open()
+
+
+def test_a_process_of_its_own_outlives_interrupts_and_ends_with_its_input(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", "import sys; from controller.links.line.host import main; sys.exit(main())"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as process:
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            assert process.stdout.readline().startswith("ready ")
+            for ending in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                process.send_signal(ending)
+            process.stdin.close()
+            assert json.loads(process.stdout.read())["script"] == "tour"
+            assert process.wait(30) == 0
+        finally:
+            process.kill()
+
+
+def test_tags_have_nine_digits_at_most_and_begin_again_at_one(port: HostPort) -> None:
+    host = RobotHost(port, Script(()), P)
+    host.send("PING")
+    assert list(host._waiting) == [1]
+    host._tag = 999_999_997
+    for _ in range(3):
+        host.send("PING")
+    assert list(host._waiting) == [1, 999_999_998, 999_999_999] and host._tag == 1
+    assert host.counts["sent"] == 4

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
+
 import pytest
 
 from controller.links.line.kind import LINK, LineSettings
@@ -41,3 +43,8 @@ def test_limits_of_the_baud_rate(baud: int, good: bool) -> None:
 def test_its_definition() -> None:
     assert (LINK.api, LINK.kind, LINK.settings) == (1, "line", LineSettings)
     assert str(read_link({"port": "simulated"})) == "line on simulated"
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(LineSettings).anything = 1

@@ -117,6 +117,18 @@ def test_a_subscription_streams_the_newest_values(port: HostPort, state: Command
     assert link.report()["streamed"]
 
 
+def test_every_line_that_is_streamed_is_counted(port: HostPort, link: LineLink) -> None:
+    peer, kinds = Peer(port), list[str]()
+    peer.send(b"SUB 100 jawOpen\n")
+    while kinds.count("P") < 3:
+        kinds.append(peer.next().kind)
+    peer.send(b"UNSUB\n")
+    while kinds.count("OK") < 2:
+        kinds.append(peer.next().kind)
+    report = link.report()
+    assert (report["streamed"], report["accepted"], report["dropped"]) == (kinds.count("P"), 2, 0)
+
+
 def test_a_peer_that_does_not_read_never_holds_up_the_link(port: HostPort, state: CommandState, link: LineLink) -> None:
     port.write(b"SUB 200 ALL\n")
     eventually(lambda: link.report()["dropped"])

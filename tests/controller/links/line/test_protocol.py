@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -182,3 +183,9 @@ def test_the_examples_in_the_specification_have_right_checksums(root: Path) -> N
 def test_every_error_code_is_in_the_specification(root: Path) -> None:
     text = (root / "docs" / "line-protocol.md").read_text(encoding="utf-8")
     assert {int(code) for code in re.findall(r"^\| (\d\d) \|", text, re.MULTILINE)} == set(map(int, Code))
+
+
+def test_records_cannot_be_changed() -> None:
+    for record in (Words, Reply):
+        with pytest.raises(FrozenInstanceError):
+            object.__new__(record).anything = 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.links.line.script import Wave, load_script
+from controller.links.line.script import Script, Wave, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
@@ -117,3 +118,8 @@ def test_one_fault_is_named_with_its_place(tmp_path: Path, text: str, fault: str
     with pytest.raises(ConfigError) as caught:
         load_script(str(path), P, VOCABULARY)
     assert fault in str(caught.value) and ": 1 fault" in str(caught.value)
+
+
+def test_a_record_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        object.__new__(Script).anything = 1
