@@ -243,3 +243,8 @@ def test_the_first_exception_is_kept_and_nothing_is_called_after_it() -> None:
     window.as_callback(lambda: called.append(1 // 0))()
     window.as_callback(lambda: called.append(2))()
     assert called == [1] and isinstance(window.failure, ZeroDivisionError) and window.params.app_shall_exit
+
+
+def test_a_windows_options_are_given_by_name() -> None:
+    with pytest.raises(TypeError, match="positional"):
+        run_window(BallHead(), lambda: values(), (320, 240))  # type: ignore[misc]
