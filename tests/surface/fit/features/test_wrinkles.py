@@ -11,6 +11,7 @@ from surface import DCPSurface
 from surface.fit.features.wrinkles import DEEPENED, add_wrinkles, with_deep_wrinkles
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
+from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group
 from surface.head.model.meshes import make_surface
 
@@ -85,7 +86,7 @@ def test_sunk_they_make_a_furrow_of_the_wanted_depth_and_width(wrinkled):
     points = part.points.copy()
     points[fold.ids] += fold.moves
     y, rise = across(part, points)
-    assert -1.15 * DEPTH < rise.min() < -0.75 * DEPTH
+    assert rise.min() == pytest.approx(-DEPTH, rel=0.07)
     assert y[rise.argmin()] == pytest.approx(Y, abs=0.5)
     half = y[rise < 0.5 * rise.min()]
     assert 0.7 * WIDTH < np.ptp(half) < 1.8 * WIDTH
@@ -236,3 +237,43 @@ def test_deepening_leaves_all_other_points(wrinkled):
     out = with_deep_wrinkles(part, part.points)
     np.testing.assert_array_equal(out[: len(face().points)], face().points)
     assert DEEPENED == 1.5
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0, 45.0, -30.0])
+def test_furrows_are_as_deep_in_any_direction(angle):
+    forward = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
+    left = np.array([-forward[1], forward[0]])
+    line = [(np.array([30.0, 35.0]) + t * forward).tolist() for t in (-30.0, 0.0, 30.0)]
+    part, _ = add_wrinkles(face(), CHART, MESH, [TABLE | {"lines": [line]}])
+    aside = np.linspace(-15, 15, 121)
+    uv = ([30.0, 35.0] + aside[:, None] * left) / 200 + 0.5
+    rise = make_surface(part).with_points(sunk(part)).evaluate(uv) - make_surface(face()).evaluate(uv)
+    deep = np.linalg.norm(rise, axis=1)
+    assert 0.75 * DEPTH < deep.max() < 1.15 * DEPTH and abs((deep * aside).sum() / deep.sum()) < 1.0
+    if angle in (0.0, 90.0):  # one askew is wider: its knots lie along u and v
+        assert np.ptp(aside[deep > 0.5 * deep.max()]) == pytest.approx(1.1 * WIDTH, rel=0.3)
+    assert deep[np.abs(aside) > 3.0 * WIDTH].max() < 0.02
+
+
+def test_groups_that_move_the_skin_little_move_the_wrinkle_as_little():
+    plain = face()
+    little = Group("browInnerUp", np.arange(len(plain.points), dtype=np.int32),
+                   np.full((len(plain.points), 3), [0.0, 0.5678, 0.0], np.float32))  # fmt: skip
+    part, _ = add_wrinkles(replace(plain, groups=[little]), CHART, MESH, [TABLE])
+    moves = group(part, "browInnerUp").moves
+    np.testing.assert_allclose(moves, np.tile([0, 0.5678, 0], (len(part.points), 1)), atol=5e-5)
+
+
+def test_a_line_lies_on_what_is_in_front_even_where_samples_of_the_back_are_nearer():
+    n = len(MESH.vertices)
+    behind = MESH.vertices + np.array([0.5, 0.5, -100.0])
+    both = FitMesh(
+        np.vstack([MESH.vertices, behind]), np.vstack([MESH.faces, MESH.faces + n]),
+        np.vstack([MESH.uv, MESH.uv + np.array([2.0, 0.0])]), np.vstack([MESH.face_uv, MESH.face_uv + n]),
+        MESH.names, np.concatenate([MESH.deltas, MESH.deltas], axis=1),
+    )  # fmt: skip
+    chart = make_chart(both, find_islands(both))
+    y = 125.0 / 3 + 0.5
+    part, _ = add_wrinkles(face(), chart, both, [TABLE | {"lines": [[[10.0, y], [40.0, y], [70.0, y]]]}])
+    own = part.points[own_points(part)]
+    np.testing.assert_allclose(own[:, 2], height(*own[:, :2].T), atol=0.3)

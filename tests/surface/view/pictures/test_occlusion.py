@@ -189,3 +189,19 @@ def test_parts_of_no_group_stay_open_and_skin_gets_three_arrays(gl: None) -> Non
     assert set(made) == {"face", "face/visible", "face/thin", "left_eye", "right_eye", "teeth", "mouth"}
     assert made["face/visible"].shape[1] == 4 and made["face/thin"].shape[1] == 1
     assert made["face/visible"].min() >= 0.0 and made["face/visible"].max() <= 1.0
+
+
+@pytest.mark.parametrize("count", [96, 300])
+def test_no_two_directions_are_near_each_other(count: int) -> None:
+    directions = sphere_directions(count)
+    between = np.degrees(np.arccos(np.clip(directions @ directions.T, -1, 1)))[~np.eye(count, dtype=bool)]
+    assert between.min() > 0.75 * np.degrees(np.sqrt(4 * np.pi / count))
+    assert directions[0, 1] == pytest.approx(1 - 1 / count) and directions[-1, 1] == pytest.approx(1 / count - 1)
+
+
+def test_visibility_ends_at_the_pictures_rim() -> None:
+    picture = np.full((4, 4), 0.5, np.float32)
+    picture[3, :], picture[:, 0] = 0.9, 0.1
+    low = [[0.0, 0.5, 0.4], [0.9, 0.5, 0.4], [0.25, 0.5, 0.4]]
+    box = np.array([*low, [1.0, 1.0, 0.8], [0.5, 0.75, 0.7], [0.5, 0.5, 0.5]])
+    assert visibility(box, picture, 0.0) == pytest.approx([0.0, 1.0, 0.5, 1.0, 0.5, 1.0])

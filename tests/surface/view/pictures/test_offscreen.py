@@ -107,3 +107,10 @@ def test_without_moderngl_the_message_says_what_to_install(monkeypatch: pytest.M
     with pytest.raises(ViewError, match="moderngl") as caught:
         open_context()
     assert ".[view]" in caught.value.hint
+
+
+def test_a_picture_is_1280_by_720_where_no_size_is_given_and_one_pixel_is_a_size(gl: None) -> None:
+    with Offscreen(BallHead(), quality="fast") as screen:
+        assert screen.render(values()).shape == (720, 1280, 3)
+    with Offscreen(BallHead(), (1, 1)) as screen:
+        assert screen.render(values()).shape == (1, 1, 3)
