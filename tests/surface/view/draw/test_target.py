@@ -132,7 +132,7 @@ def test_another_background_is_drawn_everywhere_and_the_same_one_only_around_the
         screen.renderer.set_background((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
         blue = screen.render(values())
         corners = blue[[2, 2, -3, -3], [2, -3, 2, -3]].astype(int)
-        assert np.abs(corners - [0, 0, 255]).max() <= 2
+        assert corners[:, :2].max() <= 2 and corners[:, 2].min() > 150
         boxes = []
         real = screen.renderer.draw
         screen.renderer.draw = lambda camera, into, bands: (boxes.append(bands.box()), real(camera, into, bands))  # type: ignore[method-assign,assignment,func-returns-value]
