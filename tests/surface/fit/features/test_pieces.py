@@ -283,6 +283,7 @@ def test_strips_lie_in_tiles_of_their_own_and_are_as_long_as_wanted(fitted):
     eyes = np.array([[30.0, 0.0, 20.0], [-30.0, 0.0, 20.0]])
     brows, lashes = hair_parts(mesh, chart, fit, brow.tolist(), rig(eyes))
     assert (brows.budget, lashes.budget) == ((0, 0.4, 6), (0, 0.2, 7))
+    assert brows.slits.shape == lashes.slits.shape == eyeball_part("left", eyes[0], 12.0).slits.shape == (0, 3)
     for part, count, across in ((brows, 2, 4), (lashes, 4, 3)):
         assert len(part.points) == count * 10 * across and (part.weights == 1).all()
         assert (part.degrees == [3, 2]).all()
