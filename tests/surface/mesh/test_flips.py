@@ -46,7 +46,7 @@ def test_kept_edges_stay() -> None:
 
 
 def test_edges_have_whole_keys_by_both_ends_in_either_order() -> None:
-    keys, width = edge_keys(np.array([[0, 1, 5], [5, 1, 3]]))
+    keys, width = flips.edge_keys(np.array([[0, 1, 5], [5, 1, 3]]))
     assert width == 6 and keys.dtype.kind == "i"
     assert keys.tolist() == [1, 11, 5, 11, 9, 23]
-    assert edge_keys(np.zeros((0, 3), np.int64))[1] == 1
+    assert flips.edge_keys(np.zeros((0, 3), np.int64))[1] == 1
