@@ -36,7 +36,7 @@ EQUIVALENT = ROOT / "tests/equivalent_mutants.txt"
 """Mutants that behave as the original does: one a line, as this program prints them; ``#`` starts a reason."""
 OPERATORS = (
     *("AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd"),
-    *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "NumberReplacer"),
+    *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "NumberReplacer"),
     *("ZeroIterationForLoop", "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Not"),
     *(f"ReplaceBinaryOperator_{change}" for change in ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul")),
     *(f"ReplaceBinaryOperator_{change}" for change in ("FloorDiv_Mul", "Mod_Div", "Pow_Mul", "LShift_RShift")),
@@ -117,7 +117,7 @@ def sample(room: str, count: int, seed: int) -> list[Mutant]:
 
 
 def _compiles(code: str) -> bool:
-    """Whether the change left Python; the ``*`` in a list of parameters, for one, is no product."""
+    """Whether the change left Python."""
     try:
         compile(code, "mutant", "exec")
     except SyntaxError:
@@ -141,9 +141,11 @@ def _places(module: str) -> list[list[Mutant]]:
     by_place: dict[tuple[tuple[int, int], str], list[Mutant]] = defaultdict(list)
     for name in OPERATORS:
         operator = get_operator(f"core/{name}")()
-        starts = (start for node in nodes for start, _ in operator.mutation_positions(node))
-        for occurrence, start in enumerate(starts):
-            if not any(first <= start < last for first, last in types):
+        found = ((node, start) for node in nodes for start, _ in operator.mutation_positions(node))
+        for occurrence, (node, start) in enumerate(found):
+            # the mark of keyword-only parameters is no product
+            is_mark = node.parent is not None and node.parent.type in ("parameters", "param")
+            if not is_mark and not any(first <= start < last for first, last in types):
                 by_place[start, name.partition("_")[0]].append(Mutant(module, name, occurrence))
     return [by_place[key] for key in sorted(by_place)]
 

@@ -66,7 +66,7 @@ class Offscreen:
     ) -> None:
         self.head, self._closed = head, False
         self.ctx = open_context()
-        limit = self.ctx.info["GL_MAX_VIEWPORT_DIMS"][0]
+        limit = min(self.ctx.info["GL_MAX_VIEWPORT_DIMS"])
         if not all(1 <= length <= limit for length in size):
             self.ctx.release()
             raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")

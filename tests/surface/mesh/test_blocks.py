@@ -72,3 +72,19 @@ def test_the_rectangle_of_every_cell_holds_its_vertices() -> None:
         uv = mesh.uv[mesh.cell_start[c] : mesh.cell_start[c + 1]]
         assert [u0, u1, v0, v1] == [uv[:, 0].min(), uv[:, 0].max(), uv[:, 1].min(), uv[:, 1].max()]
     assert set(bins.ids.tolist()) == set(range(len(boxes)))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("axis", range(3))
+def test_directions_need_a_product_of_a_millionth_of_a_millionth_of_the_lengths(axis: int, scale: float) -> None:
+    along, aside = np.roll([[1.0, 0, 0], [0, 1.0, 0]], axis, axis=1)
+    angles = np.array([0.0, 0.9e-12, 1.1e-12, -0.5, np.pi / 2])
+    a = np.tile(scale * along, (5, 1))
+    b = 7.0 * scale * (along * np.cos(angles)[:, None] + aside * np.sin(angles)[:, None])
+    for first, second, sign in ((a, b, 1.0), (b, a, -1.0)):
+        out, bad = np.full((5, 3), 9.0), np.zeros(5, bool)
+        blocks.unit_cross(first, second, out, bad)
+        assert bad.tolist() == [True, True, False, False, False]
+        assert (out[:2] == 9.0).all()
+        wanted = sign * np.sign(angles[2:, None]) * np.roll([0.0, 0, 1], axis)
+        np.testing.assert_allclose(out[2:], wanted, atol=1e-12)

@@ -43,3 +43,10 @@ def test_kept_edges_stay() -> None:
     assert np.array_equal(same, triangles)
     flips.improve(points, triangles, free)
     assert {2, 3} <= set(triangles[0]) and {2, 3} <= set(triangles[1])
+
+
+def test_edges_have_whole_keys_by_both_ends_in_either_order() -> None:
+    keys, width = flips.edge_keys(np.array([[0, 1, 5], [5, 1, 3]]))
+    assert width == 6 and keys.dtype.kind == "i"
+    assert keys.tolist() == [1, 11, 5, 11, 9, 23]
+    assert flips.edge_keys(np.zeros((0, 3), np.int64))[1] == 1

@@ -139,3 +139,35 @@ def test_anchors_are_where_blending_functions_are_greatest() -> None:
     assert np.allclose(uv, [[0.4, 0.4], [0.5, 0.5]])
     assert np.allclose(points, surface.evaluate(uv))
     assert len(splitting._anchors(surface, Domain((0.45, 1, 0, 1)))[0]) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "fits"),
+    [
+        ({"roots": (1, 4_000_000)}, True),
+        ({"roots": (4_000_000, 1)}, True),
+        ({"roots": (1, 4_000_001)}, False),
+        ({"roots": (4_000_001, 1)}, False),
+        ({"roots": (1, 1)}, True),
+        ({"roots": (1, 0)}, False),
+        ({"roots": (1, 1, 1)}, False),
+        ({"max_points": 1}, True),
+        ({"max_points": 0}, False),
+        ({"chord_error": 0.0}, False),
+        ({"loop_error": 0.0}, False),
+        ({"chord_error": 1e-9, "loop_error": 1e-9}, True),
+        ({"min_depth": -1}, False),
+        ({"min_depth": 6}, True),
+        ({"min_depth": 7}, False),
+        ({"max_depth": 20}, True),
+        ({"max_depth": 21}, False),
+    ],
+)
+def test_limits_are_checked_at_their_ends(changes: dict[str, object], fits: bool) -> None:
+    limits = NONE._replace(**changes)
+    if fits:
+        limits.check()
+        return
+    name = "min_depth, max_depth" if next(iter(changes)).endswith("depth") else next(iter(changes))
+    with pytest.raises(ValueError, match=f"^{name}: "):
+        limits.check()

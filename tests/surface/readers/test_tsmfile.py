@@ -101,3 +101,10 @@ def test_deleted_grips_keep_the_numbers_of_those_after_them() -> None:
     file = read(LINES.replace("0g -1 0.5 1e2 2", "0g").replace("0 1 2\n0g", "0 0 2\n0g"))
     assert sorted(file.grips) == [0, 2]
     assert len(file.owners) == 3
+
+
+def test_what_follows_the_numbers_of_creases_and_grips_is_not_read() -> None:
+    file = read(
+        LINES.replace("ec 2 0", "ec 2 hard").replace("0m gvp 0", "0m gvp 0 x").replace("0m gv 1", "0m gv 1 y z")
+    )
+    assert file.creases == read().creases and file.owners == read().owners

@@ -8,16 +8,20 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
+import moderngl
 import numpy as np
 import pytest
 from ball_head import BallHead, values
 
 from surface.base.errors import ViewError
-from surface.view import run_window
+from surface.view import Offscreen, run_window
 from surface.view.draw.renderer import Renderer
+from surface.view.draw.target import Target
+from surface.view.pictures.offscreen import open_context
 from surface.view.scene.camera import Camera
 from surface.view.scene.viewpoint import Viewpoint
 from surface.view.window import WindowReport, _Window
@@ -27,7 +31,7 @@ import json, sys
 sys.path[:0] = [{root!r}, {here!r}]
 from ball_head import BallHead, values
 from surface.base.errors import ViewError
-from surface.view import run_window
+from surface.view import Offscreen, run_window
 calls = dict(source=0, gui=0)
 def source():
     calls["source"] += 1
@@ -243,3 +247,140 @@ def test_the_first_exception_is_kept_and_nothing_is_called_after_it() -> None:
     window.as_callback(lambda: called.append(1 // 0))()
     window.as_callback(lambda: called.append(2))()
     assert called == [1] and isinstance(window.failure, ZeroDivisionError) and window.params.app_shall_exit
+
+
+def test_a_windows_options_are_given_by_name() -> None:
+    with pytest.raises(TypeError, match="positional"):
+        run_window(BallHead(), lambda: values(), (320, 240))  # type: ignore[misc]
+
+
+class Opened:
+    """A window's callbacks over a context without a window, its framebuffer (320 x 240) and what it asked for."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, quality: str) -> None:
+        self.ctx, self.asked, self.posed, self.hurried = open_context(), [], 0, 0
+        monkeypatch.setattr("moderngl.create_context", self.create)
+        self.hands = Hands()
+        self.hands.io.display_framebuffer_scale = SimpleNamespace(x=1.0, y=1.0)
+        make = partial(Renderer, head=BallHead(), quality=quality)
+        self.window = _Window(self.hands, self.source, Viewpoint(), make, quality)
+        self.window.params = SimpleNamespace(app_shall_exit=False)
+        self.frame = self.ctx.framebuffer([self.ctx.renderbuffer((400, 300), 4)])
+
+    def create(self, **settings: object) -> moderngl.Context:
+        self.asked.append(settings)
+        return self.ctx
+
+    def source(self) -> np.ndarray:
+        self.posed += 1
+        return values(jawOpen=0.5)
+
+    def draw(self, width: float = 320.0, height: float = 240.0) -> np.ndarray:
+        self.hands.io.display_size = SimpleNamespace(x=width, y=height)
+        self.frame.scissor = None
+        self.frame.use()
+        self.frame.clear(1.0, 0.0, 1.0)
+        self.window.background()
+        return np.flipud(np.frombuffer(self.frame.read(), np.uint8).reshape(300, 400, 3)).astype(int)
+
+
+@pytest.mark.parametrize("quality", ["full", "fast"])
+def test_the_head_is_drawn_into_what_is_bound(gl: None, monkeypatch: pytest.MonkeyPatch, quality: str) -> None:
+    with Offscreen(BallHead(), (320, 240), quality=quality) as screen:
+        screen.draw(values(jawOpen=0.5))
+        wanted = screen.read().astype(int)
+    opened = Opened(monkeypatch, quality)
+    window = opened.window
+    window.background()
+    assert (window.frames, opened.posed) == (0, 0), "nothing is drawn before the window has started"
+    window.start()
+    assert opened.asked == [{"require": 310}]
+    picture = opened.draw()
+    assert np.abs(picture[60:, :320] - wanted).max() <= 1
+    assert (picture[:60] == [255, 0, 255]).all() and (picture[:, 320:] == [255, 0, 255]).all()
+    assert window.frames == 1 and window.first == window.last > 0.0
+    before, first = window._target, window.first
+    assert (opened.draw() == picture).all() and window._target is before
+    assert window.frames == opened.posed == 2 and window.first == first < window.last
+    window.stop()
+    opened.ctx.release()
+
+
+def test_a_window_that_changes_its_size_gets_another_target_and_releases_the_old_one(
+    gl: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened, released = Opened(monkeypatch, "fast"), []
+    real = Target.release
+    monkeypatch.setattr(Target, "release", lambda target: (released.append(target.size), real(target)))
+    opened.window.start()
+    opened.draw()
+    small = opened.draw(160.0, 120.0)
+    assert released == [(320, 240)] and opened.window._target.size == (160, 120)
+    assert small[180:, :160].std() > 20 and (small[:180] == [255, 0, 255]).all()
+    assert (opened.draw(0.0, 120.0) == [255, 0, 255]).all(), "a minimised window draws nothing"
+    assert (opened.window.frames, opened.posed) == (2, 2)
+    renderer = opened.window._renderer
+    ended: list[int] = []
+    monkeypatch.setattr(renderer, "release", lambda: ended.append(1))
+    opened.window.stop()
+    opened.window.stop()
+    assert released == [(320, 240), (160, 120)] and ended == [1]
+    assert opened.window._target is opened.window._renderer is None
+    opened.ctx.release()
+
+
+def test_a_window_one_pixel_high_is_drawn(gl: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = Opened(monkeypatch, "fast")
+    opened.window.start()
+    opened.draw(20.0, 1.0)
+    assert opened.window.frames == 1
+    slept: list[float] = []
+    monkeypatch.setattr("surface.view.window.time.sleep", slept.append)
+    opened.window.check()
+    assert slept == [] and not opened.window.params.app_shall_exit
+    opened.window.stop()
+    opened.ctx.release()
+
+
+def test_a_window_without_opengl_says_how_to_draw_in_software(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(**settings: object) -> None:
+        raise ValueError("version 2.1")
+
+    monkeypatch.setattr("moderngl.create_context", refuse)
+    window = _Window(Hands(), lambda: values(), Viewpoint(), Renderer, "fast")
+    with pytest.raises(ViewError, match=r"no OpenGL 3\.1: version 2\.1") as caught:
+        window.start()
+    assert "LIBGL_ALWAYS_SOFTWARE=1" in caught.value.hint
+
+
+@pytest.mark.parametrize(("software", "simplified"), [(True, True), (False, False)])
+def test_only_in_software_a_window_hurries(
+    gl: None, monkeypatch: pytest.MonkeyPatch, software: bool, simplified: bool
+) -> None:
+    monkeypatch.setattr("surface.view.window.is_software", lambda ctx: software)
+    opened = Opened(monkeypatch, "full")
+    opened.window.start()
+    assert opened.window._renderer is not None
+    assert opened.window._renderer._simplified == simplified
+    opened.window.stop()
+    opened.ctx.release()
+
+
+def test_seconds_are_counted_from_the_first_picture_or_the_first_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    window = _Window(Hands(), lambda: values(), Viewpoint(), Renderer, "fast")
+    window._imgui.io.display_framebuffer_scale = SimpleNamespace(x=1.0, y=1.0)
+    window.params, window.seconds = SimpleNamespace(app_shall_exit=False), 5.0
+    clock = [100.0]
+    monkeypatch.setattr("surface.view.window.time.perf_counter", lambda: clock[0])
+
+    def closes(now: float) -> bool:
+        clock[0], window.params.app_shall_exit = now, False
+        window.check()
+        return bool(window.params.app_shall_exit)
+
+    assert [closes(now) for now in (100.0, 104.9, 105.0)] == [False, False, True]
+    window.frames, window.first = 1, 103.0
+    assert [closes(now) for now in (107.9, 108.0)] == [False, True]
+    window.seconds, asked = None, [True, False]
+    window.keep_going = lambda: asked.pop(0)
+    assert [closes(999.0), closes(999.0)] == [False, True]

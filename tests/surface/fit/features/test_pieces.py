@@ -10,6 +10,7 @@ from surface.fit.features.pieces import (
     ROOT_MM,
     HeadRig,
     Skin,
+    _lid_line,
     brow_strip,
     eyeball_part,
     fit_strip,
@@ -173,3 +174,132 @@ def test_hair_of_both_sides_is_rooted_at_the_brow_line_and_the_lids(fitted):
     ]
     assert 5.0 < reach[0] < 9.0 and 2.0 < reach[1] < 4.0
     assert {g.name for g in lashes.groups} <= {"jawOpen", "mouthSmileLeft"} and len(lashes.lids) == len(lashes.points)
+
+
+def outward_and_up(skin, uv: np.ndarray, eye: np.ndarray, sign: float) -> tuple[np.ndarray, np.ndarray]:
+    """Away from an eyeball, and up (or down) square to it."""
+    away = skin.at(uv) - eye
+    away /= np.linalg.norm(away, axis=2, keepdims=True)
+    up = np.array([0.0, sign, 0.0]) - away * sign * away[..., 1:2]
+    return away, up / np.linalg.norm(up, axis=2, keepdims=True)
+
+
+@pytest.mark.parametrize(("upper", "sign"), [(True, 1.0), (False, -1.0)])
+def test_lashes_lean_away_from_the_eyeball_and_curl_to_their_own_side(skin, upper: bool, sign: float):
+    s = np.linspace(0.35, 0.65, 40)
+    root, eye = np.column_stack([s, np.full(40, 0.45)]), np.array([3.0, -8.0, 20.0])
+    strip = lash_strip(skin, root, eye, np.full(40, 8.0), upper=upper, hairs=12)
+    places = np.column_stack([0.35 + 0.3 * np.linspace(0.02, 0.98, 9), np.full(9, 0.45)])
+    away, up = outward_and_up(skin, places, eye, sign)
+    for v, out, side in ((0.0, 0.4, 0.0), (0.5, 3.74, 0.48), (1.0, 6.8, 4.0)):
+        wanted = skin.at(places) + out * away + side * up
+        np.testing.assert_allclose(ends(strip, v)[[0, 2]], wanted[[0, 2]], atol=0.15)
+
+
+@pytest.mark.parametrize(("upper", "thick"), [(True, 0.42), (False, 0.36)])
+@pytest.mark.parametrize("hairs", [10, 24])
+def test_a_lash_is_a_hair_with_a_fine_tip_on_a_continuous_root(skin, upper: bool, thick: float, hairs: int):
+    root = np.column_stack([np.linspace(0.35, 0.65, 20), np.full(20, 0.45)])
+    (loop,) = lash_strip(skin, root, np.array([0, 0, 20.0]), np.full(20, 8.0), upper=upper, hairs=hairs).loops
+    assert loop[0].tolist() == [0.0, 0.0] and loop[-1].tolist() == [1.0, 0.0] and len(loop) == 2 + 4 * hairs
+    left, tip_left, tip_right, right = loop[1:-1].reshape(hairs, 4, 2).swapaxes(0, 1)
+    middle = 0.045 + 0.91 * (np.arange(hairs) + 0.5) / hairs
+    for side, rows in ((-1.0, left), (1.0, right)):
+        np.testing.assert_allclose(rows[:, 0], np.clip(middle + side * thick / hairs, 0, 1))
+        np.testing.assert_allclose(rows[:, 1], 0.22 * thick)
+    np.testing.assert_allclose(tip_right[:, 0] - tip_left[:, 0], 0.006)
+    np.testing.assert_array_equal(tip_left[:, 1], tip_right[:, 1])
+    assert tip_left[:, 1].min() > 0.65 and tip_left[:, 1].max() <= 1.0 and np.ptp(tip_left[:, 1]) > 0.15
+    aside = 0.5 * (tip_left + tip_right)[:, 0] - middle - 0.048 * (2 * middle - 1)  # they spread towards the ends
+    assert np.abs(aside).max() <= 0.3 / hairs and np.ptp(aside) > 0.2 / hairs and abs(aside.mean()) < 0.15 / hairs
+
+
+def test_hairs_of_a_brow_lean_over_its_upper_edge_from_uneven_roots(skin):
+    hairs = 40
+    (loop,) = brow_strip(skin, brow_uv(), hairs=hairs).loops
+    assert len(loop) == 2 + 4 * hairs
+    assert loop[0].tolist() == [0.0, 0.35] and loop[1 + 2 * hairs].tolist() == [1.0, 0.5]
+    base, tip = loop[1 : 1 + 2 * hairs].reshape(hairs, 2, 2).swapaxes(0, 1)
+    gap, root = loop[2 + 2 * hairs :][::-1].reshape(hairs, 2, 2).swapaxes(0, 1)[::-1]
+    x = (np.arange(hairs) + 0.5) / hairs
+    ranges = (
+        (base, (-0.35, -0.35), (0.66, 0.72)), (tip, (0.9, 1.7), (0.74, 1.0)),
+        (root, (0.0, 0.0), (0.06, 0.18)), (gap, (0.5, 0.5), (0.2, 0.28)),
+    )  # fmt: skip
+    for rows, (least, most), (low, high) in ranges:
+        wanted = np.clip([x + least / hairs, x + most / hairs], 0, 1)
+        assert (rows[:, 0] >= wanted[0] - 1e-9).all() and (rows[:, 0] <= wanted[1] + 1e-9).all()
+        assert rows[:, 1].min() >= low and rows[:, 1].max() <= high
+        assert np.ptp(rows[:, 1]) > 0.6 * (high - low)
+
+
+def test_a_brow_is_arched_over_the_skin(skin):
+    strip = brow_strip(skin, brow_uv(), hairs=12)
+    for v, height in ((0.0, 0.35), (0.5, 0.7), (1.0, 0.35)):
+        uv = np.column_stack([0.55 + 0.25 * np.linspace(0.02, 0.98, 9), np.full(9, 0.78 + 0.04 * v)])
+        above = ((ends(strip, v) - skin.at(uv)) * skin.normals(uv)).sum(axis=2)
+        np.testing.assert_allclose(above, height, atol=0.08)
+
+
+def test_normals_are_those_of_the_sheet(skin):
+    uv = np.array([[0.5, 0.7], [0.3, 0.6], [0.7, 0.25]])
+    x, y = 3 * (uv.T - 0.5)
+    slope = np.column_stack([0.6 * np.sin(x) * np.cos(y), 0.6 * np.cos(x) * np.sin(y), np.ones(3)])
+    wanted = slope / np.linalg.norm(slope, axis=1)[:, None]
+    np.testing.assert_allclose(skin.normals(uv)[0], wanted, atol=0.03)
+    np.testing.assert_allclose(np.linalg.norm(skin.normals(uv), axis=2), 1.0)
+
+
+@pytest.mark.parametrize(("upper", "first", "last", "count", "v"), [
+    (True, 0.10, 0.95, 24, 0.7 + 0.0188), (False, 0.22, 0.94, 20, 0.5 - 0.0145),
+])  # fmt: skip
+@pytest.mark.parametrize("inner_first", [True, False])
+def test_lashes_begin_just_outside_the_rim_from_the_inner_corner(upper, first, last, count, v, inner_first):
+    u = np.linspace(0.2, 0.6, 9)
+    rim = np.vstack([np.column_stack([u, np.full(9, 0.5)]), np.column_stack([u[::-1], np.full(9, 0.7)])])
+    roots, along = _lid_line(rim, upper=upper, inner_first=inner_first)
+    np.testing.assert_allclose(along, np.linspace(first, last, count))
+    np.testing.assert_allclose(roots[:, 0], 0.2 + 0.4 * (along if inner_first else 1.0 - along))
+    np.testing.assert_allclose(roots[:, 1], v)
+
+
+def test_teeth_are_fitted_finely_by_the_number_of_teeth(monkeypatch):
+    asked = []
+
+    def noted(mesh, chart, request):
+        asked.append(request)
+        return fit_chart(mesh, chart, request)
+
+    monkeypatch.setattr("surface.fit.features.pieces.fit_chart", noted)
+    part = recipe(name="teeth", follows="jaw", vertices=[(0, 2 * 14 * 24)], request=FitRequest(60))
+    teeth_part(two_teeth(), part, rig())
+    (request,) = asked
+    assert (request.points, request.coarse, request.deepest, request.neutral_mm) == (120, 0.4, 2, 0.08)
+
+
+def test_strips_lie_in_tiles_of_their_own_and_are_as_long_as_wanted(fitted):
+    mesh, chart, fit = fitted
+    brow = np.flatnonzero((np.abs(mesh.vertices[:, 1] - 50) < 1e-6) & (mesh.vertices[:, 0] > 20))[:5]
+    eyes = np.array([[30.0, 0.0, 20.0], [-30.0, 0.0, 20.0]])
+    brows, lashes = hair_parts(mesh, chart, fit, brow.tolist(), rig(eyes))
+    assert (brows.budget, lashes.budget) == ((0, 0.4, 6), (0, 0.2, 7))
+    assert brows.slits.shape == lashes.slits.shape == eyeball_part("left", eyes[0], 12.0).slits.shape == (0, 3)
+    for part, count, across in ((brows, 2, 4), (lashes, 4, 3)):
+        assert len(part.points) == count * 10 * across and (part.weights == 1).all()
+        assert (part.degrees == [3, 2]).all()
+        for k, knots in enumerate(np.split(part.knots_u, count)):
+            assert (knots.min(), knots.max()) == (2 * k, 2 * k + 1)
+        assert (part.knots_v.min(), part.knots_v.max()) == (0, 1)
+    assert [len(loop) for loop in lashes.loops] == [2 + 4 * 24, 2 + 4 * 14] * 2
+    assert [len(loop) for loop in brows.loops] == [2 + 4 * 40] * 2
+    left = np.split(brows.points, 2)[0]
+    assert 4.6 < left[:, 1].max() - 50 < 5.7 and 4.2 < 50 - left[:, 1].min() < 5.2
+    whole = np.hypot(0.85, 0.5)
+    for k, length in enumerate((8.0, 3.2) * 2):
+        rows = np.split(lashes.points, 4)[k].reshape(10, 3, 3)
+        reach = np.linalg.norm(rows[:, 2] - rows[:, 0], axis=1) + 0.4 * 0.85 / whole
+        inner = 0.45 + 0.55 * np.sin(np.pi * (0.12 + 0.62 * (0.10, 0.22)[k % 2]))
+        outer = 0.45 + 0.55 * np.sin(np.pi * (0.12 + 0.62 * (0.95, 0.94)[k % 2]))
+        assert reach[0] == pytest.approx(inner * length * whole, rel=0.06)
+        assert reach[-1] == pytest.approx(outer * length * whole, rel=0.06)
+        assert reach.max() == pytest.approx(length * whole, rel=0.06)

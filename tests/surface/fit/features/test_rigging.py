@@ -107,3 +107,18 @@ def test_sections_of_the_tongue_stand_square_to_its_path():
     assert abs((high - low) @ forward) < 1e-3 * np.linalg.norm(high - low) * np.linalg.norm(forward) + 2e-4
     assert 5.9 < np.linalg.norm(high - low) < 6.1
     assert 6.4 < side[0] - middle[0] < 7.2
+
+
+def test_lids_let_go_of_the_eyeball_between_three_and_eight_millimetres_and_behind_its_middle():
+    eyes = np.array([[30.0, 0, 0], [-300.0, 0, 0]])
+
+    def share(height: float, z: float) -> float:
+        y = np.sqrt((12.0 + height) ** 2 - z**2)
+        return float(lid_share(np.array([[30.0, y, z]]), eyes, 12.0)[0])
+
+    wanted = {(-1, 5): 1, (3, 5): 1, (5.5, 5): 0.5, (6.75, 5): 0.15625, (8, 5): 0, (9, 5): 0}
+    wanted |= {(0, 0): 1, (0, 1): 1, (0, -1.5): 0.5, (0, -0.75): 0.84375, (0, -3): 0, (0, -5): 0}
+    for place, expected in wanted.items():
+        assert abs(share(*place) - expected) < 1e-9, place
+    other = lid_share(np.array([[30.0, 0, 17.5]]), eyes[::-1], 12.0)
+    np.testing.assert_allclose(other, [-0.5])

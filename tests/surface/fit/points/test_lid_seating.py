@@ -1,10 +1,11 @@
 """Warps before the fit: lids onto another eyeball, lips together."""
 
 import numpy as np
+import pytest
 from face_measures import eye_height
 from slit_sheet import slit_sheet
 
-from surface.fit.points.lid_seating import Eyeball, close_lips, draw_brows, seat_lids, strengthen
+from surface.fit.points.lid_seating import Eyeball, close_lips, draw_brows, fit_sphere, seat_lids, strengthen
 from surface.fit.source.mesh import FitMesh
 
 OLD = Eyeball((30.0, 36.0, 80.0), 15.0)
@@ -94,3 +95,130 @@ def test_the_heads_of_the_brows_are_drawn_in_on_their_own_side():
     np.testing.assert_allclose(left[0], [-2.8, -1.8, 0.6])
     np.testing.assert_allclose(right[1], [2.8, -1.8, 0.6])
     assert np.abs(left[1:]).max() < 0.02
+
+
+FURTHER = Eyeball((30.0, 36.0, 88.0), 12.0)
+
+
+def test_a_sphere_is_found_from_points_on_a_part_of_it():
+    a, b = np.meshgrid(np.linspace(0.2, 1.0, 5), np.linspace(0.0, 2.0, 6))
+    directions = np.stack([np.cos(b) * np.sin(a), np.sin(b) * np.sin(a), np.cos(a)], axis=-1).reshape(-1, 3)
+    centre, radius = fit_sphere(np.array([31.0, -4.0, 70.0]) + 11.5 * directions)
+    np.testing.assert_allclose(centre, [31.0, -4.0, 70.0], atol=1e-8)
+    assert radius == pytest.approx(11.5)
+
+
+def seated_at(points: np.ndarray, old: Eyeball, new: Eyeball) -> np.ndarray:
+    return seat_lids(cloud(points, np.zeros_like(points)), old, new, np.arange(len(points))).vertices
+
+
+@pytest.mark.parametrize(("height", "share"), [(5.25, 0.5), (7.125, 0.15625), (9.0, 0.0), (12.0, 0.0)])
+def test_what_is_in_front_of_the_ball_follows_its_front_less_the_further_it_is(height: float, share: float) -> None:
+    front = np.array([[30.0, 36.0, 95.0 + height]])  # the old ball's front is at 95, the new one's at 100
+    moved = seated_at(front, OLD, FURTHER) - front
+    np.testing.assert_allclose(moved, [[0.0, 0.0, 5.0 * share]], atol=0.03)
+
+
+@pytest.mark.parametrize(("across", "share"), [(17.7, 0.5), (20.25, 0.15625), (22.8, 0.0), (40.0, 0.0)])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_what_is_beside_the_ball_follows_it_less_the_further_it_is(across: float, share: float, side: float) -> None:
+    rim_old, rim_new = (z + np.sqrt(r**2 - (0.93 * r) ** 2) for z, r in ((80.0, 15.0), (88.0, 12.0)))
+    beside = np.array([[side * 30.0, 36.0 + across, rim_old - 1.0]])
+    moved = seated_at(beside, OLD, FURTHER) - beside
+    np.testing.assert_allclose(moved, [[0.0, 0.0, (rim_new - rim_old) * share]], atol=0.12 * share + 1e-9)
+
+
+@pytest.mark.parametrize(("z", "share"), [(-3.0, 0.0), (0.0, 0.0), (1.25, 0.15625), (2.5, 0.5), (5.0, 1.0), (6.0, 1.0)])
+def test_lids_begin_to_lie_on_the_ball_in_front_of_its_middle(z: float, share: float) -> None:
+    sunk = np.array([[30.0, 36.0 + np.sqrt(11.0**2 - z**2), NEW.centre[2] + z]])  # 1 mm inside
+    moved = seated_at(sunk, NEW, NEW) - sunk
+    np.testing.assert_allclose(moved, 1.1 * share * (sunk - NEW.centre) / 11.0, atol=1e-6)
+
+
+def beside(height: float) -> np.ndarray:
+    """A place that is some mm above the new ball, off its cornea."""
+    return NEW.centre + (NEW.radius + height) * np.array([0.0, 0.8, 0.6])
+
+
+def test_skin_keeps_its_height_and_what_sinks_in_a_shape_is_laid_as_high_as_it_was() -> None:
+    heights = (-0.5, 0.1, 0.7, 1.2, 1.5, 1.7, 3.0)
+    points = np.array([beside(h) for h in heights])
+    sinking = np.array([beside(-2.0)] * len(heights)) - points
+    mesh = seat_lids(cloud(points, sinking), NEW, NEW, np.arange(len(heights)))
+    np.testing.assert_allclose(above(mesh.vertices), [0.1, 0.1, 0.7, 1.2, 1.5, 1.7, 3.0], atol=1e-6)
+    sunk = above(mesh.vertices + mesh.deltas[0])
+    np.testing.assert_allclose(sunk, [0.1, 0.1, 0.7, 1.2, 1.2, 1.2, 1.2], atol=1e-6)
+
+
+def test_what_is_up_to_loosely_on_the_ball_stays_as_near_and_the_rest_comes_off() -> None:
+    points = np.array([beside(h) for h in (0.5, 1.55, 1.65)])
+    mesh = seat_lids(cloud(points, np.array([beside(4.0)] * 3) - points), NEW, NEW, np.arange(3))
+    np.testing.assert_allclose(above(mesh.vertices + mesh.deltas[0]), [0.5, 1.55, 4.0], atol=1e-6)
+
+
+def test_only_chosen_vertices_and_moved_ones_are_touched() -> None:
+    points = np.array([beside(-1.0)] * 3)
+    delta = np.array([[0.0, 0.0, 0.0], [0.0, 5e-5, 0.0], [0.0, 0.0, 0.5]])
+    mesh = seat_lids(cloud(points, delta), NEW, NEW, np.array([0, 1]))
+    assert above(mesh.vertices)[:2] == pytest.approx([0.1, 0.1], abs=1e-6)
+    np.testing.assert_array_equal(mesh.vertices[2], points[2])
+    np.testing.assert_array_equal(mesh.deltas[0], delta)
+    little = seat_lids(cloud(points, 10.0 * delta), NEW, NEW, np.array([1]))
+    assert above(little.vertices + little.deltas[0])[1] == pytest.approx(0.1, abs=1e-6)
+
+
+def test_each_eye_has_its_own_gaze() -> None:
+    right = beside(0.5) * [-1.0, 1.0, 1.0]
+    points = np.vstack([beside(0.5), right])
+    up = np.array([0.0, 0.8, 0.6])
+    gazes = np.array([[up, [0.0, 0.0, 1.0]]])
+    mesh = seat_lids(cloud(points, np.full((2, 3), [0.01, 0.0, 0.0])), NEW, NEW, np.arange(2), gazes)
+    moved = mesh.vertices + mesh.deltas[0]
+    assert above(moved[:1], tuple(up))[0] == pytest.approx(0.5, abs=0.01), "on the cornea of the eye that looks up"
+    assert above(moved[1:] * [-1.0, 1.0, 1.0])[0] == pytest.approx(0.5, abs=0.01)
+    assert np.linalg.norm(moved[0] - NEW.centre) > np.linalg.norm(moved[1] * [-1, 1, 1] - NEW.centre) + 0.5
+
+
+def test_no_share_of_a_closing_shape_is_no_change_and_half_is_half() -> None:
+    mesh = slit_sheet()
+    assert close_lips(mesh, 0.0, "jawOpen") is mesh
+    half = close_lips(mesh, 0.5, "mouthSmile_L")
+    np.testing.assert_allclose(half.vertices - mesh.vertices, 0.5 * mesh.deltas[1], atol=1e-12)
+    np.testing.assert_allclose(half.deltas, mesh.deltas * np.array([1.0, 0.5])[:, None, None])
+
+
+def test_what_follows_the_brows_heads_fades_with_the_distance_and_towards_the_sides_of_the_head() -> None:
+    near = np.exp(-0.5)
+    places = {  # by place: share of the whole move
+        (13.0, 59.0, 105.0): 1.0, (24.0, 59.0, 105.0): near, (13.0, 68.0, 105.0): near, (13.0, 50.0, 90.0): near,
+        (13.0, 59.0, 75.0): 0.5, (13.0, 59.0, 67.5): 0.15625, (13.0, 59.0, 60.0): 0.0,
+        (3.5, 59.0, 105.0): 0.5 * np.exp(-0.5 * (9.5 / 11) ** 2), (-6.0, 59.0, 105.0): 0.0,
+    }  # fmt: skip
+    points = np.array(list(places))
+    names = ("browDownRight", "browDownLeft", "browUp", "browDown")
+    empty = np.zeros((0, 4), np.int64)
+    for side, shape in ((-1.0, 0), (1.0, 1), (1.0, 3)):
+        before = np.full((4, len(points), 3), 0.25)
+        mesh = FitMesh(points * [side, 1.0, 1.0], empty, np.zeros((0, 2)), empty, names, before.copy())
+        after = draw_brows(mesh, "browDown", (13.0, 59.0), (11.0, 9.0), (-2.8, -1.8, 0.6)).deltas
+        wanted = np.array(list(places.values()))[:, None] * [-2.8 * side, -1.8, 0.6]
+        np.testing.assert_allclose(after[shape] - before[shape], wanted, atol=1e-9)
+        np.testing.assert_array_equal(after[2], before[2])
+        np.testing.assert_array_equal(mesh.deltas, before)
+
+
+def test_the_front_of_a_ball_has_no_kink_where_it_is_held() -> None:
+    """Where its steep part begins it is as high as 0.32 mm further in: sqrt(0.4) / 2 less than min(across, held)."""
+    front_old = 80.0 + np.sqrt(15.0**2 - (0.93 * 15.0 - 0.316) ** 2)
+    front_new = 88.0 + np.sqrt(12.0**2 - (0.93 * 12.0 - 0.035) ** 2)
+    t = (0.93 * 15.0 - 1.05 * 12.0) / (0.85 * 12.0)
+    point = np.array([[30.0, 36.0 + 0.93 * 15.0, 85.0]])
+    moved = seated_at(point, OLD, FURTHER) - point
+    assert moved[0] == pytest.approx([0.0, 0.0, (1 - t * t * (3 - 2 * t)) * (front_new - front_old)], abs=0.01)
+
+
+def test_the_sides_part_in_the_middle() -> None:
+    old, new = Eyeball((6.0, 36.0, 80.0), 15.0), Eyeball((6.0, 36.0, 83.0), 12.0)
+    left = np.array([[0.5, 40.0, 93.0], [0.0, 38.0, 94.0]])
+    right = seated_at(left * [-1.0, 1.0, 1.0], old, new) * [-1.0, 1.0, 1.0]
+    np.testing.assert_allclose(right, seated_at(left, old, new))

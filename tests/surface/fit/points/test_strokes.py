@@ -3,7 +3,16 @@
 import numpy as np
 from slit_sheet import N, slit_sheet
 
-from surface.fit.points.strokes import PIECES, make_paint, mirrored, smooth_line, uv_of, vertex_row
+from surface.fit.points.strokes import (
+    PIECES,
+    arc_length,
+    evenly,
+    make_paint,
+    mirrored,
+    smooth_line,
+    uv_of,
+    vertex_row,
+)
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
 
@@ -49,3 +58,29 @@ def test_layers_of_absent_parts_are_dropped_and_mirrors_added():
     ]
     assert "mirror" not in spots
     assert hole["kind"] == "region" and len(hole["lines"][0]) == 18
+
+
+def test_a_straight_line_of_even_points_stays_straight_and_even_to_its_ends():
+    points = np.array([[0.0, 0], [2, 1], [4, 2], [6, 3]])
+    line = smooth_line(points, closed=False)
+    np.testing.assert_allclose(line, np.linspace([0, 0], [6, 3], 3 * PIECES + 1), atol=1e-12)
+    two = smooth_line(points[:2], closed=False)
+    np.testing.assert_allclose(two, np.linspace([0, 0], [2, 1], PIECES + 1), atol=1e-12)
+
+
+def test_a_smooth_line_has_no_kinks_and_passes_a_middle_by_its_four_neighbours():
+    points = np.array([[0.0, 0], [1, 4], [5, 2], [6, 7], [9, 1]])
+    for closed in (False, True):
+        line = smooth_line(points, closed=closed)
+        middle = line[PIECES + PIECES // 2]  # Catmull-Rom: (-1 9 9 -1) / 16 of the neighbours
+        np.testing.assert_allclose(middle, (-points[0] + 9 * points[1] + 9 * points[2] - points[3]) / 16)
+    first = line[PIECES // 2]
+    np.testing.assert_allclose(first, (-points[4] + 9 * points[0] + 9 * points[1] - points[2]) / 16)
+    last = line[4 * PIECES + PIECES // 2]
+    np.testing.assert_allclose(last, (-points[3] + 9 * points[4] + 9 * points[0] - points[1]) / 16)
+
+
+def test_points_along_a_line_are_evenly_far_apart():
+    line = np.array([[0.0, 0], [3, 4], [3, 14], [0, 14]])
+    np.testing.assert_allclose(arc_length(line), [0, 5, 15, 18])
+    np.testing.assert_allclose(evenly(line, 4), [[0, 0], [3, 5], [3, 11], [0, 14]])

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from meshfiles import remapped
 from slit_sheet import SIZE_MM, slit_sheet
 
@@ -106,3 +107,85 @@ def test_a_chart_without_flat_holes_is_left_alone():
     island = find_islands(slit_sheet())[0]
     tall = Island(island.vertex, island.uv * [1.0, 1.0 / OPEN * 4], island.faces)
     np.testing.assert_array_equal(open_flat_holes(tall).uv, tall.uv)
+
+
+def turned_head(angle: float):
+    """The sheet and its (u, v) turned about the line of sight: its slit is tilted by the angle, rad."""
+    mesh, (c, s) = slit_sheet(), (np.cos(angle), np.sin(angle))
+    turn = np.array([[c, -s], [s, c]])
+    vertices = np.column_stack([mesh.vertices[:, :2] @ turn.T, mesh.vertices[:, 2]])
+    return replace(mesh, vertices=vertices, uv=mesh.uv @ turn.T)
+
+
+def slit_tilt(island: Island) -> float:
+    slit = island.uv[boundary_loops(island)[1]]
+    along = np.linalg.svd(slit - slit.mean(axis=0))[2][0]
+    return float(np.degrees(np.arctan(along[1] / along[0])))
+
+
+@pytest.mark.parametrize(("tilt_deg", "wanted"), [(15, 0), (-15, 0), (19, 0), (23, 23), (-60, -60)])
+def test_a_slit_that_is_tilted_a_little_is_levelled_and_one_tilted_more_is_none(tilt_deg: float, wanted: float) -> None:
+    mesh = turned_head(np.radians(tilt_deg))
+    (island,) = lay_out(mesh, find_islands(mesh))
+    assert slit_tilt(island) == pytest.approx(wanted, abs=2.0)
+
+
+def test_an_island_is_anticlockwise_and_up_is_up_however_it_was_mirrored_and_turned() -> None:
+    mesh = slit_sheet()
+    for factors in ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-2.0, -0.3)):
+        (island,) = lay_out(mesh, find_islands(replace(mesh, uv=mesh.uv * factors)))
+        x, y = (mesh.vertices[island.vertex][:, k] for k in (0, 1))
+        assert np.corrcoef(island.uv[:, 0], x)[0, 1] > 0.999 and np.corrcoef(island.uv[:, 1], y)[0, 1] > 0.999
+        np.testing.assert_allclose(island.uv.min(axis=0), 0.0, atol=1e-12)
+        assert np.ptp(island.uv, axis=0).max() == pytest.approx(1.0)
+
+
+def test_small_islands_get_a_tile_that_is_not_too_small() -> None:
+    mesh = slit_sheet()
+    middle = mesh.vertices[mesh.faces].mean(axis=1)
+    for reach, size in ((15.0, 0.12), (75.0, 0.375)):
+        small = ((middle[:, 0] > 99 - reach) & (middle[:, 1] > 99 - reach)).astype(int)
+        islands = lay_out(mesh, find_islands(remapped(mesh, small, lambda k, uv: uv * (1.0, 7.0)[k])))
+        largest, least = (float(np.ptp(island.uv, axis=0).max()) for island in islands)
+        assert largest == pytest.approx(1.0)
+        assert least == pytest.approx(size, rel=0.08)
+        assert islands[1].uv[:, 0].min() == pytest.approx(TILE) and islands[1].uv[:, 1].min() == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(("columns", "islands"), [(1, 2), (0.5, 1)])
+def test_what_is_turned_over_is_an_island_of_its_own_from_three_hundredths_on(columns: float, islands: int) -> None:
+    """A column of the sheet is 1/24 of it, half a column 1/48."""
+    mesh = slit_sheet()
+    rows = 24 if columns == 1 else 12
+    middle = mesh.vertices[mesh.faces].mean(axis=1)
+    over = (middle[:, 0] > 92) & (middle[:, 1] < -100 + rows * 200 / 24)
+    uv = mesh.uv.copy()
+    edge = (mesh.vertices[:, 0] > 99) & (mesh.vertices[:, 1] <= -100 + rows * 200 / 24 + 1e-6)
+    uv[edge, 0] -= 2.0 / 24
+    (island,) = find_islands(replace(mesh, uv=uv))
+    parts = separate(island)
+    assert over.sum() == rows
+    assert len(parts) == islands and sum(len(part.faces) for part in parts) == len(mesh.faces)
+
+
+def test_a_flat_hole_is_opened_to_four_tenths_of_its_width_and_what_is_far_stays() -> None:
+    before, after = flat_island(), open_flat_holes(flat_island())
+    np.testing.assert_array_equal(after.uv[:, 0], before.uv[:, 0])
+    loop = boundary_loops(before)[1]
+    (u0, v0), (u1, v1) = before.uv[loop].min(axis=0), before.uv[loop].max(axis=0)
+    width, height = u1 - u0, v1 - v0
+    assert np.ptp(after.uv[loop][:, 1]) == pytest.approx(0.4 * width, rel=0.03)
+    shift = after.uv[:, 1] - before.uv[:, 1]
+    outside = np.maximum(u0 - before.uv[:, 0], before.uv[:, 0] - u1) / width
+    assert (shift[outside > 1.2] == 0.0).all() or not (outside > 1.2).any()
+    v = before.uv[:, 1] - 0.5 * (v0 + v1)
+    assert (np.sign(shift[outside < 0.9]) == np.sign(np.round(v[outside < 0.9], 9))).all()
+    above = (outside <= 0.0) & (np.abs(v) > 0.3 * width)
+    full = (0.4 * width / height - 1.0) * 2.0 * height * np.arctan(np.abs(v[above]) / (2.0 * height))
+    np.testing.assert_allclose(np.abs(shift[above]), full * np.exp(-((v[above] / (2.0 * width)) ** 2)), rtol=1e-6)
+    beside = (outside > 0.55) & (outside < 0.65)  # half of 1.2 widths: half of the shift
+    for k in np.flatnonzero(beside):
+        same = np.flatnonzero((np.abs(before.uv[:, 1] - before.uv[k, 1]) < 1e-9) & (outside <= 0.0))
+        if abs(v[k]) > 0.3 * width:
+            t = outside[k] / 1.2
+            assert shift[k] == pytest.approx(shift[same[0]] * (1.0 - t * t * (3.0 - 2.0 * t)))

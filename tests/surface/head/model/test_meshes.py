@@ -1,5 +1,7 @@
 """The tessellation kept in a head file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_head import part
@@ -7,6 +9,7 @@ from small_head import part
 from surface.head.model.data import Seam
 from surface.head.model.meshes import pack, tessellate, unpack
 from surface.head.posing.part import make_surface
+from surface.mesh.mesh import border_edges
 
 DATA = part("a", 0.0)
 SURFACE = make_surface(DATA)
@@ -81,3 +84,17 @@ def test_normals_of_a_flipped_mesh_are_turned():
     got = unpack(arrays, SURFACE, BUDGET, rough=False)
     assert got is not None and got.flip != MESH.flip and got.leaves == MESH.leaves
     np.testing.assert_allclose(got.normals, -MESH.normals, atol=1e-5)
+
+
+@pytest.mark.parametrize("chord", [0.5, 2.0])
+def test_borders_follow_their_loop_within_four_tenths_of_the_chord_error(chord: float):
+    angle = np.linspace(0, 2 * np.pi, 240, endpoint=False)
+    loop = 0.5 + 0.45 * np.column_stack([np.cos(angle), np.sin(angle)])
+    data = replace(DATA, loops=[loop], budget=(0, chord, 3))
+    mesh = tessellate(data, SURFACE)
+    a, b = (mesh.vertices[ends] for ends in border_edges(mesh.triangles).T)
+    at = SURFACE.evaluate(loop)
+    along = ((at[:, None] - a) * (b - a)).sum(axis=2) / ((b - a) ** 2).sum(axis=1)
+    nearest = a + np.clip(along, 0, 1)[..., None] * (b - a)
+    off = np.linalg.norm(at[:, None] - nearest, axis=2).min(axis=1).max()
+    assert 0.05 * chord < off < 0.45 * chord

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from surface.head import Head
 from surface.head.posing.part import border_edges
 from surface.view import Camera, Offscreen
 from surface.view.draw.decimate import decimated_triangles, grouped_in_patches
+from surface.view.draw.materials import strip_uv
 
 SHAPES: tuple[dict[str, float], ...] = (
     {"jawOpen": 1.0, "mouthUpperUpLeft": 1.0},
@@ -125,3 +127,54 @@ def test_errors_stay_below_those_of_the_material() -> None:
             inside = np.linalg.norm(part.vertices[:, None] - corners.mean(axis=1), axis=2).argmin(axis=1)
             near = planes[np.arange(len(inside)), inside]
             assert np.sqrt((near**2).mean()) < 2 * most
+
+
+ERRORS_MM = {
+    "skin": 0.5,
+    "brow": 0.56,
+    "lash": 0.42,
+    "teeth": 0.2,
+    "gums": 0.5,
+    "mouth": 0.84,
+    "eye": 0.35,
+    "wool": 0.56,
+}
+
+
+@pytest.mark.parametrize("material", ERRORS_MM)
+def test_errors_are_those_of_the_material_and_count_places_normals_and_looks(
+    monkeypatch: pytest.MonkeyPatch, material: str
+) -> None:
+    seen: list[tuple[np.ndarray, np.ndarray, list[float]]] = []
+
+    class Noted:
+        def __init__(self, places: np.ndarray, triangles: np.ndarray, locked: np.ndarray) -> None:
+            self.triangles = triangles
+            seen.append((places, locked, []))
+
+        def run(self, error: float) -> np.ndarray:
+            seen[-1][2].append(error)
+            return self.triangles
+
+    monkeypatch.setattr("surface.view.draw.decimate.Collapse", Noted)
+    data = small_head()
+    parts = [data.parts[0], *(replace(part, material=material) for part in data.parts[1:])]
+    head = Head(replace(data, parts=parts))
+    decimated_triangles(head)
+    (first, locked, errors), _, (tooth, free, others) = seen
+    assert errors == pytest.approx([0.18, 0.5])
+    assert others == pytest.approx([0.36 * ERRORS_MM[material], ERRORS_MM[material]])
+    (a, _, rigid), (zipper,) = head.parts, head.zippers
+    assert first.shape == (len(a.vertices), 5 * 6 + 3), "five poses of places and normals, and a colour"
+    np.testing.assert_allclose(first[:, :3], a.vertices, atol=1e-5)
+    np.testing.assert_allclose(first[:, 3:6], 2.0 * a.normals, atol=1e-5)
+    np.testing.assert_allclose(first[:, -3:], np.tile(4.0 * np.sqrt([0.1, 0.2, 0.3]), (len(first), 1)), atol=1e-5)
+    head.pose(head.values({"mouthPucker": 1, "browOuterUpLeft": 1, "eyeWideLeft": 1}))
+    np.testing.assert_allclose(first[:, 18:21], a.vertices, atol=1e-5)
+    head.pose(np.zeros(len(head.parameters)))
+    assert np.array_equal(np.flatnonzero(locked), np.union1d(zipper.low, zipper.high)) and not free.any()
+    looks = {"skin": np.full((len(tooth), 3), 4.0 * np.sqrt(0.5)), "wool": np.zeros((len(tooth), 0))}
+    if material in ("brow", "lash"):
+        looks[material] = 1.5 * strip_uv(rigid)
+    wanted = [rigid.vertices, 2.0 * rigid.normals] if material == "skin" else [rigid.vertices]
+    np.testing.assert_allclose(tooth, np.hstack([*wanted, looks.get(material, looks["wool"])]), atol=1e-4)

@@ -10,6 +10,7 @@ import pytest
 
 from surface.head import Head
 from surface.view import Camera, Offscreen
+from surface.view.draw.decimated_draw import JoinedParts
 
 SIZE = (320, 240)
 
@@ -68,3 +69,18 @@ def test_the_head_poses_as_before_whatever_is_drawn(screen: Offscreen, head: Hea
     head.pose(values)
     for part in head.parts:
         assert np.array_equal(part.vertices, before[part.name]), part.name
+
+
+def test_parts_that_are_joined_tell_what_changed_by_their_place_in_the_joined_rows(screen: Offscreen) -> None:
+    decimated = screen.renderer.evaluator.decimated  # type: ignore[attr-defined]
+    parts = decimated.parts[2:4]
+    joined = JoinedParts(decimated, parts)
+    start, second = parts[0].first, parts[1].first - parts[0].first
+    assert start > 0 and second == len(parts[0].kept)
+    assert len(joined.vertices) == len(joined.normals) == parts[1].last - start
+    for rows, whole in ((joined.vertices, decimated.vertices), (joined.normals, decimated.normals)):
+        assert np.array_equal(rows, whole[start : parts[1].last])
+    assert np.array_equal(joined.triangles[len(parts[0].triangles) :], parts[1].triangles + second)
+    parts[0].changed, parts[1].changed = [(1, 4)], [(0, 2), (5, 6)]
+    assert joined.changed == [(1, 4), (second, second + 2), (second + 5, second + 6)]
+    assert (joined.name, joined.material) == (parts[0].part.name, parts[0].part.material)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -101,3 +102,27 @@ def test_turned_by_share() -> None:
     points, pivot = np.array([[1.0, 5.0, 0.0], [1.0, 5.0, 0.0]]), np.array([0.0, 5.0, 0.0])
     at = rotate_by_share(points, np.array([1.0, 0.5]), np.array([0.0, np.pi / 2, 0.0]), pivot)
     assert at == pytest.approx(np.array([[0, 5, -1], [np.sqrt(0.5), 5, -np.sqrt(0.5)]]), abs=1e-12)
+
+
+def test_textures_must_be_wide_enough_for_a_line_and_high_enough_for_all_weights() -> None:
+    """64 weights a vertex at most, 1024 a line."""
+    info = {"GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS": 2, "GL_MAX_TEXTURE_SIZE": 1024}
+    small, large = (
+        SimpleNamespace(place_points=None, parts=[SimpleNamespace(vertices=range(k)) for k in (5, count)])
+        for count in (16 * 1024, 32 * 1024)
+    )
+    none = SimpleNamespace(place_points=None, parts=[])
+    assert why_not_gpu(info, small) is why_not_gpu(info, none) is None
+    assert "1023 texels" in str(why_not_gpu(info | {"GL_MAX_TEXTURE_SIZE": 1023}, none))
+    assert "2047 texels" in str(why_not_gpu(info | {"GL_MAX_TEXTURE_SIZE": 2047}, large))
+    assert why_not_gpu(info | {"GL_MAX_TEXTURE_SIZE": 2048}, large) is None
+    assert "no textures" in str(why_not_gpu(info | {"GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS": 1}, small))
+
+
+def test_no_rotation_and_half_a_turn_by_share() -> None:
+    points, pivot = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0]]), np.array([0.0, 2.0, 0.0])
+    assert rotate_by_share(points, np.ones(2), np.zeros(3), pivot) == pytest.approx(points)
+    turned = rotate_by_share(points, np.array([0.0, 1.0]), np.array([np.pi, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    assert turned == pytest.approx(np.array([[1, 2, 3], [1, 0, -3]]), abs=1e-9)
+    askew = rotate_by_share(points, np.ones(2), 2 * np.pi / 3 * np.ones(3) / np.sqrt(3), np.zeros(3))
+    assert askew == pytest.approx(points[:, [2, 0, 1]], abs=1e-9)

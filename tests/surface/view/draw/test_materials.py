@@ -13,6 +13,7 @@ from surface.view.draw.materials import (
     detail_uv,
     of,
     programs,
+    skin_program,
     strip_uv,
     uniforms_key,
 )
@@ -188,3 +189,65 @@ def test_the_detail_texture_tiles_and_is_even(gl: None) -> None:
     assert low.max() < 1e-3, "nothing that shows as a pattern"
     ratio = power[4:12, 4:12].mean(axis=(0, 1)) / power[40:60, 40:60].mean(axis=(0, 1))
     assert ratio[3] > 3 * ratio[:3].max(), "mottling is coarser than bumps"
+
+
+def test_what_is_inside_the_mouth_is_reddish_and_teeth_are_nearly_white() -> None:
+    head = BallHead()
+    seen, part = Openings(head.parts), head.parts[3]
+    given = {name: of(name).uniforms(part, THEMES["skin"], seen) for name in ("teeth", "tongue", "gums", "mouth")}
+    assert {name: (*one["albedo"], one["wrap"][0], one["wetness"]) for name, one in given.items()} == {
+        "teeth": (0.76, 0.71, 0.62, 0.3, 0.30), "tongue": (0.50, 0.17, 0.15, 0.4, 0.22),
+        "gums": (0.48, 0.15, 0.14, 0.3, 0.20), "mouth": (0.32, 0.09, 0.08, 0.3, 0.08),
+    }  # fmt: skip
+    for one in given.values():
+        assert one["wrap"][1:] == pytest.approx([0.6 * one["wrap"][0]] * 2)
+    bare = of("teeth").static(part, THEMES["skin"], seen)["occlusion"]
+    assert bare.shape == (len(part.vertices), 1) and (bare == 1.0).all()
+
+
+def test_hair_fades_towards_its_tip_and_brows_at_their_edges_too() -> None:
+    head = BallHead()
+    lash, brow = (of(name).uniforms(head.parts[0], THEMES["skin"], Openings(head.parts)) for name in ("lash", "brow"))
+    assert (lash["fade"], lash["edges"]) == ((0.85, 0.15, 0.0, 0.0), 0.0)
+    assert (brow["fade"], brow["edges"]) == ((0.72, 0.50, 0.30, 2.4), 1.0)
+    eye = of("eye").uniforms(head.parts[1], THEMES["skin"], Openings(head.parts))
+    assert (eye["iris_radius"], eye["pupil_radius"]) == (0.49, 0.185)
+
+
+@pytest.mark.parametrize("simplified", [True, False])
+@pytest.mark.parametrize("theme", THEMES)
+def test_a_shader_of_skin_knows_seams_of_masks_and_the_texels_of_unfiltered_grain(
+    monkeypatch: pytest.MonkeyPatch, theme: str, simplified: bool
+) -> None:
+    given: list[dict[str, object]] = []
+    monkeypatch.setattr("surface.view.draw.materials.build", lambda *names, defines, **_: given.append(defines))
+    for quality in ("full", "fast"):
+        skin_program(None, quality, THEMES[theme], simplified=simplified)  # type: ignore[arg-type]
+    seams = {"SEAMS": 1, "DETAIL_PER_RADIAN": "2.86479"} if theme == "mask" else {}  # 18 tiles around
+    grain = {"GRAIN_TEXELS": "64.0"} if simplified else {}
+    assert given == [{"INSIDE": "0.25"} | seams | grain, {"INSIDE": "0.25"}]
+
+
+def test_lashes_of_many_strips_are_upper_or_lower_by_their_height() -> None:
+    heights = [3.0, 2.0, -1.0, -2.0]
+    at = np.array([[0.0, y, 0.0] for y in heights])
+    part = BallPart("lashes", "lash", np.array([[0, 1, 2]]), at, np.zeros((4, 3)))
+    part.uv[:] = [(2.0 * k + 0.5, 0.5) for k in range(4)]
+    along = of("lash").static(part, THEMES["skin"], openings())["along"]
+    assert along[:, 2] == pytest.approx([1.0, 1.0, 0.42, 0.42]) and along[:, 0] == pytest.approx([0.5] * 4)
+
+
+def test_bumps_have_no_waves_longer_than_a_third_of_the_texture_and_all_shorter_ones(gl: None) -> None:
+    ctx = open_context()
+    try:
+        texture = detail_texture(ctx)
+        data = np.frombuffer(texture.read(), np.uint8).reshape(128, 128, 4).astype(float)
+        assert texture.filter == (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
+    finally:
+        ctx.release()
+    power = (np.abs(np.fft.fft2(data - data.mean(axis=(0, 1)), axes=(0, 1))) ** 2).mean(axis=2)
+    frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(128) * 128] * 2))
+    typical = power[(frequency > 2.2) & (frequency < 4.0)].mean()
+    assert power[(frequency > 0) & (frequency <= 2.0)].max() < 1e-3 * typical
+    assert power[(frequency > 2.0) & (frequency < 2.3)].mean() > 0.2 * typical
+    assert len(np.unique(data)) > 200

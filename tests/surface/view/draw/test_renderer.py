@@ -288,3 +288,30 @@ def test_many_rectangles_get_a_larger_buffer(gl: None) -> None:
         screen.render(values())
         assert background._corners.size > size
         assert screen.read()[:, 0].max(axis=1).min() > 20, "background in every row"
+
+
+@pytest.mark.parametrize(
+    ("camera", "inside"),
+    [
+        (Camera.around(0.0, -11.5), False),
+        (Camera.around(0.0, -12.5), True),
+        (Camera.around(0.0, 40.0), False),
+        (Camera.around(180.0, 0.0), True),
+        (Camera((900.0, 0.0, 0.0)), False),
+        (Camera((900.0, 0.0, -0.5)), True),
+    ],
+)
+def test_the_hollow_bust_is_seen_from_behind_and_from_well_below(
+    screen: Offscreen, camera: Camera, inside: bool
+) -> None:
+    screen.render(values(), camera)
+    assert screen.renderer._into_bust == inside
+
+
+def test_lights_follow_half_of_the_cameras_turn_and_none_of_the_pose(screen: Offscreen) -> None:
+    program = screen.renderer._programs["skin"]
+    if "key_at_rest" not in program:
+        pytest.skip("this quality computes no shade that is baked at rest")
+    screen.render(values(), Camera.around(30.0))
+    wanted = light_direction(screen.renderer.theme.key, 15.0)
+    assert np.array(program["key_at_rest"].value) == pytest.approx(wanted, abs=1e-5)

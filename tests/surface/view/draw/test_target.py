@@ -123,3 +123,41 @@ def test_enlarged_rectangles_hold_what_their_edge_reaches() -> None:
     assert (left <= 9 / 0.6, bottom <= 19 / 0.6) == (True, True)
     assert (right >= 16 / 0.6, top >= 27 / 0.6) == (True, True)
     assert max(right - left, top - bottom) < 18
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+def test_another_background_is_drawn_everywhere_and_the_same_one_only_around_the_head(gl: None, samples: int) -> None:
+    with Offscreen(BallHead(), (180, 150), samples=samples) as screen:
+        screen.render(values())
+        screen.renderer.set_background((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+        blue = screen.render(values())
+        corners = blue[[2, 2, -3, -3], [2, -3, 2, -3]].astype(int)
+        assert corners[:, :2].max() <= 2 and corners[:, 2].min() > 150
+        boxes = []
+        real = screen.renderer.draw
+        screen.renderer.draw = lambda camera, into, bands: (boxes.append(bands.box()), real(camera, into, bands))  # type: ignore[method-assign,assignment,func-returns-value]
+        screen.render(values(jawOpen=1.0))
+        assert len(boxes) == 1 and boxes[0][2] < 120
+        away = Camera.front().aimed((9000.0, 0.0, 0.0))
+        screen.render(values(), away)
+        screen.render(values(jawOpen=0.1), away)
+        assert len(boxes) == 2, "where no head is and was, nothing is drawn"
+
+
+def test_targets_have_at_least_a_pixel_and_a_sample(gl: None) -> None:
+    ctx = open_context()
+    wanted = (((1, 1), 1, 0.1, (1, 1)), ((10, 20), 1, 0.6, (6, 12)), ((10, 20), 2, 0.6, (10, 20)))
+    for size, samples, scale, inner in wanted:
+        target = Target(ctx, size, samples, scale)
+        assert (target.size, target._drawn.size, target.samples) == (size, inner, samples)
+        assert target.scale == (scale if samples == 1 else 1.0)
+        target.release()
+    most = Target(ctx, (8, 8), 10_000)
+    assert most.samples == ctx.max_samples and Target(ctx, (8, 8), 0).samples == 1
+    assert Target(ctx, (8, 8)).samples == min(4, ctx.max_samples)
+    ctx.release()
+
+
+def test_enlarged_rectangles_reach_a_pixel_of_the_smaller_picture_further() -> None:
+    assert enlarged(np.array([[10, 20, 15, 25]]), (50, 50), (100, 100)).tolist() == [[18, 38, 33, 53]]
+    assert enlarged(np.array([[0, 1, 50, 49]]), (50, 50), (100, 100)).tolist() == [[0, 0, 100, 100]]

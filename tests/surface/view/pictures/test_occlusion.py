@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from ball_head import BallHead, BallPart, ball, grid, values
+from small_head import small_head
 
+from surface.head import Head
 from surface.view.pictures.occlusion import (
     bake,
     bake_head,
     fit_sky,
     orthographic,
+    shade_head,
     smoothed,
     sphere_directions,
     thinness,
@@ -189,3 +195,48 @@ def test_parts_of_no_group_stay_open_and_skin_gets_three_arrays(gl: None) -> Non
     assert set(made) == {"face", "face/visible", "face/thin", "left_eye", "right_eye", "teeth", "mouth"}
     assert made["face/visible"].shape[1] == 4 and made["face/thin"].shape[1] == 1
     assert made["face/visible"].min() >= 0.0 and made["face/visible"].max() <= 1.0
+
+
+@pytest.mark.parametrize("count", [96, 300])
+def test_no_two_directions_are_near_each_other(count: int) -> None:
+    directions = sphere_directions(count)
+    between = np.degrees(np.arccos(np.clip(directions @ directions.T, -1, 1)))[~np.eye(count, dtype=bool)]
+    assert between.min() > 0.75 * np.degrees(np.sqrt(4 * np.pi / count))
+    assert directions[0, 1] == pytest.approx(1 - 1 / count) and directions[-1, 1] == pytest.approx(1 / count - 1)
+
+
+def test_visibility_ends_at_the_pictures_rim() -> None:
+    picture = np.full((4, 4), 0.5, np.float32)
+    picture[3, :], picture[:, 0] = 0.9, 0.1
+    low = [[0.0, 0.5, 0.4], [0.9, 0.5, 0.4], [0.25, 0.5, 0.4]]
+    box = np.array([*low, [1.0, 1.0, 0.8], [0.5, 0.75, 0.7], [0.5, 0.5, 0.5]])
+    assert visibility(box, picture, 0.0) == pytest.approx([0.0, 1.0, 0.5, 1.0, 0.5, 1.0])
+
+
+def test_a_head_is_baked_with_its_mouth_half_open_and_its_eyes_nearly_shut(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    given: list[np.ndarray] = []
+    old = tmp_path / "old"
+    old.write_text("of another head")
+    patches = {
+        "load_data": lambda folder: small_head(), "shade_path": lambda folder: old,
+        "bake_head": lambda head, pose: given.append(pose), "write_shade": lambda folder, baked, parts: old,
+    }  # fmt: skip
+    for name, instead in patches.items():
+        monkeypatch.setattr(f"surface.view.pictures.occlusion.{name}", instead)
+    assert shade_head(tmp_path) == old and not old.exists()
+    wanted = Head(small_head()).values({"jawOpen": 0.45, "eyeBlinkLeft": 0.8, "eyeBlinkRight": 0.8})
+    assert len(given) == 1 and (given[0] == wanted).all()
+
+
+def test_pictures_are_96_of_512_pixels_where_nothing_else_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[tuple[object, ...]] = []
+    ended: list[int] = []
+    context = SimpleNamespace(release=lambda: ended.append(1))
+    monkeypatch.setattr("surface.view.pictures.occlusion.open_context", lambda: context)
+    monkeypatch.setattr(
+        "surface.view.pictures.occlusion._bake", lambda ctx, members, *how: given.append((len(members), *how)) or {}
+    )
+    bake(BallHead().parts)
+    assert given == [(3, 96, 512, 1.2), (1, 96, 512, 1.2)] and ended == [1]

@@ -107,3 +107,44 @@ def test_without_moderngl_the_message_says_what_to_install(monkeypatch: pytest.M
     with pytest.raises(ViewError, match="moderngl") as caught:
         open_context()
     assert ".[view]" in caught.value.hint
+
+
+def test_a_picture_is_1280_by_720_where_no_size_is_given_and_one_pixel_is_a_size(gl: None) -> None:
+    with Offscreen(BallHead(), quality="fast") as screen:
+        assert screen.render(values()).shape == (720, 1280, 3)
+    with Offscreen(BallHead(), (1, 1)) as screen:
+        assert screen.render(values()).shape == (1, 1, 3)
+
+
+def test_egl_is_asked_first_then_the_platform_for_opengl_31(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[dict[str, object]] = []
+
+    def refuse(**options: object) -> None:
+        asked.append(options)
+        raise Exception(f" reason {len(asked)} ")
+
+    monkeypatch.setattr("moderngl.create_context", refuse)
+    with pytest.raises(ViewError, match=r"no OpenGL 3\.1 without a window: reason 1; reason 2"):
+        open_context()
+    platform = {"standalone": True, "require": 310}
+    assert asked == [platform | {"backend": "egl"}, platform]
+
+
+def test_a_closed_picture_has_released_all_it_had_once(gl: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    screen, released = Offscreen(BallHead(), (32, 32)), list[str]()
+    for name in ("renderer", "target"):
+        thing = getattr(screen, name)
+        monkeypatch.setattr(thing, "release", lambda name=name, real=thing.release: (released.append(name), real()))
+    screen.close()
+    screen.close()
+    assert released == ["renderer", "target"]
+
+
+def test_a_frame_in_flight_is_the_only_one(gl: None) -> None:
+    with Offscreen(BallHead(), (64, 64), samples=1) as screen:
+        screen.go_live()
+        assert screen.target.samples == 1 and screen.renderer.revision == 0
+        screen.draw(values())
+        assert screen.target._pending is not None
+        screen.finish()
+        assert screen.target._pending is None

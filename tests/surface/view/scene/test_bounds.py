@@ -98,3 +98,33 @@ def test_corners_of_a_box_are_where_its_pixels_are() -> None:
     at = corners(np.array([[25, 16, 50, 48], [0, 0, 1, 1]]), SIZE)
     assert at[:6].tolist() == [[-0.5, -0.5], [0, -0.5], [0, 0.5], [-0.5, -0.5], [0, 0.5], [-0.5, 0.5]]
     assert at.shape == (12, 2) and at[6].tolist() == [-1, -1]
+
+
+@pytest.mark.parametrize(("shift", "at"), [(-500.0, 0), (500.0, SIZE[0])])
+def test_what_lies_beside_the_picture_ends_at_its_border(shift: float, at: int) -> None:
+    bands = found([[shift, -30.0, 0], [shift + 10, 20, 0], [shift, 28, 0]])
+    assert (bands.low == at).all() and (bands.high == at).all()
+
+
+def test_a_triangle_is_as_wide_as_its_corners_in_any_order() -> None:
+    points = [[-20.0, -30.0, 0.0], [30.0, 10.0, 0.0], [-10.0, -5.0, 0.0]]
+    for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
+        bands = found([points[k] for k in order])
+        assert bands.boxes().tolist() == [[27, k * ROWS, 83, (k + 1) * ROWS] for k in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("bottom", "top", "count"),
+    [
+        (19.0, 25.0, 1),
+        pytest.param(
+            19.01, 25.0, 1, marks=pytest.mark.xfail(strict=True, reason="what lies within the last band is left out")
+        ),
+        (-60.0, -35.0, 1),
+        (-60.0, -35.01, 0),
+        (60.0, 70.0, 0),
+    ],
+)
+def test_the_margin_itself_reaches_the_picture(bottom: float, top: float, count: int) -> None:
+    """Margins of 3 pixels: one from row 48, the last band's first, one to row 0, one to just below it."""
+    assert len(found([[-20.0, bottom, 0], [-10, bottom, 0], [-20, top, 0]]).boxes()) == count

@@ -71,3 +71,35 @@ def test_aimed_keeps_the_direction() -> None:
 def test_an_unknown_side_is_named() -> None:
     with pytest.raises(ValueError, match="'middle'"):
         Camera.profile("middle")
+
+
+def test_presets_are_portraits_that_draw_from_40_mm_to_4_m() -> None:
+    for name, pitch, target in (
+        ("front", 1, (0, -6, 40)),
+        ("three-quarter", 3, (0, -6, 40)),
+        ("profile", 1, (0, -6, 15)),
+    ):
+        camera = PRESETS[name]()
+        assert (camera.near, camera.far, camera.fov_deg, camera.target) == (40.0, 4000.0, 20.5, target)
+        assert camera.pitch_deg == pytest.approx(pitch) and camera.distance == pytest.approx(950.0)
+    assert PRESETS["three-quarter-right"]() == Camera.around(-38.0, 3.0)
+    assert Camera.around(10.0).pitch_deg == pytest.approx(0.0)
+
+
+def test_what_is_nearest_and_furthest_ends_at_the_ends_of_depth() -> None:
+    camera = Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), 90.0, near=2.0, far=50.0)
+    for depth, wanted in ((2.0, -1.0), (50.0, 1.0)):
+        assert project(camera, (0.0, 0.0, -depth)) == pytest.approx([0.0, 0.0, wanted], abs=1e-5)
+    assert project(camera, (5.0, -3.0, -10.0), aspect=2.0)[:2] == pytest.approx([0.25, -0.3])
+
+
+def test_from_straight_above_x_stays_to_the_right() -> None:
+    view = Camera((0.0, 10.0, 0.0), (0.0, 0.0, 0.0)).view()
+    assert view.tolist() == [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, -10], [0, 0, 0, 1]]
+    with pytest.raises(ValueError, match="read-only"):
+        Camera.front().matrix(1.0)[0, 0] = 1.0
+
+
+def test_angles_and_distances_are_named_when_a_camera_is_made() -> None:
+    with pytest.raises(TypeError):
+        Camera.around(1.0, 2.0, 900.0)  # type: ignore[misc]

@@ -57,3 +57,27 @@ def test_skin_is_warm_and_painted_and_a_mask_is_grey_and_bald() -> None:
     assert (skin.detail, mask.detail) == (1.0, 0.0)
     assert mask.gloss > skin.gloss == 1.0
     assert skin.lights_follow == 0.5
+
+
+def test_lights_come_from_where_the_pictures_of_reference_have_them() -> None:
+    placed = {
+        name: [(light.yaw_deg, light.pitch_deg) for light in (theme.key, theme.fill, theme.rim)]
+        for name, theme in THEMES.items()
+    }
+    assert placed == {
+        "skin": [(-34.0, 32.0), (48.0, 6.0), (152.0, 28.0)],
+        "mask": [(-38.0, 34.0), (52.0, 4.0), (150.0, 24.0)],
+    }
+    for theme in THEMES.values():
+        for light, least, most in ((theme.key, 0.9, 1.2), (theme.fill, 0.1, 0.22), (theme.rim, 0.7, 1.15)):
+            assert least <= min(light.colour) and max(light.colour) <= most
+    assert (THEMES["mask"].gloss, THEMES["mask"].glow, THEMES["mask"].lips) == (1.5, 2.4, 0.45)
+
+
+@pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
+def test_hair_is_dark_and_the_sky_is_blue(theme: Theme) -> None:
+    assert max(*theme.brow, *theme.lash) < 0.1 and max(*theme.sky, *theme.ground, *theme.background_top) < 0.3
+    assert theme.sky == tuple(sorted(theme.sky)) and max(theme.background_bottom) < 0.5
+    assert theme.background_top == tuple(sorted(theme.background_top))
+    if not theme.use_painted:
+        assert theme.albedo == tuple(sorted(theme.albedo)) and theme.iris == tuple(sorted(theme.iris))
