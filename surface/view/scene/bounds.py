@@ -47,7 +47,7 @@ def sweep(triangles: Any, pixels: Any, rows: int, margin: float, low: Any, high:
             left, right = (x if x < left else left), (x if x > right else right)
             bottom, top = (y if y < bottom else bottom), (y if y > top else top)
         first, end = (bottom - margin) * share, (top + margin) * share
-        if first > last or end < 0.0:
+        if first >= last + 1.0 or end < 0.0:
             continue
         for band in range(int(max(first, 0.0)), int(min(end, last)) + 1):
             if left - margin < low[band]:
