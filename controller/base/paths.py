@@ -1,7 +1,8 @@
 """Finds configuration files: beside the code in a checkout, under share/ when installed.
 
 An installer puts ``share/`` under the environment, under the user's own folder, or beside the code (``pip install
---target``), and writes down where. What lies beside the code goes first, then what was written down.
+--target``), and records where in the package's metadata. The folder beside the code is tried first, then the
+recorded one.
 """
 
 from __future__ import annotations
@@ -87,6 +88,6 @@ def _installed_files() -> tuple[Path, ...]:
         files = metadata.files("omote") or []
     except metadata.PackageNotFoundError:
         return ()
-    mark = (_SHARE / "vocabularies").parts
-    found = (file for file in files if file.parts[-len(mark) - 1 : -1] == mark)
+    ending = (_SHARE / "vocabularies").parts
+    found = (file for file in files if file.parts[-len(ending) - 1 : -1] == ending)
     return tuple(Path(os.path.abspath(file.locate())).parents[1] for file in found)[:1]

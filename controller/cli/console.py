@@ -41,14 +41,14 @@ def show_table(table: Table, console: Console = console) -> None:
 
     Where even the longest words of a row do not fit side by side, every row is a paragraph instead.
     """
-    rows = _texts(table, console)
+    columns = _texts(table, console)
     natural = Measurement.get(console, console.options.update(width=_ANY_WIDTH), table).maximum
-    # a terminal has a width, and COLUMNS asks for one
-    most = console.width if console.is_terminal or os.environ.get("COLUMNS") else natural
-    if natural <= most:
+    # only a terminal, or the variable COLUMNS, limits the width
+    limit = console.width if console.is_terminal or os.environ.get("COLUMNS") else natural
+    if natural <= limit:
         table.width = natural
-    elif not _narrowed(table, rows, most - natural):
-        _print_paragraphs(table, rows, console)
+    elif not _narrowed(table, columns, limit - natural):
+        _print_paragraphs(table, columns, console)
         return
     console.print(table, crop=False)
 
@@ -60,17 +60,17 @@ def _texts(table: Table, console: Console) -> list[list[Text]]:
 
 
 def _narrowed(table: Table, columns: list[list[Text]], spare: int) -> bool:
-    """Give columns the widths that make the table ``-spare`` cells narrower; False where words would be cut."""
-    wide = [max(cell_len(line) for cell in own for line in cell.plain.split("\n")) for own in columns]
-    least = [max(cell_len(word) for cell in own for word in ["", *cell.plain.split()]) for own in columns]
-    left = sum(wide) + spare - sum(least)
-    if left < 0:
+    """Make the table ``-spare`` cells narrower by its columns' widths; False where a word would have to be cut."""
+    natural = [max(cell_len(line) for cell in cells for line in cell.plain.split("\n")) for cells in columns]
+    least = [max(cell_len(word) for cell in cells for word in ["", *cell.plain.split()]) for cells in columns]
+    free = sum(natural) + spare - sum(least)
+    if free < 0:
         return False
-    order = sorted(range(len(wide)), key=lambda i: wide[i] - least[i])
-    for done, i in enumerate(order):  # those that need little get all of it, the others share equally
-        more = min(wide[i] - least[i], left // (len(order) - done))
-        table.columns[i].width = least[i] + more
-        left -= more
+    order = sorted(range(len(natural)), key=lambda i: natural[i] - least[i])
+    for done, i in enumerate(order):  # columns that need little get all of it, the others get equal widths
+        added = min(natural[i] - least[i], free // (len(order) - done))
+        table.columns[i].width = least[i] + added
+        free -= added
     return True
 
 

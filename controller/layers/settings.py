@@ -16,7 +16,7 @@ from controller.base.paths import config_dir
 from controller.layers.mixer import LayerSettings, Mode
 
 NEEDED = ("expression", "idle", "gaze", "speech", "capture", "manual")
-"""Layers that are always there: omote writes them by name."""
+"""Layers that every stage has, because the code writes to them by name."""
 
 _Seconds = Annotated[Number, Field(ge=0, le=3600)]
 _Gain = Annotated[Number, Field(ge=0, le=4)]
@@ -33,7 +33,7 @@ class LayerTable(Settings):
 
     @field_validator("gains")
     @classmethod
-    def _of_regions(cls, value: dict[str, float]) -> dict[str, float]:
+    def _check_regions(cls, value: dict[str, float]) -> dict[str, float]:
         wrong = [f"no region called {name!r}{did_you_mean(name, REGIONS)}" for name in value if name not in REGIONS]
         if wrong:
             raise ValueError("; ".join(wrong))
@@ -47,11 +47,11 @@ class LayersTable(Settings):
 def load_layers(
     changes: Mapping[str, Mapping[str, Any]] | None = None, *, where: Path | None = None
 ) -> tuple[LayerSettings, ...]:
-    """The shipped layers, with the ``changes`` of a stage: single keys of them, or added layers.
+    """The shipped layers, with the ``changes`` of a stage: other values for some keys, or more layers.
 
     ``where`` : the file the changes are from, for messages.
 
-    Raises ConfigError: a wrong key or value; two layers of one priority. Every fault with its key.
+    Raises ConfigError: a wrong key or value; two layers of one priority. The message lists every fault with its key.
     """
     path = config_dir() / "vocabularies" / "layers.toml"
     base = read_toml(path)

@@ -18,12 +18,15 @@ _ROW = float64[::1]
 
 
 @njit([float64(float64, float64, float64, float64)], cache=True, nogil=True)
-def _braking_speed(dt: float, left: float, accel: float, response: float) -> float:
-    """Speed at the end of a step of ``dt`` from which ``left`` is just enough to brake."""
-    near = left / (response + 0.5 * dt)  # the linear end
-    beyond = 2.0 * (left - 0.5 * accel * response**2) / accel + 0.25 * dt * dt
-    far = accel * (math.sqrt(max(beyond, 0.0)) - 0.5 * dt)
-    return far if far > accel * response else near
+def _braking_speed(dt: float, distance: float, accel: float, response: float) -> float:
+    """Greatest speed at the end of a step of ``dt`` from which ``distance`` is enough to brake.
+
+    Near the target speed is proportional to the distance, with the time constant ``response``.
+    """
+    linear = distance / (response + 0.5 * dt)
+    squared_s = 2.0 * (distance - 0.5 * accel * response**2) / accel + 0.25 * dt * dt
+    parabolic = accel * (math.sqrt(max(squared_s, 0.0)) - 0.5 * dt)
+    return parabolic if parabolic > accel * response else linear
 
 
 @njit([void(float64, _ROW, _ROW, _ROW, boolean[::1], _ROW, _ROW, _ROW, _ROW, _ROW)], cache=True, nogil=True)
@@ -31,18 +34,18 @@ def move(dt: float, target: Floats, position: Floats, velocity: Floats, limited:
          response: Floats, low: Floats, high: Floats) -> None:  # fmt: skip
     """Move ``position`` and ``velocity`` towards ``target`` for ``dt`` s, in place; all are (n,).
 
-    ``limited`` : (n,) bool says where a limit of speed or acceleration held back. The acceleration is even over the
-    step; where the target lies on the way and can be reached within the limits, the value stops there.
+    ``limited`` : (n,) bool, set where a limit of speed or acceleration made a value slower. The acceleration is
+    constant over the step; a value that reaches its target within the limits stops there.
     """
     for i in range(len(position)):
         sign = math.copysign(1.0, target[i] - position[i])
         error, now = abs(target[i] - position[i]), velocity[i] * sign  # + = towards the target
-        free = _braking_speed(dt, error - 0.5 * dt * now, accel[i], response[i])  # way left when the step ended at rest
+        allowed = _braking_speed(dt, error - 0.5 * dt * now, accel[i], response[i])
         reach = accel[i] * dt
-        wanted = now + max(min(min(free, speed[i]) - now, reach), -reach)
-        limited[i] = free - wanted > 1e-9
-        way = 0.5 * dt * (now + wanted)
+        wanted = now + max(min(min(allowed, speed[i]) - now, reach), -reach)
+        limited[i] = allowed - wanted > 1e-9
+        moved = 0.5 * dt * (now + wanted)
         if now * 0.5 * dt >= error and 0.5 * now * now / accel[i] <= error + _TINY:
-            way, wanted = error, 0.0
-        position[i] = min(max(position[i] + way * sign, low[i]), high[i])
+            moved, wanted = error, 0.0
+        position[i] = min(max(position[i] + moved * sign, low[i]), high[i])
         velocity[i] = wanted * sign

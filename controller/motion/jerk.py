@@ -29,8 +29,8 @@ class JerkFilter:
         self.window_s = 2.0 * max_acceleration / max_jerk
         self._longest_s = float(self.window_s.max(initial=0.0))
         self._history = np.zeros((2, len(self.window_s)))  # newest first
-        self._steps_s = np.full(2, np.inf)  # from the row behind
-        self._share, self._work = np.zeros_like(self._history), np.zeros_like(self._history)
+        self._steps_s = np.full(2, np.inf)  # time since the next older row
+        self._weights, self._work = np.zeros_like(self._history), np.zeros_like(self._history)
         self._uniform = False
 
     @property
@@ -54,17 +54,20 @@ class JerkFilter:
         if not steady:
             self._steps_s[1:] = self._steps_s[:-1]
             self._steps_s[0] = dt
-            self._uniform = bool((self._steps_s == dt).all())  # while steps keep their length, so do the shares
+            self._uniform = bool((self._steps_s == dt).all())  # equal steps leave the weights as they are
             self._weigh()
-        np.multiply(self._share, self._history, out=self._work)
+        np.multiply(self._weights, self._history, out=self._work)
         return np.add.reduce(self._work, axis=0, out=out)
 
     def _weigh(self) -> None:
-        """Share of each kept row in the mean of the straight lines between them, over the window; the last fills up."""
-        share, before = self._share, 0.0
+        """Weights of the stored rows in the mean over the window of the straight lines between them.
+
+        The oldest row gets the rest.
+        """
+        share, before = self._weights, 0.0
         share.fill(0.0)
         for i, step_s in enumerate(self._steps_s[:-1].tolist()):
-            part = np.clip(self.window_s - before, 0.0, step_s)  # of the window that lies between this row and the next
+            part = np.clip(self.window_s - before, 0.0, step_s)  # time of the window between this row and the next
             next_ = part * part / (2.0 * step_s)
             share[i] += part - next_
             share[i + 1] += next_
@@ -78,4 +81,4 @@ class JerkFilter:
         more = len(self._steps_s)
         self._history = np.concatenate([self._history, np.repeat(self._history[-1:], more, axis=0)])
         self._steps_s = np.concatenate([self._steps_s, np.full(more, self._steps_s[-1])])
-        self._share, self._work = np.zeros_like(self._history), np.zeros_like(self._history)
+        self._weights, self._work = np.zeros_like(self._history), np.zeros_like(self._history)

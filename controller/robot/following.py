@@ -74,10 +74,10 @@ class FollowingStatistics:
 class Mirror:
     """Finds parameters whose channels give measured angles.
 
-    A servo head shows fewer things than a face, so many faces have one pose; the one with few and small values is
-    taken. The eyes are read as eye angles, never as eyeLook shapes.
+    A servo head has fewer degrees of freedom than a face, so many faces give the same angles; the one with few and
+    small values is taken. The eyes are read as eye angles, never as eyeLook shapes.
 
-    readable : (n,) bool, the channels that can be inverted; one whose map turns back or is flat cannot.
+    readable : (n,) bool, the channels that can be inverted: those whose map is strictly monotonic.
     """
 
     def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
@@ -89,9 +89,9 @@ class Mirror:
         steps = np.diff(self._rad, axis=1)
         real = np.diff(self._at, axis=1) > 0.0
         self.readable = np.array([_is_monotonic(row[keep]) for row, keep in zip(steps, real, strict=True)])
-        self._solver = lru_cache(64)(self._make_solver)  # the same angles count in most cycles
+        self._solver = lru_cache(64)(self._make_solver)  # most cycles use the same channels
         self._last = parameters.neutral()
-        self._solver(self.readable.tobytes())  # compiled now, not while a bus waits
+        self._solver(self.readable.tobytes())  # compiles the solver now, not in a cycle of a bus
 
     def read(self, angles_rad: Floats, fresh: Flags | None = None) -> Floats:
         """Parameters (P,) that show ``angles_rad`` : (n,) best; angles that are not ``fresh`` : (n,) do not count."""
@@ -124,7 +124,7 @@ class Mirror:
 
 
 def _points(table: ChannelTable) -> tuple[Floats, Floats]:
-    """Calibrated points (n, k + 1) of mix and angle (rad); missing pieces repeat the last point."""
+    """Calibrated points (n, k + 1) of mix and angle (rad); shorter curves are padded with their last point."""
     curves = table.curves
     ends = np.where(curves.widths > 0.0, curves.knots + curves.widths, -np.inf)
     at = np.maximum.accumulate(np.concatenate([curves.knots[:, :1], ends], axis=1), axis=1)

@@ -1,4 +1,4 @@
-"""Calls of compiled kernels with one table of addresses instead of all work arrays.
+"""Calls compiled kernels with one table of addresses instead of many arrays.
 
 A compiled function inspects every array that Python passes to it, which takes longer than a small update. So the
 arrays are passed as a table of their addresses, which is made again whenever one of them is replaced.
@@ -22,7 +22,7 @@ from .updates import move_points
 
 
 def address_table(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(2 * 29,) int64: address and length of every array of ``NAMES``; the arrays must outlive the table."""
+    """(2 k,) int64: address and length of the k arrays of ``NAMES``; the arrays must outlive the table."""
     table = []
     for name in NAMES:
         if not arrays[name].flags.c_contiguous:

@@ -17,7 +17,7 @@ from surface.mesh.mesh import border_edges
 
 Ids = NDArray[np.integer]
 _LEAST_COS = 0.3  # a triangle turned by more than this counts as flipped
-_BORDER = 4.0  # weight of a border's line, beside a plane's
+_BORDER = 4.0  # weight of a border's line relative to a triangle's plane
 _CHUNK = 4096  # edges whose costs are computed at a time
 
 
@@ -55,7 +55,7 @@ class Collapse:
         edges = np.unique(np.vstack([edges, edges[:, ::-1]]), axis=0)
         edges = edges[~self._locked[edges[:, 0]]]
         for start in range(0, len(edges), _CHUNK):
-            self._offer(*edges[start : start + _CHUNK].T)
+            self._queue(*edges[start : start + _CHUNK].T)
 
     def _add(self, corners: Ids, scale: float) -> None:
         """Squared distance from the flats through ``corners (k, 2 or 3)``, by their length or area, for these."""
@@ -69,7 +69,7 @@ class Collapse:
             for sums, more in ((self._a, away), (self._b, b), (self._c, c), (self._weight, weight)):
                 np.add.at(sums, ids, more)
 
-    def _offer(self, gone: Ids, kept: Ids) -> None:
+    def _queue(self, gone: Ids, kept: Ids) -> None:
         """Put collapses of vertices ``gone (k,)`` onto ``kept (k,)`` onto the heap, by the root mean square
         distance, mm, that each kept one has from what both stood for."""
         p = self._places[kept]
@@ -130,7 +130,7 @@ class Collapse:
         self._version[[gone, kept]] += 1
         near = np.array(sorted(self._neighbours(kept)), np.int64)
         pairs = np.array([[*near, *[kept] * len(near)], [*[kept] * len(near), *near]], np.int64)
-        self._offer(*pairs[:, ~self._locked[pairs[0]]])
+        self._queue(*pairs[:, ~self._locked[pairs[0]]])
 
 
 def _frames(edges: Floats) -> tuple[Floats, Floats]:

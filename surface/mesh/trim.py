@@ -18,7 +18,7 @@ from .domain import Domain, Slit
 
 ROUNDS = 4  # a triangle at a sharp corner is split so many times at most
 ALONG = 0.5, 0.25, 0.75, 0.1, 0.9  # parts of an edge at which it is tested for running through the inside
-SNAP = 0.28  # of the shortest edge at a vertex: nearer crossings pull the vertex onto the loop
+SNAP = 0.28  # share of the shortest edge at a vertex: a crossing nearer than this moves the vertex onto the loop
 LOCKED = -2
 
 

@@ -57,7 +57,7 @@ class PartData:
 
 @dataclass(frozen=True)
 class Seam:
-    """A border that two islands share: polylines (k, 2) in the (u, v) of either part, point by point equal."""
+    """A border that two islands share: polylines (k, 2) in the (u, v) of either part, of equal points."""
 
     part_a: str
     part_b: str
@@ -67,7 +67,7 @@ class Seam:
 
 @dataclass(frozen=True)
 class Jaw:
-    """The jaw's path: rotation about the x axis through ``centre`` by ``angle_rad`` per unit, and a glide, mm.
+    """The jaw's path: ``angle_rad`` per unit about the x axis through ``centre``, and a translation ``glide``, mm.
 
     ``tilts`` are the affine displacements (3, 4) of the lower teeth per unit of the sideways and forward shapes.
     """

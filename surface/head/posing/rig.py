@@ -1,4 +1,4 @@
-"""Compute a part's control points for a pose: group displacements, the jaw's arc, lids on the eyeball, contacts."""
+"""Computes a part's control points for a pose: displacements of groups, rotation of the jaw, lids, contacts."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from surface.head.model.rules import Drivers
 from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import add_moves, keep_on_eyeball, mix_rows, swing_jaw
 
-GAP = 16  # so many points that a group does not move may lie between two of one run
-CLEARANCE_GRID = (72, 36)  # samples all over what lines the lids, along u and v
-CLEARANCE_RADII = 1.4  # distance from an eye's centre, in its radii, within which what lines the lids is kept out of it
+GAP = 16  # greatest number of unmoved points within one run of a group's points
+CLEARANCE_GRID = (72, 36)  # samples of the part behind the lids, along u and v
+CLEARANCE_RADII = 1.4  # in eyeball radii: nearer points of the part behind the lids are kept outside the eyeball
 UNDONE_MM = 20.0  # displacement by mouthClose that takes back the whole motion of the jaw
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
 
 
 class Moves:
-    """Displacements of one part's groups; ``used (g,)`` are the indices into ``names`` of those that are among them."""
+    """Displacements of one part's groups; ``used (g,)`` are the indices into ``names`` of the groups that it has."""
 
     def __init__(self, part: PartData, names: tuple[str, ...]) -> None:
         place = {name: i for i, name in enumerate(names)}
@@ -65,7 +65,7 @@ class SkinRig:
     ----------
     part : its groups may name any of :data:`SHAPES` and the head's rules; others are left out.
     head : pivots, the jaw's path, rules, contacts.
-    drivers : the head's, where several parts share them.
+    drivers : of corrective groups; several parts of a head share one.
 
     Attributes
     ----------
