@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 import threading
@@ -76,3 +77,16 @@ def test_the_system_call_has_its_number_on_each_machine() -> None:
     generic, arm, x86_32, x86_64 = 274, 380, 351, 314
     numbers = {"x86_64": x86_64, "aarch64": generic, "riscv64": generic, "armv7l": arm, "armv6l": arm, "i686": x86_32}
     assert numbers == priority._SCHED_SETATTR
+
+
+@linux
+def test_waits_end_on_time() -> None:
+    get_timer_slack = 30  # PR_GET_TIMERSLACK of linux/prctl.h
+
+    def slack_ns() -> tuple[int, int]:
+        before = ctypes.CDLL(None).prctl(get_timer_slack)
+        priority.reduce_timer_slack()
+        return before, ctypes.CDLL(None).prctl(get_timer_slack)
+
+    before, after = in_thread(slack_ns)  # type: ignore[misc]
+    assert before != 1 and after == 1
