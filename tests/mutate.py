@@ -47,7 +47,7 @@ OPERATORS = (
 )
 """Changes that leave a program which still runs. cosmic-ray has more, such as ``*`` to ``>>``, which any test notices
 by a TypeError, and the removal of decorators that compile or cache, which no test should notice."""
-TIMEOUT_S = 300.0
+TIMEOUT_S = 120.0
 
 
 @dataclass(frozen=True)
