@@ -39,3 +39,22 @@ def test_a_system_that_does_not_tell(tmp_path: Path, monkeypatch: pytest.MonkeyP
     path.write_text(text, encoding="ascii")
     assert steal_time_s() is None
     assert StealTime().share() is None
+
+
+def test_a_report_that_comes_or_goes_while_it_is_measured_is_no_share(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = told(tmp_path, 1000)
+    monkeypatch.setattr(steal_time, "STAT", path)
+    counted = StealTime()
+    path.unlink()
+    assert counted.share() is None
+    counted = StealTime()
+    told(tmp_path, 1000)
+    assert counted.share() is None
+
+
+def test_no_time_has_no_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steal_time, "STAT", told(tmp_path, 1000))
+    monkeypatch.setattr(time, "monotonic", lambda: 5.0)
+    assert StealTime().share() is None

@@ -273,3 +273,16 @@ def test_a_limp_head_listens_to_links_that_are_there(
         body.begin()
         body.stop()
     assert [stage.settings.links.index(link) for link in opened] == [0, 1][2 - len(ports) :]
+
+
+def test_requests_are_served_until_one_says_stop(tmp_path: Path, pipe: tuple[Connection, Connection]) -> None:
+    main, end = pipe
+    held: list[object] = []
+    state = SimpleNamespace(
+        set_parameters=lambda *given: held.append(given[:2]), release=lambda *given: held.append(given[:1])
+    )
+    body: Any = SimpleNamespace(state=state, finished=False, check=lambda: None)
+    for message in (messages.Hold(JAW, 0.5), messages.Hold(JAW, None), messages.Stop(), messages.Hold(JAW, 0.7)):
+        main.send(message)
+    _wait(body, end, threading.Event(), None)
+    assert held == [([JAW], [0.5]), ([JAW],)]

@@ -12,8 +12,10 @@ import pytest
 from controller.base.errors import ControllerError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS
-from controller.face.face import FrameLog, HeadValues, Recorder, head_indices, process_age_s
+from controller.face.face import FrameLog, HeadlessFace, HeadValues, Recorder, head_indices, process_age_s
 from controller.stage.stage import FaceSettings
+from surface.head import Head, save_data
+from tests.surface.small_head import small_head
 
 
 def test_values_come_in_the_heads_order() -> None:
@@ -180,3 +182,17 @@ def test_the_age_of_a_process_is_that_of_the_system(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(Path, "read_text", missing)
     assert process_age_s() == 0.0
+
+
+def test_pictures_are_kept_at_the_time_since_the_run_began(tmp_path: Path) -> None:
+    save_data(tmp_path, small_head())
+    head, recorder = Head.load(tmp_path), Recorder(clip_hz=1000.0)
+    settings = FaceSettings(size=(64, 64), fps=60, evaluator="cpu")
+    face = HeadlessFace(head, settings, lambda: np.zeros(len(head.parameters)), recorder)
+    rounds = iter([True, True, True, False])
+    try:
+        face.run(lambda: next(rounds))
+    finally:
+        face.close()
+    assert 0.0 <= recorder.times_s[0] < 60.0 and recorder.times_s == sorted(recorder.times_s)
+    assert len(recorder.times_s) == 3

@@ -157,3 +157,13 @@ def test_playing_follows_the_take_and_releases_the_face_at_the_end(tmp_path: Pat
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         object.__new__(Take).anything = 1
+
+
+def test_a_take_is_finished_at_its_last_row(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", "Timecode,JawOpen", "00:00:00:00.000,0", "00:00:01:00.000,1")
+    player = TakePlayer(Take.load(path, P), CommandState(P))
+    player.tick(5_000_000_000)
+    player.tick(5_999_999_999)
+    assert not player.finished
+    player.tick(6_000_000_000)
+    assert player.finished and player.position_s == player.take.duration_s == 1.0

@@ -111,3 +111,9 @@ def test_calibrations_and_expressions_that_are_shipped_are_told_apart(tmp_path: 
     (tmp_path / "stage.toml").write_text("name = 3")
     with pytest.raises(ConfigError, match="name: "):
         check_anything(str(tmp_path / "stage.toml"))
+
+
+def test_what_a_stage_has_and_has_not(tmp_path: Path) -> None:
+    assert check_anything("demo") == ["stage demo: head ict, links: line on simulated, robots: head24: good"]
+    (tmp_path / "bare.toml").write_text('name = "bare"\n')
+    assert check_anything(str(tmp_path / "bare.toml")) == ["stage bare: head ict, links: none, robots: none: good"]

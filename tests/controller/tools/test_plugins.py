@@ -110,3 +110,11 @@ def test_what_cannot_be_used_is_listed_with_the_reason_and_the_rest_as_ever(inst
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         object.__new__(Listed).anything = 1
+
+
+def test_a_kind_that_omote_has_itself_is_listed_as_never_used(install: Install) -> None:
+    install("drivers", "dynamixel", FAMILY.format(kind="dynamixel", simulator=""))
+    own, foreign = (each for each in listed() if (each.sort, each.kind) == ("bus", "dynamixel"))
+    assert own.works and own.package == "omote"
+    assert not foreign.works and foreign.package == "dynamixel-package"
+    assert "is never used" in foreign.title and foreign.hint.startswith("pip uninstall dynamixel-package")

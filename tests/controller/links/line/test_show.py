@@ -105,3 +105,13 @@ def test_a_show_is_steered_over_a_link() -> None:
     assert "show=off" in say("STATUS")
     assert "did you mean 'end'" in say("SHOW SEEK ent") and say("SHOW SEEK").startswith("ERR 21")
     assert say("SHOW STOP") == "OK SHOW STOP" and say("SHOW STOP").startswith("ERR 30")
+
+
+def test_the_hint_lists_the_marks_there_are(show: Show) -> None:
+    with pytest.raises(ParameterError) as caught:
+        show.seek("nowhere")
+    assert caught.value.hint == f"marks: {', '.join(show.script.marks)}" and "open" in caught.value.hint
+    plain = Show(Script(((0.0, "NEUTRAL"),)), CommandState(P))
+    with pytest.raises(ParameterError) as caught:
+        plain.seek("open")
+    assert caught.value.hint == "marks: none"
