@@ -2,8 +2,8 @@
 
 Mutants come from cosmic-ray. A sample of places is drawn with a fixed seed, each place once, and each mutant runs in a
 copy of the checkout against the tests mapped to its module: the test file of its name, the test files that import it,
-and those of its folder. A mutant is killed when a test fails, or when the tests do not end in time. Outside of CI, because 50 mutants take
-ten minutes and more.
+and those of its folder. A mutant is killed when a test fails, or when the tests do not end in time. Outside of CI,
+because 50 mutants take ten minutes and more.
 """
 # ruff: noqa: T201 (a program that prints for people)
 
