@@ -272,3 +272,10 @@ def test_levels_that_are_not_nested_are_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(SurfaceFileError, match="not nested"):
         read_surface(save(tmp_path, text))
+
+
+def test_a_finest_level_with_too_many_functions_is_refused(tmp_path: Path) -> None:
+    """Four spans quartered eleven times are 8192 each way: 2^26 functions, where each direction alone is few."""
+    text = geometry("THBSpline2", hierarchy("THBSpline", [(11, 0, 0, 4, 4)]), np.zeros((36, 3)))
+    with pytest.raises(SurfaceFileError, match=r"its finest level has \d+ x \d+ functions, more than 16777216"):
+        read_surface(save(tmp_path, text))
