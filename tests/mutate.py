@@ -137,7 +137,7 @@ def modules_in(room: str) -> list[str]:
 def _places(module: str) -> list[list[Mutant]]:
     """The mutants of a module, grouped by the place in the text that they change."""
     text = (ROOT / module).read_text()
-    nodes, types = list(ast_nodes(get_ast(text))), _type_spans(text)
+    nodes, left_out = list(ast_nodes(get_ast(text))), _left_out(text)
     by_place: dict[tuple[tuple[int, int], str], list[Mutant]] = defaultdict(list)
     for name in OPERATORS:
         operator = get_operator(f"core/{name}")()
@@ -145,19 +145,26 @@ def _places(module: str) -> list[list[Mutant]]:
         for occurrence, (node, start) in enumerate(found):
             # the mark of keyword-only parameters is no product
             is_mark = node.parent is not None and node.parent.type in ("parameters", "param")
-            if not is_mark and not any(first <= start < last for first, last in types):
+            if not is_mark and not any(first <= start < last for first, last in left_out):
                 by_place[start, name.partition("_")[0]].append(Mutant(module, name, occurrence))
     return [by_place[key] for key in sorted(by_place)]
 
 
-def _type_spans(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """Spans ((line, column) from, to) of annotations, which nothing evaluates, and of unions of types."""
+def _left_out(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Spans ((line, column) from, to) of what no test should notice.
+
+    That is annotations and unions of types, and options that guard against mistakes of the program or make it faster.
+    """
     found: list[ast.expr | None] = []
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             found.append(node.returns)
         elif isinstance(node, ast.arg | ast.AnnAssign):
             found.append(node.annotation)
+        elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            found.append(node.test)
+        elif isinstance(node, ast.keyword) and node.arg in ("strict", "nogil", "cache", "frozen", "kw_only"):
+            found.append(node.value)
         elif isinstance(node, ast.BinOp) and _is_type(node):
             found.append(node)
     return [((n.lineno, n.col_offset), (n.end_lineno or 0, n.end_col_offset or 0)) for n in found if n is not None]
