@@ -66,8 +66,9 @@ class Mutant:
     def title(self) -> str:
         """Path, the line before and the line after."""
         before, after = (ROOT / self.module).read_text().splitlines(), self.code().splitlines()
-        changed = [(a.strip(), b.strip()) for a, b in zip(before, after, strict=True) if a != b]
-        return f"{self.module}: " + " | ".join(f"{a}  ->  {b}" for a, b in changed)
+        # a change may join two lines; then all lines after it differ, too
+        old, new = next((a, b) for a, b in zip(before, after, strict=False) if a != b)
+        return f"{self.module}: {old.strip()}  ->  {new.strip()}"
 
 
 def main() -> int:
