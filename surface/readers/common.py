@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.errors import SurfaceFileError
+from surface.base.files import read_file
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
 
@@ -70,6 +71,6 @@ def read_text(path: Path, errors: str = "strict") -> str:
 def read_bytes(path: Path) -> bytes:
     """A file's content; ``SurfaceFileError`` where it cannot be read."""
     try:
-        return path.read_bytes()
+        return read_file(path)
     except OSError as error:
         raise Location(path).error(f"cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error

@@ -1,0 +1,118 @@
+"""surface.base.files: files of strangers are read within limits, and what is no file is refused at once."""
+
+from __future__ import annotations
+
+import io
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from surface.base import files
+
+
+def test_a_file_is_read_whole(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(bytes(range(256)))
+    assert files.read_file(tmp_path / "a") == bytes(range(256))
+
+
+def test_a_file_of_exactly_the_limit_is_read_and_one_byte_more_is_not(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"x" * 100)
+    assert len(files.read_file(tmp_path / "a", 100)) == 100
+    with pytest.raises(OSError, match="is larger than") as raised:
+        files.read_file(tmp_path / "a", 99)
+    assert raised.value.filename == str(tmp_path / "a")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_named_pipe_that_nobody_writes_to_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="named pipe") as raised:
+        files.read_file(tmp_path / "pipe")
+    assert "named pipe" in raised.value.strerror
+
+
+def test_folders_and_devices_are_no_files(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="folder"):
+        files.read_file(tmp_path)
+    with pytest.raises(OSError, match="device"):
+        files.read_file("/dev/zero")
+
+
+def test_a_file_that_does_not_say_its_size_is_bounded_too() -> None:
+    assert Path("/proc/self/maps").stat().st_size == 0
+    with pytest.raises(OSError, match="is larger than"):
+        files.read_file("/proc/self/maps", 10)
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [("é".encode("latin-1"), "Latin-1"), ("name = 'x'".encode("utf-16"), "UTF-16"), (b"a\nb\n\xff", "line 3")],
+)
+def test_other_encodings_are_named(tmp_path: Path, data: bytes, told: str) -> None:
+    (tmp_path / "a").write_bytes(data)
+    with pytest.raises(ValueError, match=told):
+        files.read_text(tmp_path / "a")
+
+
+def test_a_byte_order_mark_is_no_text(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"\xef\xbb\xbf[a]\nb = 1")
+    assert files.parse_toml(files.read_text(tmp_path / "a")) == {"a": {"b": 1}}
+
+
+@pytest.mark.parametrize("parse", [files.parse_toml, files.parse_json])
+@pytest.mark.parametrize("text", ["[" * 100_000, "a = " + "[" * 5000 + "]" * 5000, "a={b=" * 5000 + "1" + "}" * 5000])
+def test_nesting_is_a_fault_of_the_file(parse: object, text: str) -> None:
+    with pytest.raises(ValueError):
+        parse(text)  # type: ignore[operator]
+
+
+def archive(path: Path, **members: bytes) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, data in members.items():
+            file.writestr(f"{name}.npy", data)
+    return path
+
+
+def npy(array: np.ndarray) -> bytes:
+    data = io.BytesIO()
+    np.save(data, array, allow_pickle=True)
+    return data.getvalue()
+
+
+def test_arrays_come_back_as_they_were(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "a.npz", one=np.arange(5), two=np.eye(3))
+    found = files.read_npz(tmp_path / "a.npz")
+    assert sorted(found) == ["one", "two"] and np.array_equal(found["two"], np.eye(3))
+
+
+def test_an_archive_that_unpacks_to_more_than_the_limit_is_refused_before_it_is(tmp_path: Path) -> None:
+    path = archive(tmp_path / "a.npz", bomb=npy(np.zeros(4_000_000)))
+    assert path.stat().st_size < 100_000
+    with pytest.raises(ValueError, match="unpacks to 30 MB"):
+        files.read_npz(path, 10 << 20)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"PK\3\4",
+        b"no archive",
+        npy(np.arange(3))[:-1],
+        b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999,), }",
+    ],
+)
+def test_what_is_no_sound_archive_is_a_fault_of_the_file(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / "a.npz").write_bytes(data)
+    with pytest.raises(ValueError):
+        files.read_npz(tmp_path / "a.npz")
+    with pytest.raises(ValueError):
+        files.read_npz(archive(tmp_path / "b.npz", a=data))
+
+
+def test_python_objects_are_not_loaded(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="Python objects"):
+        files.read_npz(archive(tmp_path / "a.npz", a=npy(np.array([{}], dtype=object))))
