@@ -9,33 +9,7 @@ from drivers.packets.packet import ErrorNumber as E
 from drivers.packets.packet import Instruction as I
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
-
-
-def chain(*ids: int, faults: tuple[str, ...] = (), model: str = "xl330-m288", **options) -> Chain:
-    servos = [SimulatedServo(i, model, position=2000.0 + i, **options) for i in ids or (1, 2, 3)]
-    return Chain(servos, faults=faults)
-
-
-def wire(bus: Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> bytes:
-    """What comes back, as one run of bytes."""
-    frame = encode_instruction(device, instruction, params)
-    return b"".join(reply.data for reply in bus.feed(frame, now_s))
-
-
-def ask(bus: Chain, device: int, instruction: int, params: bytes = b"", now_s: float = 0.0) -> list[StatusPacket]:
-    """The status packets that come back."""
-    return StatusReader().feed(wire(bus, device, instruction, params, now_s))
-
-
-def words(*values: int) -> bytes:
-    return b"".join(value.to_bytes(2, "little") for value in values)
-
-
-def le(value: int) -> bytes:
-    return value.to_bytes(4, "little", signed=True)
-
-
-POSITION = words(132, 4)
+from tests.drivers.sim.servos.wire2 import POSITION, ask, chain, le, wire, words
 
 
 # ---------------------------------------------------------------- bit rate, watchdog, twins
