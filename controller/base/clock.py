@@ -50,6 +50,7 @@ class Clock:
     ----------
     jitter_ms : how much later than its deadline each tick began.
     skipped : deadlines that passed unused.
+    step_s : time between the last two deadlines: how far motion goes on in this tick, however late it began.
     """
 
     def __init__(
@@ -66,30 +67,36 @@ class Clock:
         self.jitter_ms = Samples()
         self.skipped = 0
         self.ticks = 0
+        self.step_s = self.period_ns * 1e-9
         self._now_ns = now_ns
         self._sleep_s = sleep_s
         self._prompt = prompt
-        self._started_ns = 0
-        self._last_ns = 0
+        self._started_ns = self._last_ns = self._deadline_ns = 0
 
     def run(self, keep_going: Callable[[], bool]) -> Iterator[int]:
         """Yield the present time (ns) once per tick until ``keep_going()`` is false."""
-        self._started_ns = self._last_ns = self._now_ns()
-        deadline = self._started_ns
+        self._started_ns = self._last_ns = self._deadline_ns = self._now_ns()
+        before_ns = self._deadline_ns - self.period_ns
         while keep_going():
-            now = self._wait_until(deadline)
-            self.jitter_ms.add((now - deadline) / 1e6)
+            now = self._wait()
             self.ticks += 1
+            self.step_s = self._step_s(before_ns)
+            before_ns = self._deadline_ns
             yield now
             self._last_ns = self._now_ns()
-            deadline = self._next_deadline(deadline)
+            self._deadline_ns = self._next_deadline(self._deadline_ns)
 
-    def _wait_until(self, deadline: int) -> int:
+    def _wait(self) -> int:
+        """Wait for the next tick; the present time (ns)."""
         now = self._now_ns()
-        while now < deadline:
-            self._sleep_s((deadline - now) / 1e9)
+        while now < self._deadline_ns:
+            self._sleep_s((self._deadline_ns - now) / 1e9)
             now = self._now_ns()
+        self.jitter_ms.add((now - self._deadline_ns) / 1e6)
         return now
+
+    def _step_s(self, before_ns: int) -> float:
+        return (self._deadline_ns - before_ns) * 1e-9
 
     def _next_deadline(self, deadline: int) -> int:
         if self._prompt:

@@ -14,8 +14,8 @@ import time
 from contextlib import suppress
 from multiprocessing.connection import Connection
 
-from controller.base.clock import Clock
 from controller.base.errors import OMOTE_ERRORS
+from controller.base.linked_clocks import HurriedClock
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.signals import termination_signals, unblock_interrupts
@@ -60,7 +60,8 @@ class Body:
         elif options.record is not None:
             seed, period_s = stage.settings.seed, stage.period_s
             self._closers.enter_context(recorded(self.state, options.record, seed=seed, period_s=period_s))
-        self.clock = Clock(stage.settings.control_hz)
+        self.clock = HurriedClock(stage.settings.control_hz)
+        self.state.on_command = self.clock.hurry
         self.state.live(0.0 if options.mirror else stage.settings.liveliness, 0)  # 0: no command set it
         self.links: list[Link] = []
         self.buses = [loop for robot in stage.robots for loop in self._bus_loops(robot, parameters, options.mirror)]
@@ -103,7 +104,11 @@ class Body:
 
             anchors = load_anchors(robot, self.stage.head, parameters)
         return [
-            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors, limp=limp)
+            BusLoop(
+                *(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors),
+                limp=limp,
+                feed_s=self.stage.period_s,
+            )
             for bus in robot.buses
         ]
 
@@ -167,16 +172,14 @@ class Body:
 
     def _control_loop(self) -> None:
         values = self._newest[0].copy()
-        period, ticked = self.clock.period_ns, 0
         for now in self.clock.run(lambda: not self._stopping.is_set()):
             begun = self._begun.is_set()
             self.sources.tick(now, begun)
-            # whole periods, skipped ones included: a tick that is a little late must not make the motion uneven
-            steps = 1 + self.clock.skipped - ticked
-            ticked = self.clock.skipped
             face = self.replay if self.replay is not None and begun else self.state
-            stamp = face.tick(now, steps * period / 1e9, values)
-            self._newest = (values.copy(), stamp)
+            stamp, step_s = face.tick(now, self.clock.step_s, values), self.clock.step_s
+            is_new, self._newest = stamp > self._newest[1], (values.copy(), stamp)
+            for bus in self.buses:
+                bus.feed(step_s, urgent=is_new)
             self._mailbox.publish(values, stamp)
 
     def report(self) -> dict[str, object]:

@@ -116,6 +116,7 @@ class CommandState:
     Attributes
     ----------
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
+    on_command : called after each command, in the thread that gave it.
 
     Raises ConfigError: the shipped expressions or figures cannot be read.
     """
@@ -144,6 +145,7 @@ class CommandState:
         self._everything = np.ones(len(parameters), dtype=bool)
         self.servo_monitor: ServoMonitor | None = None
         self.shows: Player | None = None
+        self.on_command: Callable[[], None] = _nothing
         self._lock = threading.Lock()
         self._journal: Journal | None = None
         self._stamp_ns = 0
@@ -178,6 +180,8 @@ class CommandState:
             self._stamp_ns = max(self._stamp_ns, stamp_ns)
             if self._journal is not None:
                 self._journal(name, *arguments)
+        if stamp_ns:
+            self.on_command()
 
     def _write_layers(self, now_s: float) -> None:
         self._expression.write_masked(self._player.update(now_s), self._everything, now_s)
@@ -294,3 +298,7 @@ class CommandState:
     def _time(self, stamp_ns: int) -> float:
         """When a command takes effect: when it came, but not before the last tick."""
         return max(stamp_ns * 1e-9, self._now_s)
+
+
+def _nothing() -> None:
+    """What commands call where nothing waits for them."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller.base.clock import Clock, Samples
+from controller.base.linked_clocks import FedClock
 from controller.base.parameters import Floats, Parameters
 from controller.robot.buses import BusSettings
 from controller.robot.channels import servo_specs
@@ -48,6 +49,7 @@ class BusLoop:
         0 for none.
     rules : the robot's safety rules. anchors : solver of the robot's anchored channels, on this bus or another.
     limp : switch the motors off and only read the positions of the servos.
+    feed_s : time between calls of :meth:`feed`, after which cycles begin; 0 for a bus that cycles by itself.
     """
 
     def __init__(
@@ -60,13 +62,14 @@ class BusLoop:
         anchors: AnchorSolver | None = None,
         *,
         limp: bool = False,
+        feed_s: float = 0.0,
     ) -> None:
         self.settings = settings
         self._goals = GoalFilter(channels, parameters, rules, 1.0 / settings.rate_hz, anchors)
         self.table = self._goals.table
         specs = servo_specs(channels, self.table.neutral_rad)
         self.bus: Bus = open_bus(settings.kind, specs, **settings.options())
-        self.clock = Clock(settings.rate_hz)
+        self.clock = FedClock(settings.rate_hz, feed_s)
         self.latency_ms = Samples()
         self.following = FollowingStatistics(self.table, parameters)
         self.held = 0
@@ -99,6 +102,10 @@ class BusLoop:
             raise
         self._thread = threading.Thread(target=self._run, name=f"bus {self.settings.name}", daemon=True)
         self._thread.start()
+
+    def feed(self, step_s: float, *, urgent: bool) -> None:
+        """Report new parameters, ``step_s`` after the last ones; the next cycle begins with urgent ones."""
+        self.clock.feed(step_s, urgent=urgent)
 
     def begin(self) -> None:
         """Follow the parameters from now on; until then the servos are held at the positions they started at."""
@@ -165,7 +172,7 @@ class BusLoop:
         values, stamp = self._newest()
         angles, held = self.table.angles(values)
         self.held += held
-        self.bus.write(self._goals.step(angles, self._state))
+        self.bus.write(self._goals.step(angles, self._state, self.clock.step_s))
         if stamp > self._last_stamp:
             self._last_stamp = stamp
             self.latency_ms.add((time.monotonic_ns() - stamp) / 1e6)

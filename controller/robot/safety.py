@@ -291,8 +291,11 @@ class GoalFilter:
         np.clip(position_rad, self.table.low_rad, self.table.high_rad, out=self.sent)
         self._limiter.reset(self.sent)
 
-    def step(self, wanted: Floats, state: BusState | None = None) -> Floats:
-        """One cycle towards angles (n,) rad, given the newest measurement; goals (n,) rad, the same array each time."""
-        rest = self._limiter.rest(self.period_s)
-        allowed = self.guard.apply(wanted, self.sent, rest, state, self.period_s)
-        return self._limiter.step(self.period_s, allowed, self.sent)
+    def step(self, wanted: Floats, state: BusState | None = None, dt: float | None = None) -> Floats:
+        """One cycle of ``dt`` s, by default the bus's own, towards angles (n,) rad, given the newest measurement.
+
+        Returns goals (n,) rad, the same array each time.
+        """
+        dt = self.period_s if dt is None else dt
+        allowed = self.guard.apply(wanted, self.sent, self._limiter.rest(dt), state, dt)
+        return self._limiter.step(dt, allowed, self.sent)
