@@ -7,6 +7,7 @@ its limits of position, speed and acceleration. Angles are degrees from the serv
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -17,6 +18,8 @@ from controller.base.config import Settings
 from controller.base.parameters import Floats
 from controller.robot.buses import Bus
 from controller.robot.terms import Curve, Finite, Term, check_points
+from drivers.base.errors import DriverError
+from drivers.core.registry import usual_rate_hz
 
 Degrees = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -229,6 +232,16 @@ class RobotSettings(Settings):
         if not isinstance(channels, list) or not isinstance(profiles, dict):
             return table
         return {**table, "channels": [_with_profile(channel, profiles) for channel in channels]}
+
+    @model_validator(mode="after")
+    def _fill_in_rates(self) -> RobotSettings:
+        """Give buses without a rate the one that is usual for their servos."""
+        for at, bus in enumerate(self.buses):
+            models = [channel.model for channel in self.on_bus(bus.name)]
+            if "rate_hz" not in bus.model_fields_set:
+                with suppress(DriverError):  # an unknown model or kind has an error of its own
+                    self.buses[at] = bus.model_copy(update={"rate_hz": usual_rate_hz(bus.family, models, bus.baud)})
+        return self
 
     @property
     def anchored_channels(self) -> list[ChannelSettings]:

@@ -21,6 +21,9 @@ RESERVED = (
 SERVO_BAUD, BOARD_BAUD = 1_000_000, 115_200
 """Factory default rates of servos and boards."""
 
+USUAL_RATE_HZ, HIGH_RATE_HZ = 50.0, 100.0
+"""Cycles per second of a bus whose robot file gives none; the high one where the wire carries it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
@@ -33,6 +36,8 @@ class Family:
     settings : dataclass of the driver's options besides :data:`RESERVED`, see :mod:`drivers.base.options`; its method
         ``check(self, rate_hz)``, if any, raises ValueError where values contradict each other.
     check_model : ``"module:name"`` of a function that raises DriverError for a model that it does not drive.
+    cycle_bytes : ``"module:name"`` of a function that returns the bytes on the wire of one cycle for a sequence of
+        models, infinity where a cycle waits for more than the wire; empty: every bus has the lower usual rate.
     simulator : ``"module:name"`` of a :class:`drivers.sim.wire.simulator.Simulator`; empty: none.
     baud : default rate of the port.
     hobby : its servos are hobby servos, whose pulses can be calibrated.
@@ -45,6 +50,7 @@ class Family:
     driver: str
     settings: type
     check_model: str
+    cycle_bytes: str = ""
     simulator: str = ""
     baud: int = BOARD_BAUD
     hobby: bool = False

@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING, Any
 from drivers.base.errors import DriverError, PluginError
 from drivers.base.options import check_options
 from drivers.base.plugins import Registry, folders_with
-from drivers.core.families import API, RESERVED, Family
+from drivers.core.families import API, HIGH_RATE_HZ, RESERVED, USUAL_RATE_HZ, Family
 
 if TYPE_CHECKING:  # start-up: they import numpy, which listing the kinds does not need
     from drivers.base.bus import Bus, ServoSpec
     from drivers.core.wirebus import WireBus
 
 SIMULATED = "simulated"
+_BITS_PER_BYTE = 10
+_MOST_OF_WIRE = 0.6
+"""Share of the time that bytes may take at the high rate: adapters pause, and giving up a late answer takes time."""
 
 FAMILIES: Registry[Family] = Registry(
     Family,
@@ -82,6 +85,20 @@ def check_model(kind: str, model: str, simulates: str = "dynamixel") -> None:
     check = FAMILIES.load(family, family.check_model)
     with FAMILIES.blaming(family.kind):
         check(model)
+
+
+def usual_rate_hz(kind: str, models: Sequence[str], baud: int) -> float:
+    """Cycles per second of a bus of a family, with servos of these models, whose robot file gives no rate.
+
+    Raises DriverError for a model that the family does not drive.
+    """
+    family = FAMILIES.get(kind)
+    if not family.cycle_bytes:
+        return USUAL_RATE_HZ
+    count = FAMILIES.load(family, family.cycle_bytes)
+    with FAMILIES.blaming(family.kind):
+        busy_s = count(models) * _BITS_PER_BYTE / baud
+    return HIGH_RATE_HZ if busy_s * HIGH_RATE_HZ <= _MOST_OF_WIRE else USUAL_RATE_HZ
 
 
 def no_simulator_error(kind: str) -> PluginError:

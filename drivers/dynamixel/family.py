@@ -43,6 +43,7 @@ FAMILY = Family(
     driver="drivers.dynamixel.family:driver_for",
     settings=DynamixelSettings,
     check_model="drivers.tables.tables:check_dynamixel",
+    cycle_bytes="drivers.tables.wire:cycle_bytes",
     simulator="drivers.sim.servos.simulators:DYNAMIXEL",
     baud=SERVO_BAUD,
     install="dynamixel-sdk pyserial",

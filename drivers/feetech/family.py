@@ -22,6 +22,7 @@ FAMILY = Family(
     driver="drivers.feetech.bus:FeetechBus",
     settings=FeetechSettings,
     check_model="drivers.tables.tables:check_feetech",
+    cycle_bytes="drivers.tables.wire:cycle_bytes",
     simulator="drivers.sim.servos.simulators:FEETECH",
     baud=SERVO_BAUD,
     install="dynamixel-sdk pyserial",

@@ -22,6 +22,9 @@ from controller.stage.dry_run import OfflineRun, dry_run
 from controller.stage.stage import load_stage
 from controller.takes.recording import recorded
 
+HZ = 100
+"""Cycles per second of the bus of head24."""
+
 
 def stage_file(tmp_path: Path, text: str = "") -> Path:
     path = tmp_path / "mine.toml"
@@ -42,7 +45,7 @@ def test_every_channel_has_a_row_with_its_mix(root: Path) -> None:
 def test_without_anything_to_play_every_expression_is_shown(tmp_path: Path) -> None:
     rows, report = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), None, 8.0, PARAMETERS)
     sent = dict(zip(report[0]["channels"], zip(*report[0]["sent_deg"], strict=True), strict=True))
-    assert len(report[0]["sent_deg"]) == 8 * 50 + 1
+    assert len(report[0]["sent_deg"]) == 8 * HZ + 1
     assert max(sent["lipCornerUpLeft"]) > 20 and max(sent["neckYaw"]) < 10
     row = next(row for row in rows if row["channel"] == "lipCornerUpLeft")
     assert row["limits (deg)"] == "-32 to 38" and row["fastest (deg/s)"].endswith("of 300")
@@ -55,7 +58,7 @@ def test_a_script_is_rehearsed_with_rules_and_limits(tmp_path: Path) -> None:
     jaw = next(row for row in rows if row["channel"] == "jawOpen")
     assert "timing" in jaw["held by"]
     way = [sent[3] for sent in report[0]["sent_deg"]]
-    assert max(way) == pytest.approx(28.0, abs=0.1) and way[int(3.5 * 50)] == pytest.approx(18.0, abs=0.1)
+    assert max(way) == pytest.approx(28.0, abs=0.1) and way[int(3.5 * HZ)] == pytest.approx(18.0, abs=0.1)
     assert report[0]["rules"][0]["rule"] == "timing jawOpen toward high"
 
 
@@ -75,7 +78,7 @@ def test_the_command_opens_no_port_and_writes_every_angle(tmp_path: Path) -> Non
     assert result.exit_code == 0, result.output
     assert "no port was opened" in result.output
     written = json.loads(report.read_text())
-    assert written["dry_run"] and len(written["buses"][0]["sent_deg"]) == 26
+    assert written["dry_run"] and len(written["buses"][0]["sent_deg"]) == 51
 
 
 def test_a_stage_without_a_robot_sends_nothing() -> None:
@@ -129,6 +132,7 @@ def test_a_command_reaches_the_bus_with_the_next_tick(ticks: ModuleType) -> None
 
 def test_each_bus_has_its_own_pace() -> None:
     robot = load_robot(find_config("robots", "head24"), PARAMETERS)
+    robot.buses[0] = robot.buses[0].model_copy(update={"rate_hz": 50.0})
     state = CommandState(PARAMETERS)
     jaw = PARAMETERS.index("jawOpen")
     offline = OfflineRun(robot, state, lambda now_ns: state.set_parameters([jaw], [0.5], now_ns))
@@ -148,7 +152,7 @@ def test_a_script_without_a_loop_runs_a_moment_longer_than_its_last_step(tmp_pat
     (tmp_path / "act.toml").write_text('steps = ["0 SET jawOpen 0.5", "1 NEUTRAL"]')
     stage = load_stage(str(stage_file(tmp_path, 'show = "act.toml"\n')), PARAMETERS)
     _, report = dry_run(stage, None, None, PARAMETERS)
-    assert len(sent_of(report, "jawOpen")) == round(2.5 * 50) + 1
+    assert len(sent_of(report, "jawOpen")) == round(2.5 * HZ) + 1
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -179,7 +183,7 @@ def test_a_recording_is_played_from_its_first_face(tmp_path: Path) -> None:
             state.tick(10**9 + i * 10_000_000, 0.01, PARAMETERS.neutral())
     _, report = dry_run(stage, tmp_path / "a.rec", None, PARAMETERS)
     jaw = sent_of(report, "jawOpen")
-    assert len(jaw) == pytest.approx(1.5 * 50, abs=2)
+    assert len(jaw) == pytest.approx(1.5 * HZ, abs=2)
     assert max(jaw[:20]) < 0.1 and jaw[-1] == pytest.approx(28.0, abs=0.5)
 
 
@@ -213,7 +217,7 @@ def test_a_voice_on_standard_input_is_computed_without_a_port(tmp_path: Path) ->
         assert "dry run: no port was opened" in result.output
         found = json.loads(report.read_text())["buses"][0]
         jaw = [row[found["channels"].index("jawOpen")] for row in found["sent_deg"]]
-        assert len(jaw) == pytest.approx(50, abs=2) and max(jaw) - min(jaw) > 5.0
+        assert len(jaw) == pytest.approx(HZ, abs=2) and max(jaw) - min(jaw) > 5.0
     with pytest.raises(BlockingIOError):
         os.read(far, 1)
     os.close(far)
@@ -224,7 +228,7 @@ def test_a_long_take_is_computed_to_its_end(tmp_path: Path) -> None:
     (tmp_path / "long.tsv").write_text("0.0\taa\n40.0\tsil\n")
     stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
     _, report = dry_run(stage, tmp_path / "long.tsv", None, PARAMETERS)
-    assert len(sent_of(report, "jawOpen")) > 40 * 50
+    assert len(sent_of(report, "jawOpen")) > 40 * HZ
 
 
 def test_the_stages_own_take_and_voice_are_played_too(tmp_path: Path) -> None:
@@ -232,4 +236,4 @@ def test_the_stages_own_take_and_voice_are_played_too(tmp_path: Path) -> None:
     stage = load_stage(str(stage_file(tmp_path, 'take = "own.tsv"\n')), PARAMETERS)
     _, report = dry_run(stage, None, None, PARAMETERS)
     jaw = sent_of(report, "jawOpen")
-    assert len(jaw) == pytest.approx(2.1 * 50, abs=5) and max(jaw) > 10.0
+    assert len(jaw) == pytest.approx(2.15 * HZ, abs=10) and max(jaw) > 10.0

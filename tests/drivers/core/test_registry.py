@@ -12,7 +12,7 @@ from drivers.base.bus import ServoSpec
 from drivers.base.errors import DriverError, PluginError
 from drivers.core import registry
 from drivers.core.families import AnySettings, Family
-from drivers.core.registry import FAMILIES, check_model, driver_of, open_bus
+from drivers.core.registry import FAMILIES, check_model, driver_of, open_bus, usual_rate_hz
 
 SERVO = ServoSpec(1, "jaw", "rc-180", -0.5, 0.5, 5.0, 50.0)
 
@@ -104,3 +104,22 @@ def test_an_error_in_the_driver_of_another_package_names_the_package(
     monkeypatch.setattr(registry.FAMILIES, "package_of", lambda kind: "lame-boards 2" if kind == "lame" else "")
     with pytest.raises(PluginError, match=r"'lame' of the package lame-boards 2 failed: KeyError: \"jaw \['port'\]\""):
         open_bus("lame", [SERVO], port="x")
+
+
+@pytest.mark.parametrize(
+    ("kind", "models", "baud", "rate_hz"),
+    [
+        ("dynamixel", ["xl330-m288"] * 24, 1_000_000, 100.0),
+        ("dynamixel", ["xl330-m288"] * 25, 1_000_000, 50.0),
+        ("dynamixel", ["xl330-m288"] * 24, 115_200, 50.0),
+        ("dynamixel", ["xl330-m288"], 57_600, 50.0),
+        ("dynamixel", ["ax-12a"], 1_000_000, 50.0),
+        ("feetech", ["sts3215"] * 17, 1_000_000, 100.0),
+        ("feetech", ["sts3215"] * 18, 1_000_000, 50.0),
+        ("maestro", ["rc-180"], 115_200, 50.0),
+    ],
+)
+def test_the_usual_rate_is_the_high_one_where_the_wire_carries_it(
+    kind: str, models: list[str], baud: int, rate_hz: float
+) -> None:
+    assert usual_rate_hz(kind, models, baud) == rate_hz
