@@ -21,6 +21,7 @@ import threading
 import time
 import tomllib
 import tty
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -112,10 +113,8 @@ def send(port: int, seconds: float, seed: int) -> list[tuple[float, str]]:
             sent.append((time.monotonic(), name))
             os.write(port, f"SET {name} {values[name]}\n".encode())
             os.set_blocking(port, False)
-            try:
+            with suppress(BlockingIOError):
                 os.read(port, 65536)  # the answers before
-            except BlockingIOError:
-                pass
     return sent
 
 

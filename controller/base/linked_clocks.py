@@ -103,9 +103,8 @@ class FedClock(Clock):
     def _keep_deadline(self, now: int) -> None:
         """Count how far the tick is from its deadline, which follows the feeder slowly, and any early tick at once."""
         self._is_fed = self._urgent or self._is_near()
-        if self._urgent and now < self._deadline_ns - self._slack_ns:
-            self._deadline_ns = now
-            return
+        if self._urgent:
+            self._deadline_ns = min(self._deadline_ns, now)
         self.jitter_ms.add(abs(now - self._deadline_ns) / 1e6)
         if self._is_fed:
             self._deadline_ns += (now - self._deadline_ns) // _FOLLOW

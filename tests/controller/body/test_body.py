@@ -286,3 +286,41 @@ def test_requests_are_served_until_one_says_stop(tmp_path: Path, pipe: tuple[Con
         main.send(message)
     _wait(body, end, threading.Event(), None)
     assert held == [([JAW], [0.5]), ([JAW],)]
+
+
+class FedBus:
+    """A bus that only keeps what it is fed."""
+
+    error = None
+
+    def __init__(self) -> None:
+        self.fed: list[tuple[float, bool]] = []
+
+    def start(self) -> None:
+        pass
+
+    stop = begin = start
+
+    def feed(self, step_s: float, *, urgent: bool) -> None:
+        self.fed.append((step_s, urgent))
+
+
+def test_every_tick_feeds_the_buses_and_a_command_brings_it_forward(tmp_path: Path) -> None:
+    with Mailbox.create(len(P)) as mailbox:
+        body = Body(stage_of(tmp_path, "control_hz = 10"), P, mailbox)
+        bus = FedBus()
+        body.buses.append(cast(Any, bus))
+        body.start()
+        try:
+            until(lambda: len(bus.fed) > 1)
+            assert bus.fed[0] == (pytest.approx(0.1), False)
+            for _ in range(3):
+                body.state.set_parameters([JAW], [1.0], time.monotonic_ns())
+                count = sum(urgent for _, urgent in bus.fed)
+                until(lambda count=count: sum(urgent for _, urgent in bus.fed) > count)
+            until(lambda: not bus.fed[-1][1])
+        finally:
+            body.buses.remove(cast(Any, bus))
+            body.stop()
+    early = [step for step, urgent in bus.fed if urgent]
+    assert min(early) >= 0.05 and min(early) < 0.099, "half a period lies between two ticks at least"
