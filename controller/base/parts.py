@@ -48,7 +48,7 @@ class Part:
         self.failures = 0
         self.why = ""
         self._remedy, self._effect, self._ended, self._keep_trying = remedy, effect, ended, keep_trying
-        self._in_a_row = 0
+        self._in_a_row, self._told = 0, ""
         self._failed_s = self._due_s = 0.0
 
     def run(self, do: Callable[[], object], now_s: float) -> None:
@@ -70,22 +70,30 @@ class Part:
         """End the part and report why; returns after how long (s) it may start again, None where it is switched off."""
         self._in_a_row = 1 if now_s - self._failed_s > CALM_S else self._in_a_row + 1
         self.off = self._in_a_row > len(PAUSES_S) and not self._keep_trying
-        pause_s = PAUSES_S[min(self._in_a_row, len(PAUSES_S)) - 1]
-        self._failed_s, self._due_s = now_s, now_s if self._remedy else now_s + pause_s
-        again, self.why = self.why == describe(error), describe(error)
-        self.failed, self.failures = True, self.failures + 1
-        if self.off or not again:
-            log.error("%s", self._message(pause_s), exc_info=error if os.environ.get("OMOTE_DEBUG") else None)
+        self._failed_s, self._due_s = now_s, now_s if self._remedy else now_s + self.pause_s
+        self.failed, self.failures, self.why = True, self.failures + 1, describe(error)
+        if self.off or self.why != self._told:
+            self._told = self.why
+            log.error("%s", self._message(), exc_info=error if os.environ.get("OMOTE_DEBUG") else None)
         try:
             self._ended()
         except Exception as also:  # noqa: BLE001  it has failed already
             log.error("%s could not be ended in order: %s", self.name, describe(also))
-        return None if self.off else pause_s
+        return None if self.off else self.pause_s
+
+    @property
+    def pause_s(self) -> float:
+        """How long it pauses after the failures so far."""
+        return PAUSES_S[min(self._in_a_row, len(PAUSES_S)) - 1]
+
+    def note(self, what: str) -> None:
+        """Report something that went wrong and does not end the part."""
+        log.warning("%s: %s", self.name, what)
 
     def recover(self) -> None:
         """Say that a part that failed is at work again; does nothing for one that is."""
         if self.failed:
-            self.failed = False
+            self.failed, self._told = False, ""
             log.warning("%s works again", self.name)
 
     def report(self) -> dict[str, object]:
@@ -93,11 +101,11 @@ class Part:
         state = "switched off" if self.off else "failed" if self.failed else "at work"
         return {"part": self.name, "failures": self.failures, "why": self.why, "state": state}
 
-    def _message(self, pause_s: float) -> str:
+    def _message(self) -> str:
         if self.off:
             back = self._remedy or "it comes back with the next start"
             return f"{self.name} failed {self._in_a_row} times in a row and is switched off: {self.why}; {back}"
-        back = self._remedy or f"it starts again in {pause_s:g} s"
+        back = self._remedy or f"it starts again in {self.pause_s:g} s"
         return "; ".join(filter(None, (f"{self.name} failed: {self.why}", self._effect, back)))
 
 

@@ -49,7 +49,7 @@ class BodyProcess:
         self.finished = False
         self.report: dict[str, object] = {}
         self._pipe, self._process = preloaded.pipe, preloaded.process
-        preloaded.send(messages.BodyOrders(str(stage.path), self.mailbox.path, self._panel_mailbox.path, options))
+        preloaded.send(messages.BodyOrders(str(stage.path), options), self.mailbox, self._panel_mailbox)
 
     def wait_ready(self) -> messages.Ready:
         """Wait until the servos are up; raises ControllerError with the body's message when they do not come up."""

@@ -43,6 +43,13 @@ class Player(Protocol):
     def tick(self, now_ns: int) -> None:
         """Send the lines that are due."""
 
+    @property
+    def name(self) -> str | None:
+        """Of the show that was begun last; None where there is none."""
+
+    def abandon(self, now_ns: int) -> None:
+        """End a show that failed, and give back what it moves."""
+
     def status(self) -> str:
         """Which show plays and where it is, in one word."""
 
@@ -296,6 +303,11 @@ class CommandState:
                 layer.share.fill(1.0)
             else:
                 np.subtract(1.0, through, out=layer.share)
+
+    def release_layer(self, name: str) -> None:
+        """Let a layer fade out, whose source has failed. Raises KeyError: no layer of that name."""
+        with self._lock:
+            self.mixer[name].release()
 
     def snapshot(self, out: Floats) -> None:
         with self._lock:

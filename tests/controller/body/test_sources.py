@@ -112,11 +112,14 @@ def test_a_pipe_that_closes_is_the_end() -> None:
 
 def test_what_is_no_voice_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.wav").write_bytes(b"hello")
-    for path in (tmp_path / "a.wav", tmp_path / "none.wav"):
-        sources = Sources(CommandState(P), voice=Voice(str(path)))
-        sources.begin()
-        assert until(lambda sources=sources: sources.voice_ended)
-        assert isinstance(sources.error, TakeError)
+    sources = Sources(CommandState(P), voice=Voice(str(tmp_path / "a.wav"), alone=True))
+    sources.begin()
+    assert until(lambda: sources.voice_ended)
+    assert isinstance(sources.error, TakeError) and not sources.playing
+    with pytest.raises(TakeError, match=r"none\.wav: the voice is not there"):
+        Voice(str(tmp_path / "none.wav")).check()
+    Voice(str(tmp_path / "a.wav")).check()
+    Voice("-").check()
 
 
 def test_a_record_cannot_be_changed() -> None:
