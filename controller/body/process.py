@@ -78,11 +78,10 @@ class BodyProcess:
         if not self._process.is_alive() and not self._pipe.poll():
             return
         try:
-            self._pipe.send(messages.Stop())
+            with suppress(OSError):  # a body that has ended by a signal has left its report in the pipe
+                self._pipe.send(messages.Stop())
             while not self.report:
                 self._handle(self._receive(_STOP_TIMEOUT_S))
-        except BrokenPipeError:
-            pass
         finally:
             self._end_process()
 

@@ -19,7 +19,7 @@ class LayerPart:
         self, name: str, layer: Layer, parts: Parts, write: Callable[[float], None], renew: Callable[[], None]
     ) -> None:
         self._layer, self._write, self._renew = layer, write, renew
-        self._part = parts.add(Part(name, effect="its layer fades out", ended=layer.release))
+        self._part = parts.add(Part(name, effect="its layer fades out", ended=self._end))
 
     @property
     def share(self) -> float:
@@ -29,9 +29,8 @@ class LayerPart:
     def update(self, now_s: float) -> None:
         """Let the source write; one that failed begins again after its pause, once its layer has faded out."""
         if not self._part.failed or not self._layer.level:
-            self._part.run(lambda: self._begin(now_s), now_s)
+            self._part.run(lambda: self._write(now_s), now_s)
 
-    def _begin(self, now_s: float) -> None:
-        if self._part.failed:
-            self._renew()
-        self._write(now_s)
+    def _end(self) -> None:
+        self._layer.release()
+        self._renew()  # at once: other layers read what is left of this source
