@@ -10,15 +10,23 @@ it copies the slot ``sequence`` points at and reads again only if the writer lap
 
 from __future__ import annotations
 
+import errno
+import logging
 import mmap
 import os
 import tempfile
-from contextlib import suppress
-from pathlib import Path
+from multiprocessing import reduction
+from multiprocessing.connection import Connection
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.base.errors import ControllerError
+
+log = logging.getLogger(__name__)
+
+MEMORY = "/dev/shm"
 _HEADER = 2
 _RETRIES = 100
 
@@ -26,18 +34,16 @@ _RETRIES = 100
 class Mailbox:
     """A vector of ``count`` float64 that another process can read at any time.
 
-    Create one with :meth:`create`, open it elsewhere with ``Mailbox(path, count)``.
+    Create one with :meth:`create`, hand it to another process with :meth:`send`, and take it there with
+    :meth:`receive`. The file has no name, so nothing of it is left however the processes end.
 
-    path : the mapped file.
-    count : length of the vector.
+    file : the mapped file. count : length of the vector.
     """
 
-    def __init__(self, path: str | os.PathLike[str], count: int) -> None:
-        self.path = str(path)
+    def __init__(self, file: IO[bytes], count: int) -> None:
         self.count = count
-        self._owned = False
-        with open(self.path, "r+b") as file:
-            self._map = mmap.mmap(file.fileno(), self._size(count))
+        self._file = file
+        self._map = mmap.mmap(file.fileno(), self._size(count))
         words = np.frombuffer(self._map, dtype=np.int64)
         self._head = words[:_HEADER]
         slot = 1 + count
@@ -51,14 +57,23 @@ class Mailbox:
 
     @classmethod
     def create(cls, count: int) -> Mailbox:
-        """A new mailbox of ``count`` zeros in a private temporary file, removed by :meth:`close`."""
-        memory = Path("/dev/shm")
-        handle, path = tempfile.mkstemp(prefix="omote-", dir=memory if os.access(memory, os.W_OK) else None)
-        with os.fdopen(handle, "wb") as file:
-            file.truncate(cls._size(count))
-        box = cls(path, count)
-        box._owned = True
-        return box
+        """A new mailbox of ``count`` zeros, in memory, or in the folder of temporary files where that is full.
+
+        Raises ControllerError: there is no room in either.
+        """
+        return cls(_reserved(cls._size(count)), count)
+
+    def send(self, pipe: Connection) -> None:
+        """Hand the mailbox to the process at the other end of a pipe. Raises OSError: nobody is there."""
+        reduction.send_handle(pipe, self._file.fileno(), None)
+
+    @classmethod
+    def receive(cls, pipe: Connection, count: int) -> Mailbox:
+        """Take the mailbox of ``count`` that another process sends. Raises ControllerError: it does not come."""
+        try:
+            return cls(os.fdopen(reduction.recv_handle(pipe), "r+b"), count)
+        except (EOFError, OSError, RuntimeError, ValueError) as error:
+            raise ControllerError(f"the shared memory of the main process did not come: {error}") from error
 
     @property
     def sequence(self) -> int:
@@ -82,20 +97,51 @@ class Mailbox:
                 break
         return sequence, stamp
 
-    def unlink(self) -> None:
-        """Remove the file; processes that have mapped it keep it. Does nothing where a file in use must stay."""
-        with suppress(OSError):
-            Path(self.path).unlink(missing_ok=True)
-
     def close(self) -> None:
-        """Unmap the memory; the process that created the file also removes it."""
+        """Unmap the memory; it is free when every process has."""
         del self._head, self._stamps, self._slots
         self._map.close()
-        if self._owned:
-            Path(self.path).unlink(missing_ok=True)
+        self._file.close()
 
     def __enter__(self) -> Mailbox:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _reserved(size: int) -> IO[bytes]:
+    """A file of ``size`` zero bytes without a name whose pages exist: a write never meets a full file system."""
+    failed: list[str] = []
+    for folder in _folders():
+        try:
+            file = _filled(folder, size)
+        except OSError as error:
+            failed.append(f"{folder}: {error.strerror}")
+            continue
+        if failed:
+            log.warning("%s; the face goes from process to process through %s instead", failed[0], folder)
+        return file
+    hint = f"make room in one of them: df -h {' '.join(_folders())}"
+    raise ControllerError(f"no room for {size} bytes that two processes share: {'; '.join(failed)}", hint=hint)
+
+
+def _folders() -> list[str]:
+    """Where such a file can be: in memory first, then on the disk."""
+    folders = [MEMORY] if os.path.isdir(MEMORY) else []
+    try:
+        return list(dict.fromkeys([*folders, tempfile.gettempdir()]))
+    except OSError:  # none takes a file
+        return folders or ["/tmp"]
+
+
+def _filled(folder: str, size: int) -> IO[bytes]:
+    """Zeros that are really there; a file that is only made longer has no pages before they are written."""
+    file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115  the mailbox closes it
+    try:
+        if file.write(bytes(size)) != size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    except OSError:
+        file.close()
+        raise
+    return file

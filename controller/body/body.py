@@ -7,27 +7,30 @@ main process, SIGTERM, or an error in this process.
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
 import time
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from pathlib import Path
 
-from controller.base.errors import OMOTE_ERRORS
+from controller.base.errors import OMOTE_ERRORS, ConfigError
 from controller.base.linked_clocks import HurriedClock
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS, Floats, Parameters
+from controller.base.parts import Part
 from controller.base.signals import termination_signals, unblock_interrupts
 from controller.body import messages
+from controller.body.link_part import LinkPart, thread_errors
 from controller.body.messages import RunOptions
 from controller.body.panel_state import PanelState
-from controller.body.sources import Sources, Voice
+from controller.body.sources import Sources, Voice, show_part
 from controller.layers.mixer import by_priority
-from controller.links.kind import Link, LinkContext
-from controller.links.line.script import load_script
+from controller.links.kind import LinkContext
+from controller.links.line.script import Script, load_script
 from controller.links.line.show import Shows
-from controller.links.links import open_links
 from controller.robot.busloop import BusLoop
 from controller.robot.following import MeasuredFace
 from controller.robot.settings import RobotSettings
@@ -37,6 +40,8 @@ from controller.takes.reader import load_take, reader_of
 from controller.takes.recording import SUFFIX, Replay, recorded
 from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.base.shutdown import Closers, combine_with_context
+
+log = logging.getLogger(__name__)
 
 _POLL_S = 0.1
 
@@ -58,12 +63,11 @@ class Body:
         if path is not None and path.suffix == SUFFIX:
             self.replay = Replay(path, parameters, stage.state)
         elif options.record is not None:
-            seed, period_s = stage.settings.seed, stage.period_s
-            self._closers.enter_context(recorded(self.state, options.record, seed=seed, period_s=period_s))
+            self._record(options.record)
         self.clock = HurriedClock(stage.settings.control_hz)
         self.state.on_command = self.clock.hurry
         self.state.live(0.0 if options.mirror else stage.settings.liveliness, 0)  # 0: no command set it
-        self.links: list[Link] = []
+        self.links: list[LinkPart] = []
         self.buses = [loop for robot in stage.robots for loop in self._bus_loops(robot, parameters, options.mirror)]
         self.measured_face: MeasuredFace | None = None
         if self.buses:
@@ -74,9 +78,7 @@ class Body:
                 [bus.following for bus in self.buses],
             )
         self.state.servo_monitor = self.measured_face
-        self.state.shows = Shows(
-            lambda name: load_script(name, parameters, stage.vocabulary, beside=stage.path), self.state
-        )
+        self.state.shows = Shows(self._find_show, self.state)
         if stage.settings.show is not None:
             self.state.shows.start(stage.settings.show)
         self.follows_servos = options.mirror and self.measured_face is not None
@@ -95,6 +97,8 @@ class Body:
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping, self._begun = threading.Event(), threading.Event()
         self._error: Exception | None = None
+        self._lost = False  # nothing is left to follow
+        self._panel = self.state.parts.add(Part("panel state", effect="the panel shows what it knew last"))
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
 
     def _bus_loops(self, robot: RobotSettings, parameters: Parameters, limp: bool) -> list[BusLoop]:
@@ -111,6 +115,25 @@ class Body:
             )
             for bus in robot.buses
         ]
+
+    def _record(self, path: Path) -> None:
+        seed, period_s = self.stage.settings.seed, self.stage.period_s
+        remedy = "what came before is in it; begin another with --record where there is room"
+        part = self.state.parts.add(Part(f"recording {path}", remedy=remedy))
+        self._closers.enter_context(
+            recorded(
+                self.state, path, seed=seed, period_s=period_s,
+                failed=lambda error: part.fail(error, time.monotonic()),
+            )
+        )  # fmt: skip
+
+    def _find_show(self, name: str) -> Script:
+        """Raises ConfigError: no such script, a wrong one, or one that was switched off."""
+        script = load_script(name, self.state.parameters, self.stage.vocabulary, beside=self.stage.path)
+        part = self.state.parts.add(show_part(script.name))
+        if part.off:
+            raise ConfigError(f"{part.name} failed too often and is switched off: {part.why}", hint="start omote again")
+        return script
 
     def newest(self) -> tuple[Floats, int]:
         """The newest parameters and the arrival time (monotonic ns) of the command that caused them."""
@@ -138,20 +161,57 @@ class Body:
     def begin(self) -> None:
         """Let the servos follow; open the links, or start the take.
 
-        Raises LinkError or PortError when a link does not come up.
+        Raises what the first link raises where none comes up and nothing else plays; otherwise a link that does not
+        come up is tried again.
         """
         if self.live:
-            links = [link for link in self.stage.settings.links if not self.follows_servos or link.simulated is None]
-            context = LinkContext(self.state, self._closers, self.stage.vocabularies, self.stage.path)
-            self.links = open_links(links, context)
+            self._closers.enter_context(thread_errors(lambda: self.links, self.state.parts))
+            self._open_links()
             self._closers.callback(self.sources.stop)
             self.sources.begin()
         for bus in self.buses:
             bus.begin()
         self._begun.set()
 
+    def _open_links(self) -> None:
+        """Open the links; those that do not come up are tried again, unless there is nothing else to follow."""
+        stage, state = self.stage, self.state
+
+        def context(closers: Closers) -> LinkContext:
+            return LinkContext(state, closers, stage.vocabularies, stage.path)
+
+        choices = [link for link in stage.settings.links if not self.follows_servos or link.simulated is None]
+        self.links = [LinkPart(choice, context, state.parts) for choice in choices]
+        faults: list[tuple[LinkPart, Exception]] = []
+        for link in self.links:
+            self._closers.callback(link.close)
+            try:
+                link.open()
+            except Exception as error:  # noqa: BLE001  raised below, or tried again
+                faults.append((link, error))
+        if faults and len(faults) == len(self.links) and not self.sources.any:
+            raise faults[0][1]
+        for link, fault in faults:
+            link.fail(fault)
+
+    def publish(self, panel_state: PanelState) -> None:
+        """Write the state for the panel."""
+        self._panel.run(lambda: panel_state.publish(self.state, self.measured_face), time.monotonic())
+
+    def _look_for_something_to_follow(self) -> None:
+        """Say once when parts have failed and nothing is left that the face could follow."""
+        follows = self.sources.playing or any(link.opened for link in self.links)
+        lost = self.live and self._begun.is_set() and not follows and bool(self.state.parts.failed)
+        if lost and not self._lost:
+            log.error(
+                "NOTHING IS LEFT TO FOLLOW: every link, take, voice and show has failed or ended; the face keeps its "
+                "last commands and the servos hold them; see the messages above, then end it with Ctrl-C"
+            )
+        self._lost = lost
+
     def check(self) -> None:
-        """Raise the error that ended one of the loops, if any did."""
+        """Raise the error that ended one of the loops, or the only thing there was to play."""
+        self._look_for_something_to_follow()
         for error in (self._error, self.sources.error, *(bus.error for bus in self.buses)):
             if error is not None:
                 raise error
@@ -175,20 +235,31 @@ class Body:
         for now in self.clock.run(lambda: not self._stopping.is_set()):
             begun = self._begun.is_set()
             self.sources.tick(now, begun)
-            face = self.replay if self.replay is not None and begun else self.state
-            stamp, step_s = face.tick(now, self.clock.step_s, values), self.clock.step_s
+            stamp = self._tick(now, self.clock.step_s, values, begun)
             is_new, self._newest = stamp > self._newest[1], (values.copy(), stamp)
             for bus in self.buses:
-                bus.feed(step_s, urgent=is_new)
+                bus.feed(self.clock.step_s, urgent=is_new)
             self._mailbox.publish(values, stamp)
 
+    def _tick(self, now_ns: int, dt: float, values: Floats, begun: bool) -> int:
+        """Write the face of this tick to ``values`` : (P,); a recording that cannot be played on leaves it as it is."""
+        if self.replay is None or not begun:
+            return self.state.tick(now_ns, dt, values)
+        if self.sources.error is None:
+            try:
+                return self.replay.tick(now_ns, dt, values)
+            except Exception as error:  # noqa: BLE001  check() raises it; the servos are led to rest first
+                self.sources.error = error
+        return 0
+
     def report(self) -> dict[str, object]:
-        """Measurements of the control loop, the links and the buses."""
+        """Measurements of the control loop, the links and the buses, and the parts that failed."""
         return {
             "control": self.clock.report(),
             **self.sources.report(),
             "links": [link.report() for link in self.links],
             "buses": [bus.report() for bus in self.buses],
+            "parts": self.state.parts.report(),
         }
 
 
@@ -216,11 +287,9 @@ def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
 
 def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     stage = load_stage(orders.stage, PARAMETERS)
-    mailbox = _open_mailbox(orders.mailbox, len(PARAMETERS.names))
-    panel_state = None
-    if orders.panel_mailbox is not None:
-        panel = _open_mailbox(orders.panel_mailbox, PanelState.size(PARAMETERS))
-        panel_state = PanelState(panel, [layer.name for layer in by_priority(stage.layers)], PARAMETERS)
+    mailbox = Mailbox.receive(pipe, len(PARAMETERS.names))
+    panel = Mailbox.receive(pipe, PanelState.size(PARAMETERS))
+    panel_state = PanelState(panel, [layer.name for layer in by_priority(stage.layers)], PARAMETERS)
     body = Body(stage, PARAMETERS, mailbox, orders.options)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
     body.start()
@@ -232,13 +301,6 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event)
     _send(pipe, messages.Report(body.report()))
 
 
-def _open_mailbox(path: str, count: int) -> Mailbox:
-    """Open a mailbox of main and remove its name, because no other process has to find it."""
-    mailbox = Mailbox(path, count)
-    mailbox.unlink()
-    return mailbox
-
-
 def _wait(body: Body, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
     """Serve main until it requests a stop or has ended, a signal arrives, or a bus failed for good."""
     finished = False
@@ -246,7 +308,7 @@ def _wait(body: Body, pipe: Connection, stop: threading.Event, panel_state: Pane
         if pipe.poll(_POLL_S) and not _handle(body, pipe):
             return
         if panel_state is not None:
-            panel_state.publish(body.state, body.measured_face)
+            body.publish(panel_state)
         if body.finished and not finished:
             _send(pipe, messages.Finished())
             finished = True

@@ -25,11 +25,9 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class BodyOrders:
-    """Main to body, first: the stage's file, the files of the mailboxes for parameters and panel state, options."""
+    """Main to body, first: the stage's file and options. The mailboxes for parameters and panel state follow it."""
 
     stage: str
-    mailbox: str
-    panel_mailbox: str | None = None
     options: RunOptions = RunOptions()
 
 

@@ -20,6 +20,7 @@ from controller.base.signals import interrupts_blocked
 from drivers.base.permission import check_ports_allowed
 
 if TYPE_CHECKING:
+    from controller.base.mailboxes import Mailbox  # start-up: it loads numpy
     from controller.body.messages import BodyOrders  # start-up: it loads numpy
 
 _END_S = 5.0
@@ -44,11 +45,13 @@ class PreloadedBody:
         voice.close()
         self._sent = False
 
-    def send(self, orders: BodyOrders) -> None:
-        """Send the process its orders; from now on the caller has to end it."""
+    def send(self, orders: BodyOrders, *mailboxes: Mailbox) -> None:
+        """Send the process its orders and mailboxes; from now on the caller has to end it."""
         self._sent = True
         with suppress(OSError):  # the caller that waits for its answer reports a process that has ended
             self.pipe.send(orders)
+            for mailbox in mailboxes:
+                mailbox.send(self.pipe)
 
     def __enter__(self) -> PreloadedBody:
         return self

@@ -49,7 +49,7 @@ class BodyProcess:
         self.finished = False
         self.report: dict[str, object] = {}
         self._pipe, self._process = preloaded.pipe, preloaded.process
-        preloaded.send(messages.BodyOrders(str(stage.path), self.mailbox.path, self._panel_mailbox.path, options))
+        preloaded.send(messages.BodyOrders(str(stage.path), options), self.mailbox, self._panel_mailbox)
 
     def wait_ready(self) -> messages.Ready:
         """Wait until the servos are up; raises ControllerError with the body's message when they do not come up."""
@@ -78,11 +78,10 @@ class BodyProcess:
         if not self._process.is_alive() and not self._pipe.poll():
             return
         try:
-            self._pipe.send(messages.Stop())
+            with suppress(OSError):  # a body that has ended by a signal has left its report in the pipe
+                self._pipe.send(messages.Stop())
             while not self.report:
                 self._handle(self._receive(_STOP_TIMEOUT_S))
-        except BrokenPipeError:
-            pass
         finally:
             self._end_process()
 

@@ -6,13 +6,17 @@ import io
 import os
 import sys
 import threading
+import time
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, TextIO
 
 from controller.base.errors import TakeError
-from controller.layers.commands import CommandState
+from controller.base.parts import Part
+from controller.layers.commands import CommandState, Player
 from controller.robot.following import MeasuredFace
 from controller.takes.livelink import TakePlayer
 from controller.takes.voice import HOP_S, VoiceListener
@@ -36,6 +40,22 @@ class Voice:
     raw_hz: int | None = None
     alone: bool = False
     pipe: Connection | None = None
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        return "on standard input" if self.path == "-" else self.path
+
+    @property
+    def reopens(self) -> bool:
+        """Whether it can be opened again after a failure: a named pipe or a device; a file would begin anew."""
+        return self.path != "-" and not Path(self.path).is_file()
+
+    def check(self) -> None:
+        """Raises TakeError where there is nothing at the path, or it may not be read."""
+        if self.path != "-" and not os.access(self.path, os.R_OK):
+            why = "may not be read" if Path(self.path).exists() else "is not there"
+            raise TakeError(f"{self.path}: the voice {why}", hint=f"look at: ls -l {self.path}")
 
     def open(self) -> IO[bytes]:
         """Open the stream; raises TakeError when that fails."""
@@ -100,13 +120,17 @@ def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
 
 
 class Sources:
-    """Everything that writes to the layers before they are mixed.
+    """Everything that writes to the layers before they are mixed; each is a part that fails alone.
 
     Parameters
     ----------
     state : the layers. player : plays a take. follow : the measured face of a head that is moved by hand.
     voice : a voice to listen to.
     beside : the take plays beside the links, and its end is not the end of the run.
+
+    Attributes
+    ----------
+    error : what ended the take or the voice that was all there is to play.
     """
 
     def __init__(
@@ -120,9 +144,17 @@ class Sources:
     ) -> None:
         self._state, self._player, self._follow, self._voice, self._beside = state, player, follow, voice, beside
         self._voice_listener: VoiceListener | None = None
-        self._stopped = False
-        self.error: Exception | None = None  # what ended the voice
+        self._stopping = threading.Event()
+        self.error: Exception | None = None
         self.voice_ended = False
+        self._take = self._part(f"take {player.take.name}", player.layer) if player is not None else None
+        self._measured = state.parts.add(Part("measured face", ended=lambda: state.release_layer("capture")))
+        self._voice_part = self._part(f"voice {voice.name}", "speech", reopens=voice.reopens) if voice else None
+
+    def _part(self, name: str, layer: str, *, reopens: bool = False) -> Part:
+        remedy = "" if reopens else "it plays again when omote is started again"
+        ended = partial(self._state.release_layer, layer)
+        return self._state.parts.add(Part(name, remedy=remedy, effect="its layer fades out", ended=ended))
 
     @property
     def finished(self) -> bool:
@@ -131,6 +163,20 @@ class Sources:
             return self._player.finished and not self._beside
         return self.voice_ended and self._voice is not None and self._voice.alone
 
+    @property
+    def playing(self) -> bool:
+        """Whether the face follows any of them."""
+        take = self._player is not None and not self._player.finished and not (self._take and self._take.failed)
+        voice = self._voice is not None and not self.voice_ended
+        show = self._state.shows is not None and self._state.shows.status() != "off"
+        return take or voice or show or self._follow is not None
+
+    @property
+    def any(self) -> bool:
+        """Whether there is anything but links: a take, a voice, a show, a head that is moved by hand."""
+        show = self._state.shows is not None and self._state.shows.name is not None
+        return show or any(each is not None for each in (self._player, self._voice, self._follow))
+
     def begin(self) -> None:
         """Start to listen to the voice."""
         if self._voice is not None:
@@ -138,18 +184,42 @@ class Sources:
 
     def stop(self) -> None:
         """Stop listening; a thread that waits for a silent stream ends with the process."""
-        self._stopped = True
+        self._stopping.set()
         if self._voice_listener is not None:
             self._voice_listener.stop()
 
     def tick(self, now_ns: int, begun: bool) -> None:
         """Write to the layers what is due; takes and shows wait until ``begun``."""
-        if self._player is not None and begun:
+        if begun:
+            self._play_take(now_ns)
+        if (follow := self._follow) is not None:
+            self._measured.run(lambda: follow.capture(self._state, now_ns), now_ns * 1e-9)
+        if begun and self._state.shows is not None and self._state.shows.name is not None:
+            self._play_show(self._state.shows, self._state.shows.name, now_ns)
+
+    def _play_take(self, now_ns: int) -> None:
+        if self._player is None or self._take is None or self._take.failed:
+            return
+        try:
             self._player.tick(now_ns)
-        if self._follow is not None:
-            self._follow.capture(self._state, now_ns)
-        if self._state.shows is not None and begun:
-            self._state.shows.tick(now_ns)
+        except Exception as error:  # noqa: BLE001  the rest goes on
+            if self._beside:
+                self._take.fail(error, now_ns * 1e-9)
+            else:
+                self._fail_alone(self._take, error)
+
+    def _fail_alone(self, part: Part, error: Exception) -> None:
+        """Keep the error of the only thing there is to play, which ends the run."""
+        part.failed = True
+        self.error = self.error or error
+
+    def _play_show(self, shows: Player, name: str, now_ns: int) -> None:
+        part = self._state.parts.add(show_part(name))
+        failures = part.failures
+        part.run(lambda: shows.tick(now_ns), now_ns * 1e-9)
+        if part.failures > failures:
+            with suppress(Exception):
+                shows.abandon(now_ns)
 
     def report(self) -> dict[str, object]:
         """How much of a take was played and of a voice was received (s); None without."""
@@ -167,11 +237,31 @@ class Sources:
         return {"take": take, "voice": voice}
 
     def _listen(self, voice: Voice) -> None:
+        """Listen to the voice until it ends; a pipe or device that failed is opened again."""
+        pause_s: float | None = 0.0
+        while pause_s is not None and not self._stopping.wait(pause_s):
+            pause_s = self._hear(voice)
+        self.voice_ended = True
+
+    def _hear(self, voice: Voice) -> float | None:
+        """Listen once; returns after how long (s) to try again, None for never."""
+        part = self._voice_part
+        assert part is not None
         try:
             with voice.open() as stream:
                 self._voice_listener = VoiceListener(stream, self._state, raw_hz=voice.raw_hz)
-                if not self._stopped:
+                part.recover()
+                if not self._stopping.is_set():
                     self._voice_listener.run()
-        except Exception as error:  # noqa: BLE001  the body raises it
-            self.error = error
-        self.voice_ended = True
+        except Exception as error:  # noqa: BLE001  the rest goes on
+            if voice.alone:
+                self._fail_alone(part, error)
+                return None
+            again = part.fail(error, time.monotonic())
+            return again if voice.reopens else None
+        return None
+
+
+def show_part(name: str) -> Part:
+    """The part of a show; it begins again with its command."""
+    return Part(f"show {name}", remedy=f"SHOW {name} begins it again", effect="the face gives back what it moved")

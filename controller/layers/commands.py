@@ -6,6 +6,7 @@ Links call the methods of :class:`CommandSink` from their own threads; the contr
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,11 +14,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from controller.base.errors import ParameterError
 from controller.base.parameters import Flags, Floats, Parameters
+from controller.base.parts import Parts
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
 from controller.layers.idle import IdleMotion, IdleSettings
-from controller.layers.mixer import LayerSettings, Mixer
+from controller.layers.layer_part import LayerPart
+from controller.layers.mixer import Layer, LayerSettings, Mixer
 from controller.layers.settings import default_layers
 from controller.motion.motion import MotionLimiter
 from controller.vocabulary.vocabulary import Vocabulary
@@ -38,6 +42,13 @@ class Player(Protocol):
 
     def tick(self, now_ns: int) -> None:
         """Send the lines that are due."""
+
+    @property
+    def name(self) -> str | None:
+        """Of the show that was begun last; None where there is none."""
+
+    def abandon(self, now_ns: int) -> None:
+        """End a show that failed, and give back what it moves."""
 
     def status(self) -> str:
         """Which show plays and where it is, in one word."""
@@ -117,6 +128,7 @@ class CommandState:
     ----------
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
     on_command : called after each command, in the thread that gave it.
+    parts : what fails alone; a source of a layer that fails lets its layer fade out, and begins again.
 
     Raises ConfigError: the shipped expressions or figures cannot be read.
     """
@@ -135,14 +147,22 @@ class CommandState:
         self.vocabulary = vocabulary or Vocabulary.load(parameters)
         self.mixer = Mixer(parameters, default_layers() if layers is None else layers)
         self.limiter = MotionLimiter.of(parameters, period_s)
+        self.parts = Parts()
         self._player = ExpressionPlayer(self.vocabulary["neutral"])
         self._gaze = Gaze(parameters)
-        self._life = IdleMotion(parameters, life or IdleSettings.named("natural", parameters), seed)
+        self._life_settings, self._seed = life or IdleSettings.named("natural", parameters), seed
+        self._life = IdleMotion(parameters, self._life_settings, seed)
         self._mixed, self._present = parameters.neutral(), parameters.neutral()
         self._expression, self._looking = self.mixer["expression"], self.mixer["gaze"]
         self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
         self._speech = self.mixer["speech"]
         self._everything = np.ones(len(parameters), dtype=bool)
+        self._blocks = (0.0, 0.0, 0.0)  # how much the expression holds back blinks, gaze and speech
+        self._expressions = self._part("expressions", self._expression, self._write_expression, self._renew_expression)
+        self._sources = (
+            self._part("idle motion", self._idle, self._write_idle, self._renew_idle),
+            self._part("gaze", self._looking, self._write_gaze, self._renew_gaze),
+        )
         self.servo_monitor: ServoMonitor | None = None
         self.shows: Player | None = None
         self.on_command: Callable[[], None] = _nothing
@@ -183,25 +203,46 @@ class CommandState:
         if stamp_ns:
             self.on_command()
 
+    def _part(self, name: str, layer: Layer, write: Callable[[float], None], renew: Callable[[], None]) -> LayerPart:
+        return LayerPart(name, layer, self.parts, write, renew)
+
     def _write_layers(self, now_s: float) -> None:
-        self._expression.write_masked(self._player.update(now_s), self._everything, now_s)
-        self._update_idle(now_s)
-        _, gaze_block, mouth_block = self._player.blocks
+        self._expressions.update(now_s)
+        _, gaze_block, mouth_block = (block * self._expressions.share for block in self._blocks)
         self._looking.attenuate(gaze_block)
         self._speech.attenuate(mouth_block)
+        for source in self._sources:
+            source.update(now_s)
+
+    def _write_expression(self, now_s: float) -> None:
+        values = _finite(self._player.update(now_s))
+        self._expression.write_masked(values, self._everything, now_s)
+        self._blocks = self._player.blocks
+
+    def _renew_expression(self) -> None:
+        self._player = ExpressionPlayer(self.vocabulary["neutral"])
+
+    def _write_gaze(self, now_s: float) -> None:
         if self._gaze.active:
             eyes_rad = self._life.eye_yaw_rad, self._life.eye_pitch_rad
-            values = self._gaze.update(self._present, eyes_rad, self._life.head_rad[:2])
+            values = _finite(self._gaze.update(self._present, eyes_rad, self._life.head_rad[:2]))
             self._looking.write(self._gaze.indices, values, now_s)
 
-    def _update_idle(self, now_s: float) -> None:
-        life, (blink_block, gaze_block, _) = self._life, self._player.blocks
+    def _renew_gaze(self) -> None:
+        self._gaze = Gaze(self.parameters)
+
+    def _write_idle(self, now_s: float) -> None:
+        life, (blink_block, gaze_block, _) = self._life, self._blocks
         if life.liveliness > 0.0:
             life.update(now_s, looking=self._gaze.active, blink_block=blink_block, gaze_block=gaze_block)
-            self._idle.write_masked(life.values, self._everything, now_s)
+            self._idle.write_masked(_finite(life.values), self._everything, now_s)
         elif self._idle.holding:
             life.update(now_s, looking=False)
             self._idle.release()
+
+    def _renew_idle(self) -> None:
+        liveliness, self._life = self._life.liveliness, IdleMotion(self.parameters, self._life_settings, self._seed)
+        self._life.liveliness = liveliness
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         with self._journaled("set_parameters", indices, values, stamp_ns, stamp_ns=stamp_ns):
@@ -213,15 +254,18 @@ class CommandState:
 
     def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
         expression = self.vocabulary[name]
+        _check_finite("EXPR", intensity, duration_s or 0.0)
         with self._journaled("expression", name, intensity, duration_s, stamp_ns, stamp_ns=stamp_ns):
             self._player.play(expression, intensity, duration_s, self._time(stamp_ns))
 
     def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
+        _check_finite("GAZE", yaw_rad, pitch_rad)
         with self._journaled("gaze", yaw_rad, pitch_rad, stamp_ns, stamp_ns=stamp_ns):
             self._gaze.look(yaw_rad, pitch_rad)
             self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
 
     def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        _check_finite("GAZE AT", x_mm, y_mm, z_mm)
         with self._journaled("gaze_at", x_mm, y_mm, z_mm, stamp_ns, stamp_ns=stamp_ns):
             self._gaze.look_at(x_mm, y_mm, z_mm)
             self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
@@ -231,12 +275,14 @@ class CommandState:
             self._stop_looking()
 
     def neutral(self, seconds: float, stamp_ns: int) -> None:
+        _check_finite("NEUTRAL", seconds)
         with self._journaled("neutral", seconds, stamp_ns, stamp_ns=stamp_ns):
             self._manual.release(fade_s=seconds)
             self._stop_looking(seconds)
             self._player.rest(seconds, self._time(stamp_ns))
 
     def live(self, amount: float, stamp_ns: int) -> None:
+        _check_finite("LIFE", amount)
         with self._journaled("live", amount, stamp_ns, stamp_ns=stamp_ns):
             self._life.liveliness = min(max(amount, 0.0), 1.0)
 
@@ -251,8 +297,9 @@ class CommandState:
 
         ``through`` : (P,) how much of the layers below shows through, 0..1; nothing without.
 
-        Raises KeyError: no layer of that name.
+        Raises KeyError: no layer of that name. ParameterError: not all values are finite; nothing changes then.
         """
+        _finite(values[mask] if through is None else np.concatenate([values[mask], through]))
         with self._journaled("write_layer", name, values, mask, now_ns, stamp_ns, through, stamp_ns=stamp_ns):
             layer = self.mixer[name]
             layer.write_masked(values, mask, now_ns * 1e-9)
@@ -260,6 +307,11 @@ class CommandState:
                 layer.share.fill(1.0)
             else:
                 np.subtract(1.0, through, out=layer.share)
+
+    def release_layer(self, name: str) -> None:
+        """Let a layer fade out, whose source has failed. Raises KeyError: no layer of that name."""
+        with self._lock:
+            self.mixer[name].release()
 
     def snapshot(self, out: Floats) -> None:
         with self._lock:
@@ -288,6 +340,7 @@ class CommandState:
                 "limited": int(np.count_nonzero(self.limiter.limited)),
                 "ticks": self._ticks,
                 "layers": ",".join(self.mixer.active) or "none",
+                "failed": ",".join(self.parts.failed).replace(" ", "_") or "none",
                 **(self.servo_monitor.status() if self.servo_monitor is not None else {}),
             }
 
@@ -302,3 +355,16 @@ class CommandState:
 
 def _nothing() -> None:
     """What commands call where nothing waits for them."""
+
+
+def _finite(values: Floats) -> Floats:
+    """``values`` unchanged. Raises ParameterError: not all of them are finite."""
+    if not np.isfinite(values).all():
+        raise ParameterError("not all of its values are finite numbers")
+    return values
+
+
+def _check_finite(what: str, *numbers: float) -> None:
+    """Raise ParameterError for a command with a number that is not finite."""
+    if not all(map(math.isfinite, numbers)):
+        raise ParameterError(f"{what}: needs finite numbers")

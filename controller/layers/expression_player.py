@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller.base.errors import ParameterError
 from controller.base.parameters import Floats
 from controller.motion.motion import minimum_jerk
 from controller.vocabulary.expression import Expression
@@ -55,9 +56,12 @@ class ExpressionPlayer:
         return blink, gaze, mouth
 
     def play(self, expression: Expression, intensity: float, duration_s: float | None, now_s: float) -> None:
-        """Show an expression for ``duration_s`` from now until it falls, or as the new mood without one."""
-        self.update(now_s)
+        """Show an expression for ``duration_s`` from now until it falls, or as the new mood without one.
+
+        Raises ParameterError: its values are not finite.
+        """
         pose = self._pose(expression, intensity)
+        self.update(now_s)
         if duration_s is None:
             self._mood = pose
             self._fall_at_s = np.inf
@@ -91,7 +95,7 @@ class ExpressionPlayer:
         self._start_s, self._length_s = now_s, length_s
 
     def _blend(self, now_s: float) -> None:
-        passed = now_s - self._start_s
+        passed = max(now_s - self._start_s, 0.0)  # a command can be newer than the tick that shows it first
         if passed >= self._length_s:
             self._now[:] = self._target.goal
             return
@@ -103,6 +107,8 @@ class ExpressionPlayer:
     def _pose(expression: Expression, intensity: float) -> _Pose:
         overrides = [_override(kind, intensity) for kind in (expression.blink, expression.gaze, expression.mouth)]
         goal = np.concatenate([expression.weights * intensity, overrides])
+        if not np.isfinite(goal).all():
+            raise ParameterError(f"expression {expression.name}: not all of its values are finite numbers")
         return _Pose(expression.name, intensity, goal, expression.offset_s)
 
 

@@ -30,6 +30,10 @@ def _in_order(span: tuple[float, float]) -> tuple[float, float]:
 Span = Annotated[tuple[Annotated[Number, Field(ge=0, le=3600)], Seconds], AfterValidator(_in_order)]
 
 
+Period = Annotated[Number, Field(ge=0.1, le=3600)]
+Periods = Annotated[tuple[Period, Period], AfterValidator(_in_order)]  # times are divided by them
+
+
 class BlinkSettings(Settings):
     interval_s: Span
     double_share: Share
@@ -54,7 +58,7 @@ class HeadSettings(Settings):
     yaw_deg: Degrees
     pitch_deg: Degrees
     roll_deg: Degrees
-    period_s: Span
+    period_s: Periods
 
 
 class BreathSettings(Settings):

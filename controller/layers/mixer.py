@@ -57,7 +57,7 @@ class Layer:
         self.name = settings.name
         self.values, self.gain, self.share = table.values[row], table.gain[row], table.share[row]
         self.applied, self.held, self._stamp = table.applied[row], table.held[row], table.stamp[row]
-        self._fade_out, self._block = table.fade_out_s[row], table.block[row]
+        self._fade_out, self._block, self._level = table.fade_out_s[row], table.block[row], table.level[row]
         self._fresh, self._positions = np.zeros(len(self.values), dtype=bool), np.arange(len(self.values))
 
     def write(self, indices: Which, values: Floats | Sequence[float] | float, now_s: float) -> None:
@@ -91,6 +91,11 @@ class Layer:
     def holding(self) -> int:
         """How many parameters the layer holds."""
         return int(np.count_nonzero(self.held))
+
+    @property
+    def level(self) -> float:
+        """How far it has faded in where that is most, 0..1."""
+        return float(self._level.max())
 
 
 class _Table:

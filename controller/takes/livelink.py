@@ -113,7 +113,7 @@ class TakePlayer:
 
     def __init__(self, take: Take, state: CommandState, layer: str = "capture") -> None:
         self.take = take
-        self._layer = layer
+        self.layer = layer
         self.finished = False
         self._state = state
         self._values = np.zeros(take.values.shape[1])
@@ -129,7 +129,7 @@ class TakePlayer:
             return
         self.finished = self.position_s >= self.take.duration_s
         values = self.take.sample(self.position_s, self._values)
-        self._state.write_layer(self._layer, values, self.take.mask, now_ns, now_ns, through=self.take.through)
+        self._state.write_layer(self.layer, values, self.take.mask, now_ns, now_ns, through=self.take.through)
 
 
 def _read(path: Path) -> tuple[list[str], Floats, Floats]:

@@ -19,6 +19,7 @@ from controller.base.errors import ControllerError
 from controller.base.files import format_fault
 from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState
+from controller.takes.line_writer import LineWriter
 
 SUFFIX = ".rec"
 """What names of recordings end in."""
@@ -36,39 +37,55 @@ def _default_state(parameters: Parameters, seed: int, period_s: float) -> Comman
 
 
 @contextmanager
-def recorded(state: CommandState, path: Path, *, seed: int = 0, period_s: float = 0.01) -> Iterator[CommandState]:
+def recorded(
+    state: CommandState,
+    path: Path,
+    *,
+    seed: int = 0,
+    period_s: float = 0.01,
+    failed: Callable[[Exception], object] | None = None,
+) -> Iterator[CommandState]:
     """Record the calls of ``state`` until the block ends.
 
     ``path`` : the file to write; ``seed`` and ``period_s`` : those of ``state``, for the replay.
+    ``failed`` : called from another thread when the file cannot be written any more; it can be played as far as it
+    goes. Without it, that error is raised when the block ends.
 
     Raises ControllerError: the file cannot be written.
     """
     try:
-        file = path.open("w", encoding="ascii")
+        writer = LineWriter(path, failed or (lambda _: None))
     except OSError as error:
-        raise ControllerError(f"{path}: cannot be written: {error.strerror}", hint="choose another path") from error
+        raise _not_written(path, error) from error
+    writer.put(_line(_KIND, _VERSION, seed, period_s, state.parameters.names))
+    state.record(lambda name, *arguments: writer.put(_entry(name, *arguments)))
+    try:
+        yield state
+    finally:
+        state.record(None)
+        writer.close()
+    if writer.error is not None and failed is None:
+        raise _not_written(path, writer.error) from writer.error
 
-    def write(*items: Any) -> None:
-        file.write(json.dumps(items, separators=(",", ":"), default=lambda array: array.tolist()) + "\n")
 
-    def journal(name: str, *arguments: Any) -> None:
-        if name == "tick":
-            now_ns, dt, out = arguments
-            write(name, now_ns, dt, zlib.crc32(out.tobytes()))
-        elif name == "write_layer":
-            layer, values, mask, *rest = arguments
-            held = np.flatnonzero(mask)
-            write(name, layer, held, values[held], *rest)
-        else:
-            write(name, *arguments)
+def _entry(name: str, *arguments: Any) -> bytes:
+    """The line of a call."""
+    if name == "tick":
+        now_ns, dt, out = arguments
+        return _line(name, now_ns, dt, zlib.crc32(out.tobytes()))
+    if name == "write_layer":
+        layer, values, mask, *rest = arguments
+        held = np.flatnonzero(mask)
+        return _line(name, layer, held, values[held], *rest)
+    return _line(name, *arguments)
 
-    with file:
-        write(_KIND, _VERSION, seed, period_s, state.parameters.names)
-        state.record(journal)
-        try:
-            yield state
-        finally:
-            state.record(None)
+
+def _line(*items: Any) -> bytes:
+    return json.dumps(items, separators=(",", ":"), default=lambda array: array.tolist()).encode("ascii") + b"\n"
+
+
+def _not_written(path: Path, error: OSError) -> ControllerError:
+    return ControllerError(f"{path}: cannot be written: {error.strerror}", hint="choose another path")
 
 
 def replay(path: Path, parameters: Parameters, *, make: Maker = _default_state) -> Iterator[tuple[int, Floats]]:

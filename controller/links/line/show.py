@@ -10,6 +10,7 @@ from collections.abc import Callable
 from controller.base.errors import ParameterError
 from controller.base.parameters import did_you_mean
 from controller.layers.commands import CommandSink
+from controller.links.line.commands import Grammar
 from controller.links.line.script import Script
 from controller.links.line.session import LineSession
 
@@ -30,7 +31,8 @@ class Show:
         self.script = script
         self.playing = False
         self.position_s = 0.0
-        self._session = LineSession(sink, 0)
+        self._sink, self._session = sink, LineSession(sink, 0)
+        self._grammar = Grammar(sink.parameters, lambda name: sink.vocabulary[name].name)
         self._times = [at_s for at_s, _ in script.steps]
         self._next = 0
         self._last_ns: int | None = None
@@ -70,6 +72,18 @@ class Show:
             self._next = 0
             sent += self._send_due(now_ns)
         return sent
+
+    def give_back(self, now_ns: int) -> None:
+        """Release what the lines of the script hold; the layers below come back over the usual fades."""
+        requests = [self._grammar.parse(line.encode("ascii")) for _, line in self.script.steps]
+        commands = [request.command for request in requests if request is not None]
+        self._sink.release(
+            sorted({i for command in commands if command.name == "SET" for i in command.indices}), now_ns
+        )
+        if any(command.name == "EXPR" for command in commands):
+            self._sink.expression("neutral", 1.0, None, now_ns)
+        if any(command.name.startswith("GAZE") for command in commands):
+            self._sink.gaze_off(now_ns)
 
     def _send_due(self, now_ns: int) -> list[str]:
         sent = []
@@ -120,6 +134,19 @@ class Shows:
         with self._lock:
             if self._show is not None:
                 self._show.tick(now_ns)
+
+    @property
+    def name(self) -> str | None:
+        """The script's name of the show that was begun last; None after its end by STOP or a failure."""
+        show = self._show
+        return None if show is None else show.script.name or "without a name"
+
+    def abandon(self, now_ns: int) -> None:
+        """End a show that failed, and give back what it moves."""
+        with self._lock:
+            show, self._show = self._show, None
+        if show is not None:
+            show.give_back(now_ns)
 
     def status(self) -> str:
         """``off``, or the script's name, where it is (s), and whether it waits: ``tour@12.3``, ``tour@12.3,paused``."""

@@ -15,14 +15,14 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from controller.base.errors import LinkError
+from controller.base.errors import ConfigError, LinkError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.body import messages
 from controller.body.body import Body, _handle, _wait
 from controller.body.messages import RunOptions
 from controller.body.panel_state import PanelState
-from controller.body.sources import Voice
+from controller.body.sources import Voice, show_part
 from controller.stage.stage import Stage, load_stage
 from controller.takes.recording import replay
 
@@ -111,18 +111,13 @@ def test_a_voice_of_the_command_line_goes_before_that_of_the_stage(tmp_path: Pat
     assert own == Voice(str(tmp_path / "a.raw"), 8000) and other == Voice("b.raw")
 
 
-def test_a_link_that_does_not_come_up_is_raised_and_an_error_of_a_source_is_kept(tmp_path: Path) -> None:
+def test_a_link_that_does_not_come_up_is_raised_where_there_is_nothing_else(tmp_path: Path) -> None:
     with (
         running(stage_of(tmp_path, '[[links]]\nport = "/dev/none"\n')) as (body, _),
         pytest.raises(Exception) as caught,
     ):
         body.begin()
     assert "/dev/none" in str(caught.value)
-    with running(stage_of(tmp_path, 'voice = "none.wav"\n')) as (body, _):
-        body.begin()
-        until(lambda: body.sources.error is not None)
-        with pytest.raises(Exception, match=r"none\.wav"):
-            body.check()
 
 
 def test_a_stage_mirrors_its_servos_and_leaves_simulated_links_out(tmp_path: Path) -> None:
@@ -233,7 +228,8 @@ class Main:
 @pytest.mark.parametrize(("finished", "sent"), [(True, [messages.Finished()]), (False, [])])
 def test_main_is_told_exactly_once_and_only_when_all_was_played(finished: bool, sent: list[object]) -> None:
     main, checks = Main(5), list[int]()
-    body: Any = SimpleNamespace(finished=finished, state="s", measured_face="m", check=lambda: checks.append(1))
+    body: Any = SimpleNamespace(finished=finished, check=lambda: checks.append(1))
+    body.publish = lambda panel_state: panel_state.publish("s", "m")
     _wait(body, cast(Any, main), main.stop, cast(Any, main))
     assert main.sent == sent and main.waits == [0.1] * 5  # ten times a second
     assert main.published == [("s", "m")] * 5 and len(checks) == 5
@@ -264,7 +260,7 @@ def test_a_limp_head_listens_to_links_that_are_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mirror: bool, ports: list[str]
 ) -> None:
     opened: list[Any] = []
-    monkeypatch.setattr("controller.body.body.open_links", lambda links, context: opened.extend(links) or [])
+    monkeypatch.setattr("controller.body.link_part.open_links", lambda links, context: opened.extend(links) or [None])
     links = '[[links]]\nport = "simulated"\nscript = "tour"\n[[links]]\nport = "/dev/x"\n'
     stage = stage_of(tmp_path, f'robots = ["head24"]\n{links}')
     with Mailbox.create(len(P)) as mailbox:
@@ -324,3 +320,89 @@ def test_every_tick_feeds_the_buses_and_a_command_brings_it_forward(tmp_path: Pa
             body.stop()
     early = [step for step, urgent in bus.fed if urgent]
     assert min(early) >= 0.05 and min(early) < 0.099, "half a period lies between two ticks at least"
+
+
+def ticks_on(body: Body) -> bool:
+    """Whether the control loop goes on."""
+    ticks = body.clock.ticks
+    until(lambda: body.clock.ticks > ticks + 20)
+    body.check()
+    return True
+
+
+def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with running(stage_of(tmp_path), RunOptions(record=Path("/dev/full"))) as (body, _):
+        body.begin()
+        until(lambda: body.state.parts.failed)
+        assert ticks_on(body)
+        (said,) = (message for message in caplog.messages if message.startswith("recording"))
+        assert said.startswith("recording /dev/full failed: /dev/full: No space left on device; what came before")
+        (part,) = body.report()["parts"]  # type: ignore[misc]
+        assert part["part"] == "recording /dev/full" and part["state"] == "failed"  # type: ignore[index]
+
+
+def test_a_link_that_does_not_come_up_leaves_the_show_alone(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "act.toml").write_text('loop_s = 1\nsteps = ["0 SET jawOpen 1"]')
+    stage = stage_of(tmp_path, 'show = "act.toml"\n[[links]]\nport = "/dev/none"\n')
+    with running(stage) as (body, _):
+        body.begin()
+        until(lambda: body.newest()[0][JAW] > 0.9)
+        assert ticks_on(body)
+        assert sum("link line on /dev/none failed: " in message for message in caplog.messages) == 1
+        assert body.report()["links"][0]["port"] == "line on /dev/none"  # type: ignore[index]
+        assert body.state.parts.failed == ("link line on /dev/none",)
+        assert not any("NOTHING IS LEFT" in message for message in caplog.messages)
+        assert body.state.shows is not None
+        body.state.shows.control("STOP")
+        body.check()
+        body.check()
+        assert sum("NOTHING IS LEFT TO FOLLOW" in message for message in caplog.messages) == 1
+
+
+def test_a_voice_that_fails_leaves_the_run_alone(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "a.wav").write_bytes(b"no sound")
+    with running(stage_of(tmp_path, 'voice = "a.wav"\n')) as (body, _):
+        body.begin()
+        until(lambda: body.sources.voice_ended)
+        assert ticks_on(body) and body.sources.error is None
+        assert sum("not WAV of PCM" in message for message in caplog.messages) == 1
+        assert sum("NOTHING IS LEFT TO FOLLOW" in message for message in caplog.messages) == 1
+
+
+def test_a_panel_state_that_fails_leaves_the_run_alone(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    def publish(state: object, face: object) -> None:
+        raise ValueError("no panel")
+
+    panel: Any = SimpleNamespace(publish=publish)
+    with running(stage_of(tmp_path)) as (body, _):
+        body.publish(panel)
+        body.publish(panel)
+        assert ticks_on(body) and len(caplog.messages) == 1 and caplog.messages[0].startswith("panel state failed: ")
+
+
+def test_a_recording_that_cannot_be_played_on_ends_the_run(tmp_path: Path) -> None:
+    stage, file = stage_of(tmp_path), tmp_path / "a.rec"
+    with running(stage, RunOptions(record=file)) as (body, _):
+        until(lambda: body.clock.ticks > 60)
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([*lines[:40], "damaged"]) + "\n")
+    with running(stage, RunOptions(file)) as (body, _):
+        body.begin()
+        until(lambda: body.sources.error is not None)
+        ticks = body.clock.ticks
+        until(lambda: body.clock.ticks > ticks + 20)  # the servos still get a face to be led to rest from
+        with pytest.raises(Exception, match=r"a\.rec, line 41: damaged"):
+            body.check()
+
+
+def test_a_show_that_failed_too_often_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "act.toml").write_text('steps = ["0 SET jawOpen 1"]')
+    with running(stage_of(tmp_path)) as (body, _):
+        shows = body.state.shows
+        assert shows is not None
+        shows.start(str(tmp_path / "act.toml"))
+        part = body.state.parts.add(show_part("act"))
+        for _ in range(6):
+            part.fail(ValueError("no"), time.monotonic())
+        with pytest.raises(ConfigError, match="show act failed too often and is switched off: ValueError: no"):
+            shows.start(str(tmp_path / "act.toml"))

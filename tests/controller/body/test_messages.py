@@ -17,7 +17,7 @@ OPTIONS = messages.RunOptions(Path("a.csv"), True, Voice("-", 8000, alone=True),
 @pytest.mark.parametrize(
     "message",
     [
-        messages.BodyOrders("stage.toml", "/box", "/panel", OPTIONS),
+        messages.BodyOrders("stage.toml", OPTIONS),
         messages.Begin(),
         messages.Stop(),
         messages.Hold(3, 0.5),
@@ -39,9 +39,8 @@ def test_a_message_arrives_as_it_was_sent(message: object) -> None:
 
 
 def test_orders_without_options_play_the_links() -> None:
-    options = messages.BodyOrders("s", "m").options
+    options = messages.BodyOrders("s").options
     assert options == messages.RunOptions(take=None, mirror=False, voice=None, record=None)
-    assert messages.BodyOrders("s", "m").panel_mailbox is None
 
 
 def test_messages_are_not_mistaken_for_each_other() -> None:

@@ -26,7 +26,7 @@ def test_it_ends_with_the_block_where_nobody_has_orders() -> None:
 
 def test_it_does_as_it_is_told_and_is_left_alone_then() -> None:
     with PreloadedBody() as waiting:
-        waiting.send(BodyOrders("no such stage", "/nowhere"))
+        waiting.send(BodyOrders("no such stage"))
     assert not waiting.pipe.closed
     assert waiting.pipe.poll(30.0)
     answer = waiting.pipe.recv()

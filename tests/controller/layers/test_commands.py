@@ -96,7 +96,7 @@ def test_neutral_releases_everything(face: Face) -> None:
     assert np.abs(face.run(3.0)).max() < 1e-3
     assert face.state.status() | {"ticks": 0} == {
         "expression": "neutral", "intensity": 1.0, "gaze": "off", "life": 0.0, "manual": 0, "capture": 0,
-        "limited": 0, "ticks": 0, "layers": "expression",
+        "limited": 0, "ticks": 0, "layers": "expression", "failed": "none",
     }  # fmt: skip
 
 
@@ -124,7 +124,18 @@ def test_what_is_not_finite_never_gets_through(face: Face) -> None:
     face.state.set_parameters([JAW], [0.5], face.now)
     face.run(1.0)
     face.state.set_parameters([JAW], [math.nan], face.now)
-    face.state.capture(np.full(59, math.inf), np.ones(59, dtype=bool), face.now)
+    with pytest.raises(ParameterError, match="finite"):
+        face.state.capture(np.full(59, math.inf), np.ones(59, dtype=bool), face.now)
+    for refused in (
+        lambda: face.state.gaze(math.nan, 0.0, face.now),
+        lambda: face.state.gaze_at(0.0, math.inf, 0.0, face.now),
+        lambda: face.state.neutral(math.nan, face.now),
+        lambda: face.state.live(math.nan, face.now),
+        lambda: face.state.expression("happiness", math.inf, None, face.now),
+        lambda: face.state.expression("happiness", 1.0, math.nan, face.now),
+    ):
+        with pytest.raises(ParameterError, match="finite"):
+            refused()
     face.state.gaze(0.2, 0.1, face.now)
     values = face.run(1.0)
     assert np.isfinite(values).all() and values[JAW] == pytest.approx(0.5, abs=1e-6)

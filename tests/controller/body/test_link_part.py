@@ -1,0 +1,165 @@
+"""Links that fail: while they are opened, in a thread of their own, in their report, and while they are closed."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, cast
+
+import pytest
+
+from controller.base.errors import LinkError
+from controller.base.parts import Parts
+from controller.body import link_part
+from controller.body.link_part import LinkPart, thread_errors
+from controller.links.kind import LinkContext
+from drivers.base.shutdown import Closers
+
+
+def until(condition: Callable[[], object]) -> None:
+    for _ in range(6000):
+        if condition():
+            return
+        time.sleep(0.01)
+    raise AssertionError("waited in vain")
+
+
+class Foreign:
+    """A link of another package: its thread works until it is told to raise."""
+
+    def __init__(self, context: LinkContext) -> None:
+        self.said: dict[str, object] = {"port": "far", "accepted": 7, "refused": {}}
+        self._go, self.trouble = threading.Event(), Exception("nothing")
+        self.thread = threading.Thread(target=self._run, name="foreign", daemon=True)
+        self.thread.start()
+        context.closers.callback(self.end)
+
+    def _run(self) -> None:
+        self._go.wait(60.0)
+        raise self.trouble
+
+    def raise_in_thread(self, error: Exception) -> None:
+        self.trouble = error
+        self._go.set()
+
+    def end(self) -> None:
+        self.ended = True
+
+    def report(self) -> dict[str, object]:
+        if isinstance(self.said, Exception):
+            raise self.said
+        return self.said
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The links that were opened; exceptions put in front are raised instead."""
+    links: list[Any] = []
+    waiting: list[Exception] = []
+
+    def start(choices: Any, context: LinkContext) -> list[Any]:
+        if waiting:
+            raise waiting.pop(0)
+        links.append(Foreign(context))
+        return links[-1:]
+
+    monkeypatch.setattr(link_part, "open_links", start)
+    monkeypatch.setattr("controller.base.parts.PAUSES_S", (0.01,) * 5)
+    links_and_waiting: Any = links
+    monkeypatch.setattr(Foreign, "waiting", waiting, raising=False)
+    return cast(list[Any], links_and_waiting)
+
+
+@pytest.fixture
+def link(made: list[Any]) -> Iterator[LinkPart]:
+    parts = Parts()
+
+    def context(closers: Closers) -> LinkContext:
+        return LinkContext(cast(Any, None), closers)
+
+    part = LinkPart(cast(Any, "foreign on far"), context, parts)
+    with thread_errors(lambda: [part], parts):
+        part.open()
+        yield part
+    part.close()
+
+
+def test_an_error_that_ends_a_thread_of_a_link_closes_it_and_opens_it_again(
+    link: LinkPart, made: list[Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    assert link.opened
+    made[0].raise_in_thread(ValueError("no such face"))
+    until(lambda: len(made) == 2 and link.opened)
+    assert made[0].ended
+    assert caplog.messages == [
+        "link foreign on far failed: ValueError: no such face; it starts again in 0.01 s",
+        "link foreign on far works again",
+    ]
+    assert link.report() == made[1].said
+
+
+def test_a_link_that_does_not_come_up_is_tried_again_for_ever(
+    link: LinkPart, made: list[Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    Foreign.waiting[:] = [LinkError("nobody there", hint="plug it in")] * 9  # type: ignore[attr-defined]
+    link.fail(LinkError("nobody there", hint="plug it in"))
+    assert not link.opened
+    until(lambda: link.opened)
+    assert caplog.messages == [
+        "link foreign on far failed: nobody there (plug it in); it starts again in 0.01 s",
+        "link foreign on far works again",
+    ]
+    assert link._part.failures == 10 and len(made) == 2
+
+
+def test_a_report_that_raises_says_so_and_leaves_the_others_alone(link: LinkPart, made: list[Any]) -> None:
+    made[0].said = KeyError("port")
+    assert link.report() == {
+        "port": "foreign on far", "accepted": 0, "refused": {}, "fault": "its report failed: KeyError: 'port'",
+    }  # fmt: skip
+
+
+def test_a_link_that_hangs_while_it_is_closed_does_not_keep_the_servos_waiting(
+    link: LinkPart, made: list[Any], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(link_part, "_CLOSE_S", 0.05)
+    release = threading.Event()
+    link._closers.callback(lambda: release.wait(60.0))
+    link.close()
+    release.set()
+    assert caplog.messages == ["link foreign on far: it did not close within 0.05 s"]
+
+
+def test_a_link_that_raises_while_it_is_closed_is_reported(link: LinkPart, caplog: pytest.LogCaptureFixture) -> None:
+    def trouble() -> None:
+        raise OSError(5, "Input/output error")
+
+    link._closers.callback(trouble)
+    link.close()
+    assert caplog.messages == ["link foreign on far: it could not be closed in order: Input/output error"]
+
+
+def test_a_thread_of_nobody_is_reported_by_its_name(link: LinkPart, caplog: pytest.LogCaptureFixture) -> None:
+    def trouble() -> None:
+        raise ValueError("lost")
+
+    thread = threading.Thread(target=trouble, name="stray")
+    thread.start()
+    thread.join()
+    assert caplog.messages == ["thread stray failed: ValueError: lost; it comes back with the next start"]
+    assert link.opened
+
+
+def test_what_was_opened_before_an_error_is_closed(made: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    def half(choices: Any, context: LinkContext) -> list[Any]:
+        made.append(Foreign(context))
+        raise LinkError("only half")
+
+    monkeypatch.setattr(link_part, "open_links", half)
+    part = LinkPart(cast(Any, "x"), lambda closers: LinkContext(cast(Any, None), closers), Parts())
+    with pytest.raises(LinkError, match="only half"):
+        part.open()
+    assert made[0].ended and not part.opened
+    assert part.report() == {"port": "x", "accepted": 0, "refused": {}, "fault": ""}
+    part.close()
