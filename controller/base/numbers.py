@@ -12,7 +12,7 @@ _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 
 
 def plain_number(text: str) -> float | None:
-    """The value of a number in plain decimal notation, such as ``-0.5``, ``.8`` or ``1e-3``; None for any other text."""
+    """The value of a number in plain decimal notation, as ``-0.5``, ``.8`` or ``1e-3``; None for any other text."""
     if _NUMBER.fullmatch(text) is None:
         return None
     value = float(text)

@@ -25,7 +25,7 @@ from controller.body.panel_state import PanelState
 from controller.body.sources import Sources, Voice
 from controller.layers.mixer import by_priority
 from controller.links.kind import Link, LinkContext
-from controller.links.line.script import load_script
+from controller.links.line.script import load_named_script, load_script
 from controller.links.line.show import Shows
 from controller.links.links import open_links
 from controller.robot.busloop import BusLoop
@@ -73,11 +73,11 @@ class Body:
                 [bus.following for bus in self.buses],
             )
         self.state.servo_monitor = self.measured_face
-        self.state.shows = Shows(
-            lambda name: load_script(name, parameters, stage.vocabulary, beside=stage.path), self.state
+        shows = self.state.shows = Shows(
+            lambda name: load_named_script(name, parameters, stage.vocabulary, beside=stage.path), self.state
         )
         if stage.settings.show is not None:
-            self.state.shows.start(stage.settings.show)
+            shows.play(load_script(stage.settings.show, parameters, stage.vocabulary, beside=stage.path))
         self.follows_servos = options.mirror and self.measured_face is not None
         self.live = path is None
         voice, settings = options.voice, stage.settings
@@ -270,6 +270,10 @@ def _handle(body: Body, pipe: Connection) -> bool:
             state.expression(name, intensity, None, now)
         case messages.Neutral(seconds):
             state.neutral(seconds, now)
+        case messages.StopServos():
+            state.stop_latch.stop("panel", now)
+        case messages.StartServos():
+            state.stop_latch.start()
         case _:
             return False
     return True

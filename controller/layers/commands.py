@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from controller.base.parameters import Flags, Floats, Parameters
+from controller.base.stop_latch import StopLatch
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
 from controller.layers.idle import IdleMotion, IdleSettings
@@ -47,8 +48,10 @@ class CommandSink(Protocol):
     """What a link may ask of the face. ``stamp_ns`` is when the command arrived (monotonic clock, ns).
 
     vocabulary : the named expressions. shows : plays scripts; None where none can be.
+    stop_latch : set by STOP, released by START.
     """
 
+    stop_latch: StopLatch
     parameters: Parameters
     vocabulary: Vocabulary
     shows: Player | None
@@ -116,6 +119,7 @@ class CommandState:
     Attributes
     ----------
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
+    stop_latch : keeps the servos off from STOP to START.
 
     Raises ConfigError: the shipped expressions or figures cannot be read.
     """
@@ -144,6 +148,7 @@ class CommandState:
         self._everything = np.ones(len(parameters), dtype=bool)
         self.servo_monitor: ServoMonitor | None = None
         self.shows: Player | None = None
+        self.stop_latch = StopLatch()
         self._lock = threading.Lock()
         self._journal: Journal | None = None
         self._stamp_ns = 0

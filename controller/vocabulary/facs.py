@@ -191,7 +191,7 @@ class Facs:
 
 
 def is_formula(text: str) -> bool:
-    """Whether a text is meant as a formula of action units, not as the name of an expression: it begins like ``AU12``."""
+    """Whether a text is meant as a formula of action units and not as a name: it begins like ``AU12``."""
     return _FORMULA.match(text) is not None
 
 

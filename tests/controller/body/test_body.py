@@ -163,6 +163,9 @@ def test_requests_of_the_panel_reach_the_layers(tmp_path: Path, pipe: tuple[Conn
         assert ask(messages.Begin()) and body._begun.is_set()
         assert not ask(messages.Stop())
         main.close()
+        assert body.state.stop_latch.stopped is None
+        assert ask(messages.StopServos()) and body.state.stop_latch.stopped.who == "panel"
+        assert ask(messages.StartServos()) and body.state.stop_latch.stopped is None
         assert not _handle(body, end)  # main is gone
 
 

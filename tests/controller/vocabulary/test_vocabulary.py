@@ -187,7 +187,8 @@ def test_anything_else_is_a_name(vocabulary: Vocabulary, text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "hint"),
     [("AU99", "facs.toml"), ("AU1-2", "12B"), ("VA:1", "VA:0.5,-0.2"), ("VA:1,2", "VA:0.5,-0.2"), ("VA:a,b", "VA:"),
-     ("VA:nan,0", "VA:"), ("VA:-1.01,0", "VA:"), ("VAD:0,0", "VAD:0.5,-0.2,0.1"), ("VA:0_1,0", "VA:"), ("VA: 0,0", "VA:"), ("VA:,0", "VA:")],
+     ("VA:nan,0", "VA:"), ("VA:-1.01,0", "VA:"), ("VAD:0,0", "VAD:0.5,-0.2,0.1"),
+     ("VA:0_1,0", "VA:"), ("VA: 0,0", "VA:"), ("VA:,0", "VA:")],
 )  # fmt: skip
 def test_wrong_formulas_are_refused(vocabulary: Vocabulary, text: str, hint: str) -> None:
     with pytest.raises(ParameterError) as caught:

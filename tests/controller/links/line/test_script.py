@@ -101,7 +101,9 @@ def test_a_script_of_ones_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("steps = ['inf PING']", "steps[0]: times must rise from 0"),
+        ("steps = ['inf PING']", "steps[0]: begins with a time in seconds"),
+        ("steps = ['1_0 PING']", "steps[0]: begins with a time in seconds"),
+        ("steps = ['0 START']", "steps[0]: START is not for scripts"),
         ("steps = ['-1 PING']", "steps[0]: times must rise from 0"),
         ("steps = ['0 EXPR smirk']", "steps[0]: unknown expression 'smirk'"),
         ("steps = [1]", "steps[0]: input should be a valid string (is 1)"),
