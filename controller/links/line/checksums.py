@@ -26,11 +26,14 @@ class ChecksumRule:
         self._seen = False
 
     def check(self, words: Words) -> None:
-        """Raises LineError for a line without a checksum that must have one."""
+        """Raises LineError for a line without a checksum that must have one.
+
+        The error has no tag: the line may be damaged, its tag as well, and whoever sent it sends it again.
+        """
         if words.checked:
             self._seen = True
         elif self._demanded and not (_is_change(words) and not self._fixed):
-            raise LineError(Code.CHECKSUM, self._reason(), tag=words.tag)
+            raise LineError(Code.CHECKSUM, self._reason())
 
     def change(self, mode: str, *, checked: bool) -> None:
         """Set the mode as the other end asks; ``checked`` : its line had a checksum.

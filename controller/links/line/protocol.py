@@ -176,8 +176,13 @@ def format_ok(text: str, *, tag: int | None = None, checked: bool = False) -> by
 
 def format_error(error: LineError) -> bytes:
     """The reply to a line that was refused."""
-    reason = re.sub(r"\s*\n\s*", "; ", str(error).strip())
+    reason = _one_line(str(error))
     return format_words(["ERR", str(int(error.code)), reason], tag=error.tag, checked=error.checked)
+
+
+def _one_line(text: str) -> str:
+    """Text of several lines, such as the faults of a file, as one."""
+    return re.sub(r"\s*\n\s*", "; ", re.sub(r":\s*\n\s*", ": ", text.strip()))
 
 
 def _finish(text: str, checked: bool) -> bytes:

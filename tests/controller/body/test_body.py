@@ -161,11 +161,11 @@ def test_requests_of_the_panel_reach_the_layers(tmp_path: Path, pipe: tuple[Conn
         assert ask(messages.Neutral(0.05))
         until(lambda: body.newest()[0][P.index("mouthSmileLeft")] < 0.01)
         assert ask(messages.Begin()) and body._begun.is_set()
+        latch = body.state.stop_latch
+        assert ask(messages.StopServos()) and latch.stopped is not None and latch.stopped.who == "panel"
+        assert ask(messages.StartServos()) and latch.stopped is None
         assert not ask(messages.Stop())
         main.close()
-        assert body.state.stop_latch.stopped is None
-        assert ask(messages.StopServos()) and body.state.stop_latch.stopped.who == "panel"
-        assert ask(messages.StartServos()) and body.state.stop_latch.stopped is None
         assert not _handle(body, end)  # main is gone
 
 
