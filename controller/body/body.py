@@ -29,7 +29,7 @@ from controller.body.panel_state import PanelState
 from controller.body.sources import Sources, Voice, show_part
 from controller.layers.mixer import by_priority
 from controller.links.kind import LinkContext
-from controller.links.line.script import Script, load_script
+from controller.links.line.script import Script, load_named_script, load_script
 from controller.links.line.show import Shows
 from controller.robot.busloop import BusLoop
 from controller.robot.following import MeasuredFace
@@ -78,9 +78,10 @@ class Body:
                 [bus.following for bus in self.buses],
             )
         self.state.servo_monitor = self.measured_face
-        self.state.shows = Shows(self._find_show, self.state)
+        shows = self.state.shows = Shows(self._find_show, self.state)
         if stage.settings.show is not None:
-            self.state.shows.start(stage.settings.show)
+            script = load_script(stage.settings.show, parameters, stage.vocabulary, beside=stage.path)
+            shows.play(self._as_part(script))
         self.follows_servos = options.mirror and self.measured_face is not None
         self.live = path is None
         voice, settings = options.voice, stage.settings
@@ -128,8 +129,12 @@ class Body:
         )  # fmt: skip
 
     def _find_show(self, name: str) -> Script:
-        """Raises ConfigError: no such script, a wrong one, or one that was switched off."""
-        script = load_script(name, self.state.parameters, self.stage.vocabulary, beside=self.stage.path)
+        """The script that a robot asks for by name. Raises ConfigError: there is none, or it was switched off."""
+        stage = self.stage
+        return self._as_part(load_named_script(name, self.state.parameters, stage.vocabulary, beside=stage.path))
+
+    def _as_part(self, script: Script) -> Script:
+        """The script, as a part that fails alone. Raises ConfigError: it was switched off."""
         part = self.state.parts.add(show_part(script.name))
         if part.off:
             raise ConfigError(f"{part.name} failed too often and is switched off: {part.why}", hint="start omote again")
@@ -335,6 +340,10 @@ def _handle(body: Body, pipe: Connection) -> bool:
             state.expression(name, intensity, None, now)
         case messages.Neutral(seconds):
             state.neutral(seconds, now)
+        case messages.StopServos():
+            state.stop_latch.stop("panel", now)
+        case messages.StartServos():
+            state.stop_latch.start()
         case _:
             return False
     return True

@@ -64,7 +64,17 @@ class Neutral:
     seconds: float
 
 
-PanelRequest = Hold | Show | Neutral
+@dataclass(frozen=True)
+class StopServos:
+    """Main to body, from the panel: servos off until :class:`StartServos`, whatever else is commanded."""
+
+
+@dataclass(frozen=True)
+class StartServos:
+    """Main to body, from the panel: let the servos move again."""
+
+
+PanelRequest = Hold | Show | Neutral | StopServos | StartServos
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""State for the panel besides the values: the layer that holds each parameter, and what the servos show of it.
+"""State for the panel besides the values: the layer that holds each parameter, what the servos show, who stopped them.
 
 The body writes it ten times a second to a mailbox; main reads it when it draws.
 """
@@ -14,6 +14,9 @@ from controller.base.parameters import REGIONS, Parameters
 from controller.layers.commands import CommandState
 from controller.robot.following import MeasuredFace
 
+_NAME_LENGTH = 64
+"""Characters of the name of who stopped the servos, a number each: a mailbox carries numbers only."""
+
 
 class PanelState:
     """Reads and writes the state through a mailbox; main calls :meth:`refresh` once a frame.
@@ -24,12 +27,13 @@ class PanelState:
     def __init__(self, mailbox: Mailbox, layers: Sequence[str], parameters: Parameters) -> None:
         self._mailbox, self._layers, self._p = mailbox, tuple(layers), len(parameters)
         self._all = np.full(self.size(parameters), np.nan)
-        self._holders, self._measured, self._away = np.split(self._all, [self._p, 2 * self._p])
+        ends = np.cumsum([self._p, self._p, len(REGIONS)])
+        self._holders, self._measured, self._away, self._stopped = np.split(self._all, ends)
 
     @staticmethod
     def size(parameters: Parameters) -> int:
-        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region."""
-        return 2 * len(parameters) + len(REGIONS)
+        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region, a name."""
+        return 2 * len(parameters) + len(REGIONS) + _NAME_LENGTH
 
     def publish(self, state: CommandState, measured_face: MeasuredFace | None) -> None:
         """Write the state of this moment; ``measured_face`` None without servos."""
@@ -41,6 +45,10 @@ class PanelState:
             self._measured[~known] = np.nan
             away = measured_face.differences()
             self._away[:] = [away.get(region, np.nan) for region in REGIONS]
+        stopped = state.stop_latch.stopped
+        letters = [ord(letter) for letter in stopped.who[:_NAME_LENGTH]] if stopped is not None else []
+        self._stopped[:] = np.nan
+        self._stopped[: len(letters)] = letters
         self._mailbox.publish(self._all)
 
     def refresh(self) -> None:
@@ -52,6 +60,11 @@ class PanelState:
         """The layer that holds a parameter; empty when none does or nothing is known."""
         layer = self._holders[index]
         return self._layers[int(layer)] if layer >= 0 else ""
+
+    @property
+    def stopped_by(self) -> str:
+        """Who stopped the servos; empty while they may move."""
+        return "".join(chr(int(letter)) for letter in self._stopped[np.isfinite(self._stopped)])
 
     def measured(self, index: int) -> float | None:
         """What the servos show of a parameter; None where that is not known."""

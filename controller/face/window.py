@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS, REGIONS, Floats
-from controller.body.messages import Hold, Neutral, PanelRequest, Show
+from controller.body.messages import Hold, Neutral, PanelRequest, Show, StartServos, StopServos
 from controller.body.panel_state import PanelState
 from controller.face.face import FrameLog, HeadValues
 from controller.face.point_editing import PointEditor, Screen
@@ -29,6 +29,8 @@ from surface.view.window import run_window
 _TITLE = "omote"
 _BUTTONS_A_ROW = 3
 _CALM_S = 0.6
+_STOP_HEIGHT = 36
+_RED, _GREEN = (0.75, 0.1, 0.1, 1.0), (0.1, 0.5, 0.2, 1.0)
 
 
 class WindowFace:
@@ -114,11 +116,23 @@ class Panel:
         if self._panel_state is not None:
             self._panel_state.refresh()
         if imgui.begin("omote")[0]:
+            self._stop_or_start(imgui)
             self._top(imgui)
             for region in REGIONS:
                 if imgui.collapsing_header(f"{region}{self._away(region)}###{region}"):
                     self._sliders(imgui, PARAMETERS.region(region))
         imgui.end()
+
+    def _stop_or_start(self, imgui: Any) -> None:
+        """The button that stops the servos; while they are stopped, who did it and the button that ends that."""
+        by = self._panel_state.stopped_by if self._panel_state is not None else ""
+        if by:
+            imgui.text(f"servos stopped by {by}")
+        label, colour, request = ("START servos", _GREEN, StartServos()) if by else ("STOP servos", _RED, StopServos())
+        imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(*colour))
+        if imgui.button(label, imgui.ImVec2(-1, _STOP_HEIGHT)):
+            self._send(request)
+        imgui.pop_style_color()
 
     def _top(self, imgui: Any) -> None:
         imgui.text(f"{imgui.get_io().framerate:.0f} frames/s")

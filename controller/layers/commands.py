@@ -17,6 +17,7 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.parts import Parts
+from controller.base.stop_latch import StopLatch
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
 from controller.layers.idle import IdleMotion, IdleSettings
@@ -58,8 +59,10 @@ class CommandSink(Protocol):
     """What a link may ask of the face. ``stamp_ns`` is when the command arrived (monotonic clock, ns).
 
     vocabulary : the named expressions. shows : plays scripts; None where none can be.
+    stop_latch : set by STOP, released by START.
     """
 
+    stop_latch: StopLatch
     parameters: Parameters
     vocabulary: Vocabulary
     shows: Player | None
@@ -129,6 +132,7 @@ class CommandState:
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
     on_command : called after each command, in the thread that gave it.
     parts : what fails alone; a source of a layer that fails lets its layer fade out, and begins again.
+    stop_latch : keeps the servos off from STOP to START.
 
     Raises ConfigError: the shipped expressions or figures cannot be read.
     """
@@ -166,6 +170,7 @@ class CommandState:
         self.servo_monitor: ServoMonitor | None = None
         self.shows: Player | None = None
         self.on_command: Callable[[], None] = _nothing
+        self.stop_latch = StopLatch()
         self._lock = threading.Lock()
         self._journal: Journal | None = None
         self._stamp_ns = 0

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 LETTERS = "ABCDE"
 """Intensities of FACS, 0.2 to 1.0."""
 
-_TERM = re.compile(r"([LR]?)(?:AU|AD)?(\d{1,2})([LR]?)([A-E]?)", re.IGNORECASE)
+_PREFIX = r"(?:AU|AD)"
+_TERM = re.compile(rf"([LR]?){_PREFIX}?([LR]?)([0-9]{{1,2}})([LR]?)([A-E]?)", re.IGNORECASE)
+_FORMULA = re.compile(rf"{_PREFIX}[LR]?[0-9]", re.IGNORECASE)
 _SPARSITY = 2e-3
 _LEAST_INTENSITY = 0.1
 _LEAST_LIKENESS = 0.35  # cosine to the nearest emotion below which a face shows none
@@ -121,14 +123,16 @@ class Facs:
         return faults
 
     def levels(self, formula: str, intensity: float = 1.0) -> Floats:
-        """(n,) levels of a formula: units with optional side and letter, joined by ``+``.
+        """(n,) levels of a formula: units with optional side and letter, joined by ``+``; nothing for an empty one.
 
-        ``12`` is both sides at full intensity, ``L12B`` the face's own left side at 0.4.
+        ``12`` is both sides at full intensity, ``L12B`` the face's own left side at 0.4. The side may also follow the
+        number, ``12LB``, and each unit may begin with ``AU`` or ``AD``.
 
         Raises ParameterError: a term is not understood or no unit has its number.
         """
         levels = np.zeros(len(self.names))
-        for term in filter(None, formula.replace(" ", "").split("+")):
+        terms = formula.replace(" ", "")
+        for term in terms.split("+") if terms else ():
             indices, level = self._term(term)
             levels[indices] = np.maximum(levels[indices], level * intensity)
         return levels
@@ -171,20 +175,30 @@ class Facs:
 
     def _term(self, term: str) -> tuple[list[int], float]:
         match = _TERM.fullmatch(term)
-        if match is None:
+        number, side, letter = ("", "", "") if match is None else _parts(match)
+        if not number or len(side) > 1:
             raise ParameterError(f"{term!r} is not an action unit", hint='write it like "12", "12B" or "L12B"')
-        before, number, after, letter = (group.upper() for group in match.groups())
         unit = self._aliases.get(number, number)
         if unit not in self._of_unit:
             raise ParameterError(f"unknown action unit {number!r}{did_you_mean(number, self._of_unit)}",
                                  hint="configs/vocabularies/facs.toml lists the units")  # fmt: skip
         indices = self._of_unit[unit]
-        side = before or after
         if side:
             indices = [i for i in indices if self.names[i] == side + unit]
             if not indices:
                 raise ParameterError(f"action unit {unit} has no sides", hint=f"write it as {unit}")
         return indices, (LETTERS.index(letter) + 1) / 5 if letter else 1.0
+
+
+def is_formula(text: str) -> bool:
+    """Whether a text is meant as a formula of action units and not as a name: it begins like ``AU12``."""
+    return _FORMULA.match(text) is not None
+
+
+def _parts(match: re.Match[str]) -> tuple[str, str, str]:
+    """Number, sides and letter of a term."""
+    first, second, number, third, letter = (group.upper() for group in match.groups())
+    return number, first + second + third, letter
 
 
 def _columns(parameters: Parameters, name: str, unit: _Unit) -> list[_Column]:

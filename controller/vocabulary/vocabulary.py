@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from functools import cached_property
@@ -11,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from controller.base.errors import ParameterError
+from controller.base.numbers import plain_number
 from controller.base.parameters import Parameters, did_you_mean, fold
 from controller.base.paths import config_dir
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.expression import Expression, read_expressions
-from controller.vocabulary.facs import Facs
+from controller.vocabulary.facs import Facs, is_formula
 
-_UNITS = re.compile(r"(AU|AD)[LR]?\d", re.IGNORECASE)
 _MOOD = re.compile(r"(VAD?):(.*)", re.IGNORECASE)
 
 
@@ -55,7 +54,7 @@ class Vocabulary:
 
         Raises ParameterError: unknown name, with the nearest ones, or a wrong formula. ConfigError: a file is wrong.
         """
-        if _UNITS.match(name):
+        if is_formula(name):
             return Expression(name.upper(), self._facs.expand(name), source="FACS")
         if mood := _MOOD.fullmatch(name):
             kind = mood[1].upper()
@@ -92,10 +91,7 @@ def _point(kind: str, text: str) -> list[float]:
     cells = text.split(",")
     if len(cells) != len(kind):
         raise ParameterError(f"{kind}: needs {len(kind)} numbers with commas between", hint=hint)
-    try:
-        values = [float(cell) for cell in cells]
-    except ValueError:
-        values = [math.nan]
-    if not all(abs(value) <= 1.0 for value in values):
+    values = [value for cell in cells if (value := plain_number(cell)) is not None and abs(value) <= 1.0]
+    if len(values) < len(cells):
         raise ParameterError(f"{kind}: takes numbers from -1 to 1, not {text!r}", hint=hint)
     return values

@@ -6,12 +6,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from controller.base.errors import ParameterError
+from controller.base.numbers import plain_number
 from controller.base.parameters import Parameters, did_you_mean
+from controller.links.line.checksums import CHECKSUMS
 from controller.links.line.protocol import Code, LineError, Words, parse_words
 
 MAX_RATE_HZ = 200.0
@@ -25,8 +26,7 @@ MAX_FADE_S = 60.0
 READINGS = ("UNITS", "EMOTION", "VISEMES", "MOOD")
 """What a face can be read as: action units, the nearest emotion, mouth shapes, valence-arousal-dominance."""
 LISTS = ("COMMANDS", "EXPRESSIONS", "HOLDERS", "LAYERS", "PARAMETERS")
-
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
+_SHOWN = 32
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,8 @@ class Command:
 
     name : its first word, or two for ``GAZE AT`` and ``GAZE OFF``; FRAME becomes SET and VERSION becomes HELLO.
     indices : positions of the parameters it names. values : its numbers, of SET one for each of ``indices``.
-    words : other names in it: of an expression, a list, a reading, a script or a mark.
+    words : other names in it: of an expression, a list, a reading, a script or a mark; of HELLO
+        one of :data:`controller.links.line.checksums.CHECKSUMS`.
     question : what SUB streams: a command GET, MEASURED or READ.
     """
 
@@ -61,11 +62,18 @@ class Request:
 
 
 class Grammar:
-    """Parses lines; ``find_expression`` gives the canonical name of an expression, or raises ParameterError."""
+    """Parses lines.
 
-    def __init__(self, parameters: Parameters, find_expression: Callable[[str], str]) -> None:
+    ``find_expression`` gives the canonical name of an expression, or raises ParameterError. ``scripted`` : the lines
+    come from a script, which cannot let servos move that a person has stopped: START is refused.
+    """
+
+    def __init__(
+        self, parameters: Parameters, find_expression: Callable[[str], str], *, scripted: bool = False
+    ) -> None:
         self._parameters = parameters
         self._find_expression = find_expression
+        self._scripted = scripted
         self._all = tuple(range(len(parameters)))
 
     def parse(self, line: bytes) -> Request | None:
@@ -74,8 +82,10 @@ class Grammar:
         Raises LineError: the line is refused; it carries code, reason and tag.
         """
         words = parse_words(line)
-        if words is None:
-            return None
+        return None if words is None else self.request(words)
+
+    def request(self, words: Words) -> Request:
+        """The request that the words of a line make. Raises LineError, as :meth:`parse`."""
         try:
             return Request(self._command(words), words.tag, words.checked)
         except LineError as error:
@@ -86,13 +96,18 @@ class Grammar:
         name = words.words[0].upper()
         rule = _RULES.get(name)
         if rule is None:
-            shown = words.words[0][:32]
-            raise LineError(Code.COMMAND, f"unknown command {shown!r}{did_you_mean(shown, COMMANDS)}")
+            text = words.words[0]
+            raise LineError(Code.COMMAND, f"unknown command {quoted(text)}{did_you_mean(text[:_SHOWN], COMMANDS)}")
         least, most, usage, read = rule
         given = words.words[1:]
         if len(given) < least or (most is not None and len(given) > most):
-            raise LineError(Code.ARGUMENTS, f"{len(given)} arguments; usage: {usage}")
+            raise LineError(Code.ARGUMENTS, f"{_count(len(given), 'argument')}; usage: {usage}")
         return read(self, given)
+
+    def read_start(self, _: Sequence[str]) -> Command:
+        if self._scripted:
+            raise LineError(Code.BUSY, "START is not for scripts: a person or a robot sends it on a link")
+        return Command("START")
 
     def read_set(self, given: Sequence[str]) -> Command:
         if len(given) % 2:
@@ -102,7 +117,7 @@ class Grammar:
 
     def read_frame(self, given: Sequence[str]) -> Command:
         if len(given) != len(self._all):
-            raise LineError(Code.ARGUMENTS, f"{len(given)} values; FRAME needs all {len(self._all)}")
+            raise LineError(Code.ARGUMENTS, f"{_count(len(given), 'value')}; FRAME needs all {len(self._all)}")
         return Command("SET", self._all, self.values(self._all, given))
 
     def read_expr(self, given: Sequence[str]) -> Command:
@@ -151,11 +166,25 @@ class Grammar:
 
 def in_range(what: str, text: str, low: float, high: float) -> float:
     """A number in plain decimal notation, from ``low`` to ``high``. Raises LineError; nothing is clipped."""
-    if _NUMBER.fullmatch(text) is None or not math.isfinite(value := float(text)):
-        raise LineError(Code.NUMBER, f"{what}: {text[:32]!r} is not a finite number")
+    value = plain_number(text)
+    if value is None:
+        raise LineError(Code.NUMBER, f"{what}: {quoted(text)} is not a finite number")
     if not low <= value <= high:
-        raise LineError(Code.RANGE, f"{what} must be {low:g} to {high:g}, not {value:g}")
+        raise LineError(Code.RANGE, f"{what} must be {low:g} to {high:g}, not {_cut(text)}")
     return value
+
+
+def quoted(text: str) -> str:
+    """A word as it was typed, in quotes; the beginning of a long one."""
+    return f"'{_cut(text)}'"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _usage(name: str) -> str:
@@ -178,6 +207,13 @@ def _gaze(_: Grammar, given: Sequence[str]) -> Command:
     return Command("GAZE", values=(yaw, in_range("pitch", given[1], -GAZE_PITCH_DEG, GAZE_PITCH_DEG)))
 
 
+def _hello(_: Grammar, given: Sequence[str]) -> Command:
+    asked = tuple(word.lower().removeprefix("checksum=") for word in given if word.lower().startswith("checksum="))
+    if len(asked) != len(given) or not set(asked) <= set(CHECKSUMS):
+        raise LineError(Code.ARGUMENTS, _usage("HELLO"))
+    return Command("HELLO", words=asked)
+
+
 def _show(_: Grammar, given: Sequence[str]) -> Command:
     word = given[0].upper()
     if (word == "SEEK") != (len(given) == 2):
@@ -195,7 +231,7 @@ def _read(_: Grammar, given: Sequence[str]) -> Command:
 def _list(_: Grammar, given: Sequence[str]) -> Command:
     (what,) = given
     if what.upper() not in LISTS:
-        raise LineError(Code.NAME, f"unknown list {what[:32]!r}; {_usage('LIST')}")
+        raise LineError(Code.NAME, f"unknown list {quoted(what)}; {_usage('LIST')}")
     return Command("LIST", words=(what.upper(),))
 
 
@@ -217,7 +253,7 @@ Rule = tuple[int, int | None, str, Callable[[Grammar, Sequence[str]], Command]]
 """Least and most arguments, how the command is written, and what reads its arguments."""
 
 _RULES: dict[str, Rule] = {
-    "HELLO": (0, 0, "HELLO", lambda _, given: Command("HELLO")),
+    "HELLO": (0, 1, f"HELLO [checksum={'|'.join(CHECKSUMS)}]", _hello),
     "VERSION": (0, 0, "VERSION", lambda _, given: Command("HELLO")),
     "PING": (0, None, "PING [word ...]", lambda _, given: Command("PING", words=tuple(given))),
     "SET": (2, None, "SET name value [name value ...]", Grammar.read_set),
@@ -239,6 +275,8 @@ _RULES: dict[str, Rule] = {
             Grammar.read_sub),
     "UNSUB": (0, 0, "UNSUB", lambda _, given: Command("UNSUB")),
     "LIST": (1, 1, "LIST COMMANDS, EXPRESSIONS, HOLDERS, LAYERS or PARAMETERS", _list),
+    "STOP": (0, None, "STOP", lambda _, given: Command("STOP")),
+    "START": (0, 0, "START", Grammar.read_start),
 }  # fmt: skip
 
 COMMANDS = tuple(_RULES)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from controller.links.kind import LinkKind
+from controller.links.line.checksums import CHECKSUMS
 from drivers.base.options import REQUIRED, option
 
 SIMULATED = "simulated"
@@ -16,6 +17,9 @@ class LineSettings:
 
     port: str = option("Device path; simulated starts a simulated robot host.", REQUIRED)
     baud: int = option("Rate of the port.", 115_200, at_least=300, at_most=12_000_000)
+    checksum: str = option(
+        "When lines must have one: never, once a line had a valid one, or always.", "latched", choices=CHECKSUMS
+    )
     script: str | None = option("What a simulated host plays: a name in configs/scripts, or a path.")
 
     def check(self) -> None:

@@ -1,26 +1,24 @@
 """Serves the line protocol on a serial port, in its own thread.
 
-Replies and streamed lines are written without waiting: a peer that does not read loses lines, and never holds up the
-face. A port that vanishes is opened again when it comes back, and a subscription goes on then. Only its owner ends the
-thread: faults are logged and counted.
+Replies and streamed lines are written without waiting: a peer that does not read loses lines, which are counted, and
+never holds up the face. A port that vanishes is opened again when it comes back, and a subscription goes on then. Only
+its owner ends the thread: faults are logged and counted.
 """
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
 
 from controller.layers.commands import CommandSink
+from controller.links.line.outbox import Outbox
 from controller.links.line.session import LineSession
 from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
 
-log = logging.getLogger(__name__)
-
 _POLL_S = 0.05
 _RETRY_S = 0.5
-_OUT_LIMIT = 16_384
+_READ_LIMIT = 65_536
 _FAULT_PAUSE_S = 0.05
 
 
@@ -31,23 +29,23 @@ class LineLink:
     ----------
     port : device path. baud : its rate.
     sink : where accepted commands go, with the time they arrived.
+    checksum : when lines must have one, of :data:`controller.links.line.checksums.CHECKSUMS`.
     retry_s : how often a lost port is tried again.
 
     Attributes
     ----------
     connected : whether the port is there. reconnects : how often it came back.
-    faults : how many errors there were besides those of the port; last_fault : the last of them.
     """
 
-    def __init__(self, port: str, baud: int, sink: CommandSink, *, retry_s: float = _RETRY_S) -> None:
+    def __init__(
+        self, port: str, baud: int, sink: CommandSink, *, checksum: str = "latched", retry_s: float = _RETRY_S
+    ) -> None:
         self.port = port
         self.connected = False
         self.reconnects = 0
-        self.faults = 0
-        self.last_fault = ""
         self._serial = SerialPort(port, baud)
-        self._session = LineSession(sink, time.monotonic_ns())
-        self._out = bytearray()
+        self._session = LineSession(sink, time.monotonic_ns(), name=f"line {port}", checksum=checksum)
+        self._out = Outbox()
         self._retry_s = retry_s
         self._counts = {"bytes_in": 0, "bytes_out": 0, "streamed": 0, "dropped": 0}
         self._stopping = threading.Event()
@@ -69,16 +67,17 @@ class LineLink:
         self.connected = False
 
     def report(self) -> dict[str, object]:
-        """Counts: lines taken and refused (by code), bytes, streamed and dropped lines, reconnects."""
+        """Counts: lines taken, refused (by code) and not answered, bytes, streamed and dropped lines, reconnects."""
         return {
             "port": self.port,
             "connected": self.connected,
             "accepted": self._session.accepted,
             "refused": {str(code): count for code, count in sorted(self._session.refused.items())},
+            "unanswered": self._session.unanswered,
             **self._counts,
             "reconnects": self.reconnects,
-            "faults": self.faults,
-            "last_fault": self.last_fault,
+            "faults": self._session.faults,
+            "last_fault": self._session.last_fault,
         }
 
     def __enter__(self) -> LineLink:
@@ -93,28 +92,30 @@ class LineLink:
                 self._serve()
             except PortError:
                 self._reconnect()
-            except Exception as error:  # noqa: BLE001  one line must not end the link
-                self._log_fault(error)
-
-    def _log_fault(self, error: Exception) -> None:
-        """Log an error, once for each kind, and begin with the next line."""
-        text = f"{type(error).__name__}: {error}"
-        if text != self.last_fault:
-            log.exception("link %s: %s; it goes on with the next line", self.port, text)
-        self.faults, self.last_fault = self.faults + 1, text
-        self._session.drop()
-        self._stopping.wait(_FAULT_PAUSE_S)
+            except Exception as error:  # noqa: BLE001  nothing that arrives may end the link
+                self._session.fault(error, "it goes on with the next line")
+                self._session.drop()
+                self._stopping.wait(_FAULT_PAUSE_S)
 
     def _serve(self) -> None:
         while not self._stopping.is_set():
-            data = self._serial.read(self._wake_s())
+            data = self._read()
             now_ns = time.monotonic_ns()
-            if data:
-                self._counts["bytes_in"] += len(data)
-                self._reply(self._session.feed(data, now_ns))
-                self._flush()
+            for answer in self._session.answers(data, now_ns) if data else ():
+                self._reply(answer)
+            self._flush()
             self._stream(now_ns)
             self._flush()
+
+    def _read(self) -> bytes:
+        """All that has arrived, so that a STOP is found however much came before it."""
+        data = self._serial.read(self._wake_s())
+        more = data
+        while more and len(data) < _READ_LIMIT:
+            more = self._serial.read(0.0)
+            data += more
+        self._counts["bytes_in"] += len(data)
+        return data
 
     def _wake_s(self) -> float:
         """When to stop reading from the port next, on the monotonic clock."""
@@ -122,34 +123,27 @@ class LineLink:
         due_ns = self._session.due_ns()
         return now_s + _POLL_S if due_ns is None else min(now_s + _POLL_S, due_ns * 1e-9)
 
-    def _reply(self, lines: bytes) -> None:
-        if len(self._out) + len(lines) > _OUT_LIMIT:
-            self._counts["dropped"] += lines.count(b"\n")
+    def _reply(self, line: bytes) -> None:
+        if self._out.add(line, answer=True):
             return
-        self._out += lines
+        self._flush()
+        if not self._out.add(line, answer=True):
+            self._counts["dropped"] += 1
+            self._session.unanswered += 1
 
     def _stream(self, now_ns: int) -> None:
         line = self._session.stream(now_ns)
-        if not line:
-            return
-        if self._out:  # the peer does not keep up: this line is old before it is read
-            self._counts["dropped"] += 1
-            return
-        self._out += line
-        self._counts["streamed"] += 1
+        if line:
+            self._counts["streamed" if self._out.add(line, answer=False) else "dropped"] += 1
 
     def _flush(self) -> None:
-        if not self._out:
-            return
-        sent = self._serial.put(bytes(self._out))
-        self._counts["bytes_out"] += sent
-        del self._out[:sent]
+        self._counts["bytes_out"] += self._out.flush(self._serial.put)
 
     def _reconnect(self) -> None:
         """Wait for the port to come back; the face keeps its last commands."""
         self.connected = False
         self._session.drop()
-        self._out.clear()
+        self._session.unanswered += self._out.clear()
         while not self._stopping.wait(self._retry_s):
             try:
                 self._serial.open()

@@ -33,7 +33,7 @@ def open_line(settings: LineSettings, context: LinkContext) -> LineLink:
         host = HostProcess(str(script), context.vocabularies)
         context.closers.callback(host.stop)
         port = host.path
-    link = LineLink(port, settings.baud, context.sink).start()
+    link = LineLink(port, settings.baud, context.sink, checksum=settings.checksum).start()
     context.closers.callback(link.stop)
     return link
 

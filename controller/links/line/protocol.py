@@ -26,7 +26,8 @@ MAX_REPLY = 2048
 _TAG = re.compile(r"#(\d{1,9})")
 _REPLY = re.compile(r"(?:#(\d{1,9}) )?(?:(OK|P|F)|ERR ([0-9]+))(?: (.*))?", re.DOTALL)
 _CHECKSUM = re.compile(rb"\*([0-9A-Fa-f]{2})[ \t]*\Z")
-_PRINTABLE = re.compile(rb"[\x20-\x7e\t]*\Z")
+_UNPRINTABLE = re.compile(rb"[^\x20-\x7e\t]")
+_STOP = re.compile(rb"[^\x21-\x7e]*(?:#[0-9]*[^\x21-\x7e]+)?STOP(?![\x21-\x29\x2b-\x7e])", re.IGNORECASE)
 
 
 class Code(IntEnum):
@@ -43,6 +44,7 @@ class Code(IntEnum):
     NAME = 23
     RANGE = 24
     BUSY = 30
+    FAULT = 31
 
 
 class LineError(LinkError):
@@ -115,6 +117,8 @@ def parse_words(line: bytes) -> Words | None:
     if not line.strip(b" \t"):
         return None
     _check_bytes(line)
+    if line.count(b"*") > 1:
+        raise LineError(Code.CHECKSUM, "there is more than one * in the line; only the checksum begins with one")
     body, checked = _strip_checksum(line)
     words = body.decode("ascii").split()
     tag = None
@@ -134,16 +138,23 @@ def _check_bytes(line: bytes) -> None:
         raise LineError(Code.BINARY, "binary frames are reserved for a later version; send ASCII lines")
     if len(line) > MAX_LINE:
         raise LineError(Code.TOO_LONG, f"a line has at most {MAX_LINE} bytes")
-    if not _PRINTABLE.match(line):
-        raise LineError(Code.NOT_ASCII, "only printable ASCII is allowed")
+    if found := _UNPRINTABLE.search(line):
+        what = f"byte {found.start() + 1} of the line is 0x{found[0][0]:02X}"
+        raise LineError(Code.NOT_ASCII, f"{what}; only printable ASCII (0x20 to 0x7E) and tab are allowed")
+
+
+def is_stop(line: bytes) -> bool:
+    """Whether a line begins with the command STOP, after a tag or noise; whatever else is wrong with it, it stops."""
+    return _STOP.match(line) is not None
 
 
 def _strip_checksum(line: bytes) -> tuple[bytes, bool]:
     if b"*" not in line:
         return line, False
     match = _CHECKSUM.search(line)
-    if match is None or line.count(b"*") > 1:
-        raise LineError(Code.CHECKSUM, "* must be followed by two hexadecimal digits at the end of the line")
+    if match is None:
+        reason = "* must be followed by two hexadecimal digits at the end of the line"
+        raise LineError(Code.CHECKSUM, reason, checked=True)
     body = line[: match.start()]
     want = checksum(body)
     if int(match[1], 16) != want:
@@ -165,12 +176,19 @@ def format_ok(text: str, *, tag: int | None = None, checked: bool = False) -> by
 
 def format_error(error: LineError) -> bytes:
     """The reply to a line that was refused."""
-    return format_words(["ERR", str(int(error.code)), str(error)], tag=error.tag, checked=error.checked)
+    reason = _one_line(str(error))
+    return format_words(["ERR", str(int(error.code)), reason], tag=error.tag, checked=error.checked)
+
+
+def _one_line(text: str) -> str:
+    """Text of several lines, such as the faults of a file, as one."""
+    return re.sub(r"\s*\n\s*", "; ", re.sub(r":\s*\n\s*", ": ", text.strip()))
 
 
 def _finish(text: str, checked: bool) -> bytes:
-    data = re.sub(rb"[^\x20-\x29\x2b-\x7e]", b"?", text.encode("ascii", "replace"))[: MAX_REPLY - 3]
-    return data + (b"*%02X\n" % checksum(data) if checked else b"\n")
+    """The bytes of a line; one that contains ``*`` always has a checksum, so that its last ``*`` begins that."""
+    data = re.sub(rb"[^\x20-\x7e]", b"?", text.encode("ascii", "replace"))[: MAX_REPLY - 3]
+    return data + (b"*%02X\n" % checksum(data) if checked or b"*" in data else b"\n")
 
 
 def parse_reply(line: bytes) -> Reply | None:

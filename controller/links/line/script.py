@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -11,11 +12,17 @@ import numpy as np
 from pydantic import Field
 
 from controller.base.config import Number, Settings, load
-from controller.base.parameters import Floats, Parameters
-from controller.base.paths import find_config
-from controller.links.line.commands import Grammar
+from controller.base.errors import ConfigError
+from controller.base.numbers import plain_number
+from controller.base.parameters import Floats, Parameters, did_you_mean
+from controller.base.paths import config_dir, find_config
+from controller.links.line.commands import Grammar, quoted
 from controller.links.line.protocol import LineError
 from controller.vocabulary.vocabulary import Vocabulary
+
+_SUFFIX = ".toml"
+_NAME = re.compile(r"(?![.])[^/\\\x00-\x1f\x7f]{1,100}")
+"""Of a script that a robot may ask for: no folder, nothing hidden, nothing that a file system refuses."""
 
 _Seconds = Annotated[Number, Field(ge=0, le=86_400)]
 
@@ -62,11 +69,10 @@ def _read_steps(file: _File, grammar: Grammar) -> tuple[list[tuple[float, str]],
 
 def _read_step(text: str, grammar: Grammar, earliest_s: float) -> tuple[float, str]:
     time_text, _, line = text.strip().partition(" ")
-    try:
-        at_s = float(time_text)
-    except ValueError:
-        raise ValueError("begins with a time in seconds, then the line") from None
-    if not earliest_s <= at_s < math.inf:
+    at_s = plain_number(time_text)
+    if at_s is None:
+        raise ValueError("begins with a time in seconds, then the line")
+    if not earliest_s <= at_s:
         raise ValueError(f"times must rise from 0; this one is before {earliest_s:g}")
     if grammar.parse(line.encode("utf-8")) is None:
         raise ValueError("no command after the time")
@@ -82,9 +88,31 @@ def load_script(
 
     Raises ConfigError: it is not there, or wrong; every fault with its key.
     """
-    path = find_config("scripts", name, beside=beside)
+    return _load(find_config("scripts", name, beside=beside), parameters, vocabulary)
+
+
+def load_named_script(
+    name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
+) -> Script:
+    """The script that a robot asks for by name: one in the folder of ``beside`` or in ``configs/scripts``.
+
+    A robot gets no other file: ``name`` is no path, and a link out of these folders is not followed.
+
+    Raises ConfigError: there is none of that name, or it is wrong; every fault with its key.
+    """
+    folders = [beside.parent, config_dir() / "scripts"] if beside is not None else [config_dir() / "scripts"]
+    for folder in folders if _NAME.fullmatch(name) else ():
+        file = folder / f"{name.removesuffix(_SUFFIX)}{_SUFFIX}"
+        if file.is_file() and file.resolve().parent == folder.resolve():
+            return _load(file, parameters, vocabulary)
+    known = sorted(path.stem for path in folders[-1].glob(f"*{_SUFFIX}"))
+    message = f"no script {quoted(name)} in the folders of the stage and of configs/scripts{did_you_mean(name, known)}"
+    raise ConfigError(message, hint=f"there are {', '.join(known)}")
+
+
+def _load(path: Path, parameters: Parameters, vocabulary: Vocabulary | None) -> Script:
     vocabulary = vocabulary or Vocabulary.load(parameters)
-    grammar = Grammar(parameters, lambda name: vocabulary[name].name)
+    grammar = Grammar(parameters, lambda name: vocabulary[name].name, scripted=True)
     file = load(path, _File, lambda file: _read_steps(file, grammar)[1])
     steps, _ = _read_steps(file, grammar)
     return Script(tuple(steps), file.loop_s, file.frames_hz, path.stem if file.name is None else file.name, file.marks)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections import Counter
+from collections.abc import Iterator
 from functools import cache, cached_property
 from importlib import metadata
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
+from controller.base.numbers import plain_number
 from controller.layers.commands import CommandSink, Player
+from controller.links.line.checksums import ChecksumRule
 from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Command, Grammar, Request
 from controller.links.line.protocol import (
     MAX_LINE,
@@ -16,14 +20,19 @@ from controller.links.line.protocol import (
     Code,
     LineDecoder,
     LineError,
+    Words,
     format_error,
     format_frame,
     format_ok,
     format_pairs,
+    is_stop,
     number,
     pairs,
+    parse_words,
 )
 from controller.vocabulary.reading import Readings
+
+log = logging.getLogger(__name__)
 
 
 class LineSession:
@@ -33,16 +42,30 @@ class LineSession:
     ----------
     sink : where accepted commands go.
     start_ns : time zero of the stream (monotonic clock, ns).
+    name : who sends the lines, for people: a STOP is reported under this name.
+    checksum : when lines must have one, of :data:`controller.links.line.checksums.CHECKSUMS`.
+    scripted : the lines come from a script; see :class:`controller.links.line.commands.Grammar`.
 
     Attributes
     ----------
-    accepted : lines taken. refused : lines refused, by error code.
+    accepted : lines taken. refused : lines refused, by error code. unanswered : lines whose answer could not be sent.
+    faults : how many errors of omote itself there were; last_fault : the last of them.
     """
 
-    def __init__(self, sink: CommandSink, start_ns: int) -> None:
+    def __init__(
+        self,
+        sink: CommandSink,
+        start_ns: int,
+        *,
+        name: str = "line",
+        checksum: str = "optional",
+        scripted: bool = False,
+    ) -> None:
         self._sink = sink
+        self._name = name
+        self._checksums = ChecksumRule(checksum)
         self._parameters = sink.parameters
-        self._grammar = Grammar(sink.parameters, lambda name: sink.vocabulary[name].name)
+        self._grammar = Grammar(sink.parameters, lambda name: sink.vocabulary[name].name, scripted=scripted)
         self._decoder = LineDecoder()
         self._values = sink.parameters.neutral()
         self._start_ns = start_ns
@@ -50,10 +73,23 @@ class LineSession:
         self._due_ns = 0
         self.accepted = 0
         self.refused: Counter[int] = Counter()
+        self.unanswered = 0
+        self.faults = 0
+        self.last_fault = ""
+        self._stops_waiting = 0
 
     def feed(self, data: bytes, now_ns: int) -> bytes:
         """Act on bytes that arrived at ``now_ns``; returns the replies, one line for each line that has anything."""
-        return b"".join(self._line(line, now_ns) for line in self._decoder.feed(data))
+        return b"".join(self.answers(data, now_ns))
+
+    def answers(self, data: bytes, now_ns: int) -> Iterator[bytes]:
+        """As :meth:`feed`, but gives each reply when its line has been acted on. A STOP acts before all other lines."""
+        lines = self._decoder.feed(data)
+        self._stops_waiting = sum(map(is_stop, lines))
+        if self._stops_waiting:
+            self._sink.stop_latch.stop(self._name, now_ns)
+        for line in lines:
+            yield self._line(line, now_ns)
 
     def due_ns(self) -> int | None:
         """When the next streamed line is due; None without a subscription."""
@@ -66,7 +102,12 @@ class LineSession:
             return b""
         period = round(1e9 / request.command.values[0])
         self._due_ns += period * (1 + (now_ns - self._due_ns) // period)
-        return self._streamed(request.command.question, (now_ns - self._start_ns) // 1_000_000, request.checked)
+        try:
+            return self._streamed(request.command.question, (now_ns - self._start_ns) // 1_000_000, request.checked)
+        except Exception as error:  # noqa: BLE001  it ends this stream and nothing else
+            self._stream = None
+            self.fault(error, "it ends the stream")
+            return b""
 
     def _streamed(self, question: Command, time_ms: int, checked: bool) -> bytes:
         if not self._look(question.measured):
@@ -89,28 +130,67 @@ class LineSession:
         self._decoder.clear()
 
     def _line(self, line: bytes, now_ns: int) -> bytes:
+        words = None
         try:
-            request = self._grammar.parse(line)
-            if request is None:
+            words = self._words(line)
+            if words is None:
                 return b""
-            text = self._do(request, now_ns)
-        except LineError as error:
-            self.refused[int(error.code)] += 1
-            return format_error(error)
+            text = self._do(self._grammar.request(words), now_ns)
+        except Exception as error:  # noqa: BLE001  one line must not cost another its answer
+            refusal = self._refusal(error)
+            if words is not None:
+                refusal.tag, refusal.checked = words.tag, words.checked
+            self.refused[int(refusal.code)] += 1
+            return format_error(refusal)
         self.accepted += 1
-        return format_ok(text, tag=request.tag, checked=request.checked)
+        return format_ok(text, tag=words.tag, checked=words.checked)
+
+    def _words(self, line: bytes) -> Words | None:
+        """The words of a line that has any; a STOP is one however damaged its line is. Raises LineError."""
+        stop = is_stop(line)
+        try:
+            words = parse_words(line)
+        except LineError as error:
+            if not stop:
+                raise
+            return Words(("STOP",), checked=error.checked)
+        if words is not None and not stop:
+            self._checksums.check(words)
+        return words
+
+    def _refusal(self, error: Exception) -> LineError:
+        if isinstance(error, LineError):
+            return error
+        if isinstance(error, OMOTE_ERRORS):
+            return LineError(Code.BUSY, str(error))
+        self.fault(error, "it goes on with the next line")
+        return LineError(Code.FAULT, f"an error in omote, see its log: {self.last_fault}")
 
     def _do(self, request: Request, now_ns: int) -> str:
         """Act on a request; returns the text of the reply."""
         command = request.command
-        try:
-            if command.name in ("SUB", "UNSUB"):
+        match command.name:
+            case "SUB" | "UNSUB":
                 self._stream, self._due_ns = (request if command.question else None), now_ns
-            elif not self._act(command, now_ns):
-                return self._answer(command)
-            return _receipt(command)
-        except OMOTE_ERRORS as error:
-            raise LineError(Code.BUSY, str(error), tag=request.tag, checked=request.checked) from error
+            case "STOP":
+                self._stops_waiting -= 1
+                self._sink.stop_latch.stop(self._name, now_ns)
+            case "START":
+                self._start()
+            case "HELLO":
+                for mode in command.words:
+                    self._checksums.change(mode, checked=request.checked)
+                return self._answer(command, now_ns)
+            case _:
+                return _receipt(command) if self._act(command, now_ns) else self._answer(command, now_ns)
+        return _receipt(command)
+
+    def fault(self, error: Exception, consequence: str) -> None:
+        """Count an error of omote itself, and log it once for each kind."""
+        text = f"{type(error).__name__}: {error}"
+        if text != self.last_fault:
+            log.error("%s: %s; %s", self._name, text, consequence, exc_info=error)
+        self.faults, self.last_fault = self.faults + 1, text
 
     def _act(self, command: Command, now_ns: int) -> bool:
         """Pass a command that changes the face to the sink; False when it is a question."""
@@ -138,7 +218,13 @@ class LineSession:
                 return False
         return True
 
-    def _answer(self, command: Command) -> str:
+    def _start(self) -> None:
+        """Let the servos move again, unless a STOP has arrived behind this line."""
+        if self._stops_waiting > 0:
+            raise LineError(Code.BUSY, "a STOP follows this line, and stops first; send START after its answer")
+        self._sink.stop_latch.start()
+
+    def _answer(self, command: Command, now_ns: int) -> str:
         """Text of the reply to a question."""
         name, words = command.name, command.words
         if name in ("GET", "MEASURED", "READ", "INFO") and not self._look(command.measured):
@@ -151,12 +237,12 @@ class LineSession:
             case "INFO":
                 return "INFO " + self._info(command.indices[0])
             case "STATUS":
-                return "STATUS " + " ".join(f"{key}={_word(value)}" for key, value in self._status().items())
+                return "STATUS " + " ".join(f"{key}={_word(value)}" for key, value in self._status(now_ns).items())
             case "LIST":
                 return f"LIST {words[0]} " + " ".join(self._list(words[0]))
             case "HELLO":
                 limits = f"parameters={len(self._parameters)} max_line={MAX_LINE} max_rate_hz={MAX_RATE_HZ:g}"
-                return f"HELLO omote {package_version()} protocol={VERSION} {limits}"
+                return f"HELLO omote {package_version()} protocol={VERSION} {limits} checksum={self._checksums.mode}"
         return " ".join(["PONG", *words])
 
     @cached_property
@@ -178,9 +264,17 @@ class LineSession:
         full = math.degrees(p.full_scale_rad[index])
         return text if math.isnan(full) else f"{text} full_scale_deg={full:g}"
 
-    def _status(self) -> dict[str, str | int | float]:
+    def _status(self, now_ns: int) -> dict[str, str | int | float]:
         show = self._sink.shows.status() if self._sink.shows is not None else "off"
-        return {**self._sink.status(), "show": show, "accepted": self.accepted, "refused": self.refused.total()}
+        counts = {"accepted": self.accepted, "refused": self.refused.total(), "unanswered": self.unanswered}
+        return {**self._sink.status(), "show": show, **self._stopped(now_ns), **counts}
+
+    def _stopped(self, now_ns: int) -> dict[str, str | float]:
+        """Who stopped the servos, as one word, and how long ago (s)."""
+        stopped = self._sink.stop_latch.stopped
+        if stopped is None:
+            return {"stopped": "no"}
+        return {"stopped": "_".join(stopped.who.split()), "stopped_s": max(0.0, (now_ns - stopped.at_ns) * 1e-9)}
 
     def _list(self, what: str) -> tuple[str, ...]:
         if what == "HOLDERS":
@@ -213,11 +307,8 @@ def _play(shows: Player | None, what: str, to: str = "0") -> None:
     if what not in ("PLAY", "PAUSE", "STOP", "SEEK"):
         shows.start(what)
         return
-    try:
-        seek: str | float = float(to)
-    except ValueError:
-        seek = to
-    shows.control(what, seek)
+    seconds = plain_number(to)
+    shows.control(what, to if seconds is None else seconds)
 
 
 def _word(value: str | int | float) -> str:

@@ -31,8 +31,9 @@ class Show:
         self.script = script
         self.playing = False
         self.position_s = 0.0
-        self._sink, self._session = sink, LineSession(sink, 0)
-        self._grammar = Grammar(sink.parameters, lambda name: sink.vocabulary[name].name)
+        self._sink = sink
+        self._grammar = Grammar(sink.parameters, lambda name: sink.vocabulary[name].name, scripted=True)
+        self._session = LineSession(sink, 0, name=f"show {script.name}", scripted=True)
         self._times = [at_s for at_s, _ in script.steps]
         self._next = 0
         self._last_ns: int | None = None
@@ -98,7 +99,7 @@ class Show:
 class Shows:
     """The show that plays now; links change it from their threads, the control loop ticks it.
 
-    find : the script of a name; raises ConfigError. sink : the face.
+    find : the script of a name that a link may ask for; raises ConfigError. sink : the face.
     """
 
     def __init__(self, find: Callable[[str], Script], sink: CommandSink) -> None:
@@ -107,8 +108,12 @@ class Shows:
         self._lock = threading.RLock()  # a show may start another
 
     def start(self, name: str) -> None:
-        """Play a script from its beginning. Raises ConfigError."""
-        show = Show(self._find(name), self._sink)
+        """Play the script of a name from its beginning. Raises ConfigError."""
+        self.play(self._find(name))
+
+    def play(self, script: Script) -> None:
+        """Play a script from its beginning."""
+        show = Show(script, self._sink)
         show.playing = True
         with self._lock:
             self._show = show

@@ -156,6 +156,9 @@ def test_requests_of_the_panel_reach_the_layers(tmp_path: Path, pipe: tuple[Conn
         assert ask(messages.Neutral(0.05))
         until(lambda: body.newest()[0][P.index("mouthSmileLeft")] < 0.01)
         assert ask(messages.Begin()) and body._begun.is_set()
+        latch = body.state.stop_latch
+        assert ask(messages.StopServos()) and latch.stopped is not None and latch.stopped.who == "panel"
+        assert ask(messages.StartServos()) and latch.stopped is None
         assert not ask(messages.Stop())
         main.close()
         assert not _handle(body, end)  # main is gone
@@ -400,9 +403,9 @@ def test_a_show_that_failed_too_often_is_refused(tmp_path: Path) -> None:
     with running(stage_of(tmp_path)) as (body, _):
         shows = body.state.shows
         assert shows is not None
-        shows.start(str(tmp_path / "act.toml"))
+        shows.start("act")
         part = body.state.parts.add(show_part("act"))
         for _ in range(6):
             part.fail(ValueError("no"), time.monotonic())
         with pytest.raises(ConfigError, match="show act failed too often and is switched off: ValueError: no"):
-            shows.start(str(tmp_path / "act.toml"))
+            shows.start("act")

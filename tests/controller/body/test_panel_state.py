@@ -49,6 +49,22 @@ def test_holders_measured_values_and_differences_reach_the_other_side() -> None:
         assert insight.away_deg("tongue") is None
 
 
+def test_who_stopped_the_servos_reaches_the_other_side() -> None:
+    state = CommandState(P)
+    with Mailbox.create(PanelState.size(P)) as mailbox:
+        body, panel = (PanelState(mailbox, state.layer_names(), P) for _ in range(2))
+        assert panel.stopped_by == ""
+        for who, shown in (("panel", "panel"), ("line /dev/ttyUSB0", "line /dev/ttyUSB0"), ("x" * 300, "x" * 64)):
+            state.stop_latch.stop(who, 5)
+            body.publish(state, None)
+            panel.refresh()
+            assert panel.stopped_by == shown
+            state.stop_latch.start()
+            body.publish(state, None)
+            panel.refresh()
+            assert panel.stopped_by == ""
+
+
 def test_without_servos_only_holders_are_known() -> None:
     state, out = CommandState(P), P.neutral()
     state.tick(10_000_000, 0.01, out)

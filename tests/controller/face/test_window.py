@@ -18,7 +18,7 @@ import pytest
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
-from controller.body.messages import Hold, Neutral, Show
+from controller.body.messages import Hold, Neutral, Show, StartServos, StopServos
 from controller.body.panel_state import PanelState
 from controller.face.window import MouseEditing, Panel
 from controller.layers.commands import CommandState
@@ -72,6 +72,7 @@ from controller.face.face import HeadValues
 from controller.face.point_editing import Screen
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
+from controller.body.messages import Hold
 from controller.stage.stage import FaceSettings, load_stage
 from controller.face.window import WindowFace
 from surface.view.scene.camera import Camera
@@ -83,7 +84,8 @@ told, frames = {}, [0]
 
 
 def send(request):
-    told[P.names[request.index]] = request.value
+    if isinstance(request, Hold):  # the panel may lie under the mouse: its buttons are not what this tests
+        told[P.names[request.index]] = request.value
 
 
 with Mailbox.create(len(P)) as mailbox:
@@ -234,6 +236,37 @@ def test_the_panel_shows_who_holds_a_parameter_and_what_the_servos_show(
         screen.frame(panel)
     assert any(text.startswith("manual  servos 0.") for text in places.texts)
     assert "expression" in places.texts  # of a parameter without a servo nothing is measured
+
+
+def test_the_panel_stops_and_starts_the_servos_and_says_who_stopped_them(
+    screen: Screen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places, sent, state = Places(screen.imgui, monkeypatch), [], CommandState(PARAMETERS)
+    with Mailbox.create(PanelState.size(PARAMETERS)) as mailbox:
+        body = PanelState(mailbox, state.layer_names(), PARAMETERS)
+        panel = Panel(PARAMETERS.neutral, sent.append, PanelState(mailbox, state.layer_names(), PARAMETERS))
+        body.publish(state, None)
+        for _ in range(3):
+            screen.frame(panel)
+        assert "START servos" not in places.at and not any("stopped" in text for text in places.texts)
+        screen.click(panel, *places.at["STOP servos"])
+        assert sent == [StopServos()]
+        state.stop_latch.stop("line /dev/ttyUSB0", 5)
+        body.publish(state, None)
+        for _ in range(2):
+            screen.frame(panel)
+        assert "servos stopped by line /dev/ttyUSB0" in places.texts
+        screen.click(panel, *places.at["START servos"])
+        assert sent == [StopServos(), StartServos()]
+
+
+def test_without_the_state_of_the_body_the_panel_can_stop(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
+    places, sent = Places(screen.imgui, monkeypatch), []
+    panel = Panel(PARAMETERS.neutral, sent.append)
+    for _ in range(3):
+        screen.frame(panel)
+    screen.click(panel, *places.at["STOP servos"])
+    assert sent == [StopServos()]
 
 
 def test_a_reshaped_face_is_saved_or_the_reason_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,6 +28,7 @@ def test_formulas() -> None:
     assert show("AU12C") == {"mouthSmileLeft": 0.6, "mouthSmileRight": 0.6}
     assert show("L12B + R14a") == {"mouthSmileLeft": 0.4, "mouthDimpleRight": 0.2}
     assert show("12LB") == {"mouthSmileLeft": 0.4}
+    assert show("AUR12C+R14D") == show("R12C+R14D") == show("AU12RC+ADR14D") == show("RAU12C+14RD")
     assert show("R30") == {"jawRight": 1.0}
     assert show("43") == show("45") and show("AD34") == show("33")
     assert show("26") == {"jawOpen": 0.5} and show("27") == {"jawOpen": 1.0}
@@ -36,7 +37,19 @@ def test_formulas() -> None:
 
 
 @pytest.mark.parametrize(
-    ("formula", "message"), [("99", "unknown action unit '99'"), ("12F", "not an action unit"), ("L1", "has no sides")]
+    ("formula", "message"),
+    [
+        ("99", "unknown action unit '99'"),
+        ("12F", "not an action unit"),
+        ("L1", "has no sides"),
+        ("L12R", "'L12R' is not an action unit"),
+        ("1+", "'' is not an action unit"),
+        ("1++2", "not an action unit"),
+        ("+", "not an action unit"),
+        ("AU", "not an action unit"),
+        ("123", "not an action unit"),
+        ("\u0661", "not an action unit"),
+    ],
 )
 def test_wrong_formulas(formula: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):

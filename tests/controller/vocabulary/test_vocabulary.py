@@ -159,6 +159,9 @@ def test_formulas_of_action_units(vocabulary: Vocabulary) -> None:
     made = vocabulary["au6+12"]
     assert (made.name, made.source, made.kind) == ("AU6+12", "FACS", "user")
     np.testing.assert_array_equal(made.weights, Facs.load(P).expand("6+12"))
+    one_sided = vocabulary["AUR12C+R14D"]
+    np.testing.assert_array_equal(one_sided.weights, Facs.load(P).expand("R12C+R14D"))
+    assert vocabulary[one_sided.name].name == "AUR12C+R14D"
     assert vocabulary.expand("AU26", 0.5) == {P.index("jawOpen"): 0.25}
 
 
@@ -184,7 +187,8 @@ def test_anything_else_is_a_name(vocabulary: Vocabulary, text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "hint"),
     [("AU99", "facs.toml"), ("AU1-2", "12B"), ("VA:1", "VA:0.5,-0.2"), ("VA:1,2", "VA:0.5,-0.2"), ("VA:a,b", "VA:"),
-     ("VA:nan,0", "VA:"), ("VA:-1.01,0", "VA:"), ("VAD:0,0", "VAD:0.5,-0.2,0.1")],
+     ("VA:nan,0", "VA:"), ("VA:-1.01,0", "VA:"), ("VAD:0,0", "VAD:0.5,-0.2,0.1"),
+     ("VA:0_1,0", "VA:"), ("VA: 0,0", "VA:"), ("VA:,0", "VA:")],
 )  # fmt: skip
 def test_wrong_formulas_are_refused(vocabulary: Vocabulary, text: str, hint: str) -> None:
     with pytest.raises(ParameterError) as caught:

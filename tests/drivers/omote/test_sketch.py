@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
-import shutil
 import subprocess
 import time
 from collections.abc import Iterator
@@ -15,32 +13,9 @@ import pytest
 
 from drivers import open_bus
 from drivers.base.bus import ServoSpec
+from tests.arduino import compile_sketch
 from tests.drivers.contract import settle
 
-ARDUINO = """
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <cstdint>
-#include <poll.h>
-#include <time.h>
-#include <unistd.h>
-unsigned long millis() { timespec t; clock_gettime(CLOCK_MONOTONIC, &t); return t.tv_sec * 1000 + t.tv_nsec / 1000000; }
-struct SerialPort {
-  void begin(long) {}
-  int available() { pollfd p = {0, POLLIN, 0}; return poll(&p, 1, 1) > 0; }
-  int read() { char c; if (::read(0, &c, 1) < 1) exit(0); return (unsigned char)c; }
-  void print(const char *s) { if (write(1, s, strlen(s))) {} }
-  void print(char c) { if (write(1, &c, 1)) {} }
-} Serial;
-struct Servo {
-  int pin = 0;
-  bool attached() { return pin; }
-  void attach(int p, int, int) { pin = p; }
-  void detach() { if (pin) { fprintf(stderr, "%d off\\n", pin); pin = 0; } }
-  void writeMicroseconds(int us) { fprintf(stderr, "%d %d\\n", pin, us); }
-};
-"""
 SERVOS = [
     ServoSpec(i, name, "rc-180", -0.5, 0.5, 20.0, 900.0) for i, name in enumerate(("jaw", "neckYaw", "neckPitch"))
 ]
@@ -48,14 +23,7 @@ SERVOS = [
 
 @pytest.fixture(scope="module")
 def sketch(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if shutil.which("g++") is None:
-        pytest.skip("needs g++ to compile the sketch")
-    folder = tmp_path_factory.mktemp("sketch")
-    code = re.search(r"```cpp\n#include <Servo.h>\n(.*?)```", (root / "docs/boards.md").read_text(), re.DOTALL)
-    assert code
-    (folder / "s.cpp").write_text(ARDUINO + code[1] + "int main() { setup(); for (;;) loop(); }\n")
-    subprocess.run(["g++", "-O0", "-o", folder / "s", folder / "s.cpp"], check=True)
-    return folder / "s"
+    return compile_sketch(root / "docs/boards.md", tmp_path_factory.mktemp("sketch"))
 
 
 @pytest.fixture

@@ -66,6 +66,10 @@ def parse(line: str) -> Command:
         ("SUB 5 MEASURED jawOpen", Command("SUB", (), (5.0,), (), Command("MEASURED", (JAW,)))),
         ("SUB 5 READ VISEMES", Command("SUB", (), (5.0,), (), Command("READ", words=("VISEMES",)))),
         ("version", Command("HELLO")),
+        ("HELLO Checksum=LATCHED", Command("HELLO", words=("latched",))),
+        ("STOP", Command("STOP")),
+        ("stop at once", Command("STOP")),
+        ("START", Command("START")),
         ("PING a B", Command("PING", words=("a", "B"))),
         ("STATUS", Command("STATUS")),
         ("UNSUB", Command("UNSUB")),
@@ -101,6 +105,13 @@ def test_only_measured_and_read_measured_ask_for_the_servos() -> None:
         ("SET jawOpen 0.5 JAWOPEN 0.6", Code.ARGUMENTS, "jawOpen is named twice"),
         ("SET jawOpn 0.5", Code.NAME, "did you mean 'jawOpen'"),
         ("SET jawOpen 1.01", Code.RANGE, "jawOpen must be 0 to 1, not 1.01"),
+        ("SET jawOpen 1.00000001", Code.RANGE, "jawOpen must be 0 to 1, not 1.00000001"),
+        ("SET jawOpen a\\b'c", Code.NUMBER, "jawOpen: 'a\\b'c' is not a finite number"),
+        ("SET jawOpen " + 40 * "x", Code.NUMBER, f"jawOpen: '{32 * 'x'}...' is not a finite number"),
+        ("FRAME 1", Code.ARGUMENTS, "1 value; FRAME needs all 59"),
+        ("HELLO checksum=never", Code.ARGUMENTS, "usage: HELLO [checksum=optional|latched|required]"),
+        ("HELLO latched", Code.ARGUMENTS, "usage: HELLO [checksum="),
+        ("START now", Code.ARGUMENTS, "1 argument; usage: START"),
         ("SET headYaw -2", Code.RANGE, "headYaw must be -1 to 1"),
         ("SET jawOpen nan", Code.NUMBER, "'nan' is not a finite number"),
         ("SET jawOpen inf", Code.NUMBER, "not a finite number"),
@@ -136,9 +147,9 @@ def test_only_measured_and_read_measured_ask_for_the_servos() -> None:
         ("LIFE", Code.ARGUMENTS, "0 arguments; usage: LIFE"),
         ("INFO jawOpen headYaw", Code.ARGUMENTS, "2 arguments; usage: INFO"),
         ("LIST LAYERS COMMANDS", Code.ARGUMENTS, "2 arguments; usage: LIST"),
-        ("SET jawOpen", Code.ARGUMENTS, "1 arguments; usage: SET"),
-        ("STATUS now", Code.ARGUMENTS, "1 arguments; usage: STATUS"),
-        ("UNSUB now", Code.ARGUMENTS, "1 arguments; usage: UNSUB"),
+        ("SET jawOpen", Code.ARGUMENTS, "1 argument; usage: SET"),
+        ("STATUS now", Code.ARGUMENTS, "1 argument; usage: STATUS"),
+        ("UNSUB now", Code.ARGUMENTS, "1 argument; usage: UNSUB"),
         ("SHOW tour end", Code.ARGUMENTS, "usage: SHOW name"),
         ("READ TEA", Code.ARGUMENTS, "usage: READ UNITS"),
         ("READ UNITS NOW", Code.ARGUMENTS, "usage: READ UNITS"),
@@ -160,6 +171,15 @@ def test_refusals_say_why(line: str, code: Code, part: str) -> None:
         GRAMMAR.parse(b"#5 " + line.encode())
     assert (caught.value.code, caught.value.tag) == (code, 5)
     assert part in str(caught.value)
+
+
+def test_a_script_may_stop_the_servos_and_not_start_them() -> None:
+    scripted = Grammar(P, lambda name: VOCABULARY[name].name, scripted=True)
+    request = scripted.parse(b"STOP")
+    assert request is not None and request.command == Command("STOP")
+    with pytest.raises(LineError, match="START is not for scripts") as caught:
+        scripted.parse(b"#3 START")
+    assert (caught.value.code, caught.value.tag) == (Code.BUSY, 3)
 
 
 def test_a_checked_refusal_is_answered_checked() -> None:

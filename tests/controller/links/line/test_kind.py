@@ -40,6 +40,13 @@ def test_limits_of_the_baud_rate(baud: int, good: bool) -> None:
             read_link(table)
 
 
+def test_when_checksums_are_demanded() -> None:
+    assert LineSettings(port="a").checksum == "latched"
+    assert read_link({"port": "a", "checksum": "required"}).own.checksum == "required"
+    with pytest.raises(ValueError, match="checksum"):
+        read_link({"port": "a", "checksum": "never"})
+
+
 def test_its_definition() -> None:
     assert (LINK.api, LINK.kind, LINK.settings) == (1, "line", LineSettings)
     assert str(read_link({"port": "simulated"})) == "line on simulated"

@@ -191,10 +191,12 @@ def test_a_fault_of_its_own_is_told_once_and_the_link_goes_on(
 
     monkeypatch.setattr(state, "live", broken)
     peer = Peer(port)
-    for faults in (1, 2):
-        peer.send(b"LIFE 1\n")
-        eventually(lambda faults=faults: link.faults == faults)
-    assert peer.ask("PING").ok
+    peer.send(b"PING a\nLIFE 1\n#2 LIFE 0\nPING b\n")
+    answers = [peer.next() for _ in range(4)]
+    assert [(reply.code, reply.tag) for reply in answers] == [(None, None), (31, None), (31, 2), (None, None)]
+    assert answers[1].text == "an error in omote, see its log: ZeroDivisionError: life is short"
+    assert (answers[0].text, answers[3].text) == ("PONG a", "PONG b")  # the fault costs no other line its answer
+    assert link.report()["faults"] == 2
     assert link.report()["last_fault"] == "ZeroDivisionError: life is short"
     assert caplog.text.count("goes on with the next line") == 1
 
@@ -209,5 +211,57 @@ def test_replies_beyond_the_buffer_are_dropped_whole_and_counted(port: HostPort,
     peer = Peer(port)
     answers = {peer.next("OK").text for _ in range(count - dropped)}
     assert len(answers) == 1 and answers.pop().split()[2:] == list(P.names)
+    assert link.report()["unanswered"] == dropped
     assert peer.ask("PING").text == "PONG"
-    assert link.report()["bytes_in"] == count * 16 + len(format_words(["PING"], tag=7, checked=True))
+    assert f" unanswered={dropped}" in peer.ask("STATUS").text + " "
+    assert link.report()["bytes_in"] == count * 16 + len(b"#7 STATUS*HH\n#7 PING*HH\n")
+
+
+def test_every_line_of_a_burst_is_answered_or_counted(port: HostPort, link: LineLink) -> None:
+    peer, count = Peer(port), 4000
+    for first in range(0, count, 500):
+        peer.send(b"".join(b"#%d PING\n" % i for i in range(first, first + 500)))
+    eventually(lambda: link.report()["accepted"] == count)
+    unanswered = link.report()["unanswered"]
+    assert isinstance(unanswered, int)
+    tags = [peer.next("OK").tag for _ in range(count - unanswered)]
+    assert tags == sorted(set(tags), key=lambda tag: tag or 0)
+    assert f"unanswered={unanswered}" in peer.ask("STATUS").text.split()
+
+
+def test_answers_that_a_lost_port_did_not_take_are_counted(tmp_path: Path, state: CommandState) -> None:
+    path = tmp_path / "robot"
+    first = HostPort(path)
+    with LineLink(str(path), 115200, state, retry_s=0.02) as link:
+        first.write(b"LIST PARAMETERS\n" * 120)  # more than a pseudo-terminal holds
+        eventually(lambda: link.report()["accepted"] == 120)
+        before = link.report()["unanswered"]
+        assert isinstance(before, int)
+        first.close()
+        eventually(lambda: not link.connected)
+        eventually(lambda: link.report()["unanswered"] > before)
+
+
+def test_a_stop_acts_before_the_lines_that_arrived_with_it(port: HostPort, state: CommandState) -> None:
+    seen: list[bool] = []
+    link = LineLink(port.path, 115200, state)
+    record, state.live = state.live, lambda amount, stamp_ns: seen.append(state.stop_latch.stopped is not None)  # type: ignore[method-assign]
+    link._serial.open()
+    port.write(b"LIFE 1\n" * 300 + b"STOP\n")  # there before the link reads for the first time
+    link._thread.start()
+    try:
+        peer = Peer(port)
+        answers = [peer.next().text for _ in range(301)]
+        assert answers == ["LIFE 1"] * 300 + ["STOP"] and seen == [True] * 300
+        assert state.stop_latch.stopped is not None and state.stop_latch.stopped.who == f"line {port.path}"
+    finally:
+        state.live = record  # type: ignore[method-assign]
+        link.stop()
+
+
+def test_the_setting_of_the_stage_reaches_the_link(port: HostPort, state: CommandState) -> None:
+    with LineLink(port.path, 115200, state, checksum="required"):
+        peer = Peer(port)
+        peer.send(b"PING\n")
+        assert peer.next().code == 13
+        assert peer.ask("PING").ok

@@ -25,6 +25,7 @@ from controller.links.line.protocol import (
     format_ok,
     format_pairs,
     format_words,
+    is_stop,
     number,
     parse_reply,
     parse_words,
@@ -111,8 +112,50 @@ def test_replies_round_trip_whatever_the_text(text: str, tag: int | None, checke
     line = format_ok(text, tag=tag, checked=checked)
     assert line.count(b"\n") == 1 and re.fullmatch(rb"[\x20-\x7e]*\n", line)
     reply = parse_reply(line[:-1])
-    assert reply is not None and reply.ok and (reply.tag, reply.checked) == (tag, checked)
-    assert len(reply.text) == len(text)
+    assert reply is not None and reply.ok and (reply.tag, reply.checked) == (tag, checked or "*" in text)
+    assert reply.text == re.sub(r"[^ -~]", "?", text)
+
+
+def test_an_error_of_several_lines_is_one_line_that_shows_what_was_typed() -> None:
+    error = LineError(Code.BUSY, "a.toml: 2 faults:\n  x: 2*3 is no number\n  y: missing\n")
+    body = b"ERR 30 a.toml: 2 faults: x: 2*3 is no number; y: missing"
+    assert format_error(error) == body + b"*%02X\n" % checksum(body)
+    reply = parse_reply(format_error(error)[:-1])
+    assert reply is not None and reply.text == "a.toml: 2 faults: x: 2*3 is no number; y: missing"
+    for damaged in (body, body + b"*00"):
+        with pytest.raises(LineError):
+            parse_reply(damaged)
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        (b"PING\x85", "byte 5 of the line is 0x85"),
+        (b"\x00PING", "byte 1 of the line is 0x00"),
+        (b"SET a*b 0*5A", "more than one * in the line"),
+        (b"SET jawOpen 0*5", "* must be followed by two hexadecimal digits"),
+    ],
+)
+def test_a_refusal_shows_what_was_typed(line: bytes, text: str) -> None:
+    with pytest.raises(LineError) as caught:
+        parse_words(line)
+    assert text in str(caught.value) and text.encode() in format_error(caught.value)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [b"STOP", b"stop", b"STOP*00", b"STOP *", b"STOP now", b"#1 STOP", b"# STOP", b"#12345678901 STOP",
+     b" \t STOP", b"\xff\x00STOP", b"STOP\xff", b"STOP\x00", b"#4\x80STOP*", b"STOP " + b"x" * 2000],
+)  # fmt: skip
+def test_a_line_that_begins_with_stop_is_one_whatever_else_is_in_it(line: bytes) -> None:
+    assert is_stop(line)
+
+
+@pytest.mark.parametrize(
+    "line", [b"", b"STOPPED", b"SHOW STOP", b"PING STOP", b"START", b"XSTOP", b"STO", b"#1 PING STOP"]
+)
+def test_other_lines_are_not(line: bytes) -> None:
+    assert not is_stop(line)
 
 
 def test_error_reply() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import FrozenInstanceError
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.links.line.script import Script, Wave, load_script
+from controller.links.line.script import Script, Wave, load_named_script, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
@@ -59,6 +60,43 @@ def test_scripts_by_name_and_path(tmp_path: Path) -> None:
         load_script("tuor", P)
 
 
+def write(path: Path, command: str = "PING") -> Path:
+    path.write_text(f'steps = ["0 {command}"]')
+    return path
+
+
+def test_a_robot_gets_scripts_of_the_stage_and_the_shipped_ones_by_name(tmp_path: Path) -> None:
+    stage = tmp_path / "stage.toml"
+    write(tmp_path / "own.toml")
+    for name in ("own", "own.toml"):
+        assert load_named_script(name, P, VOCABULARY, beside=stage).name == "own"
+    assert load_named_script("tour", P, VOCABULARY, beside=stage).steps == load_script("tour", P).steps
+    assert load_named_script("tour", P, VOCABULARY).steps
+    write(tmp_path / "tour.toml")
+    assert load_named_script("tour", P, VOCABULARY, beside=stage).steps == ((0.0, "PING"),)
+    (tmp_path / "other.toml").symlink_to(tmp_path / "own.toml")
+    assert load_named_script("other", P, VOCABULARY, beside=stage).steps
+
+
+def test_a_robot_gets_no_other_file(tmp_path: Path) -> None:
+    folder = tmp_path / "stage"
+    folder.mkdir()
+    (folder / "sub").mkdir()
+    for path in (tmp_path / "outside.toml", folder / "sub" / "inside.toml", folder / ".hidden.toml"):
+        write(path)
+    (folder / "away.toml").symlink_to(tmp_path / "outside.toml")
+    (folder / "folder.toml").mkdir()
+    os.mkfifo(folder / "pipe.toml")
+    names = [str(tmp_path / "outside.toml"), "/etc/passwd", "../outside", "../outside.toml", "sub/inside", "..", ".",
+             ".hidden", "away", "away.toml", "folder", "pipe", "", "a" * 300, "a" * 101, "a\0b", "a\nb", "..\\outside",
+             "~root", "nothing"]  # fmt: skip
+    for name in names:
+        with pytest.raises(ConfigError, match="no script"):
+            load_named_script(name, P, VOCABULARY, beside=folder / "stage.toml")
+    with pytest.raises(ConfigError, match="did you mean 'tour'"):
+        load_named_script("tuor", P, VOCABULARY)
+
+
 def test_in_a_wave_every_parameter_moves_every_frame_and_stays_in_range() -> None:
     wave = Wave(P)
     path = np.array([wave.at(i / 60) for i in range(1800)])
@@ -101,7 +139,9 @@ def test_a_script_of_ones_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("steps = ['inf PING']", "steps[0]: times must rise from 0"),
+        ("steps = ['inf PING']", "steps[0]: begins with a time in seconds"),
+        ("steps = ['1_0 PING']", "steps[0]: begins with a time in seconds"),
+        ("steps = ['0 START']", "steps[0]: START is not for scripts"),
         ("steps = ['-1 PING']", "steps[0]: times must rise from 0"),
         ("steps = ['0 EXPR smirk']", "steps[0]: unknown expression 'smirk'"),
         ("steps = [1]", "steps[0]: input should be a valid string (is 1)"),

@@ -7,11 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.base.errors import ControllerError
+from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.links.line.protocol import MAX_LINE, MAX_REPLY, Reply, checksum, format_words, parse_reply
+from controller.links.line.script import Script
 from controller.links.line.session import LineSession
+from controller.links.line.show import Shows
+from controller.vocabulary.vocabulary import Vocabulary
 
 SECOND = 10**9
 JAW = P.index("jawOpen")
@@ -206,3 +209,117 @@ def test_what_the_servos_show_is_told_and_streamed(talk: Talk) -> None:
     servos.known = False
     talk.now += SECOND
     assert talk.session.stream(talk.now) == b""
+
+
+def checked(line: str) -> str:
+    return format_words([line], checked=True).decode().strip()
+
+
+def test_a_link_that_had_a_checksum_takes_no_line_without_one(talk: Talk) -> None:
+    talk.session = LineSession(talk.state, 0, checksum="latched")
+    assert talk.say("SET tongueOut 0.3").ok  # a person at a terminal
+    assert talk.say(checked("SET tongueOut 0")).ok
+    damaged = checked("SET tongueOut 0").replace("*", ".")
+    assert damaged == "SET tongueOut 0.45"
+    reply = talk.say(damaged)
+    assert reply.code == 13 and "HELLO checksum=optional" in reply.text
+    assert talk.run(1.0)[P.index("tongueOut")] == pytest.approx(0.0, abs=1e-3)
+    assert talk.say("#4 PING").tag is None and talk.say("HELLO").code == 13 and talk.say("START").code == 13
+    assert talk.say("HELLO checksum=never").code == 21
+    assert talk.say("HELLO checksum=optional").text.endswith("checksum=optional")  # the way out that it names
+    assert talk.say(checked("PING")).ok and talk.say("PING").ok
+    assert talk.say("HELLO checksum=latched").ok and talk.say("PING").ok
+    assert talk.say(checked("SET nothing 1")).code == 23 and talk.say("PING").code == 13
+    assert talk.say(checked("HELLO checksum=latched")).ok and talk.say("PING").code == 13
+
+
+def test_a_link_that_demands_checksums_never_takes_a_line_without(talk: Talk) -> None:
+    talk.session = LineSession(talk.state, 0, checksum="required")
+    for line in ("PING", "HELLO", "HELLO checksum=optional", "START"):
+        reply = talk.say(line)
+        assert reply.code == 13 and "the stage's file requires" in reply.text and reply.checked
+    assert talk.say(checked("HELLO checksum=optional")) == Reply(
+        "ERR", "the stage's file requires checksums on this link", None, 30, True
+    )
+    assert talk.say(checked("HELLO checksum=required")).text.endswith("checksum=required")
+    assert talk.say("PING").code == 13 and talk.say(checked("PING")).ok
+
+
+def test_a_host_can_ask_for_checksums_and_a_person_can_end_that(talk: Talk) -> None:
+    assert talk.say("HELLO").text.endswith("checksum=optional") and talk.say(checked("PING")).ok
+    assert talk.say("PING").ok
+    assert talk.say("HELLO checksum=required").ok
+    assert "this link requires one" in talk.say("PING").text
+    assert talk.say("HELLO checksum=optional").ok and talk.say("PING").ok
+
+
+def test_stop_holds_until_start_and_is_reported(talk: Talk) -> None:
+    session, latch = LineSession(talk.state, 0, name="line /dev/tty ACM0"), talk.state.stop_latch
+    talk.session = session
+    assert "stopped=no" in talk.say("STATUS").text.split()
+    assert talk.say("#3 STOP") == Reply("OK", "STOP", 3)
+    assert latch.stopped is not None and latch.stopped.who == "line /dev/tty ACM0"
+    other = LineSession(talk.state, 0, name="line other")
+    assert other.feed(b"STOP\n", talk.now) == b"OK STOP\n" and latch.stopped.who == "line /dev/tty ACM0"
+    talk.say("SET jawOpen 0.5")
+    talk.run(1.25)
+    for text in (talk.say("STATUS").text, other.feed(b"STATUS\n", talk.now).decode()):
+        assert {"stopped=line_/dev/tty_ACM0", "stopped_s=1.25"} <= set(text.split())
+    assert talk.values[JAW] > 0.4  # the face goes on
+    assert talk.say("START").ok and latch.stopped is None and "stopped_s" not in talk.say("STATUS").text
+    assert talk.say("START").ok  # nothing had stopped them
+
+
+@pytest.mark.parametrize("mode", ["latched", "required"])
+@pytest.mark.parametrize(
+    "line", [b"STOP", b"STOP*00", b" STOP", b"#1234567890 STOP", b"\xff\x00STOP", b"STOP now", b"STOP*"]
+)
+def test_stop_is_never_refused(talk: Talk, mode: str, line: bytes) -> None:
+    session = LineSession(talk.state, 0, checksum=mode)
+    session.feed(checked("PING").encode() + b"\n", 0)
+    reply = parse_reply(session.feed(line + b"\n", 0).strip())
+    assert reply is not None and (reply.kind, reply.text) == ("OK", "STOP")
+    assert talk.state.stop_latch.stopped is not None
+    assert b"ERR 13" in session.feed(b"START\n", 0) and talk.state.stop_latch.stopped is not None
+
+
+def test_a_start_before_a_stop_in_one_read_never_lets_the_servos_go(talk: Talk) -> None:
+    latch = talk.state.stop_latch
+    replies = talk.session.feed(b"STOP\nSTART\nPING\nSTOP\n", 0).splitlines()
+    assert [reply.split()[0] for reply in replies] == [b"OK", b"ERR", b"OK", b"OK"]
+    assert b"a STOP follows" in replies[1] and latch.stopped is not None and latch.stops == 1
+    assert talk.session.feed(b"STOP\nSTART\n", 0) == b"OK STOP\nOK START\n" and latch.stopped is None
+
+
+def test_a_script_stops_under_its_own_name(talk: Talk) -> None:
+    session = LineSession(talk.state, 0, name="show tour", scripted=True)
+    assert session.feed(b"STOP\nSTART\n", 0).splitlines()[1].startswith(b"ERR 30 START is not for scripts")
+    assert "stopped=show_tour" in talk.say("STATUS").text
+
+
+def test_an_error_of_omote_in_a_stream_ends_the_stream_only(talk: Talk, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(out: np.ndarray) -> None:
+        raise ZeroDivisionError("no values")
+
+    talk.say("SUB 10")
+    monkeypatch.setattr(talk.state, "snapshot", broken)
+    assert talk.session.stream(talk.now) == b"" and talk.session.due_ns() is None
+    assert (talk.session.faults, talk.session.last_fault) == (1, "ZeroDivisionError: no values")
+    assert talk.say("PING").ok and talk.say("GET jawOpen").code == 31
+
+
+def test_a_file_that_is_wrong_refuses_the_line_that_needs_it(talk: Talk, monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong(self: Vocabulary, name: str) -> None:
+        raise ConfigError("facs.toml: 1 fault:\n  units: missing")
+
+    monkeypatch.setattr(Vocabulary, "__getitem__", wrong)
+    assert talk.say("#5 EXPR AU1") == Reply("ERR", "facs.toml: 1 fault: units: missing", 5, 30)
+    assert talk.session.faults == 0
+
+
+@pytest.mark.parametrize("to", ["1_0", "nan", "inf", "1e999"])
+def test_only_plain_numbers_are_times_of_a_show(talk: Talk, to: str) -> None:
+    script = Script(((0.0, "PING"), (50.0, "PING")), name="mine", marks={"end": 1.0})
+    talk.state.shows = Shows(lambda name: script, talk.state)
+    assert talk.say("SHOW mine").ok and talk.say("SHOW SEEK 10").ok
+    assert talk.say(f"SHOW SEEK {to}").kind == "ERR" and "show=mine@10" in talk.say("STATUS").text

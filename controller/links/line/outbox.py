@@ -1,0 +1,49 @@
+"""Keeps what a link has to send until there is room for it, and knows which lines of it are answers."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+LIMIT = 16_384
+"""Bytes that wait at most; a peer that does not read loses lines beyond it, whole ones."""
+
+
+class Outbox:
+    """Lines that wait to be sent, in order. Streamed lines never wait: they would be old when they are read."""
+
+    def __init__(self) -> None:
+        self._lines: deque[tuple[bytes, bool]] = deque()
+        self._size = 0
+
+    def __bool__(self) -> bool:
+        return bool(self._lines)
+
+    def add(self, line: bytes, *, answer: bool) -> bool:
+        """Take a line with its line end; False when there is no room for it."""
+        if self._size + len(line) > LIMIT or (self._lines and not answer):
+            return False
+        self._lines.append((line, answer))
+        self._size += len(line)
+        return True
+
+    def flush(self, put: Callable[[bytes], int]) -> int:
+        """Send what ``put`` takes without waiting; returns the number of bytes."""
+        if not self._lines:
+            return 0
+        sent = left = put(b"".join(line for line, _ in self._lines))
+        while left:
+            line, answer = self._lines.popleft()
+            if left < len(line):
+                self._lines.appendleft((line[left:], answer))
+                break
+            left -= len(line)
+        self._size -= sent
+        return sent
+
+    def clear(self) -> int:
+        """Discard everything; returns how many answers were not sent whole."""
+        lost = sum(answer for _, answer in self._lines)
+        self._lines.clear()
+        self._size = 0
+        return lost
