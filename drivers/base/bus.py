@@ -135,6 +135,7 @@ class BusReport:
     stray : replies discarded because they answer no request (late, duplicated, echo or noise).
     eeprom_writes : one line for every permanent register written.
     silent : ids that are not answering now.
+    not_driven : ids of servos that are sent no goals now, see ``Bus.driven``.
     """
 
     cycles: int = 0
@@ -147,6 +148,7 @@ class BusReport:
     stray: int = 0
     eeprom_writes: list[str] = field(default_factory=list)
     silent: tuple[int, ...] = ()
+    not_driven: tuple[int, ...] = ()
 
     def count(self, kind: str, servo_id: int | None = None) -> None:
         """Add one error of a kind, for a servo where one is concerned."""
@@ -192,6 +194,15 @@ class Bus(ABC):
     def running(self) -> bool:
         """True between a ``start`` that succeeded and ``stop``: motors may be on."""
 
+    @property
+    def driven(self) -> Flags:
+        """(n,) servos that are sent goals; all others keep still until it is known where they are.
+
+        A servo is not driven while its position is not known, or while it could not be started with the others. Then
+        its goals begin where it is, no faster than its top speed. Servos that measure nothing are always driven.
+        """
+        return read_only(np.ones(len(self.servos), bool))
+
     @abstractmethod
     def open(self) -> None:
         """Open the port; raises PortMissing, PortBusy or PortPermission. Nothing is sent."""
@@ -201,17 +212,20 @@ class Bus(ABC):
         """Look for servos by id; None asks all at once. Nothing moves."""
 
     @abstractmethod
-    def start(self) -> None:
+    def start(self, *, partly: bool = False) -> None:
         """Check every servo and switch the motors on at their present positions, without a movement.
 
         Raises NoReply, WrongModel, ServoFault, ServoRefused or CorruptReply, before anything moved; see ``servo_ids``.
+        With ``partly``, for servos that were started before, those that cannot be are left out (see :attr:`driven`) and
+        join when they can; it raises only where that is all of them.
         """
 
     @abstractmethod
     def write(self, angle_rad: ArrayLike) -> Floats:
         """Send targets (n,) rad, NaN to keep a servo's last one; returns what was sent after limits, (n,) read-only.
 
-        Raises PortLost where the port went away; see :meth:`reconnect`.
+        A servo that is not :attr:`driven` is sent nothing; its last goal is returned. Raises PortLost where the port
+        went away; see :meth:`reconnect`.
         """
 
     @abstractmethod
@@ -222,14 +236,15 @@ class Bus(ABC):
     def stop(self) -> None:
         """Switch every motor off, each by itself; does nothing when not running.
 
-        Raises NoReply after everything was tried; ``servo_ids`` are those not confirmed off.
+        Raises NoReply after everything was tried; ``servo_ids`` are those not confirmed off. A second call tries again.
         """
 
     @abstractmethod
     def reconnect(self) -> None:
         """Open the port again after PortLost, and start the servos again if they were running.
 
-        Raises PortMissing or BusError while it is unplugged or servos are missing; call again later.
+        Servos that cannot be started are left out, as by :meth:`start` with ``partly``. Raises PortMissing or BusError
+        while it is unplugged or no servo can be started; call again later.
         """
 
     @abstractmethod

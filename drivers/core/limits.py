@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivers.base.bus import BusReport, Floats, ServoSpec
+from drivers.base.bus import BusReport, Flags, Floats, ServoSpec
 
 BURST_S = 0.05
 """Time at top speed that the travel budget holds at most, so that uneven cycles lose no speed."""
@@ -38,18 +38,30 @@ class TargetLimits:
         self._last, self._budget = self.target.copy(), np.zeros_like(self.target)
         self._time_s = now_s
 
-    def reset_one(self, index: int, position_rad: float) -> None:
-        """Start one servo again from a position."""
+    def reset_one(self, index: int, position_rad: float, now_s: float) -> None:
+        """Start one servo again from a position; its travel budget grows from now on."""
         self.target[index] = self._last[index] = position_rad
-        self._budget[index] = 0.0
+        before_s = min(max(now_s - self._time_s, 0.0), BURST_S)  # will count as elapsed in the next step
+        self._budget[index] = -before_s * self._speed[index]
 
-    def apply(self, wanted_rad: Floats, now_s: float) -> Floats:
+    def apply(self, wanted_rad: Floats, now_s: float, driven: Flags | None = None) -> Floats:
         """Targets (n,) rad inside the angle limits and no further from the last ones than top speed allows.
 
-        A target that is no finite number keeps the last one. Time that goes backwards counts as none.
+        A target that is no finite number keeps the last one. Time that goes backwards counts as none. A servo that is
+        not ``driven`` (n,), None: all are, keeps its last target, wherever that is.
         """
         elapsed_s = min(max(now_s - self._time_s, 0.0), BURST_S)
         self._time_s = now_s
+        if driven is not None and not driven.all():
+            kept = self._last[~driven]
+            wanted_rad = np.where(driven, wanted_rad, np.clip(self._last, self._low, self._high))
+            self._step(wanted_rad, elapsed_s)
+            self.target[~driven] = self._last[~driven] = kept
+        else:
+            self._step(wanted_rad, elapsed_s)
+        return self._last.copy()
+
+    def _step(self, wanted_rad: Floats, elapsed_s: float) -> None:
         refused, clipped, shortened = self._limit(
             wanted_rad, self._low, self._high, self._speed, elapsed_s, BURST_S, self.target, self._budget, self._last
         )
@@ -57,4 +69,3 @@ class TargetLimits:
             self._report.refused_targets += refused
             self._report.limits_hit += clipped
             self._report.speed_limited += shortened
-        return self._last.copy()

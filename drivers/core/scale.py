@@ -50,6 +50,12 @@ class Scale:
         """Nearest step of each angle, not limited. ``(n,)`` finite -> ``(n,) int32``."""
         return np.rint(self._steps(angle_rad)).astype(np.int32)
 
+    def tick(self, index: int, angle_rad: float) -> int:
+        """Nearest step of one servo's angle, not limited."""
+        sign, zero_rad, center, rad_per_tick = self.axes[:, index].tolist()
+        sign, zero_rad, center, rad_per_tick = map(float, self.axes[:, index])
+        return round(center + (zero_rad + sign * angle_rad) / rad_per_tick)
+
     def radians(self, ticks: NDArray[np.integer] | Floats) -> Floats:
         """Angle of each step, ``(n,) -> (n,) float64``."""
         angle: Floats = self.sign * ((ticks - self.center) * self.rad_per_tick - self.zero_rad)

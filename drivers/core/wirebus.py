@@ -1,4 +1,4 @@
-"""Base class of all drivers on one port: loss of the port and reconnecting, target limits, and a safe stop.
+"""Base class of all drivers on one port: loss of the port and reconnecting, absent servos, target limits, a safe stop.
 
 A family implements hooks that open its port and start, drive, read and switch off its servos.
 """
@@ -9,20 +9,24 @@ import copy
 import logging
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from drivers.base.bus import Bus, BusReport, BusState, Floats, ServoSpec, frozen
-from drivers.base.errors import BusError, DriverError, PortLost
+from drivers.base.bus import Bus, BusReport, BusState, Flags, Floats, ServoSpec, frozen
+from drivers.base.errors import BusError, DriverError, PortLost, merge_errors
 from drivers.core.limits import TargetLimits
+from drivers.core.presence import Presence
 
 log = logging.getLogger(__name__)
 
 E = TypeVar("E", bound=DriverError)
+
+JOIN_S = 1.0
+"""Time between two attempts to start servos that were left out, one of them at a time."""
 
 
 class WireBus(Bus):
@@ -33,7 +37,11 @@ class WireBus(Bus):
         self._clock = clock
         self._report = BusReport()
         self._limits = TargetLimits(self.servos, self._report)
+        self._presence = Presence(len(self.servos))
+        self._reasons: dict[int, BusError] = {}  # why servos were left out, by index
+        self._join_s, self._tried = 0.0, -1
         self._running = False
+        self._unconfirmed = False  # servos may be on although the bus was stopped
         self._lost = False
 
     @property
@@ -57,9 +65,23 @@ class WireBus(Bus):
     def _bring_up(self) -> Floats:
         """Check every servo, switch it on at its present position, and return these (n,) rad; see :meth:`Bus.start`."""
 
+    def _bring_back(self) -> Floats:
+        """As :meth:`_bring_up`, but NaN for servos that cannot be started, with ``_leave_out`` called for each.
+
+        For servos that ran already in this run. By default as many as a start needs: all of them.
+        """
+        return self._bring_up()
+
+    def _join(self, index: int) -> float:
+        """Start a servo that was left out, where it is (rad); raises BusError where that is not safe."""
+        raise BusError("this bus leaves no servo out")
+
     @abstractmethod
     def _send(self, angle_rad: Floats) -> Floats:
-        """Send goals (n,) rad that passed the limits; returns them rounded to the servos' steps, (n,) rad."""
+        """Send goals (n,) rad that passed the limits; returns them rounded to the servos' steps, (n,) rad.
+
+        Nothing may be sent to servos that are not in :attr:`driven`.
+        """
 
     @abstractmethod
     def _ask(self) -> BusState:
@@ -76,6 +98,15 @@ class WireBus(Bus):
     def running(self) -> bool:
         return self._running
 
+    @property
+    def driven(self) -> Flags:
+        return self._presence.driven
+
+    @property
+    def _reads_a_turn(self) -> int:
+        """Reads within which every servo is asked for its position."""
+        return 1
+
     def open(self) -> None:
         self._open_link()
         self._lost = False
@@ -83,14 +114,15 @@ class WireBus(Bus):
     def reconnect(self) -> None:
         """Open the port again and, if the bus was running, start from the servos' present positions.
 
-        When that fails the bus stays lost and sends no goals; call again later.
+        Servos that cannot be started are left out and join later, see :meth:`Bus.start`. When all of them fail, the bus
+        stays lost and sends no goals; call again later.
         """
         self._close_link()
         self.open()
         if not self._running:
             return
         try:
-            self._start()
+            self._start(partly=True)
         except BaseException:
             self._lost = True
             self._close_link()
@@ -126,19 +158,30 @@ class WireBus(Bus):
         self._report.count("port_lost")
         log.error("port %s went away", self.path)
 
-    def start(self) -> None:
+    def start(self, *, partly: bool = False) -> None:
         if not self._running:
-            self._start()
+            self._start(partly)
 
-    def _start(self) -> None:
+    def _start(self, partly: bool = False) -> None:
         with self._losing():
-            self._limits.reset(self._bring_up(), self._clock())
-            self._running = True
+            self._begin_driving(self._bring_back() if partly else self._bring_up())
+            if not self._presence.driven.any():
+                self._running = False
+                raise merge_errors(self._reasons)
+
+    def _begin_driving(self, here_rad: Floats) -> None:
+        """Drive servos from where they are, (n,) rad; NaN for one that is left out."""
+        started = np.isfinite(here_rad)
+        self._reasons = {index: why for index, why in self._reasons.items() if not started[index]}
+        self._limits.reset(np.where(started, here_rad, 0.0), self._clock())
+        self._presence.reset(started)
+        self._join_s = self._clock() + JOIN_S
+        self._running = True
 
     def stop(self) -> None:
-        if not self._running:
+        if not self._running and not self._unconfirmed:
             return
-        self._running = False
+        self._running, self._unconfirmed = False, True
         if self._lost:  # the adapter may be back
             try:
                 self.reconnect()
@@ -147,6 +190,7 @@ class WireBus(Bus):
                 raise self._error(PortLost, message, "switch the servos' power off") from error
         with self._losing():
             self._switch_off()
+        self._unconfirmed = False
 
     def write(self, angle_rad: ArrayLike) -> Floats:
         """As :meth:`drivers.base.bus.Bus.write`; raises ValueError for not n angles, BusError when not started."""
@@ -159,7 +203,7 @@ class WireBus(Bus):
         try:
             now = self._clock()
             self._settle(now)
-            sent = self._send(self._limits.apply(wanted, now))
+            sent = self._send(self._limits.apply(wanted, now, self.driven))
         except PortLost:
             self._note_loss()
             raise
@@ -171,11 +215,58 @@ class WireBus(Bus):
         try:
             self._settle(self._clock())
             state = self._ask()
+            if self._running and self.measures:
+                self._follow(state)
         except PortLost:
             self._note_loss()
             raise
         self._report.cycles += 1
         return state
 
+    def _follow(self, state: BusState) -> None:
+        """Drive only servos whose positions are known, each from where it is; see :mod:`drivers.core.presence`."""
+        for index in self._presence.note(state, self._reads_a_turn):
+            self._begin_at(index, float(state.position_rad[index]))
+        if self._presence.left_out.any() and self._clock() >= self._join_s:
+            self._let_join(np.flatnonzero(self._presence.left_out & ~state.silent).tolist())
+
+    def _begin_at(self, index: int, angle_rad: float) -> None:
+        """Let the goals of one servo begin at a position."""
+        self._limits.reset_one(index, angle_rad, self._clock())
+
+    def _let_join(self, waiting: Sequence[int]) -> None:
+        """Try to start one of the servos that were left out and answer, each in its turn."""
+        self._join_s = self._clock() + JOIN_S
+        if not waiting:
+            return
+        index = min(waiting, key=lambda each: (each <= self._tried, each))
+        self._tried = index
+        try:
+            here = self._join(index)
+        except BusError as error:
+            self._leave_out(index, error)
+            return
+        self._drive_again(index, here)
+
+    def _drive_again(self, index: int, angle_rad: float) -> None:
+        """Drive a servo that was started by itself, from where it is."""
+        self._begin_at(index, angle_rad)
+        self._presence.join(index)
+        if self._reasons.pop(index, None) is not None:
+            log.warning("servo %s is driven again", self._label(index))
+
+    def _leave_out(self, index: int, why: BusError) -> None:
+        """Keep, and log where it is new, why a servo cannot be started with the others."""
+        before = self._reasons.get(index)
+        self._reasons[index] = why
+        if before is None or str(before) != str(why):
+            log.warning("servo %s is left out, the others go on: %s (%s)", self._label(index), why, why.hint)
+
+    def _label(self, index: int) -> str:
+        """The name of a servo in messages."""
+        return f'"{self.servos[index].name}" (id {self.ids[index]}) on {self.path}'
+
     def report(self) -> BusReport:
+        away = np.flatnonzero(~self.driven) if self._running else ()
+        self._report.not_driven = tuple(sorted(self.ids[index] for index in away))
         return copy.deepcopy(self._report)

@@ -48,6 +48,7 @@ class DynamixelBus(ServoBus):
     Raises DriverError for an unknown model or an option that does not fit.
     """
 
+    policy: Policy
     _port: Port
     _registers: Registers
     _telemetry: Telemetry
@@ -75,7 +76,6 @@ class DynamixelBus(ServoBus):
         self._may_map = indirect and feedback == "full"
         self._group({})
         self._remapped: Counter[int] = Counter()
-        self._goals = np.zeros(len(self.ids), np.int32)
         self._heard_s = 0.0
 
     # ------------------------------------------------------------------ looking, starting, stopping
@@ -90,35 +90,30 @@ class DynamixelBus(ServoBus):
                 found = {i: reply.params for replies in answers for i, reply in replies.items()}
             return [self._info(i, params[0] | params[1] << 8, params[2]) for i, params in sorted(found.items())]
 
-    def _startup(self) -> Startup:
-        return Startup(self._registers, self.policy, self._may_map)
+    def _startup(self, policy: Policy | None = None) -> Startup:
+        return Startup(self._registers, policy or self.policy, self._may_map)
 
     def _group(self, mapped: Mapping[int, Block]) -> None:
         self._mapped = dict(mapped)
         self._telemetry.rebuild(mapped)
 
-    def _bring_up(self) -> Floats:
-        here = super()._bring_up()
+    def _started(self, started: Started) -> Floats:
+        here = super()._started(started)
         self._remapped.clear()
         self._heard_s = self._clock()
         return here
 
     def _use(self, started: Started) -> None:
         self._use_map(self._mapped | started.mapped)
+        self._telemetry.tripped.difference_update(started.ticks)
         super()._use(started)
-        for servo, ticks in started.ticks.items():
-            self._goals[self.ids.index(servo)] = ticks
-
-    def _hold(self, index: int, ticks: int) -> None:
-        self._goals[index] = ticks
-        super()._hold(index, ticks)
 
     # ------------------------------------------------------------------ every cycle
 
     def _send(self, angle_rad: Floats) -> Floats:
         """One sync write of all goals, inside the servos' own limits too."""
         sent = self.scale.goals(angle_rad, self._goals)
-        self._telemetry.send_goals(self._goals)
+        self._telemetry.send_goals(self._goals, self.driven)
         return sent
 
     def _settle(self, now: float) -> None:
@@ -153,10 +148,11 @@ class DynamixelBus(ServoBus):
 
     def _clear_watchdogs(self) -> None:
         """Clear tripped watchdogs with the goal where the servo is, so that nothing jumps."""
-        for servo in sorted(self._telemetry.tripped):
+        left_out = {self.ids[index] for index in np.flatnonzero(self._presence.left_out)}
+        for servo in sorted(self._telemetry.tripped - left_out):
             try:
                 self._registers.put(servo, "watchdog", 0, tries=1)
-                goal = self._startup().goals_at_present([servo])[servo]
+                goal = self._startup().goals_at_present([servo], held=[servo])[servo]
                 self._registers.put(servo, "goal", goal, tries=1)
                 self._registers.put(servo, "watchdog", self.policy.watchdog_steps, tries=1)
             except PortLost:
@@ -165,4 +161,5 @@ class DynamixelBus(ServoBus):
                 log.warning("watchdog not cleared yet: %s", error)  # and not forgotten: its register may read 0 now
                 continue
             self._telemetry.tripped.discard(servo)
-            self._hold(self.ids.index(servo), goal)
+            index = self.ids.index(servo)
+            self._begin_at(index, self._radians(index, goal))

@@ -104,6 +104,25 @@ class MixedBus(WireBus):
             here[index] = half._limits.target
         return here
 
+    def _bring_back(self) -> Floats:
+        """Both halves, each with the servos that can be started."""
+        here = np.full(len(self.ids), np.nan)
+        for half, index in zip(self._halves, self._index, strict=True):
+            with half._losing():
+                half._begin_driving(half._bring_back())
+            here[index] = np.where(half.driven, half._limits.target, np.nan)
+            self._reasons |= {int(index[at]): why for at, why in half._reasons.items()}
+        return here
+
+    def _join(self, index: int) -> float:
+        """Where a servo is that its half has started again."""
+        for half, places in zip(self._halves, self._index, strict=True):
+            if index in places:
+                at = half.ids.index(self.ids[index])
+                if half.driven[at]:
+                    return float(half._limits.target[at])
+        raise self._reasons[index]
+
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that switched off or were rebooted; see the drivers of both protocols."""
         with self._losing():
@@ -113,7 +132,7 @@ class MixedBus(WireBus):
                     continue
                 half.recover(chosen)
                 for servo in chosen:
-                    self._limits.reset_one(self.ids.index(servo), half._limits.target[half.ids.index(servo)])
+                    self._drive_again(self.ids.index(servo), half._limits.target[half.ids.index(servo)])
 
     def _switch_off(self) -> None:
         failed = self._stop_halves()
@@ -140,8 +159,12 @@ class MixedBus(WireBus):
     def _send(self, angle_rad: Floats) -> Floats:
         sent = np.empty(len(self.ids))
         for half, index in zip(self._halves, self._index, strict=True):
-            sent[index] = half.write(angle_rad[index])
+            sent[index] = half.write(np.where(self.driven[index], angle_rad[index], np.nan))
         return sent
+
+    @property
+    def _reads_a_turn(self) -> int:
+        return max(half._reads_a_turn for half in self._halves)
 
     def _ask(self) -> BusState:
         states = [half.read() for half in self._halves]

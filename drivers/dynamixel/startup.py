@@ -19,6 +19,7 @@ WATCHDOG_STEP_S = 0.02
 INPUT_VOLTAGE = 0x01
 REVERSE, TIME_PROFILE, TORQUE_BY_GOAL = 0x01, 0x04, 0x08
 OUT_OF_TURN_TICKS = 64
+MAX_OFFSET = 1024
 BOOT_S = 1.0
 EEPROM_TRIES = 10
 
@@ -38,7 +39,10 @@ class Policy(startup.Policy):
 class Startup(startup.Startup[StatusPacket]):
     """Start-up and stop sequence; `indirect` maps registers side by side where the models have indirect addressing."""
 
-    out_of_turn_hint = "clear its homing offset and turn count: switch its power off and on"
+    out_of_turn_hint = (
+        "turn it back by hand; if that does not help, clear its homing offset, and switch its power off and on, which "
+        "clears its turn count"
+    )
     not_on_hint = "switch their power off and on, or start with reboot_faulted=true"
     not_off_hint = "switch the servos' power off; their watchdog stops them when it is armed"
 
@@ -57,6 +61,15 @@ class Startup(startup.Startup[StatusPacket]):
 
     def _slack(self, turn: int) -> float:
         return OUT_OF_TURN_TICKS
+
+    def _first_steps(self, ids: Sequence[int]) -> Mapping[int, int]:
+        """Switched on, a servo counts within the turn that begins at its homing offset, however far it was turned.
+
+        A limp servo that was turned to -30 is at 4066 then, and a goal at 0 would spin it. Source: e-Manual, Present
+        Position (132). Offsets beyond `MAX_OFFSET` do not act in position mode.
+        """
+        offsets = self.registers.get_all(ids, "offset")
+        return {servo: offset for servo, offset in offsets.items() if abs(offset) <= MAX_OFFSET}
 
     def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
         latched = self.registers.get_all(ids, "hardware")

@@ -16,7 +16,7 @@ from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Got, Packets, group_read
 from drivers.servos import telemetry
 from drivers.servos.exchange import Exchange
-from drivers.servos.layout import Block, ReadRequest, block_of
+from drivers.servos.layout import Block, Group, ReadRequest, block_of
 from drivers.servos.telemetry import Octets, Values
 from drivers.tables.tables import TRIPPED
 
@@ -43,6 +43,7 @@ class Telemetry(telemetry.Telemetry):
     ) -> None:
         super().__init__(registers, ids, report, slow_group)
         self._feedback, self._may_be_fast = feedback, fast
+        self._goals: list[GoalFrame] = []
         self.tripped: set[int] = set()
         self.unmapped: set[int] = set()
 
@@ -53,8 +54,7 @@ class Telemetry(telemetry.Telemetry):
         """
         tables = self._registers.tables
         self._regroup([layout_of(tables[servo], self._feedback, indirect.get(servo)) for servo in self.ids])
-        goals = [(group, group.layout.goal) for group in self._groups]
-        self._goals = [GoalFrame(group.ids, goal.address, goal.size, group.index) for group, goal in goals]
+        self._driven: Flags | None = None
         self._feedbacks = [ReadRequest(group, group.layout.feedback, group.ids) for group in self._groups]
         self._fast = self._may_be_fast and all(table.fast_read for table in tables.values())
         self._joint_failures = 0
@@ -62,9 +62,13 @@ class Telemetry(telemetry.Telemetry):
         self.tripped.clear()
         self.unmapped.clear()
 
-    def send_goals(self, ticks: Ticks) -> None:
-        """One sync write per group, all written at once. ``(n,)`` steps."""
-        self._packets.send_only(self._port, b"".join([goals.encode(ticks) for goals in self._goals]))
+    def send_goals(self, ticks: Ticks, driven: Flags) -> None:
+        """One sync write per group to the servos that are driven, all written at once. ``(n,)`` steps, and flags."""
+        if driven is not self._driven:
+            self._driven = driven
+            self._goals = [_goal_frame(group, driven) for group in self._groups if driven[group.index].any()]
+        if self._goals:
+            self._packets.send_only(self._port, b"".join([goals.encode(ticks) for goals in self._goals]))
 
     def ask_watchdogs(self, clock: Callable[[], float]) -> None:
         """Read every servo's watchdog now."""
@@ -144,6 +148,13 @@ class Telemetry(telemetry.Telemetry):
                 self.report.count("reset", servo)
                 self._log("servo %s was rebooted or without power", self._registers.label(servo))
         return mapped
+
+
+def _goal_frame(group: Group, driven: Flags) -> GoalFrame:
+    """The sync write of goals to those servos of a group that are driven."""
+    chosen, goal = driven[group.index], group.layout.goal
+    ids = np.array(group.ids)[chosen].tolist()
+    return GoalFrame(ids, goal.address, goal.size, group.index[chosen])
 
 
 def _runs(requests: Iterable[ReadRequest]) -> tuple[Run, ...]:

@@ -13,8 +13,6 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
-import numpy as np
-
 from drivers.base.bus import BusState, Flags, Floats, ServoInfo, ServoSpec, frozen
 from drivers.base.errors import DriverError
 from drivers.core.dead_man_switch import DeadManSwitch
@@ -54,6 +52,7 @@ class Protocol1Bus(ServoBus):
     Raises DriverError for an unknown model or an option that does not fit.
     """
 
+    policy: Policy
     _registers: Registers
     _telemetry: Telemetry
 
@@ -107,8 +106,8 @@ class Protocol1Bus(ServoBus):
             return configured
         return load_table(number)
 
-    def _startup(self) -> Startup:
-        return Startup(self._registers, self.policy)
+    def _startup(self, policy: Policy | None = None) -> Startup:
+        return Startup(self._registers, policy or self.policy)
 
     def _group(self, mapped: Mapping[int, Block]) -> None:
         self._telemetry.rebuild({servo.id: startup.speed_steps(servo, self._registers) for servo in self.servos})
@@ -156,9 +155,13 @@ class Protocol1Bus(ServoBus):
 
     def _send(self, angle_rad: Floats) -> Floats:
         """Sync writes of all goals, inside the servos' own limits too."""
-        ticks = np.minimum(np.maximum(self.scale.ticks(angle_rad), self.scale.low), self.scale.high)
-        self._telemetry.send_goals(ticks)
-        return self.scale.radians(ticks)
+        sent = self.scale.goals(angle_rad, self._goals)
+        self._telemetry.send_goals(self._goals, self.driven)
+        return sent
+
+    @property
+    def _reads_a_turn(self) -> int:
+        return self._telemetry.turn
 
     def _ask(self) -> BusState:
         return self._telemetry.cycle(self._clock, self._running, self.scale)

@@ -63,7 +63,9 @@ def speed_steps(servo: ServoSpec, registers: Registers) -> int:
 class Startup(startup.Startup[Packet1]):
     """Start-up and stop sequence; parameters as for :class:`~drivers.servos.startup.Startup`."""
 
-    out_of_turn_hint = "clear its offset and turn count: switch its power off and on"
+    out_of_turn_hint = (
+        "turn it back by hand; where that does not help, clear its offset and switch its power off and on"
+    )
     not_on_hint = "switch their power off and on"
     not_off_hint = "switch the servos' power off: they have no watchdog that would"
 
@@ -112,9 +114,9 @@ class Startup(startup.Startup[Packet1]):
             raise self.fault("report", self._faulted)
         return ()
 
-    def torque_on(self, ids: Sequence[int]) -> None:
+    def torque_on(self, ids: Sequence[int], held: Sequence[int]) -> None:
         """Switch torque on, and see whether servos that had shut down stay on."""
-        super().torque_on(ids)
+        super().torque_on(ids, held)
         if self._faulted:
             self.registers.port.sleep(RELAPSE_S)  # a cause that persists shuts it down again
             self.registers.get_all(ids, "voltage")

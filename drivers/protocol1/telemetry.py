@@ -74,10 +74,19 @@ class Telemetry(telemetry.Telemetry):
         self._goals = [GoalRows(group, [speeds[servo] for servo in group.ids]) for group in self._groups]
         self._next_single = dict.fromkeys(self._groups, 0)
 
-    def send_goals(self, ticks: Ticks) -> None:
-        """One sync write per group, ``(n,)`` steps; none to servos whose torque is off: it could switch them on."""
+    @property
+    def turn(self) -> int:
+        """Cycles in which the position of every servo is read once."""
+        singles = [len(group.ids) for group in self._groups if not group.layout.manner]
+        return -(-max(singles, default=1) // self._singles)
+
+    def send_goals(self, ticks: Ticks, driven: Flags) -> None:
+        """One sync write per group to the servos that are driven, ``(n,)`` steps, and flags.
+
+        None to servos whose torque is off: it could switch them on.
+        """
         for goals in self._goals:
-            if rows := goals.encode(ticks, self._torque):
+            if rows := goals.encode(ticks, self._torque & driven):
                 self._packets.write_group(self._port, goals.block.address, goals.block.size, rows)
 
     def _read_feedback(self, clock: Callable[[], float], running: bool, scale: Scale) -> BusState | None:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from drivers.base.bus import BusReport, Floats, ServoInfo
+from drivers.base.bus import BusReport, Floats, ServoInfo, ServoSpec
+from drivers.base.errors import BusError
 from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
 from drivers.servos.layout import Block
 from drivers.servos.port import Port
 from drivers.servos.registers import Registers
-from drivers.servos.startup import Started, Startup
+from drivers.servos.startup import Policy, Started, Startup
 from drivers.servos.telemetry import Telemetry
 from drivers.tables.tables import ControlTable, load_table
 
@@ -28,12 +30,13 @@ class ServoBus(WireBus):
     _port: Port
     _registers: Registers[Any]
     _telemetry: Telemetry
+    policy: Policy
 
     # ------------------------------------------------------------------ hooks
 
     @abstractmethod
-    def _startup(self) -> Startup[Any]:
-        """The start-up and stop sequence of the protocol."""
+    def _startup(self, policy: Any = None) -> Startup[Any]:
+        """The start-up and stop sequence of the protocol, with the bus's policy by default."""
 
     @abstractmethod
     def _group(self, mapped: Mapping[int, Block]) -> None:
@@ -74,34 +77,71 @@ class ServoBus(WireBus):
 
     def _bring_up(self) -> Floats:
         self._port.suspects.clear()
-        startup = self._startup()
-        startup.identify(self.servos)
+        return self._started(self._start_all(self.servos, self._startup()))
+
+    def _bring_back(self) -> Floats:
+        """Start as many servos as can be, and leave out those that an error names."""
+        self._port.suspects.clear()
+        chosen = list(self.servos)
+        while chosen:
+            try:
+                return self._started(self._start_all(chosen, self._startup(self._again(self.policy.reboot_faulted))))
+            except BusError as error:
+                named = [servo for servo in chosen if servo.id in error.servo_ids] or chosen
+                for servo in named:
+                    self._leave_out(self.ids.index(servo.id), error)
+                chosen = [servo for servo in chosen if servo not in named]
+        return self._started(Started())
+
+    def _again(self, reboot_faulted: bool) -> Policy:
+        """The policy for servos that ran already: they may hold, and the others do not wait for them."""
+        return replace(self.policy, takeover="adopt", voltage_wait_s=0.0, reboot_faulted=reboot_faulted, partly=True)
+
+    def _start_all(self, servos: Sequence[ServoSpec], startup: Startup[Any]) -> Started:
+        startup.identify(servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         self._identified()
-        started = startup.bring_up(self.servos)
+        return startup.bring_up(servos)
+
+    def _started(self, started: Started) -> Floats:
+        """Keep what start-up found and did; returns where the servos are, (n,) rad, NaN for those not started."""
         self._group(started.mapped)
         self._use(started)
-        return self.scale.radians(np.array([started.ticks[servo] for servo in self.ids]))
+        here = np.array([started.ticks.get(servo, np.nan) for servo in self.ids])
+        return self.scale.radians(here)
+
+    def _join(self, index: int) -> float:
+        """Start one servo, without a reboot: the others would have to wait for it."""
+        servo = self.ids[index]
+        started = self._start_again([self.servos[index]], self._startup(self._again(reboot_faulted=False)))
+        return self._radians(index, started.ticks[servo])
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that switched off or were rebooted, where they are; ``ids`` None means all of them.
 
         Raises BusError where one stays off; see the policy of the family's start-up for what is allowed.
         """
-        chosen = [servo for servo in self.servos if ids is None or servo.id in ids]
         with self._losing():
-            startup = self._startup()
-            startup.identify(chosen)
-            started = startup.bring_up(chosen)
-            self._use(started)
+            started = self._start_again([servo for servo in self.servos if ids is None or servo.id in ids])
             for servo, ticks in started.ticks.items():
-                self._hold(self.ids.index(servo), ticks)
+                index = self.ids.index(servo)
+                self._drive_again(index, self._radians(index, ticks))
+
+    def _start_again(self, chosen: Sequence[ServoSpec], startup: Startup[Any] | None = None) -> Started:
+        """Start some servos of a running bus."""
+        startup = startup or self._startup()
+        startup.identify(chosen)
+        started = startup.bring_up(chosen)
+        self._use(started)
+        return started
 
     def _use(self, started: Started) -> None:
         """Keep what start-up found and did."""
         self._report.eeprom_writes += started.eeprom
         for servo, (low, high) in started.limits.items():
             self.scale.narrow(self.ids.index(servo), low, high)
+        for servo, ticks in started.ticks.items():
+            self._goals[self.ids.index(servo)] = ticks
         self._telemetry.started(list(started.ticks))
 
     def _switch_off(self) -> None:
@@ -111,12 +151,15 @@ class ServoBus(WireBus):
         """Use these control tables, in the order of the servos."""
         self._registers.tables = dict(zip(self.ids, tables, strict=True))
         self.scale = Scale(self.servos, tables)
+        self._goals = np.zeros(len(self.ids), np.int32)
 
-    def _hold(self, index: int, ticks: int) -> None:
-        """Let the goals of one servo begin at a position."""
-        full = np.zeros(len(self.ids))
-        full[index] = ticks
-        self._limits.reset_one(index, float(self.scale.radians(full)[index]))
+    def _begin_at(self, index: int, angle_rad: float) -> None:
+        super()._begin_at(index, angle_rad)
+        self._goals[index] = self.scale.tick(index, angle_rad)
+
+    def _radians(self, index: int, ticks: int) -> float:
+        """The angle of one servo at a step."""
+        return float(self.scale.radians(np.full(len(self.ids), ticks))[index])
 
     def report(self) -> BusReport:
         self._report.stray = self._port.stray

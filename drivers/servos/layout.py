@@ -30,6 +30,7 @@ NAMES = {
     "accel": ("Goal Acceleration", "Acceleration"),
     "speed_limit": ("Profile Velocity", "Moving Speed"),
     "accel_limit": ("Profile Acceleration",),
+    "offset": ("Homing Offset",),
     "min_ticks": ("Min Position Limit", "CW Angle Limit"),
     "max_ticks": ("Max Position Limit", "CCW Angle Limit"),
     "min_voltage": ("Min Voltage Limit",),

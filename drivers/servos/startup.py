@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import ClassVar, Generic
 
@@ -34,12 +35,14 @@ class Policy:
     reboot_faulted : reboot servos that had shut down for a hardware error; they have no torque meanwhile.
     min_voltage_v : wait until every servo has at least this supply; None takes each servo's own limit.
     voltage_wait_s : how long to wait for it.
+    partly : where some servos do not come on, the others keep their torque.
     """
 
     takeover: str = "adopt"
     reboot_faulted: bool = False
     min_voltage_v: float | None = None
     voltage_wait_s: float = 30.0
+    partly: bool = False
 
     def __post_init__(self) -> None:
         if self.takeover not in ("adopt", "release", "refuse"):
@@ -117,7 +120,11 @@ class Startup(ABC, Generic[R]):
 
     @abstractmethod
     def _slack(self, turn: int) -> float:
-        """Steps that a position may lie outside of a turn of so many."""
+        """Steps that the position of a servo that holds may lie outside of a turn of so many."""
+
+    def _first_steps(self, ids: Sequence[int]) -> Mapping[int, int]:
+        """First step of the turn in which servos that are off count once they are on, by id; 0 where it is missing."""
+        return {}
 
     @abstractmethod
     def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
@@ -151,7 +158,8 @@ class Startup(ABC, Generic[R]):
     def bring_up(self, servos: Sequence[ServoSpec]) -> Started:
         """Start identified servos where they are.
 
-        Raises BusError where that is not safe; torque was switched off again where it had been switched on.
+        Raises BusError where that is not safe; torque was switched off again where it had been switched on, with the
+        policy ``partly`` only of the servos that the error names.
         """
         ids = [servo.id for servo in servos]
         held = self.take_over(ids)
@@ -163,11 +171,19 @@ class Startup(ABC, Generic[R]):
         self.started.limits = {servo: (low[servo], high[servo]) for servo in low}
         self._prepare(servos)
         try:
-            self.torque_on(ids)
-        except BaseException:
-            self.switch_off(ids)
+            self.torque_on(ids, [servo for servo in held if servo not in rebooted])
+        except BaseException as error:
+            self._back_out(ids, error)
             raise
         return self.started
+
+    def _back_out(self, ids: Sequence[int], error: BaseException) -> None:
+        """Switch off what was switched on before an error."""
+        if not self.policy.partly or not isinstance(error, BusError):
+            self.switch_off(ids)
+            return
+        with suppress(NoReply):  # the first error names them too
+            self.switch_off([servo for servo in ids if servo in error.servo_ids] or ids)
 
     def take_over(self, ids: Sequence[int]) -> list[int]:
         """Servos whose torque is on and stays on. Raises ServoRefused: some hold, and that is not allowed."""
@@ -227,13 +243,14 @@ class Startup(ABC, Generic[R]):
         self.started.eeprom.append(line)
         log.info("permanent setting written: %s", line)
 
-    def torque_on(self, ids: Sequence[int]) -> None:
+    def torque_on(self, ids: Sequence[int], held: Sequence[int]) -> None:
         """Write goals at the present positions, right before torque; then switch torque on and read it back.
 
-        Raises ServoFault: a motor did not come on, or a position is not within one turn.
+        ``held`` are the servos whose torque is on already. Raises ServoFault: a motor did not come on, or a position is
+        not within one turn.
         """
         registers = self.registers
-        registers.set_all(self.goals_at_present(ids), "goal")
+        registers.set_all(self.goals_at_present(ids, held), "goal")
         registers.put_all(dict.fromkeys(ids, 1), "torque")
         off = [servo for servo, torque in registers.get_all(ids, "torque").items() if torque != 1]
         if off:
@@ -244,22 +261,27 @@ class Startup(ABC, Generic[R]):
             )
         self.started.ticks = registers.get_all(ids, "position")
 
-    def goals_at_present(self, ids: Sequence[int]) -> dict[int, int]:
-        """The goal by id that keeps every servo where it is.
+    def goals_at_present(self, ids: Sequence[int], held: Sequence[int]) -> dict[int, int]:
+        """The goal by id that keeps every servo where it is; ``held`` are those whose torque is on.
 
         Raises ServoFault: a position is not within one turn, so a goal there could spin the servo.
         """
-        goals = {}
+        goals, far = {}, {}
+        firsts = self._first_steps([servo for servo in ids if servo not in held])
         for servo, value in self.registers.get_all(ids, "position").items():
             turn = self.registers.tables[servo].ticks_per_turn
-            slack = self._slack(turn)
-            if not -slack <= value < turn + slack:
-                where = f"outside one turn of {turn} steps"
-                message = f"servo {self.registers.label(servo)} reads position {value}, {where}"
-                raise self.registers.error(ServoFault, message, self.out_of_turn_hint, servo)
+            first, slack = (0, self._slack(turn)) if servo in held else (firsts.get(servo, 0), 0)
+            if not first - slack <= value < first + turn + slack:
+                far[servo] = self._out_of_turn(servo, value, turn)
             low, high = self.started.limits.get(servo, (0, turn - 1))
             goals[servo] = min(max(value, low), high)
+        if far:
+            raise merge_errors(far)
         return goals
+
+    def _out_of_turn(self, servo: int, value: int, turn: int) -> BusError:
+        message = f"servo {self.registers.label(servo)} reads position {value}, outside one turn of {turn} steps"
+        return self.registers.error(ServoFault, message, self.out_of_turn_hint, servo)
 
     # ------------------------------------------------------------------ down
 

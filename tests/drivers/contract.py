@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import Bus, BusState, ServoSpec
-from drivers.base.errors import BusError, DriverError, PortLost
+from drivers.base.errors import BusError, DriverError, PortLost, PortMissing
+from drivers.sim.serving.virtual import VirtualLink
+from drivers.sim.servos.device import SimulatedServo
 
 SERVOS = (
     ServoSpec(1, "jaw", "xl330-m288", -0.6, 0.4, 8.0, 200.0),
@@ -19,6 +21,7 @@ SERVOS = (
 )
 STEP_RAD = 2 * np.pi / 4096
 PERIOD_S = 0.005
+CYCLE_S = 0.02
 
 
 def pause(bus: Bus, span_s: float = PERIOD_S) -> None:
@@ -42,6 +45,12 @@ def settle(
         pause(bus)
 
 
+def step(bus: Bus, target: np.ndarray | list[float]) -> BusState:
+    """Drive one cycle."""
+    bus.write(target)
+    return bus.read()
+
+
 def read_until(bus: Bus, done: Callable[[BusState], bool], timeout_s: float = 10.0) -> BusState:
     """Read until something is known."""
     end = bus._clock() + timeout_s
@@ -54,6 +63,42 @@ def read_until(bus: Bus, done: Callable[[BusState], bool], timeout_s: float = 10
 def all_known(values: np.ndarray, wanted: bool) -> bool:
     """Whether all values have arrived, where any are wanted."""
     return not wanted or bool(np.isfinite(values).all())
+
+
+def link_of(bus: Bus) -> VirtualLink:
+    """The port of a bus that runs in virtual time, with short waits from now on; other tests are skipped."""
+    port = getattr(bus, "_new", bus)._port
+    link = getattr(port, "link", port)
+    if not isinstance(link, VirtualLink):
+        pytest.skip("this takes seconds; the same driver does it in virtual time")
+    port.margin_s = 0.005
+    return link
+
+
+def angle_of(spec: ServoSpec, servo: SimulatedServo, ticks: float) -> float:
+    """The angle of a servo at a step."""
+    shaft = (ticks - servo.table.center) * servo.table.rad_per_tick
+    return (-1.0 if spec.reverse else 1.0) * (shaft - spec.zero_rad)
+
+
+class GoalWatch:
+    """Drives cycles; no goal of one servo may lie further from where it is than its top speed takes it in a cycle."""
+
+    def __init__(self, bus: Bus, spec: ServoSpec, servo: SimulatedServo) -> None:
+        self._bus, self._spec, self._servo = bus, spec, servo
+        self._written_s = bus._clock()
+
+    def cycle(self, target: np.ndarray) -> float:
+        """Drive one cycle; returns how far the goal moved."""
+        bus, servo = self._bus, self._servo
+        before, here = servo.goal, servo.position_ticks(bus._clock())
+        span_s, self._written_s = bus._clock() - self._written_s, bus._clock()
+        step(bus, target)
+        goal, was, shaft = (angle_of(self._spec, servo, ticks) for ticks in (servo.goal, before, here))
+        reach = self._spec.max_speed_rad_s * span_s + 2 * servo.table.rad_per_tick
+        assert goal == was or min(abs(goal - shaft), abs(goal - was)) <= reach, (goal, was, shaft, reach)
+        pause(bus, CYCLE_S)
+        return abs(goal - was)
 
 
 class BusContract:
@@ -213,6 +258,78 @@ class BusContract:
             raise ZeroDivisionError
         assert not bus.running
         assert not bus.is_open
+
+    @pytest.mark.parametrize("fault", ["mute:2", "silent:2"])
+    def test_a_servo_that_was_silent_is_sent_nothing_and_then_starts_where_it_is(self, bus: Bus, fault: str) -> None:
+        with bus:
+            link = link_of(bus)
+            bus.start()
+            self.settle(bus, [0.3, -0.3, 0.3])
+            if not self.MEASURES:
+                self._pulses_go_on(bus, link)
+                return
+            servo = link._line.servo(2)
+            watch = GoalWatch(bus, self.SERVOS[1], servo)
+            goals, away = np.array([0.3, -0.3, 0.3]), np.array([-0.2, 0.3, -0.2])
+            link._line.faults.add([fault], bus._clock())
+            read_until(bus, lambda state: not bus.driven[1])
+            goal, end = servo.goal, bus._clock() + 2.5
+            while bus._clock() < end:
+                assert watch.cycle(away) == 0.0
+            assert servo.goal == goal
+            assert bus.driven.tolist() == [True, False, True] and bus.report().not_driven == (2,)
+            assert np.abs(bus.read().position_rad - away)[[0, 2]].max() < 3 * self.STEP_RAD, "the others went on"
+            link._line.faults.clear(None, bus._clock())
+            end = bus._clock() + 4.0
+            while bus._clock() < end:
+                watch.cycle(away)
+            assert bus.driven.all() and bus.report().not_driven == ()
+            assert np.abs(bus.read().position_rad - away).max() < 3 * self.STEP_RAD
+            self.settle(bus, goals.tolist())
+
+    def _pulses_go_on(self, bus: Bus, link: VirtualLink) -> None:
+        """Servos that measure nothing: a board that does not answer gets all goals, and limits of speed hold."""
+        link._line.faults.add(["mute:*"], bus._clock())
+        for _ in range(50):
+            bus.write([-0.2, 0.3, -0.2])
+            bus.read()
+            pause(bus, CYCLE_S)
+        assert bus.driven.all() and bus.report().not_driven == ()
+        link._line.faults.clear(None, bus._clock())
+        self.settle(bus, [-0.2, 0.3, -0.2])
+
+    @pytest.mark.parametrize("sick", ["mute:2", "hw:2:0x20"])
+    def test_a_sick_servo_stays_out_when_the_port_comes_back_and_joins_where_it_is(self, bus: Bus, sick: str) -> None:
+        with bus:
+            link = link_of(bus)
+            bus.start()
+            self.settle(bus, [0.3, -0.3, 0.3])
+            servos = link._line.servo if self.MEASURES else None
+            link._line.faults.add([sick] if servos else [], bus._clock())
+            link._line.faults.add(["unplug:for=1s"], bus._clock())
+            with pytest.raises(PortLost):
+                step(bus, [0.3, -0.3, 0.3])
+            with pytest.raises(PortMissing):
+                bus.reconnect()
+            pause(bus, 1.1)
+            bus.reconnect()
+            if servos is None:
+                self.settle(bus, [-0.2, 0.3, -0.2])
+                return
+            servo, target = servos(2), np.array([-0.2, 0.3, -0.2])
+            watch = GoalWatch(bus, self.SERVOS[1], servo)
+            assert bus.driven.tolist() == [True, False, True] and bus.report().not_driven == (2,)
+            for _ in range(100):
+                assert watch.cycle(target) == 0.0
+            assert np.abs(bus.read().position_rad - target)[[0, 2]].max() < 3 * self.STEP_RAD, "the others went on"
+            link._line.faults.clear(None, bus._clock())
+            if sick.startswith("hw"):
+                servo.reboot(bus._clock())
+            end = bus._clock() + 5.0
+            while bus._clock() < end:
+                watch.cycle(target)
+            assert bus.driven.all() and servo.torque
+            assert np.abs(bus.read().position_rad - target).max() < 3 * self.STEP_RAD
 
     def test_counters_are_a_copy(self, bus: Bus) -> None:
         with bus:

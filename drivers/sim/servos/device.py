@@ -159,6 +159,8 @@ class SimulatedServo(ServoState):
         if value == CALIBRATE:
             self._calibrate(now_s)
         elif bool(value) != self.plant.powered:
+            if value and "Homing Offset" in self.table and not (self.is_feetech or self.registers.extended):
+                self._wrap_position(now_s)  # e-Manual, Present Position (132); the goal stays as it is
             self._set_power(bool(value), now_s)
 
     def _calibrate(self, now_s: float) -> None:

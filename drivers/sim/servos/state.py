@@ -293,10 +293,13 @@ class ServoState:
 
     def _wrap_turns(self, now_s: float) -> None:
         """Bring the shaft's position back into one turn, and Goal Position to it."""
+        self._wrap_position(now_s)
+        self.registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))
+
+    def _wrap_position(self, now_s: float) -> None:
+        """Bring the shaft's position back into one turn."""
         self._sensed_at = -1.0
         turn = self.table.ticks_per_turn
         position = self.plant.motion(now_s).position
         if not 0 <= position < turn:
             self.plant.place(now_s, position % turn)
-        registers = self.registers
-        registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))

@@ -85,10 +85,27 @@ def test_a_long_stall_saves_up_no_more_than_a_burst(calls_before: int) -> None:
 def test_one_servo_begins_again_by_itself() -> None:
     limits, _ = limits_at([0.0, 0.0])
     limits.apply(np.full(2, 0.1), 0.02)
-    limits.reset_one(1, 2.0)
+    limits.reset_one(1, 2.0, 0.02)
     np.testing.assert_allclose(limits.apply(np.full(2, 0.1), 0.02), [0.04, 2.0])
-    limits.reset_one(1, 3.0)
+    limits.reset_one(1, 3.0, 0.02)
     np.testing.assert_allclose(limits.apply(np.array([0.1, np.nan]), 0.02), [0.04, 3.0])
+
+
+def test_the_travel_of_a_servo_that_begins_again_counts_from_that_moment() -> None:
+    limits, _ = limits_at([0.0, 0.0])
+    limits.apply(np.zeros(2), 1.0)
+    limits.reset_one(1, 2.0, 1.03)
+    np.testing.assert_allclose(limits.apply(np.full(2, 3.0), 1.04), [0.05 * SPEED[0], 2.0 + 0.01 * SPEED[1]])
+
+
+def test_a_servo_that_is_not_driven_keeps_its_last_goal_wherever_that_is() -> None:
+    limits, report = limits_at([0.0, 12.0])
+    driven = np.array([True, False])
+    for k in range(1, 4):
+        sent = limits.apply(np.array([0.1, -3.0]), 0.02 * k, driven)
+        assert sent[1] == 12.0
+    assert sent[0] == pytest.approx(0.1) and counts(report)[1] == 0
+    assert limits.apply(np.array([0.1, -3.0]), 0.08)[1] < 12.0
 
 
 def test_targets_beyond_the_angle_limits_are_clipped_and_counted() -> None:

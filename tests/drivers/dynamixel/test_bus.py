@@ -9,6 +9,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,23 @@ class TestDynamixelBusFastReads(BusContract):
     @pytest.fixture
     def bus(self) -> Bus:
         return VirtualBus(SERVOS).bus(fast=True, **CALM)
+
+
+class TestDynamixelBusXl320(BusContract):
+    MODELS = ("xl320",) * 3
+    SERVOS = tuple(replace(servo, model="xl320") for servo in SERVOS)
+    STEP_RAD = np.deg2rad(300) / 1024
+    VOLTS = 7.4
+
+    @pytest.fixture
+    def bus(self) -> Bus:
+        return VirtualBus(self.SERVOS).bus(**CALM)
+
+
+class TestDynamixelBusWithWatchdogs(BusContract):
+    @pytest.fixture
+    def bus(self) -> Bus:
+        return VirtualBus(SERVOS).bus(margin_s=0.05, watchdog_ms=200)
 
 
 def torques(wire: SimulatedBus) -> list[bool]:

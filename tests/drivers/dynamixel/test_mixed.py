@@ -79,7 +79,7 @@ def test_a_dead_servo_of_one_half_leaves_no_other_on(wire: VirtualBus, number: i
 def test_counters_are_those_of_both_halves(wire: VirtualBus, bus: Bus) -> None:
     wire.fault("mute:3", "mute:1")
     read_until(bus, lambda state: int(state.silent.sum()) == 2)
-    bus.write([0.4, 0.4, 9.0, 9.0])
+    bus.write([9.0, 0.4, 0.4, 9.0])
     report = bus.report()
     assert report.silent == (1, 3)
     assert report.errors == {"no_reply": 2}

@@ -49,6 +49,19 @@ class TestFeetechSts(Family):
             yield open_bus(self.KIND, self.SERVOS, port=wire.path, **CALM)
 
 
+class TestFeetechStsInVirtualTime(Family):
+    MODELS = ("sts3215",) * 3
+    SERVOS = servos_of(*MODELS)
+    VOLTS = 7.4
+
+
+class TestDynamixelMx(Family):
+    KIND = "dynamixel"
+    MODELS = ("mx1-28",) * 3
+    SERVOS = servos_of(*MODELS)
+    VOLTS = 12.0
+
+
 class TestFeetechScs(Family):
     MODELS = ("scs0009",) * 3
     SERVOS = servos_of(*MODELS)
