@@ -149,7 +149,7 @@ def fit(
 def _decimate_and_shade(out: Path) -> bool:
     """Add to a head's folder its decimated triangles and how much light reaches each vertex; False without OpenGL."""
     # start-up: --help does without any of these
-    from surface.base.errors import ViewError
+    from surface.base.errors import MissingPackage, ViewError
     from surface.view.draw.decimate import decimate_head
     from surface.view.pictures.occlusion import shade_head
 
@@ -158,7 +158,7 @@ def _decimate_and_shade(out: Path) -> bool:
     try:
         with console.status("baking shade"):
             shade_head(out)
-    except ViewError:
+    except (ViewError, MissingPackage):
         return False
     return True
 
