@@ -12,16 +12,15 @@ takes a few rounds, fast enough to follow a tracker.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-import surface.base.jit  # noqa: F401  first of all: it keeps numba from importing scipy
 from controller.base.parameters import Floats
+from surface.base.jit import kernel
 
 _ROUNDS = 200
 _ZERO = 1e-13
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sweep(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> float:
     """One round over all coordinates, in place on ``x`` and ``gradient``; returns the largest change."""
     largest = 0.0
@@ -38,7 +37,7 @@ def _sweep(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: 
     return largest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _reach(x: float, step: float, low: float, high: float) -> float:
     """How much of ``step`` can be taken from ``x`` without leaving the bounds or passing zero, 0..1."""
     end = x + step
@@ -50,7 +49,7 @@ def _reach(x: float, step: float, low: float, high: float) -> float:
     return 1.0 if (end <= stop) == (step > 0.0) or end == stop else (stop - x) / step
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _solve(matrix: Floats, right: Floats) -> None:
     """Gauss elimination with pivots: ``right (n,)`` becomes the solution; ``matrix (n, n)`` is overwritten.
 
@@ -77,7 +76,7 @@ def _solve(matrix: Floats, right: Floats) -> None:
         right[i] /= matrix[i, i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _newton_step(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> None:
     """Newton step of all values inside their bounds at once, as far as the first bound; in place."""
     free = np.flatnonzero((x > low) & (x < high) & (x != 0.0))
@@ -102,7 +101,7 @@ def _newton_step(gram: Floats, gradient: Floats, low: Floats, high: Floats, spar
             x[k] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _descend(
     gram: Floats, wanted: Floats, low: Floats, high: Floats, sparsity: float, tolerance: float, x: Floats
 ) -> int:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -20,14 +21,13 @@ def make_app() -> Typer:
     from typer import Typer
 
     # start-up: the same
-    from controller.cli import bench, bus, check, heads, run, simulate
+    from controller.cli import bench, bus, check, heads, run, simulate, version
 
     app = Typer(
         name="omote",
         help="Drives a robot's face: a CG face and a servo head that make the same expression.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
-        add_completion=False,
         rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
@@ -37,6 +37,7 @@ def make_app() -> Typer:
     ):  # fmt: skip
         app.command()(command)
     app.add_typer(simulate.make_app(), name="simulate")
+    app.callback()(version.root)
     return app
 
 
@@ -45,11 +46,12 @@ def report_error(error: BaseException, remark: str = "") -> None:
     from rich.console import Console  # start-up: Ctrl-C ends it quietly from main() on
 
     console = Console(stderr=True, highlight=False, soft_wrap=True)
-    console.print(f"[bold red]error:[/] {_escape(str(error) or type(error).__name__)}")
-    if hint := getattr(error, "hint", ""):
-        console.print(f"[bold]try:[/] {_escape(hint)}")
-    if remark:
-        console.print(remark, style="dim")
+    with suppress(OSError):  # where standard error cannot be written either, the exit code says it
+        console.print(f"[bold red]error:[/] {_escape(str(error) or type(error).__name__)}")
+        if hint := getattr(error, "hint", ""):
+            console.print(f"[bold]try:[/] {_escape(hint)}")
+        if remark:
+            console.print(remark, style="dim")
 
 
 def _escape(text: str) -> str:
@@ -61,19 +63,38 @@ def main() -> None:
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in the background so
         signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        from controller.base.errors import OMOTE_ERRORS  # start-up: Ctrl-C ends it quietly from main() on
-
-        make_app()()
+        sys.exit(_run())
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _run() -> int:
+    """Run the command of this process; returns its exit code."""
+    # start-up: main() ends Ctrl-C quietly
+    from controller.base.errors import OMOTE_ERRORS
+    from controller.cli.streams import fault_of, prepare_streams
+
+    prepare_streams()
+    try:
+        make_app()()
+        code = 0
+    except SystemExit as end:
+        code = int(end.code or 0)
     except OMOTE_ERRORS as error:
         report_error(error)
-        sys.exit(1)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
-    except Exception as error:
-        if os.environ.get("OMOTE_DEBUG"):
-            raise
-        report_error(error, "This is a fault in omote. OMOTE_DEBUG=1 shows where.")
-        sys.exit(70)
+        code = 1
+    except Exception as error:  # noqa: BLE001  reported, or raised again
+        if not (isinstance(error, OSError) and error in (fault_of(sys.stdout), fault_of(sys.stderr))):
+            return _report_fault(error)
+        code = 1
+    fault = fault_of(sys.stdout)
+    if fault is not None and not isinstance(fault, BrokenPipeError):  # a reader that has gone wants to hear no more
+        report_error(OSError(f"standard output cannot be written: {fault.strerror}"))
+    return code or int(fault is not None)
+
+
+def _report_fault(error: Exception) -> int:
+    if os.environ.get("OMOTE_DEBUG"):
+        raise error
+    report_error(error, "This is a fault in omote. OMOTE_DEBUG=1 shows where.")
+    return 70

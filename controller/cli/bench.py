@@ -14,6 +14,7 @@ from rich.table import Table
 
 from controller.base.errors import ControllerError
 from controller.base.files import replacing
+from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
 
 PICTURES = (".png", ".svg", ".jpg", ".webp")
@@ -34,7 +35,9 @@ def bench(
     what: Annotated[
         Subject, typer.Argument(help="A head, the engine at its limit, quad trees, drift, or a servo bus.")
     ] = Subject.head,
-    head: Annotated[str, typer.Option(help="Head: a name from configs/heads or a folder.")] = "ict",
+    head: Annotated[
+        str, typer.Option(help="Head: a name from configs/heads or a folder.", autocompletion=names_of("heads"))
+    ] = "ict",
     seconds: Annotated[float, typer.Option(help="Time for each measurement.", min=0.01)] = 0.3,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture of the meshes (quadtree only).")] = None,
     large: Annotated[bool, typer.Option("--large", help="Also a million vertices (surface only).")] = False,

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from controller.base.errors import ConfigError
 from controller.base.paths import find_config
+from controller.cli.completion import models, names_of
 from controller.cli.console import console, show_table
 
 Port = Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")]
@@ -101,7 +102,9 @@ def monitor(
     listen: Annotated[
         bool, typer.Option("--listen", help="Only listen: for a second adapter on a wire that another program drives.")
     ] = False,
-    model: Annotated[str, typer.Option(help="With --listen: the servos' model, so that registers have names.")] = "",
+    model: Annotated[
+        str, typer.Option(help="With --listen: the servos' model, so that registers have names.", autocompletion=models)
+    ] = "",
     rate: Annotated[float, typer.Option(min=0.1, max=200, help="How often the servos are read, per second.")] = 10.0,
     seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
 ) -> None:
@@ -129,7 +132,9 @@ def monitor(
 
 
 def calibrate(
-    robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],
+    robot: Annotated[
+        str, typer.Argument(help="Robot: a name from configs/robots or a file.", autocompletion=names_of("robots"))
+    ],
     name: Annotated[str, typer.Option("--name", "-n", help="Name of the calibration.")] = "default",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write; default: beside the robot file.")

@@ -8,14 +8,21 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
+from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
+
+
+def checkable(incomplete: str) -> list[str]:
+    """Names that can be checked."""
+    return [name for kind in ("stages", "robots", "heads") for name in names_of(kind)(incomplete)]
 
 
 def check(
     file: Annotated[
         str,
         typer.Argument(
-            help="A stage, robot, head, expressions, script, take, recording, group or surface: path or name."
+            help="A stage, robot, head, expressions, script, take, recording, group or surface: path or name.",
+            autocompletion=checkable,
         ),
     ],
 ) -> None:

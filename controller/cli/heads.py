@@ -10,6 +10,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from controller.base.errors import ConfigError
+from controller.cli.completion import expressions, identities, names_of
+from controller.cli.completion import settings as setting_names
 from controller.cli.console import console, show_table
 
 if TYPE_CHECKING:
@@ -17,19 +19,28 @@ if TYPE_CHECKING:
 
 _NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
 Identity = Annotated[
-    str | None, typer.Option(metavar="NAME=AMOUNT,…", help="Variations of the head to mix in, each 0 to 1.")
+    str | None,
+    typer.Option(
+        metavar="NAME=AMOUNT,...", help="Variations of the head to mix in, each 0 to 1.", autocompletion=identities
+    ),
 ]
+Expression = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--expression", "-e", metavar="NAME[=INTENSITY]", help="Add a named expression.", autocompletion=expressions
+    ),
+]
+Setting = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated.", autocompletion=setting_names),
+]
+HEAD = "Head: a name from configs/heads or a folder."
 
 
 def render(
     out: Annotated[Path, typer.Option("--out", "-o", help="Picture to write (PNG).")],
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated.")
-    ] = None,
-    expression: Annotated[
-        list[str] | None,
-        typer.Option("--expression", "-e", metavar="NAME[=INTENSITY]", help="Add a named expression."),
-    ] = None,
+    settings: Setting = None,
+    expression: Expression = None,
     size: Annotated[str | None, typer.Option(help="Width x height in pixels.", show_default="800x800")] = None,
     camera: Annotated[
         str | None,
@@ -43,12 +54,14 @@ def render(
     evaluator: Annotated[
         str | None, typer.Option(help="Where vertices are computed: auto, cpu or gpu.", show_default="auto")
     ] = None,
-    head: Annotated[
-        str | None, typer.Option(help="Head: a name from configs/heads or a folder.", show_default="ict")
-    ] = None,
+    head: Annotated[str | None, typer.Option(help=HEAD, show_default="ict", autocompletion=names_of("heads"))] = None,
     identity: Identity = None,
     stage: Annotated[
-        str | None, typer.Option(help="Stage that gives head, groups, expressions and look unless other options do.")
+        str | None,
+        typer.Option(
+            help="Stage that gives head, groups, expressions and look unless other options do.",
+            autocompletion=names_of("stages"),
+        ),
     ] = None,
     vocabulary: Annotated[
         list[str] | None, typer.Option(metavar="FILE", help="Expressions of your own; may be repeated.")
@@ -149,7 +162,7 @@ def fit(
 def _decimate_and_shade(out: Path) -> bool:
     """Add to a head's folder its decimated triangles and how much light reaches each vertex; False without OpenGL."""
     # start-up: --help does without any of these
-    from surface.base.errors import ViewError
+    from surface.base.errors import MissingPackage, ViewError
     from surface.view.draw.decimate import decimate_head
     from surface.view.pictures.occlusion import shade_head
 
@@ -158,7 +171,7 @@ def _decimate_and_shade(out: Path) -> bool:
     try:
         with console.status("baking shade"):
             shade_head(out)
-    except ViewError:
+    except (ViewError, MissingPackage):
         return False
     return True
 
@@ -176,14 +189,9 @@ def _error_table(report: FitReport) -> Table:
 
 def export(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write: .glb, .obj or what a plug-in adds.")],
-    head: Annotated[str, typer.Option("--head", help="Head: a name from configs/heads or a folder.")] = "ict",
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Pose it: set a parameter; may be repeated.")
-    ] = None,
-    expression: Annotated[
-        list[str] | None,
-        typer.Option("--expression", "-e", metavar="NAME[=INTENSITY]", help="Pose it: add a named expression."),
-    ] = None,
+    head: Annotated[str, typer.Option("--head", help=HEAD, autocompletion=names_of("heads"))] = "ict",
+    settings: Setting = None,
+    expression: Expression = None,
     identity: Identity = None,
 ) -> None:
     """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.

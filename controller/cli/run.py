@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
 from controller.cli.heads import Identity
 from drivers.base.permission import ports_forbidden
@@ -31,7 +32,8 @@ VoiceHz = Annotated[
     typer.Option("--voice-rate", min=1000, help="The voice is signed 16 bit mono PCM without a header, at this rate."),
 ]
 Record = Annotated[Path | None, typer.Option("--record", help="Write every command and tick to this file (.rec).")]
-StageName = Annotated[str, typer.Option("--stage", help="Stage: a name from configs/stages or a file.")]
+STAGE = "Stage: a name from configs/stages or a file."
+StageName = Annotated[str, typer.Option("--stage", help=STAGE, autocompletion=names_of("stages"))]
 
 
 def demo(
@@ -55,7 +57,7 @@ def demo(
 
 
 def run(
-    stage: Annotated[str, typer.Argument(help="Stage: a name from configs/stages or a file.")],
+    stage: Annotated[str, typer.Argument(help=STAGE, autocompletion=names_of("stages"))],
     seconds: Seconds = None,
     headless: Headless = False,
     report: ReportFile = None,

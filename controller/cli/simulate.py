@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import inspect
 import logging
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from controller.base.errors import ConfigError
+from controller.cli.completion import models, names_of
 from controller.cli.console import console
 from drivers.base.errors import PluginError
 from drivers.base.options import REQUIRED, Entry, entries
@@ -50,6 +52,16 @@ class _Simulators(TyperGroup):
         app = typer.Typer(add_completion=False)
         app.command(cmd_name)(_simulate_family(cmd_name))
         return typer.main.get_command(app)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the words name; an unknown one is refused with the nearest of all."""
+        from drivers.core.registry import kinds  # start-up: most commands need no families
+
+        known = [*kinds(), *self.commands]
+        close = difflib.get_close_matches(args[0], known, n=1) if args and args[0] not in known else []
+        if close:
+            ctx.fail(f"No such command {args[0]!r}. Did you mean {close[0]!r}?")
+        return super().resolve_command(ctx, args)
 
 
 def make_app() -> typer.Typer:
@@ -139,7 +151,8 @@ def _parameter(entry: Entry, usual: Any) -> inspect.Parameter:
     """An option of a simulator as an option of the command; ``usual`` replaces its default where it is given."""
     limits, name = entry.option, entry.name.replace("_", "-")
     flag = f"--{name}/--no-{name}" if entry.default is True else f"--{name}"
-    shown = typer.Option(flag, min=limits.at_least, max=limits.at_most, help=limits.help)
+    complete = models if entry.name == "model" else None
+    shown = typer.Option(flag, min=limits.at_least, max=limits.at_most, help=limits.help, autocompletion=complete)
     kind, empty = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.empty
     default = usual or (empty if entry.default is REQUIRED else entry.default)
     return inspect.Parameter(entry.name, kind, default=default, annotation=Annotated[entry.type, shown])
@@ -148,7 +161,9 @@ def _parameter(entry: Entry, usual: Any) -> inspect.Parameter:
 @_add_serving
 def simulate_robot(
     how: Serving,
-    robot: Annotated[str, typer.Argument(help="Robot: a name from configs/robots or a file.")],
+    robot: Annotated[
+        str, typer.Argument(help="Robot: a name from configs/robots or a file.", autocompletion=names_of("robots"))
+    ],
     bus: Annotated[str | None, typer.Option("--bus", help="Name of the bus; the first without it.")] = None,
 ) -> None:
     """Serve the simulated servos or board of a robot file, until interrupted; prints `ready PATH`.
@@ -161,7 +176,9 @@ def simulate_robot(
 
 
 def simulate_host(
-    script: Annotated[str, typer.Argument(help="Script: a name from configs/scripts.")] = "tour",
+    script: Annotated[
+        str, typer.Argument(help="Script: a name from configs/scripts.", autocompletion=names_of("scripts"))
+    ] = "tour",
     link: Link = None,
 ) -> None:
     """Serve a simulated robot host that writes omote line protocol, until interrupted; prints `ready PATH`.

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import math
 
-from numba import boolean, float64, njit, void
+from numba import boolean, float64, void
 
-import surface.base.jit  # noqa: F401  first of all: it keeps numba from importing scipy, which takes longer than all the rest
 from controller.base.parameters import Flags, Floats
+from surface.base.jit import declared
 
 _TINY = 1e-12
 _ROW = float64[::1]
 
 
-@njit([float64(float64, float64, float64, float64)], cache=True, nogil=True)
+@declared(float64(float64, float64, float64, float64))
 def _braking_speed(dt: float, distance: float, accel: float, response: float) -> float:
     """Greatest speed at the end of a step of ``dt`` from which ``distance`` is enough to brake.
 
@@ -29,7 +29,7 @@ def _braking_speed(dt: float, distance: float, accel: float, response: float) ->
     return parabolic if parabolic > accel * response else linear
 
 
-@njit([void(float64, _ROW, _ROW, _ROW, boolean[::1], _ROW, _ROW, _ROW, _ROW, _ROW)], cache=True, nogil=True)
+@declared(void(float64, _ROW, _ROW, _ROW, boolean[::1], _ROW, _ROW, _ROW, _ROW, _ROW))
 def move(dt: float, target: Floats, position: Floats, velocity: Floats, limited: Flags, speed: Floats, accel: Floats,
          response: Floats, low: Floats, high: Floats) -> None:  # fmt: skip
     """Move ``position`` and ``velocity`` towards ``target`` for ``dt`` s, in place; all are (n,).

@@ -23,6 +23,7 @@ from controller.robot.settings import AnchorSettings, ChannelSettings, RobotSett
 from surface.head import Head
 from surface.head.model.parameters import SHAPES, read_pose
 from surface.head.posing.part import HeadPart
+from surface.spline.matrix import basis_rows
 
 _LEVELS = 4
 _STRAIGHT_MM = 0.02
@@ -75,7 +76,7 @@ def sample_skin(head: Head, part: str, uv: Floats) -> SkinSamples:
     Raises KeyError when there is no such part.
     """
     index = head.parts.index(head.part(part))
-    basis = head.part(part).surface.basis_matrix(uv)
+    basis = basis_rows(head.part(part).surface, uv)
     rest = basis @ head.place_points(np.zeros(len(head.parameters)))[0][index]
 
     def displacement(values: dict[str, float]) -> Floats:

@@ -8,6 +8,7 @@ servos' watchdog.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,8 +35,14 @@ TEMPERATURE, HARDWARE, TORQUE, WATCHDOG = range(3, 7)
 """Registers that `take_replies` reads, in its order, and the indices of those that are not motion."""
 
 
-def _kernel(*parameters: Any) -> Any:
-    return njit([parameters], cache=True, nogil=True)
+def _kernel(*parameters: Any) -> Callable[[Callable[..., Any]], Any]:
+    def compiled(function: Callable[..., Any]) -> Any:
+        try:
+            return njit([parameters], cache=True, nogil=True)(function)
+        except (RuntimeError, OSError):  # numba finds no folder to keep compiled code in, or a full disk
+            return njit([parameters], nogil=True)(function)
+
+    return compiled
 
 
 @_kernel(_BYTES, int64, int64, int64)

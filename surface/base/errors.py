@@ -36,3 +36,7 @@ class SurfaceFileError(SurfaceError):
 
 class ViewError(SurfaceError):
     """No picture can be drawn: no OpenGL, no display, or a context that is too old."""
+
+
+class MissingPackage(SurfaceError, ImportError):
+    """A package that an extra brings is not installed; :attr:`hint` is the command that installs it."""

@@ -1,5 +1,8 @@
 """Decorators that compile kernels with numba and keep the compiled code on disk; importing this imports numba.
 
+Compiled code is kept beside the code it was made from, or in the user's cache folder where that cannot be written
+(``NUMBA_CACHE_DIR`` names another place). Where neither can, kernels are compiled in every process.
+
 Numba compiles again when the file of a kernel changes. Here it also does when a file of the package changes that this
 one imports, directly or not, since kernels and constants from there are compiled into it.
 """
@@ -7,14 +10,18 @@ one imports, directly or not, since kernels and constants from there are compile
 from __future__ import annotations
 
 import hashlib
+import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core import event
+
+log = logging.getLogger(__name__)
 
 
 def _skip_scipy() -> None:
@@ -41,12 +48,67 @@ IMPORT = re.compile(r"^from[ ]+(\.*)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n#]*)", 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile at the first call for each set of argument types, cache on disk, release the GIL."""
-    return _watch_imports(njit(cache=True, nogil=True)(function))
+    return _compiled(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """As :func:`kernel`, and its code is put into the caller's."""
-    return _watch_imports(njit(cache=True, nogil=True, inline="always")(function))
+    return _compiled(function, inline="always")
+
+
+def declared(*signatures: Any) -> Callable[[Callable[..., Any]], Any]:
+    """As :func:`kernel`, but compile for these types of arguments at once, and for no others."""
+    return lambda function: _compiled(function, signatures)
+
+
+def _compiled(function: Callable[..., Any], signatures: Sequence[Any] = (), **options: Any) -> Any:
+    dispatcher = njit(nogil=True, **options)(function)
+    try:
+        dispatcher.enable_caching()
+    except RuntimeError:  # numba finds no folder that it may write to
+        _log_once("compiled code can be kept in no folder, so every start compiles it: set NUMBA_CACHE_DIR to one")
+    else:
+        _tolerate_full_disks(dispatcher._cache)
+        _watch_imports(dispatcher)
+    for signature in signatures:
+        dispatcher.compile(signature)
+    if signatures:
+        dispatcher.disable_compile()
+    return dispatcher
+
+
+def _tolerate_full_disks(kept: Any) -> None:
+    """Let a kernel run that could be compiled but not be kept."""
+    save = kept.save_overload
+
+    def save_or_log(signature: Any, data: Any) -> None:
+        try:
+            save(signature, data)
+        except OSError as error:
+            _log_once(f"compiled code cannot be kept in {kept.cache_path}: {error.strerror or error}")
+
+    kept.save_overload = save_or_log
+
+
+@cache
+def _log_once(text: str) -> None:
+    log.warning("%s", text)
+
+
+class _FirstCompilation(event.Listener):
+    """Says that a room's kernels are being compiled, which takes so long that a person would wonder."""
+
+    def on_start(self, event: Any) -> None:
+        """Called before numba compiles a function that it has not found on disk."""
+        room = event.data["dispatcher"].py_func.__module__.partition(".")[0]
+        if room != "numba":  # some of its own functions are compiled into kernels
+            _log_once(f"compiling the kernels of {room} for this machine: up to a minute, only once")
+
+    def on_end(self, event: Any) -> None:
+        """Nothing to say."""
+
+
+event.register("numba:compile", _FirstCompilation())  # type: ignore[no-untyped-call]
 
 
 def _watch_imports(dispatcher: Any) -> Any:

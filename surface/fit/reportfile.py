@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats, Floats32
-from surface.base.errors import FitError, ViewError
+from surface.base.errors import FitError, MissingPackage, ViewError
 from surface.base.progress import Progress
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import Errors, FitReport, FitResult, FittedPart, face_bounds
@@ -137,7 +137,7 @@ def _draw(result: FitResult, folder: Path) -> list[str]:
             part.attributes["albedo"] = _colours(part.uv.astype(float), fitted, error)
         try:
             _picture(head, folder / name)
-        except ViewError:
+        except (ViewError, MissingPackage):
             return []
     return list(errors)
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.base.errors import SurfaceError
+from surface.base.extras import require
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
 from surface.spline.nurbs import nurbs_arrays
@@ -33,11 +33,9 @@ MOST_POINTS = 1024  # points along one edge
 
 
 def read(path: Path) -> list[NamedSurface]:
-    """The surfaces of a file; ``SurfaceFileError`` names the object, ``SurfaceError`` says rhino3dm is missing."""
-    try:
-        rhino3dm: Any = import_module("rhino3dm")
-    except ImportError as error:
-        raise SurfaceError(f"{path}: .3dm needs the package rhino3dm", hint="pip install rhino3dm") from error
+    """The surfaces of a file; ``SurfaceFileError`` names the object, ``MissingPackage`` the package rhino3dm."""
+    require(f"{path}: a .3dm file", "rhino3dm")
+    rhino3dm: Any = import_module("rhino3dm")
     file = Location(path)
     model = rhino3dm.File3dm.FromByteArray(read_bytes(path))
     if model is None:

@@ -1,8 +1,9 @@
-"""The rational weights of a surface at samples as sparse matrices (scipy CSR)."""
+"""The rational weights of a surface at samples: as rows for products, and as sparse matrices (scipy CSR)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats, Ints
 from surface.base.checks import check_sides, check_uv
+from surface.base.extras import require
 
 from .closed import wrap
 from .controlpoints import ControlPoints
@@ -20,12 +22,55 @@ if TYPE_CHECKING:
 CHUNK = 8192  # samples per pass: bounds the scratch memory
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Rational weights of ``m`` samples, without scipy: ``rows @ points`` is the surface there.
+
+    share : (k,) weights. column : (k,) the control point of each. row : (k,) the sample of each. count : m.
+    """
+
+    share: Floats
+    column: Ints
+    row: Ints
+    count: int
+
+    def __matmul__(self, points: ArrayLike) -> Floats:
+        """(m, ...) float64 sums for values (n, ...) of the control points."""
+        values = np.asarray(points, np.float64)[self.column]
+        terms = values.reshape(len(values), -1).T * self.share
+        sums: Floats = np.stack([np.bincount(self.row, term, self.count) for term in terms], axis=1)
+        return sums.reshape(self.count, *values.shape[1:])
+
+
+def basis_rows(surface: ControlPoints, uv: ArrayLike) -> Rows:
+    """The weights of :meth:`surface.DCPSurface.basis_matrix`, for products with few columns."""
+    (share,), column, start = _ratios(surface, uv, [(0, 0)], None)
+    return Rows(share, column, np.repeat(np.arange(len(start) - 1), np.diff(start)), len(start) - 1)
+
+
 def basis_matrices(
     surface: ControlPoints, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None = None
 ) -> list[csr_matrix]:
-    """Several matrices of :meth:`surface.DCPSurface.basis_matrix`, for hardly more than the time of one."""
+    """Several matrices of :meth:`surface.DCPSurface.basis_matrix`, for hardly more than the time of one.
+
+    Raises MissingPackage: scipy is not installed.
+    """
+    require("a sparse matrix of weights", "scipy")
     from scipy.sparse import csr_matrix  # slow to import
 
+    ratios, columns, start = _ratios(surface, uv, derivatives, side)
+    out = []
+    for ratio in ratios:
+        matrix = csr_matrix((ratio, columns.copy(), start.copy()), shape=(len(start) - 1, surface.n))
+        matrix.sum_duplicates()
+        out.append(matrix)
+    return out
+
+
+def _ratios(
+    surface: ControlPoints, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None
+) -> tuple[list[Floats], Ints, Ints]:
+    """Rational weights (k,) or their derivatives, the control point of each (k,), and row starts (m + 1,)."""
     from .kernels import TINY  # compiled: loaded when first used
 
     for wanted in derivatives:
@@ -39,14 +84,9 @@ def basis_matrices(
         rows, total = _sums(data, start)
     columns %= surface.n  # shifted copies are the same point
     value = data[:, 0] / total[rows, 0]
-    out = []
-    for u, v in derivatives:
-        k = 2 * v + u
-        ratio = value if k == 0 else (data[:, k] - value * total[rows, k]) / total[rows, 0]
-        matrix = csr_matrix((ratio, columns.copy(), start.copy()), shape=(len(samples), surface.n))
-        matrix.sum_duplicates()
-        out.append(matrix)
-    return out
+    slots = [2 * v + u for u, v in derivatives]
+    ratios = [value if k == 0 else (data[:, k] - value * total[rows, k]) / total[rows, 0] for k in slots]
+    return ratios, columns, start
 
 
 def _sums(data: Floats, start: Ints) -> tuple[Ints, Floats]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.base.errors import ViewError
+from surface.base.extras import importing
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target
 from surface.view.scene.camera import Camera
@@ -70,16 +71,13 @@ def run_window(
     kiosk : cover a whole monitor, hide the cursor, ignore mouse and keys but for Esc, which closes the window.
     monitor : which one, from 0.
 
-    Raises ViewError: no display, no OpenGL, or imgui-bundle is missing. Exceptions of `source` and `gui` are raised
-    again after the window is closed.
+    Raises ViewError: no display, or no OpenGL. MissingPackage: imgui-bundle is not installed. Exceptions of `source`
+    and `gui` are raised again after the window is closed.
     """
     if not has_display():  # the window library would end the process instead
         raise ViewError("there is no display to open a window on (DISPLAY is not set)", hint=HEADLESS_HINT)
-    try:
-        from imgui_bundle import hello_imgui, imgui  # optional
-    except ImportError as error:
-        why = f"the window needs imgui-bundle ({error})"
-        raise ViewError(why, hint="pip install '.[view]' in the checkout") from error
+    with importing("the window", "imgui_bundle"):
+        from imgui_bundle import hello_imgui, imgui  # optional: the extra view
     viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera)
     make = partial(Renderer, head=head, quality=quality, theme=theme, evaluator=evaluator)
     window = _Window(imgui, source, viewpoint, make, quality)

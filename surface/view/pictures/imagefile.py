@@ -12,17 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from surface.base.errors import ViewError
+from surface.base.extras import importing
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
 
 def as_image(pixels: np.ndarray) -> Image:
-    """Pillow image of (height, width, 3) uint8 pixels. Raises ViewError: Pillow is missing."""
-    try:
+    """Pillow image of (height, width, 3) uint8 pixels. Raises MissingPackage: Pillow is not installed."""
+    with importing("an image file", "PIL"):
         from PIL import Image as pillow  # optional: the extra view
-    except ImportError as error:
-        raise ViewError(f"image files need Pillow ({error})", hint="pip install '.[view]' in the checkout") from error
     return pillow.fromarray(np.ascontiguousarray(pixels))
 
 

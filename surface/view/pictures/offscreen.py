@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.base.errors import ViewError
+from surface.base.extras import importing
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target
 from surface.view.scene.camera import Camera
@@ -24,12 +25,10 @@ NO_OPENGL_HINT = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 def open_context() -> moderngl.Context:
     """A new context: EGL first (no display needed), then the platform's.
 
-    Raises ViewError: moderngl is missing, or there is no OpenGL 3.1.
+    Raises MissingPackage: moderngl is not installed. ViewError: there is no OpenGL 3.1.
     """
-    try:
-        import moderngl  # optional
-    except ImportError as error:
-        raise ViewError(f"pictures need moderngl ({error})", hint="pip install '.[view]' in the checkout") from error
+    with importing("a picture", "moderngl"):
+        import moderngl  # optional: the extra view
     reasons = []
     for settings in ({"backend": "egl"}, {}):
         try:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -265,7 +266,25 @@ def test_no_words_show_the_help_and_short_help_works(omote: Omote) -> None:
         assert "Drives a robot's face" in said.stdout + said.stderr
         for command in ("set-id", "plugins", "export", "simulate"):
             assert command in said.stdout + said.stderr
-        assert "--install-completion" not in said.stdout + said.stderr
+        assert "--install-completion" in said.stdout + said.stderr
     for words in (("simulate",), ("run", "-h")):
         said = omote(*words)
         assert "Usage" in said.stdout + said.stderr
+
+
+def test_the_version_is_that_of_the_installation(omote: Omote) -> None:
+    assert omote("--version") == Said(0, f"omote {version('omote')}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"), [(("rnu",), "run"), (("simulate", "maestor"), "maestro"), (("simulate", "robto"), "robot")]
+)
+def test_a_mistyped_command_names_the_one_that_was_meant(omote: Omote, words: tuple[str, ...], meant: str) -> None:
+    said = omote(*words)
+    assert said.returncode == 2
+    assert f"No such command {words[-1]!r}. Did you mean {meant!r}?" in said.stderr
+
+
+def test_a_command_that_resembles_none_is_refused(omote: Omote) -> None:
+    said = omote("simulate", "xyzzy")
+    assert said.returncode == 2 and "No such command 'xyzzy'." in said.stderr and "mean" not in said.stderr

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import PchipInterpolator
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.following import Mirror
 from controller.robot.robot import load_robot
-from controller.robot.terms import TermSettings, curve_corners
+from controller.robot.terms import TermSettings, curve_corners, monotone_slopes
 
 ROBOT = """
 name = "r"
@@ -130,3 +131,14 @@ def test_a_smooth_curve_is_the_monotone_cubic_through_its_points() -> None:
     assert np.interp(0.5, x, y) == pytest.approx(hermite)
     two = curve_corners(np.array([0.0, 1.0]), np.array([0.0, 1.0]), "smooth")
     assert two[0].tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_slopes_of_a_smooth_curve_are_scipys(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    at = np.cumsum(random.uniform(0.1, 2.0, 3 + seed % 5))
+    gives = random.choice([-1.0, 0.0, 0.0, 0.3, 2.0], len(at))
+    wanted = PchipInterpolator(at, gives)
+    assert np.allclose(monotone_slopes(at, gives), wanted.derivative()(at), rtol=0, atol=1e-12)
+    x, y = curve_corners(at, gives, "smooth")
+    assert np.allclose(y, wanted(x), rtol=0, atol=1e-12)

@@ -224,3 +224,15 @@ def test_goals_go_into_a_frame_low_byte_first() -> None:
     stuffed = np.array([0x00FD, 0, 0xFFFF], np.int32)
     frame[15] = 0xFD
     assert not kernels.put_goals(frame, 12, stuffed, places, 2, state)
+
+
+@pytest.mark.parametrize("error", [RuntimeError("no locator available"), OSError(28, "No space left on device")])
+def test_kernels_are_there_where_no_compiled_code_can_be_kept(
+    error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("numba.core.caching.FunctionCache.__init__", refuse)
+    double = kernels._kernel(kernels._REAL)(lambda x: 2.0 * x)
+    assert double(3.0) == 6.0 and not double._can_compile

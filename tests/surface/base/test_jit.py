@@ -82,3 +82,41 @@ def test_every_file_whose_kernels_a_file_calls_is_watched(name: str) -> None:
             functions = [v for v in vars(value).values() if isinstance(v, CPUDispatcher)]
         for function in functions:
             assert Path(function.py_func.__code__.co_filename) in watched, function
+
+
+def said(folder: Path, **settings: str) -> subprocess.CompletedProcess[str]:
+    """What a process of its own that uses the kernel writes."""
+    env = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", **settings}
+    return subprocess.run([sys.executable, "-c", RUN], cwd=folder, env=env, capture_output=True, text=True, check=False)
+
+
+def test_compiling_for_the_first_time_says_so_once(copy: Path) -> None:
+    first, second = said(copy), said(copy)
+    assert first.stderr == "compiling the kernels of surface for this machine: up to a minute, only once\n"
+    assert (second.stdout, second.stderr) == ("8.0 1\n", "")
+
+
+def test_kernels_run_where_no_compiled_code_can_be_kept(copy: Path) -> None:
+    nowhere = {"NUMBA_CACHE_DIR": "/dev/null/cache", "HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"}
+    for folder in copy.rglob("*.py"):
+        (folder.parent / "__pycache__").unlink(missing_ok=True)
+        if not (folder.parent / "__pycache__").exists():
+            (folder.parent / "__pycache__").touch()  # a file, so that there is no such folder for root either
+    result = said(copy, **nowhere)
+    assert result.stdout == "8.0 0\n", result.stderr
+    assert result.stderr.count("set NUMBA_CACHE_DIR") == 1  # for all kernels together
+
+
+def test_kernels_run_on_a_full_disk(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    def refuse(self: object, signature: object, data: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("numba.core.caching.FunctionCache.save_overload", refuse)
+    jit._log_once.cache_clear()
+
+    @jit.kernel
+    def double(x):
+        return 2.0 * x
+
+    assert double(2.0) == 4.0
+    assert "No space left on device" in caplog.text

@@ -163,7 +163,7 @@ def test_without_rhino3dm_it_says_what_to_install(tmp_path: Path, monkeypatch: p
     (tmp_path / "a.3dm").write_bytes(b"")
     with pytest.raises(SurfaceError, match=r"a\.3dm.*rhino3dm") as caught:
         read_surface(tmp_path / "a.3dm")
-    assert caught.value.hint == "pip install rhino3dm"
+    assert caught.value.hint == "pip install 'omote[cad]'"
 
 
 @cache

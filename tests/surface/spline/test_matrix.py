@@ -73,3 +73,12 @@ def test_copies_of_a_closed_surface_count_for_their_point() -> None:
 def test_an_unknown_derivative_is_named() -> None:
     with pytest.raises(ValueError, match=r"derivative: must be \(0, 0\), \(1, 0\) or \(0, 1\), not \(1, 1\)"):
         matrix.basis_matrices(shapes.torus(), [[0.5, 0.5]], [(0, 0), (1, 1)])
+
+
+def test_rows_for_products_are_the_matrix_without_scipy() -> None:
+    surface, _ = net(np.random.default_rng(3).uniform(0.5, 2, (5, 5)))
+    uv = np.random.default_rng(0).uniform(0, 1, (40, 2))
+    rows, sparse = matrix.basis_rows(surface, uv), matrix.basis_matrices(surface, uv, [(0, 0)])[0]
+    for values in (surface.points, np.arange(25.0), np.ones((25, 2, 3))):
+        wanted = (sparse @ values.reshape(25, -1)).reshape(40, *values.shape[1:])
+        assert np.allclose(rows @ values, wanted, rtol=0, atol=1e-13)

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from ball_head import BallHead, values
 
-from surface.base.errors import ViewError
+from surface.base.errors import MissingPackage, ViewError
 from surface.view import Offscreen, run_window
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target
@@ -134,7 +134,7 @@ def test_no_display(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_imgui_bundle(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setitem(sys.modules, "imgui_bundle", None)
-    with pytest.raises(ViewError, match="imgui-bundle"):
+    with pytest.raises(MissingPackage, match="imgui-bundle"):
         run_window(BallHead(), lambda: values())
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from surface.base.errors import ViewError
+from surface.base.errors import MissingPackage, ViewError
 from surface.view.pictures.imagefile import as_image, replacing
 
 
@@ -50,6 +50,6 @@ def test_a_target_that_cannot_be_replaced(tmp_path: Path) -> None:
 
 def test_without_pillow_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "PIL", None)
-    with pytest.raises(ViewError, match="Pillow") as caught:
+    with pytest.raises(MissingPackage, match="Pillow") as caught:
         as_image(np.zeros((2, 2, 3), np.uint8))
-    assert ".[view]" in caught.value.hint
+    assert caught.value.hint == "pip install 'omote[view]'"

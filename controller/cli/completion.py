@@ -1,0 +1,62 @@
+"""Names that the shell completes: of configuration files, parameters, expressions, identities and models.
+
+Each function takes the beginning of a word. None raises: a shell would show the error in the middle of what is typed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+Complete = Callable[[str], list[str]]
+
+
+def _quiet(names: Callable[[], Iterable[str]]) -> Complete:
+    def complete(incomplete: str) -> list[str]:
+        try:
+            return sorted(name for name in names() if name.startswith(incomplete))
+        except Exception:  # noqa: BLE001  a damaged file is reported by the command, not by the shell
+            return []
+
+    return complete
+
+
+def names_of(kind: str) -> Complete:
+    """Names of a folder of configs; what else may stand there is a path, which the shell itself completes."""
+
+    def names() -> Iterable[str]:
+        from controller.base.paths import config_dir  # start-up: only completion needs it
+
+        return (path.stem for path in (config_dir() / kind).iterdir() if not path.name.startswith("."))
+
+    return _quiet(names)
+
+
+def _settings() -> Iterable[str]:
+    from controller.base.parameters import PARAMETERS  # start-up: only completion needs it
+
+    return (f"{name}=" for name in PARAMETERS.names)
+
+
+def _expressions() -> Iterable[str]:
+    # start-up: only completion needs them
+    from controller.base.parameters import PARAMETERS
+    from controller.vocabulary.vocabulary import Vocabulary
+
+    return Vocabulary.load(PARAMETERS).names
+
+
+def _identities() -> Iterable[str]:
+    # start-up: only completion needs them
+    from controller.base.paths import find_config
+    from surface.head.model.identity import load_identities
+
+    return (f"{name}=" for name in load_identities(find_config("heads", "ict")))
+
+
+def _models() -> Iterable[str]:
+    from drivers.tables.tables import known_models  # start-up: only completion needs it
+
+    return known_models().values()
+
+
+settings, expressions, identities, models = map(_quiet, (_settings, _expressions, _identities, _models))
