@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -13,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, ValidationError
 from controller.base.errors import ConfigError
 from controller.base.files import NEWER
 from controller.base.partial_config import PartialConfig
+from surface.base import files
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -35,12 +35,8 @@ class Settings(BaseModel):
 
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as tables. Raises ConfigError when it cannot be read or is not TOML."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}", hint="correct the line named above") from error
+    with files.reading(path, ConfigError, hint="correct the line named above"):
+        return files.read_toml(path)
 
 
 def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
