@@ -16,6 +16,8 @@ from surface.base import files
 
 Model = TypeVar("Model", bound=BaseModel)
 
+_MOST_FAULTS = 50  # listed of a file
+
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite number; neither ``true`` nor ``"1"`` is one."""
 Positive = Annotated[Number, Field(gt=0)]
@@ -68,7 +70,9 @@ def check(table: dict[str, Any], model: type[Model], path: Path,
 
 def config_error(path: Path, faults: list[str]) -> ConfigError:
     """One error that lists all ``faults`` of ``path``."""
-    listing = "\n".join(f"  {fault}" for fault in faults)
+    listing = "\n".join(f"  {fault}" for fault in faults[:_MOST_FAULTS])
+    if len(faults) > _MOST_FAULTS:
+        listing += f"\n  and {len(faults) - _MOST_FAULTS} more"
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     newer = any(NEWER in fault for fault in faults)
     hint = "pip install --upgrade omote" if newer else f"correct the file, then: omote check {path}"
@@ -88,8 +92,14 @@ def describe(fault: Any, model: type[BaseModel]) -> str:
     if fault["type"] in ("model_type", "dict_type"):
         reason = "must be a table"
     given = fault.get("input")
-    shown = f" (is {given!r})" if isinstance(given, str | int | float | bool) else ""
+    shown = f" (is {shortened(given)})" if isinstance(given, str | int | float | bool) else ""
     return f"{where}: {reason[:1].lower()}{reason[1:]}{shown}"
+
+
+def shortened(given: object) -> str:
+    """What was given, as a person would write it; the beginning of what is long."""
+    text = repr(given)
+    return text if len(text) <= 80 else f"{text[:76]} ..."
 
 
 def key_path(parts: tuple[str | int, ...]) -> str:

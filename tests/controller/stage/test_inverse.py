@@ -171,7 +171,7 @@ def test_a_damaged_group_file_names_its_key(head: Head, tmp_path: Path, key: str
     with pytest.raises(ConfigError, match=key):
         load_group(path, head)
     path.write_text("{")
-    with pytest.raises(ConfigError, match="cannot be read"):
+    with pytest.raises(ConfigError, match="not valid JSON"):
         load_group(path, head)
 
 
