@@ -25,6 +25,7 @@ from controller.robot.anchors import SkinSamples
 from controller.robot.terms import Finite
 from surface.base import files
 from surface.head import Head
+from surface.head.model.data import HeadData
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix  # start-up: only sculpting needs it
@@ -199,12 +200,12 @@ def save_group(path: Path, name: str, group: GroupMoves) -> None:
         temporary.write_text(json.dumps(table) + "\n", encoding="utf-8")
 
 
-def load_group(path: Path, head: Head) -> tuple[str, GroupMoves]:
+def load_group(path: Path, head: HeadData) -> tuple[str, GroupMoves]:
     """Read a group file for a head; returns its name and content.
 
     Raises ConfigError, with every fault, when the file cannot be read, is no group file, or does not fit the head.
     """
-    counts = {part.name: len(part.points) for part in head.data.parts}
+    counts = {part.name: len(part.points) for part in head.parts}
 
     def misfits(group: GroupFile) -> list[str]:
         if group.part not in counts:

@@ -150,7 +150,7 @@ def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tupl
 
     head = Head.load(folder, identity)
     for path, amount in groups:
-        add_group(head, load_group(path, head)[1], amount)
+        add_group(head, load_group(path, head.data)[1], amount)
     return head
 
 

@@ -100,9 +100,9 @@ def _is_group(path: Path) -> bool:
 
 def _check_group(path: Path) -> str:
     from controller.stage.inverse import load_group  # start-up: as Head
-    from surface.head import Head  # start-up: only heads and groups need it
+    from surface.head.model.file import load_data  # start-up: as Head
 
-    head = Head.load(find_config("heads", DEFAULT_HEAD))
+    head = load_data(find_config("heads", DEFAULT_HEAD))
     name, group = load_group(path, head)
     return f"group {name}: {len(group.ids)} control points of part {group.part} of head {head.name}"
 
