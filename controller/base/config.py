@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -13,8 +12,11 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, ValidationError
 from controller.base.errors import ConfigError
 from controller.base.files import NEWER
 from controller.base.partial_config import PartialConfig
+from surface.base import files
 
 Model = TypeVar("Model", bound=BaseModel)
+
+_MOST_FAULTS = 50  # listed of a file
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite number; neither ``true`` nor ``"1"`` is one."""
@@ -35,12 +37,8 @@ class Settings(BaseModel):
 
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as tables. Raises ConfigError when it cannot be read or is not TOML."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}", hint="correct the line named above") from error
+    with files.reading(path, ConfigError, hint="correct the line named above"):
+        return files.read_toml(path)
 
 
 def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
@@ -72,7 +70,9 @@ def check(table: dict[str, Any], model: type[Model], path: Path,
 
 def config_error(path: Path, faults: list[str]) -> ConfigError:
     """One error that lists all ``faults`` of ``path``."""
-    listing = "\n".join(f"  {fault}" for fault in faults)
+    listing = "\n".join(f"  {fault}" for fault in faults[:_MOST_FAULTS])
+    if len(faults) > _MOST_FAULTS:
+        listing += f"\n  and {len(faults) - _MOST_FAULTS} more"
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     newer = any(NEWER in fault for fault in faults)
     hint = "pip install --upgrade omote" if newer else f"correct the file, then: omote check {path}"
@@ -92,8 +92,14 @@ def describe(fault: Any, model: type[BaseModel]) -> str:
     if fault["type"] in ("model_type", "dict_type"):
         reason = "must be a table"
     given = fault.get("input")
-    shown = f" (is {given!r})" if isinstance(given, str | int | float | bool) else ""
+    shown = f" (is {shortened(given)})" if isinstance(given, str | int | float | bool) else ""
     return f"{where}: {reason[:1].lower()}{reason[1:]}{shown}"
+
+
+def shortened(given: object) -> str:
+    """What was given, as a person would write it; the beginning of what is long."""
+    text = repr(given)
+    return text if len(text) <= 80 else f"{text[:76]} ..."
 
 
 def key_path(parts: tuple[str | int, ...]) -> str:

@@ -5,7 +5,6 @@ A value that does not fit its key is removed; where the table around it cannot b
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Iterable, Iterator
 from typing import Any, Generic, TypeVar
@@ -23,39 +22,70 @@ class PartialConfig(Generic[Model]):
     """
 
     def __init__(self, table: dict[str, Any], model: type[Model], error: ValidationError) -> None:
-        self._kept, self._removed = dict[str, list[int]](), set[str]()
+        self._rest, self._removed = _numbered(table), set[str]()
         self.read: Model | None = None
-        rest = copy.deepcopy(table)
-        while self.read is None and self._remove(rest, error):
+        while self.read is None and self._remove(error):
             try:
-                self.read = model.model_validate(rest)
+                self.read = model.model_validate(self._rest)
             except ValidationError as left:
                 error = left
 
     def relocate(self, faults: Iterable[str]) -> list[str]:
         """Faults of :attr:`read` by their places in the whole file, without those that name something removed."""
-        return [self._placed(fault) for fault in faults if not any(repr(name) in fault for name in self._removed)]
+        named = re.compile("|".join(re.escape(repr(name)) for name in self._removed) or "(?!)")
+        return [_PLACE.sub(self._placed, fault) for fault in faults if not named.search(fault)]
 
-    def _remove(self, table: dict[str, Any], error: ValidationError) -> bool:
+    def _remove(self, error: ValidationError) -> bool:
         """Remove what is at the places of the faults, or the tables around them; False where nothing is left."""
-        found = {_existing(table, fault["loc"]) for fault in error.errors()} - {()}
-        for *parents, last in sorted(found, reverse=True):  # the last entries of a list first
-            around: Any = table
+        found = {_existing(self._rest, fault["loc"]) for fault in error.errors()} - {()}
+        outermost = [loc for loc in found if not any(loc[:depth] in found for depth in range(1, len(loc)))]
+        for *parents, last in sorted(outermost, key=_order, reverse=True):  # the last entries of a list first
+            around: Any = self._rest
             for part in parents:
                 around = around[part]
-            if isinstance(around, list):
-                name = ".".join(map(str, parents))
-                del self._kept.setdefault(name, list(range(len(around))))[int(last)]
             value = around.pop(last)
             self._removed |= {*_texts(value), *([str(last)] if isinstance(value, dict) else [])}
         return bool(found)
 
-    def _placed(self, fault: str) -> str:
-        for name, kept in self._kept.items():
-            parts = re.split(rf"(?<={re.escape(name)}\[)(\d+)(?=\])", fault)
-            parts[1::2] = [str(kept[int(part)]) for part in parts[1::2]]
-            fault = "".join(parts)
-        return fault
+    def _placed(self, found: re.Match[str]) -> str:
+        """A place in what is left, as ``channels[1].map.deg[0]``, by the numbers of the whole file."""
+        value: Any = self._rest
+        parts = re.split(r"([.\[\]]+)", found[0])
+        for i, part in enumerate(parts[::2]):
+            if isinstance(value, _Numbered) and part.isdigit() and int(part) < len(value):
+                parts[2 * i] = str(value.numbers[int(part)])
+                value = value[int(part)]
+            else:
+                value = value.get(part) if isinstance(value, dict) else None
+        return "".join(parts)
+
+
+_PLACE = re.compile(r"[\w-]+(?:\.[\w-]+|\[\d+\])+")
+
+
+class _Numbered(list[Any]):
+    """A list that knows the numbers its entries had before others were removed."""
+
+    def __init__(self, values: Iterable[Any]) -> None:
+        super().__init__(values)
+        self.numbers = list(range(len(self)))
+
+    def pop(self, index: Any = -1) -> Any:
+        """Remove an entry and its number."""
+        self.numbers.pop(index)
+        return super().pop(index)
+
+
+def _numbered(value: Any) -> Any:
+    """A copy in which every list is numbered."""
+    if isinstance(value, dict):
+        return {key: _numbered(each) for key, each in value.items()}
+    return _Numbered(map(_numbered, value)) if isinstance(value, list) else value
+
+
+def _order(loc: Loc) -> tuple[tuple[bool, int | str], ...]:
+    """Sorts places: names before numbers."""
+    return tuple((isinstance(part, int), part) for part in loc)
 
 
 def _existing(table: Any, loc: Loc) -> Loc:

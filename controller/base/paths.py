@@ -49,7 +49,8 @@ def find_config(kind: str, name: str, *, beside: Path | None = None) -> Path:
     if beside is not None:
         places.insert(0, beside.parent / name)
     for place in places:
-        if (place / "head.toml" if kind == "heads" else place).is_file():
+        found = place / "head.toml" if kind == "heads" else place
+        if os.path.exists(found) and not os.path.isdir(found):  # False for names that no file can have
             return place
     raise _unknown(kind, name, folder)
 

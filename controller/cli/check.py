@@ -21,7 +21,8 @@ def check(
     file: Annotated[
         str,
         typer.Argument(
-            help="A stage, robot, head, expressions, script, take, recording, group or surface: path or name.",
+            help="A stage, robot, calibration, head, vocabulary, layers, life, script, take, recording, group or "
+            "surface: path or name.",
             autocompletion=checkable,
         ),
     ],
@@ -33,7 +34,7 @@ def check(
     from controller.tools.check import check_anything  # start-up: --help does without it
 
     for line in check_anything(file):
-        console.print(line, soft_wrap=True)
+        console.print(escape(line), soft_wrap=True)
 
 
 def plugins() -> None:

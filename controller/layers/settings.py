@@ -45,21 +45,24 @@ class LayersTable(Settings):
 
 
 def load_layers(
-    changes: Mapping[str, Mapping[str, Any]] | None = None, *, where: Path | None = None
+    changes: Mapping[str, Mapping[str, Any]] | None = None, *, where: Path | None = None, base: Path | None = None
 ) -> tuple[LayerSettings, ...]:
     """The shipped layers, with the ``changes`` of a stage: other values for some keys, or more layers.
 
-    ``where`` : the file the changes are from, for messages.
+    ``where`` : the file the changes are from, for messages. ``base`` : a file instead of the shipped one.
 
     Raises ConfigError: a wrong key or value; two layers of one priority. The message lists every fault with its key.
     """
-    path = config_dir() / "vocabularies" / "layers.toml"
-    base = read_toml(path)
-    merged = {
-        name: {**base.get(name, {}), **dict((changes or {}).get(name, {}))} for name in {**base, **(changes or {})}
-    }
+    path = base or config_dir() / "vocabularies" / "layers.toml"
+    shipped, changes = read_toml(path), changes or {}
+    merged = {name: _merged(shipped.get(name, {}), changes.get(name, {})) for name in {**shipped, **changes}}
     tables = check({"layers": merged}, LayersTable, where or path, _faults).layers
     return tuple(LayerSettings(name, **dict(table)) for name, table in tables.items())
+
+
+def _merged(own: Any, changes: Mapping[str, Any]) -> Any:
+    """A layer's table with changes; what is no table stays as it is, a fault of its file."""
+    return {**own, **changes} if isinstance(own, Mapping) else own
 
 
 @cache

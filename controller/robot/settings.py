@@ -218,8 +218,8 @@ class RobotSettings(Settings):
     name: str
     description: str = ""
     calibration: str | None = None
-    buses: list[Bus] = Field(min_length=1)
-    channels: list[ChannelSettings] = Field(min_length=1)
+    buses: list[Bus] = Field(min_length=1, max_length=64)
+    channels: list[ChannelSettings] = Field(min_length=1, max_length=1024)
     landmarks: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=3)]] = {}
     profiles: dict[str, dict[str, Any]] = {}
     rules: RuleSettings = RuleSettings()

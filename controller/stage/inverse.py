@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from controller.base.config import Settings, check, config_error
+from controller.base.errors import ConfigError
 from controller.base.files import format_fault, replacing
 from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.robot.anchors import SkinSamples
 from controller.robot.terms import Finite
+from surface.base import files
 from surface.head import Head
+from surface.head.model.data import HeadData
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix  # start-up: only sculpting needs it
@@ -33,6 +36,7 @@ _TOLERANCE = 1e-4
 _STRAIGHT_MM = 0.5
 _ROUNDS = 2  # solves again, at most, where shapes are not straight
 _SETTLED = 0.02
+_MOST_BYTES = 4 << 20
 FORMAT = 1
 """Version of the group files that :func:`save_group` writes."""
 
@@ -196,12 +200,12 @@ def save_group(path: Path, name: str, group: GroupMoves) -> None:
         temporary.write_text(json.dumps(table) + "\n", encoding="utf-8")
 
 
-def load_group(path: Path, head: Head) -> tuple[str, GroupMoves]:
+def load_group(path: Path, head: HeadData) -> tuple[str, GroupMoves]:
     """Read a group file for a head; returns its name and content.
 
     Raises ConfigError, with every fault, when the file cannot be read, is no group file, or does not fit the head.
     """
-    counts = {part.name: len(part.points) for part in head.data.parts}
+    counts = {part.name: len(part.points) for part in head.parts}
 
     def misfits(group: GroupFile) -> list[str]:
         if group.part not in counts:
@@ -213,10 +217,8 @@ def load_group(path: Path, head: Head) -> tuple[str, GroupMoves]:
             faults.append(f"ids: a control point that is not there (0 to {counts[group.part] - 1})")
         return faults
 
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise config_error(path, [f"file: cannot be read ({error})"]) from error
+    with files.reading(path, ConfigError, hint="make it again, or take it from a copy"):
+        table = files.read_json(path, _MOST_BYTES)
     fault = format_fault(table.get("format"), FORMAT) if isinstance(table, dict) else "file: must hold a table"
     if fault is not None:
         raise config_error(path, [fault])

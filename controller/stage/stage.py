@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -79,20 +80,20 @@ class StageSettings(Settings):
     description: str = ""
     head: str = "ict"
     identity: dict[str, Annotated[float, Field(ge=0, le=1)]] = {}
-    robots: list[str] = []
+    robots: Annotated[list[str], Field(max_length=32)] = []
     control_hz: Annotated[float, Field(ge=10, le=1000)] = 100.0
     liveliness: Annotated[float, Field(ge=0, le=1)] = 0.0
     life: str = "natural"
     seed: Annotated[int, Field(ge=0)] = 0
-    vocabularies: list[str] = []
+    vocabularies: Annotated[list[str], Field(max_length=64)] = []
     show: str | None = None
     take: str | None = None
     voice: str | None = None
     voice_hz: Annotated[int, Field(ge=1000)] | None = None
-    groups: dict[str, Annotated[float, Field(ge=-1, le=1)]] = {}
-    layers: dict[str, dict[str, Any]] = {}
+    groups: Annotated[dict[str, Annotated[float, Field(ge=-1, le=1)]], Field(max_length=64)] = {}
+    layers: Annotated[dict[str, dict[str, Any]], Field(max_length=64)] = {}
     face: FaceSettings = FaceSettings()
-    links: list[LinkTable] = []
+    links: Annotated[list[LinkTable], Field(max_length=64)] = []
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ class Stage:
     def file(self, name: str) -> Path:
         """A file that the stage names: relative to the stage's folder, or a path."""
         beside = self.path.parent / name
-        return beside if beside.exists() else Path(name)
+        return beside if os.path.exists(beside) else Path(name)
 
     @property
     def period_s(self) -> float:
@@ -149,7 +150,7 @@ def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tupl
 
     head = Head.load(folder, identity)
     for path, amount in groups:
-        add_group(head, load_group(path, head)[1], amount)
+        add_group(head, load_group(path, head.data)[1], amount)
     return head
 
 

@@ -8,6 +8,7 @@ eyeLook columns say; and the labels JawLeft/JawRight and MouthLeft/MouthRight ar
 from __future__ import annotations
 
 import csv
+import io
 import math
 import re
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ import numpy as np
 from controller.base.errors import ParameterError, TakeError
 from controller.base.parameters import Flags, Floats, Parameters, fold
 from controller.layers.commands import CommandState
+from surface.base import files
 
 _FRAMES_PER_S = 60.0
 _DAY_S = 86_400.0
@@ -134,12 +136,11 @@ class TakePlayer:
 
 def _read(path: Path) -> tuple[list[str], Floats, Floats]:
     """Column names (folded, without timecode and count), times from the first row (s) and cells (n, columns)."""
+    with files.reading(path, TakeError, hint=_HINT):
+        text = files.read_text(path)
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.reader(file))
-    except OSError as error:
-        raise TakeError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
+        rows = list(csv.reader(io.StringIO(text, newline="")))
+    except csv.Error as error:
         raise TakeError(f"{path}: not a CSV file: {error}", hint=_HINT) from error
     if not rows:
         raise TakeError(f"{path}: the file is empty", hint=_HINT)

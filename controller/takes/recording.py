@@ -20,11 +20,13 @@ from controller.base.files import format_fault
 from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState
 from controller.takes.line_writer import LineWriter
+from surface.base import files
 
 SUFFIX = ".rec"
 """What names of recordings end in."""
 
 _KIND, _VERSION = "omote recording", 1
+_LONGEST_LINE = 1 << 20
 _COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live")
 
 
@@ -111,7 +113,7 @@ def replay(path: Path, parameters: Parameters, *, make: Maker = _default_state) 
                 yield now_ns, out
             else:
                 _apply(state, items)
-        except (KeyError, IndexError, TypeError, ValueError) as error:
+        except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
             raise _damaged(path, number) from error
 
 
@@ -160,20 +162,15 @@ def _apply(state: CommandState, items: list[Any]) -> None:
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[Any]]]:
-    try:
-        with path.open(encoding="ascii") as file:
-            for number, line in enumerate(file, 1):
-                try:
-                    items = json.loads(line)
-                except ValueError as error:
-                    raise _damaged(path, number) from error
-                if not isinstance(items, list) or not items:
-                    raise _damaged(path, number)
-                yield number, items
-    except OSError as error:
-        raise ControllerError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
-    except UnicodeDecodeError as error:
-        raise ControllerError(f"{path}: not a recording", hint="omote writes recordings as ASCII text") from error
+    with files.reading(path, ControllerError), files.open_file(path) as file:
+        for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), b""), 1):
+            try:
+                items = files.parse_json(line.decode("ascii"))
+            except ValueError as error:
+                raise _damaged(path, number) from error
+            if not isinstance(items, list) or not items:
+                raise _damaged(path, number)
+            yield number, items
 
 
 def _header(path: Path, lines: Iterator[tuple[int, list[Any]]], parameters: Parameters) -> tuple[int, float]:

@@ -6,7 +6,6 @@ the firmer they hold their own shape, so that lips meet for a short "p" between 
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,13 +15,17 @@ import numpy as np
 
 from controller.base.errors import ParameterError, TakeError
 from controller.base.parameters import Floats, Parameters
-from controller.motion.motion import minimum_jerk
 from controller.takes.livelink import Take
 from controller.vocabulary.visemes import Visemes
+from surface.base import files
 
 RATE_HZ = 100.0
 """Rows per second of the takes made here."""
 
+LONGEST_S = 3600.0
+"""Length of the longest take made here."""
+
+_MOST_BYTES = 4 << 20
 _BEFORE_S = 0.12
 _AFTER_S = 0.08
 _FIRM = 0.85
@@ -45,45 +48,47 @@ def speech_take(name: str, cues: Sequence[Cue], end_s: float, parameters: Parame
     Raises TakeError: no cue, or times that do not rise.
     """
     starts = np.array([cue.start_s for cue in cues])
-    if len(cues) == 0 or np.any(np.diff(starts) < 0) or end_s < starts[-1]:
+    if len(cues) == 0 or not (np.diff(starts) >= 0).all() or not starts[-1] <= end_s:
         raise TakeError(f"{name}: needs at least one sound, with times that rise", hint="sort the sounds by time")
+    if not 0.0 <= starts[0] <= end_s <= LONGEST_S:
+        why = f"its sounds are at {starts[0]:g} to {end_s:g} s; 0 to {LONGEST_S:g} s are read"
+        raise TakeError(f"{name}: {why}", hint="give the times in seconds")
     ends = np.append(starts[1:], end_s)
     weights = np.stack([cue.weights for cue in cues])
     hold = weights @ visemes.hold
     times = np.arange(0.0, end_s + _AFTER_S + 1 / RATE_HZ, 1 / RATE_HZ)
-    values = np.stack([visemes.matrix @ _mix(t, starts, ends, weights, hold) for t in times])
+    values = _mix(times, starts, ends, weights, hold) @ visemes.matrix.T
     return Take(name, times, np.minimum(values, 1.0), visemes.mask, parameters.low, parameters.high, visemes.through)
 
 
-def _mix(t: float, starts: Floats, ends: Floats, weights: Floats, hold: Floats) -> Floats:
-    """(n,) weights of the visemes at a time: the sounds near it, each by its dominance there."""
-    here = max(int(np.searchsorted(starts, t, side="right")) - 1, 0)
-    near = range(max(here - _NEIGHBOURS, 0), min(here + _NEIGHBOURS + 1, len(starts)))
+def _mix(times: Floats, starts: Floats, ends: Floats, weights: Floats, hold: Floats) -> Floats:
+    """(t, n) weights of the visemes at times (t,): the sounds near each, each by its dominance there."""
+    here = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
     room = 1.0 - _FIRM * hold[here]
-    dominance = np.array([_dominance(t, starts[k], ends[k], room) * (0.2 + 0.8 * hold[k]) for k in near])
-    total = dominance.sum()
-    if total <= 0.0:
-        return np.zeros(weights.shape[1])
-    mixed: Floats = dominance @ weights[near.start : near.stop] / total
-    mixed *= min(1.0, _dominance(t, starts[0], ends[-1], 1.0))
-    return mixed
+    mixed, total = np.zeros((len(times), weights.shape[1])), np.zeros(len(times))
+    for step in range(-_NEIGHBOURS, _NEIGHBOURS + 1):
+        near = np.clip(here + step, 0, len(starts) - 1)
+        dominance = _dominance(times, starts[near], ends[near], room) * (0.2 + 0.8 * hold[near])
+        dominance[near != here + step] = 0.0
+        mixed += dominance[:, None] * weights[near]
+        total += dominance
+    mixed /= np.where(total > 0.0, total, 1.0)[:, None]
+    everything: Floats = _dominance(times, starts[0], ends[-1], 1.0)
+    return mixed * np.minimum(1.0, everything)[:, None]
 
 
-def _dominance(t: float, start: float, end: float, room: float) -> float:
+def _dominance(t: Floats, start: Floats, end: Floats, room: Floats | float) -> Floats:
     """1 during a sound, falling to 0 before and after it over a time that ``room`` scales."""
-    if t < start:
-        return 1.0 - minimum_jerk((start - t) / (_BEFORE_S * room))
-    if t >= end:
-        return 1.0 - minimum_jerk((t - end) / (_AFTER_S * room))
-    return 1.0
+    away = np.maximum((start - t) / (_BEFORE_S * room), (t - end) / (_AFTER_S * room))
+    away = np.clip(away, 0.0, 1.0)
+    level: Floats = 1.0 - away**3 * (10.0 + away * (6.0 * away - 15.0))
+    return level
 
 
 def cue_take(path: Path, parameters: Parameters) -> Take:
     """A take from Rhubarb's TSV or JSON, or from a TSV of phonemes or visemes (time, tab, name). Raises TakeError."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise TakeError(f"{path}: cannot be read: {error}", hint=f"look at: ls -l {path}") from error
+    with files.reading(path, TakeError, hint="save it as UTF-8"):
+        text = files.read_text(path, _MOST_BYTES)
     visemes = Visemes.load(parameters)
     rows, end_s = _json_rows(path, text) if path.suffix.lower() == ".json" else _tsv_rows(path, text)
     shapes = all(name in visemes.rhubarb for _, _, name in rows)
@@ -120,10 +125,10 @@ def _tsv_rows(path: Path, text: str) -> tuple[list[tuple[str, float, str]], floa
 
 def _json_rows(path: Path, text: str) -> tuple[list[tuple[str, float, str]], float]:
     try:
-        cues = json.loads(text)["mouthCues"]
+        cues = files.parse_json(text)["mouthCues"]
         rows = [(f"mouthCues[{i}]", float(cue["start"]), str(cue["value"])) for i, cue in enumerate(cues)]
         return rows, float(cues[-1]["end"]) if cues else 0.0
-    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+    except (LookupError, TypeError, ValueError, OverflowError) as error:
         raise TakeError(
             f"{path}: not the output of rhubarb -f json: {error}", hint="rhubarb -f json voice.wav"
         ) from error

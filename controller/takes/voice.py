@@ -7,10 +7,11 @@ stream with the loudest of the last few seconds.
 from __future__ import annotations
 
 import math
+import struct
 import threading
 import time
 import wave
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import IO
@@ -23,6 +24,7 @@ from controller.layers.commands import CommandState
 from controller.takes.livelink import Take
 from controller.vocabulary.sides import spread
 from controller.vocabulary.visemes import Visemes
+from surface.base import files
 
 _RATE_HZ = 100
 HOP_S = 1.0 / _RATE_HZ
@@ -31,6 +33,7 @@ _GATE = 0.06
 _RISE_S, _FALL_S = 0.03, 0.09
 _MEMORY_S = 4.0
 _LONGEST_S = 3600.0
+_HIGHEST_HZ, _MOST_CHANNELS = 384_000, 32
 _QUIET = 0.003  # rms of what counts as silence whatever came before
 _LOUD_PERCENTILE = 95.0
 _FORMATS = {1: "u1", 2: "<i2", 4: "<i4"}
@@ -39,11 +42,8 @@ _HINT = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le -"
 
 def wav_take(path: Path, parameters: Parameters) -> Take:
     """A take of a WAV file, a row every 10 ms. Raises TakeError: not a WAV file of PCM, or an empty one."""
-    try:
-        with path.open("rb") as stream:
-            return voice_take(stream, str(path), parameters)
-    except OSError as error:
-        raise TakeError(f"{path}: cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+    with files.reading(path, TakeError), files.open_file(path) as stream:
+        return voice_take(stream, str(path), parameters)
 
 
 def voice_take(
@@ -57,17 +57,14 @@ def voice_take(
     seconds = min(longest_s or _LONGEST_S, _LONGEST_S)
     if raw_hz is None:
         file = _open(stream, name)
-        rate = file.getframerate()
-        frames = min(file.getnframes(), math.ceil(seconds * rate))
-        sound = samples(file.readframes(frames), file.getsampwidth(), file.getnchannels())
+        rate, width, channels = file.getframerate(), file.getsampwidth(), file.getnchannels()
+        pieces = _pieces(file.readframes, rate, seconds)
     else:
-        rate = raw_hz
-        sound = samples(stream.read(2 * math.ceil(seconds * rate)), 2, 1)
-    if not len(sound):
+        rate, width, channels = raw_hz, 2, 1
+        pieces = _pieces(lambda count: stream.read(2 * count), rate, seconds)
+    loudness = _loudness_of((samples(piece, width, channels) for piece in pieces), rate)
+    if not len(loudness):
         raise TakeError(f"{name}: no sound in it", hint=_HINT)
-    size = int(_WINDOW_S * rate)
-    starts = np.arange(max(len(sound) * _RATE_HZ // rate, 1)) * rate // _RATE_HZ
-    loudness = _loudness(np.concatenate([sound, np.zeros(size)])[starts[:, None] + np.arange(size)], rate)
     loud = np.percentile(loudness, _LOUD_PERCENTILE, axis=0)
     goals = np.clip(loudness / np.where(loud > 0.0, loud, 1.0) - _GATE, 0.0, 1.0)
     levels, level = np.empty_like(goals), np.zeros(2)
@@ -77,6 +74,29 @@ def voice_take(
     times: Floats = np.arange(len(levels)) / _RATE_HZ
     mask = shapes.sum(axis=0) > 0
     return Take(Path(name).name, times, _mouth(levels, shapes), mask, parameters.low, parameters.high, through)
+
+
+def _pieces(read: Callable[[int], bytes], rate: int, seconds: float) -> Iterator[bytes]:
+    """The first ``seconds`` of a sound, a second at a time: a file may say that it is longer than it is."""
+    left = math.ceil(seconds * rate)
+    while left > 0 and (piece := read(min(rate, left))):
+        yield piece
+        left -= rate
+
+
+def _loudness_of(seconds: Iterator[Floats], rate: int) -> Floats:
+    """(k, 2) loudness of the voice and of hissing every 10 ms of a sound that comes a second, (rate,), at a time."""
+    size = int(_WINDOW_S * rate)
+    window = np.arange(size)
+    out, here = [np.zeros((0, 2))], next(seconds, np.zeros(0))
+    while len(here):
+        after = next(seconds, np.zeros(0))
+        hops = _RATE_HZ if len(after) else max(len(here) * _RATE_HZ // rate, not out[1:])
+        starts = np.arange(hops) * rate // _RATE_HZ
+        sound = np.concatenate([here, after[:size], np.zeros(size)])
+        out.append(_loudness(sound[starts[:, None] + window], rate))
+        here = after
+    return np.concatenate(out)
 
 
 class VoiceEnvelope:
@@ -168,11 +188,13 @@ def samples(data: bytes, width: int, channels: int) -> Floats:
 def _open(stream: IO[bytes], name: str) -> wave.Wave_read:
     try:
         file = wave.Wave_read(stream)
-    except (OSError, wave.Error, EOFError) as error:
+    except (OSError, wave.Error, EOFError, struct.error, RuntimeError) as error:
         raise TakeError(f"{name}: not WAV of PCM: {str(error) or 'it ends too early'}", hint=_HINT) from error
-    if file.getsampwidth() not in _FORMATS or file.getframerate() < 1000:
-        found = f"{8 * file.getsampwidth()} bit at {file.getframerate()} Hz"
-        raise TakeError(f"{name}: {found}; 8, 16 or 32 bit PCM of 1000 Hz or more is read", hint=_HINT)
+    width, channels, rate = file.getsampwidth(), file.getnchannels(), file.getframerate()
+    if width not in _FORMATS or channels > _MOST_CHANNELS or not 1000 <= rate <= _HIGHEST_HZ:
+        found = f"{channels} channels of {8 * width} bit at {rate} Hz"
+        read = f"8, 16 or 32 bit PCM of 1000 to {_HIGHEST_HZ} Hz and up to {_MOST_CHANNELS} channels is read"
+        raise TakeError(f"{name}: {found}; {read}", hint=_HINT)
     return file
 
 

@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from controller.base.config import load
+from controller.base.config import load, read_toml
 from controller.base.errors import ConfigError
-from controller.base.parameters import PARAMETERS
+from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.paths import config_dir, find_config
+from controller.layers.idle import IdleSettings
+from controller.layers.settings import load_layers
 from controller.links.line.script import load_script
 from controller.robot.calibration import CalibrationFile
 from controller.robot.robot import load_robot
+from controller.robot.settings import RobotSettings
 from controller.stage.stage import load_stage
 from controller.takes.reader import load_take, suffixes
 from controller.takes.recording import SUFFIX, replay
+from controller.tools import file_kinds
+from controller.tools.robot_warnings import robot_warnings
+from controller.vocabulary.affect import Affect
+from controller.vocabulary.facs import Facs
+from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
 from drivers.base.permission import ports_forbidden
+from surface.base.files import read_text
 from surface.readers import is_plain, read_surface, summary
 
 DEFAULT_HEAD = "ict"
@@ -36,14 +45,15 @@ def check_anything(name: str) -> list[str]:
 
 
 def _find(name: str) -> Path:
-    if Path(name).exists():
+    if os.path.exists(name):
         return Path(name)
-    for kind in ("stages", "robots", "heads"):
+    for kind in ("stages", "robots", "heads", "scripts", "vocabularies", "life"):
         try:
             return find_config(kind, name)
         except ConfigError:
             continue
-    raise ConfigError(f"{name}: no such file, and no stage, robot or head of that name", hint="omote check demo")
+    hint = "omote check demo"
+    raise ConfigError(f"{name}: no such file, and no stage, robot, head, script, vocabulary or life of it", hint=hint)
 
 
 def _describe(path: Path) -> Iterator[str]:
@@ -83,51 +93,93 @@ def _check_head(folder: Path) -> str:
 
 def _is_group(path: Path) -> bool:
     try:
-        return '"moves_mm"' in path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
+        return '"moves_mm"' in read_text(path)
+    except (OSError, ValueError):
         return False
 
 
 def _check_group(path: Path) -> str:
     from controller.stage.inverse import load_group  # start-up: as Head
-    from surface.head import Head  # start-up: only heads and groups need it
+    from surface.head.model.file import load_data  # start-up: as Head
 
-    head = Head.load(find_config("heads", DEFAULT_HEAD))
+    head = load_data(find_config("heads", DEFAULT_HEAD))
     name, group = load_group(path, head)
     return f"group {name}: {len(group.ids)} control points of part {group.part} of head {head.name}"
 
 
 def _describe_toml(path: Path) -> Iterator[str]:
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
-        table = {}  # the reader below reports what is wrong
-    if isinstance(table.get("channels"), dict) and "buses" not in table:
-        found = load(path, CalibrationFile)
-        yield f"calibration {found.name} of robot {found.robot}: {len(found.channels)} channels"
-    elif "channels" in table or "buses" in table:
-        yield from _describe_robot(path)
-    elif "steps" in table or "frames_hz" in table:
-        script = load_script(str(path), PARAMETERS)
-        yield f"script {script.name}: {len(script.steps)} steps, {len(script.marks)} marks"
-    elif table and all(isinstance(each, dict) and {"weights", "of"} & set(each) for each in table.values()):
-        shipped = config_dir() / "vocabularies" / "expressions.toml"
-        more = () if path.resolve() == shipped.resolve() else (path,)
-        known = len(Vocabulary.load(PARAMETERS).names) if more else 0
-        yield f"expressions {path.name}: {len(Vocabulary.load(PARAMETERS, more=more).names) - known}"
-    else:
-        stage = load_stage(str(path), PARAMETERS)
-        if stage.groups:
-            stage.load_head()
-        links = ", ".join(map(str, stage.settings.links)) or "none"
-        robots = ", ".join(robot.name for robot in stage.robots) or "none"
-        yield f"stage {stage.settings.name}: head {stage.head.name}, links: {links}, robots: {robots}"
+    table = read_toml(path)
+    kind = file_kinds.kind_of(table)
+    if kind is None and table:
+        why = f"no kind of file has the keys {', '.join(table)[:200]}"
+        raise ConfigError(f"{path}: {why}", hint="compare it with the files in configs/, or see docs/expression.md")
+    yield from _READERS.get(kind or file_kinds.STAGE, _describe_stage)(path)
+
+
+def _describe_calibration(path: Path) -> Iterator[str]:
+    found = load(path, CalibrationFile)
+    yield f"calibration {found.name} of robot {found.robot}: {len(found.channels)} channels"
+
+
+def _describe_script(path: Path) -> Iterator[str]:
+    script = load_script(str(path), PARAMETERS)
+    yield f"script {script.name}: {len(script.steps)} steps, {len(script.marks)} marks"
+
+
+def _describe_expressions(path: Path) -> Iterator[str]:
+    shipped = config_dir() / "vocabularies" / "expressions.toml"
+    more = () if path.resolve() == shipped.resolve() else (path,)
+    known = len(Vocabulary.load(PARAMETERS).names) if more else 0
+    yield f"expressions {path.name}: {len(Vocabulary.load(PARAMETERS, more=more).names) - known}"
+
+
+def _describe_life(path: Path) -> Iterator[str]:
+    settings = IdleSettings.named(str(path), PARAMETERS)
+    shortest, longest = settings.blink.interval_s
+    yield f"life {path.name}: a blink every {shortest:g} to {longest:g} s"
+
+
+def _describe_parameters(path: Path) -> Iterator[str]:
+    yield f"parameters {path.name}: {len(Parameters.load(path))}"
+
+
+def _describe_units(path: Path) -> Iterator[str]:
+    found = Facs.load(PARAMETERS, path)
+    yield f"action units {path.name}: {len(found.names)} with sides, {len(found.emotions)} emotions"
+
+
+def _describe_visemes(path: Path) -> Iterator[str]:
+    found = Visemes.load(PARAMETERS, path)
+    yield f"visemes {path.name}: {len(found.names)}, {len(found.phonemes)} phonemes"
+
+
+def _describe_moods(path: Path) -> Iterator[str]:
+    yield f"moods {path.name}: {len(Affect.load(Vocabulary.load(PARAMETERS), path).names) - 1} anchors"
+
+
+def _describe_layers(path: Path) -> Iterator[str]:
+    yield f"layers {path.name}: {', '.join(layer.name for layer in load_layers(base=path))}"
+
+
+def _describe_stage(path: Path) -> Iterator[str]:
+    stage = load_stage(str(path), PARAMETERS)
+    if stage.groups:
+        stage.load_head()
+    links = ", ".join(map(str, stage.settings.links)) or "none"
+    robots = ", ".join(robot.name for robot in stage.robots) or "none"
+    yield f"stage {stage.settings.name}: head {stage.head.name}, links: {links}, robots: {robots}"
+    yield from _warnings(stage.robots)
+
+
+def _warnings(robots: Sequence[RobotSettings]) -> Iterator[str]:
+    yield from (f"  warning: {line}" for line in robot_warnings(robots))
 
 
 def _describe_robot(path: Path) -> Iterator[str]:
     """A robot; with anchors, by region how far emotions move the skin and the servos fall short (rms, mm)."""
     robot = load_robot(path, PARAMETERS)
     yield f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels"
+    yield from _warnings([robot])
     if not robot.anchored_channels:
         return
     from controller.robot.anchors import load_anchors, residual_rows  # start-up: as Head
@@ -137,3 +189,18 @@ def _describe_robot(path: Path) -> Iterator[str]:
     emotions = {n: vocabulary[n].weights for n in vocabulary.names if vocabulary[n].kind == "emotion"}
     for region, wanted, left in residual_rows(anchors, emotions, PARAMETERS) if anchors is not None else ():
         yield f"  {region}: emotions move it {wanted:.1f} mm, the servos stay {left:.1f} mm behind (rms)"
+
+
+_READERS: dict[file_kinds.FileKind, Callable[[Path], Iterator[str]]] = {
+    file_kinds.STAGE: _describe_stage,
+    file_kinds.ROBOT: _describe_robot,
+    file_kinds.CALIBRATION: _describe_calibration,
+    file_kinds.SCRIPT: _describe_script,
+    file_kinds.LIFE: _describe_life,
+    file_kinds.PARAMETERS: _describe_parameters,
+    file_kinds.UNITS: _describe_units,
+    file_kinds.VISEMES: _describe_visemes,
+    file_kinds.MOODS: _describe_moods,
+    file_kinds.LAYERS: _describe_layers,
+    file_kinds.EXPRESSIONS: _describe_expressions,
+}

@@ -12,17 +12,34 @@ import errno
 import json
 import os
 import stat
+import struct
+import tokenize
 import tomllib
 import zipfile
-from typing import IO, Any
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import IO, Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+CONFIG_LIMIT = 1 << 20
+"""Bytes of a file of settings (TOML)."""
 TEXT_LIMIT = 64 << 20
-"""Bytes of a text file that a person may have written (TOML, JSON, CSV)."""
+"""Bytes of a text file that a program may have written (takes, recordings)."""
 DATA_LIMIT = 1 << 30
 """Bytes of a mesh, a surface file, a sound or an archive, before and after unpacking."""
+
+MOST_DEPTH = 64
+"""Tables and lists inside each other."""
+_DEEP = f"nested too deeply: {MOST_DEPTH} tables and lists inside each other are the most"
+
+DAMAGED = (
+    OSError, ValueError, TypeError, OverflowError, EOFError, KeyError, IndexError, NotImplementedError, RuntimeError,
+    MemoryError, SyntaxError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What numpy and zipfile raise for damaged archives."""
 
 _CHUNK = 1 << 20
 _KINDS = {
@@ -32,6 +49,27 @@ _KINDS = {
     stat.S_ISBLK: "is a device, not a file",
     stat.S_ISSOCK: "is a socket, not a file",
 }
+
+
+Parsed = TypeVar("Parsed")
+
+
+class _Error(Protocol):
+    def __call__(self, message: str, /, *, hint: str = "") -> Exception: ...
+
+
+@contextmanager
+def reading(path: str | os.PathLike[str], error: _Error, hint: str = "") -> Iterator[None]:
+    """Raise as `error`, with the file's name and what to do next, whatever the functions here raise.
+
+    hint : what to do about wrong content.
+    """
+    try:
+        yield
+    except OSError as found:
+        raise error(f"{path}: cannot be read: {found.strerror or found}", hint=f"look at: ls -l {path}") from found
+    except ValueError as found:
+        raise error(f"{path}: {found}", hint=hint) from found
 
 
 def open_file(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> IO[bytes]:
@@ -62,14 +100,13 @@ def _check_kind(found: os.stat_result, limit: int) -> None:
 
 def read_file(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> bytes:
     """All bytes of a regular file. Raises OSError, as :func:`open_file`."""
-    pieces, size = list[bytes](), 0
     with open_file(path, limit) as file:
-        while piece := file.read(_CHUNK):
-            size += len(piece)
-            if size > limit:  # a file of the kernel's, or one that grows: its size did not say how much there is
-                raise OSError(errno.EFBIG, f"is larger than {limit >> 20} MB", os.fspath(path))
-            pieces.append(piece)
-    return b"".join(pieces)
+        data = file.read(os.fstat(file.fileno()).st_size + 1)
+        while len(data) <= limit and (more := file.read(_CHUNK)):  # of the kernel, or growing: its size does not tell
+            data += more
+    if len(data) > limit:
+        raise OSError(errno.EFBIG, f"is larger than {limit >> 20} MB", os.fspath(path))
+    return data
 
 
 def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
@@ -97,20 +134,47 @@ def _encoding(data: bytes) -> str:
     return "probably Latin-1 or Windows-1252"
 
 
+def read_toml(path: str | os.PathLike[str], limit: int = CONFIG_LIMIT) -> dict[str, Any]:
+    """A TOML file as a table. Raises OSError and ValueError, as :func:`read_text` and :func:`parse_toml`."""
+    return parse_toml(read_text(path, limit))
+
+
+def read_json(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> Any:
+    """A JSON file. Raises OSError and ValueError, as :func:`read_text` and :func:`parse_json`."""
+    return parse_json(read_text(path, limit))
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """TOML as a table. Raises ValueError with line and column, also where it is nested too deeply."""
     try:
-        return tomllib.loads(text)
+        return _shallow(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"not valid TOML: {error}") from error
     except RecursionError:
-        raise ValueError("nested too deeply") from None
+        raise ValueError(_DEEP) from None
 
 
 def parse_json(text: str | bytes, **options: Any) -> Any:
     """JSON; `options` are those of :func:`json.loads`. Raises ValueError, also where it is nested too deeply."""
     try:
-        return json.loads(text, **options)
+        return _shallow(json.loads(text, **options))
+    except json.JSONDecodeError as error:
+        raise ValueError(f"not valid JSON: {error.msg} (line {error.lineno}, column {error.colno})") from error
     except RecursionError:
-        raise ValueError("nested too deeply") from None
+        raise ValueError(_DEEP) from None
+
+
+def _shallow(value: Parsed) -> Parsed:
+    """The value, once it is known that a few calls inside each other reach all of it."""
+    level: list[Any] = [value]
+    for _ in range(MOST_DEPTH):
+        level = [
+            inner for each in level if isinstance(each, dict | list)
+            for inner in (each.values() if isinstance(each, dict) else each)
+        ]  # fmt: skip
+        if not level:
+            return value
+    raise ValueError(_DEEP)
 
 
 def read_npz(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> dict[str, NDArray[Any]]:
@@ -125,12 +189,12 @@ def read_npz(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> dict[str,
             _check_archive(file, limit)
             with np.load(file, allow_pickle=False) as stored:
                 found = {name: stored[name] for name in stored.files}
-        except (zipfile.BadZipFile, EOFError, KeyError, NotImplementedError, MemoryError, UnicodeError) as error:
-            raise ValueError(f"not a sound archive of arrays: {error}") from error
-        except ValueError as error:
+        except DAMAGED as error:
             if "allow_pickle" in str(error):  # numpy's words for what is no archive name an option of its own
                 raise ValueError("holds Python objects, which omote does not load") from error
-            raise
+            if isinstance(error, OSError) and error.strerror:
+                raise  # the disk's fault, not the content's
+            raise ValueError(f"not a sound archive of arrays: {error}") from error
     if foreign := [name for name, array in found.items() if not isinstance(array, np.ndarray)]:
         raise ValueError(f"{foreign[0]} is no array")  # numpy gives the bytes of a member that it does not know
     return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import struct
-import tomllib
 import zlib
 from collections.abc import Mapping
 from functools import cache
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surface.base import files
 from surface.base.arrays import Array, Floats32
 from surface.base.errors import ExportError
 from surface.export.exporter import Exporter
@@ -56,7 +56,7 @@ EXPORTER = Exporter(
 @cache
 def materials() -> dict[str, Any]:
     """The table of materials beside this module."""
-    return tomllib.loads(Path(__file__).with_name("materials.toml").read_text(encoding="utf-8"))
+    return files.read_toml(Path(__file__).with_name("materials.toml"))
 
 
 def png_bytes(picture: NDArray[np.uint8]) -> bytes:

@@ -6,7 +6,6 @@ shortest mix of them, in standard deviations, that changes the measures so is fi
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from surface.base.arrays import Floats, Ints
+from surface.base import files
+from surface.base.arrays import Array, Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
 from surface.fit.points.net import Net
@@ -29,7 +29,6 @@ from surface.head.model.file import load_data
 from surface.head.model.identity import Identity, fingerprint, save_identities, with_identities
 from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.rig import SkinRig
-from surface.readers.npzmesh import DAMAGED
 
 TABLE = Path(__file__).with_name("identities.toml")
 LEAST_MM = 0.01
@@ -53,7 +52,7 @@ class Wanted:
 
 def read_wanted(path: Path = TABLE) -> Wanted:
     """The table of variations."""
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    table = files.read_toml(path)
     return Wanted(**table | {"landmarks": np.array(table["landmarks"])})
 
 
@@ -80,14 +79,10 @@ def add_identities(head: str | Path, mesh_path: str | Path, modes_path: str | Pa
 
 def read_modes(path: Path, mesh: FitMesh, mesh_path: str | Path) -> Floats:
     """(k, n, 3) displacements in mm, in the unit that the mesh's file has."""
-    try:
-        with path.open("rb") as f, np.load(f, allow_pickle=False) as z:
-            deltas = z["deltas"].astype(float)
-        with Path(mesh_path).open("rb") as f, np.load(f, allow_pickle=False) as z:
-            own = z["neutral"].astype(float)
-    except DAMAGED as e:
-        hint = "give the identity modes of this mesh"
-        raise FitError(f"{path}: cannot be read as .npz with deltas ({e})", hint=hint) from e
+    with files.reading(path, FitError, hint="give the identity modes of this mesh"):
+        deltas = _numbers(files.read_npz(path), "deltas")
+    with files.reading(mesh_path, FitError, hint="give the mesh that the head was fitted to, as .npz"):
+        own = _numbers(files.read_npz(mesh_path), "neutral")
     if deltas.ndim != 3 or deltas.shape[1:] != mesh.vertices.shape:
         raise FitError(f"{path}: deltas has shape {deltas.shape}, expected (k, {len(mesh.vertices)}, 3)")
     if not np.isfinite(deltas).all():
@@ -95,6 +90,12 @@ def read_modes(path: Path, mesh: FitMesh, mesh_path: str | Path) -> Floats:
         raise FitError(f"{path}: deltas[{mode}] holds something that is not a finite number")
     scaled: Floats = deltas * (np.ptp(mesh.vertices) / np.ptp(own))
     return scaled
+
+
+def _numbers(arrays: dict[str, Array], key: str) -> Floats:
+    if key not in arrays or arrays[key].dtype.kind not in "fiu":
+        raise ValueError(f"has no array of numbers {key!r}")
+    return arrays[key].astype(float)
 
 
 def symmetric(vertices: Floats, modes: Floats) -> Floats:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.errors import SurfaceFileError
-from surface.base.files import read_file
+from surface.base.files import DATA_LIMIT, TEXT_LIMIT, decode, read_file, reading
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
 
@@ -62,15 +62,14 @@ class Location:
 
 def read_text(path: Path, errors: str = "strict") -> str:
     """A file's content as UTF-8; ``SurfaceFileError`` where it cannot be read."""
+    data = read_bytes(path, TEXT_LIMIT)
     try:
-        return read_bytes(path).decode("utf-8", errors)
-    except UnicodeDecodeError as error:
-        raise Location(path).error(f"is not text (byte {error.start}: {error.reason})") from error
+        return decode(data) if errors == "strict" else data.decode("utf-8-sig", errors)
+    except ValueError as error:
+        raise Location(path).error(f"is {error}") from error
 
 
-def read_bytes(path: Path) -> bytes:
+def read_bytes(path: Path, limit: int = DATA_LIMIT) -> bytes:
     """A file's content; ``SurfaceFileError`` where it cannot be read."""
-    try:
-        return read_file(path)
-    except OSError as error:
-        raise Location(path).error(f"cannot be read: {error.strerror}", hint=f"look at: ls -l {path}") from error
+    with reading(path, SurfaceFileError):
+        return read_file(path, limit)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import json
 import struct
 from pathlib import Path
 from typing import Any
@@ -19,13 +18,15 @@ import numpy as np
 
 from surface.base.arrays import Array, Floats, Ints
 from surface.base.errors import FitError
+from surface.base.files import DATA_LIMIT, decode, parse_json
 from surface.readers.meshdata import read_bytes
 
 MAGIC, JSON_CHUNK, BIN_CHUNK = b"glTF", 0x4E4F534A, 0x004E4942
 TYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"}
-MOST_ELEMENTS = 20_000_000  # of one accessor
+MOST_ELEMENTS = 4_000_000  # of one accessor
+MOST_ITEMS = 10_000  # nodes, accessors and so on
 
 
 class Gltf:
@@ -46,9 +47,9 @@ class Gltf:
             raise FitError(f"{path}: {why}", hint="export the head as .glb")
         text, self._chunk = self._chunks(raw) if binary else (raw, None)
         try:
-            self.document = json.loads(text.decode("utf-8"))
-        except (UnicodeDecodeError, ValueError, RecursionError) as e:
-            raise self.error("JSON", f"cannot be read ({e})") from e
+            self.document = parse_json(decode(text))
+        except ValueError as e:
+            raise self.error("JSON", str(e)) from e
         if not isinstance(self.document, dict):
             raise self.error("JSON", "is no object")
         version = self.value(self.value(self.document, "asset", dict, "JSON"), "version", str, "asset")
@@ -95,7 +96,10 @@ class Gltf:
 
     def items(self, key: str) -> list[Any]:
         """A list of the document; empty if it is missing."""
-        return list(self.value(self.document, key, list, "JSON", []))
+        found: list[Any] = self.value(self.document, key, list, "JSON", [])
+        if len(found) > MOST_ITEMS:
+            raise self.error(key, f"there are {len(found)}; {MOST_ITEMS} are the most", "export the head alone")
+        return found
 
     def item(self, key: str, index: Any, where: str) -> dict[str, Any]:
         """``document[key][index]``, an object; ``where`` is the element that refers to it."""
@@ -190,6 +194,8 @@ class Gltf:
         table = self.item("buffers", index, where)
         if index not in self._buffers:
             self._buffers[index] = self._load(table.get("uri"), f"buffers[{index}]", index)
+            if sum(map(len, self._buffers.values())) > DATA_LIMIT:
+                raise self.error("buffers", f"hold more than {DATA_LIMIT >> 20} MB", "export the head alone")
         return self._buffers[index]
 
     def _load(self, uri: Any, where: str, index: int) -> bytes:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
+from surface.base.files import DATA_LIMIT, read_file, reading
 
-MOST_BYTES = 2**31  # of one file
 MOST_VERTICES = 400_000
 MOST_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
 
@@ -47,13 +48,8 @@ def check_size(where: str, vertices: int, shapes: int) -> None:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file that is not too large. Raises FitError: missing, unreadable or above :data:`MOST_BYTES`."""
-    try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise FitError(f"{path}: {size / 1e9:.1f} GB is more than a head needs", hint="export the head alone")
-        return path.read_bytes()
-    except FileNotFoundError as e:
-        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh") from e
-    except (OSError, ValueError) as e:
-        raise FitError(f"{path}: cannot be read ({e})", hint="check the path and its permissions") from e
+    """The content of a file that is not too large. Raises FitError: missing, unreadable or too large."""
+    if not os.path.exists(path):
+        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
+    with reading(path, FitError):
+        return read_file(path, DATA_LIMIT)

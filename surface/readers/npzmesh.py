@@ -6,23 +6,17 @@ uv (t, 2)        face_uv (f, 4), texture coordinates per face corner
 
 from __future__ import annotations
 
-import struct
-import tokenize
 from pathlib import Path
-from zipfile import BadZipFile
-from zlib import error as ZlibError
 
 import numpy as np
 
 from surface.base.arrays import Array
 from surface.base.errors import FitError
-from surface.readers.meshdata import MOST_MOVES, MOST_VERTICES, MeshData, check_size
+from surface.base.files import read_npz as read_npz_file
+from surface.base.files import reading
+from surface.readers.meshdata import MeshData, check_size
 
 KEYS = ("neutral", "deltas", "names", "faces", "uv", "face_uv")
-DAMAGED = (
-    OSError, ValueError, EOFError, BadZipFile, ZlibError, KeyError, NotImplementedError, RuntimeError, struct.error,
-    MemoryError, OverflowError, SyntaxError, TypeError, tokenize.TokenError, IndexError,
-)  # fmt: skip
 
 
 def read_npz(path: Path) -> MeshData:
@@ -48,26 +42,12 @@ def read_npz(path: Path) -> MeshData:
 
 
 def _arrays(path: Path) -> dict[str, Array]:
-    if not path.is_file():
+    if not path.exists():
         raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
-    try:
-        with path.open("rb") as f:
-            if f.read(2) != b"PK":
-                raise FitError(f"{path}: is no .npz archive", hint=f"save {', '.join(KEYS)} with numpy.savez")
-            f.seek(0)
-            with np.load(f, allow_pickle=False) as z:
-                missing = [k for k in KEYS if k not in z.files]
-                if missing:
-                    why = f"key {missing[0]!r} is missing (found: {', '.join(z.files)})"
-                    raise FitError(f"{path}: {why}", hint=f"the layout needs {', '.join(KEYS)}")
-                _check_declared_sizes(path, z)
-                return {k: z[k] for k in KEYS}
-    except DAMAGED as e:
-        raise FitError(f"{path}: cannot be read as .npz ({type(e).__name__}: {e})", hint="save the mesh again") from e
-
-
-def _check_declared_sizes(path: Path, archive: np.lib.npyio.NpzFile) -> None:
-    """Refuse arrays that would not fit into memory before they are unpacked."""
-    for info in archive.zip.infolist() if archive.zip is not None else []:
-        if info.file_size > 24 * (MOST_MOVES + MOST_VERTICES):
-            raise FitError(f"{path}: {info.filename} is {info.file_size / 1e9:.1f} GB", hint="decimate the mesh first")
+    with reading(path, FitError, hint=f"save {', '.join(KEYS)} with numpy.savez"):
+        arrays = read_npz_file(path)
+    missing = [k for k in KEYS if k not in arrays]
+    if missing:
+        why = f"key {missing[0]!r} is missing (found: {', '.join(arrays)[:200]})"
+        raise FitError(f"{path}: {why}", hint=f"the layout needs {', '.join(KEYS)}")
+    return arrays

@@ -27,6 +27,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from surface.base.files import parse_json, read_json
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain, Slit
 
@@ -39,7 +40,7 @@ LARGEST = sys.float_info.max
 def is_plain(path: Path) -> bool:
     """Whether a file declares this format (speech takes are JSON files, too)."""
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        table = read_json(path)
     except (OSError, ValueError):
         return False
     return isinstance(table, dict) and ("format" in table or "surfaces" in table)
@@ -63,11 +64,9 @@ def _parse(file: Location, text: str) -> Any:
         raise file.at(f"line {line}").error(f"{word} is not a number a surface can have")
 
     try:
-        return json.loads(text, parse_constant=refuse)
-    except json.JSONDecodeError as error:
-        raise file.at(f"line {error.lineno} column {error.colno}").error(f"is not JSON: {error.msg}") from error
-    except RecursionError as error:
-        raise file.error("is not JSON a surface can have: nested too deep") from error
+        return parse_json(text, parse_constant=refuse)
+    except ValueError as error:
+        raise file.error(str(error)) from error
 
 
 def _surface(here: Location, row: Any) -> NamedSurface:

@@ -10,6 +10,8 @@ refused.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -25,6 +27,16 @@ from surface.spline.nurbs import nurbs_arrays
 
 from .common import Location, NamedSurface, read_bytes
 
+PATIENCE_S, BYTES_PER_S = 0.7, 20e6  # of processor time, and how much more for large files
+TRIAL = """
+import sys, rhino3dm
+try:
+    import signal
+    signal.setitimer(signal.ITIMER_PROF, float(sys.argv[1]))
+except (ImportError, AttributeError):
+    pass
+sys.exit(rhino3dm.File3dm.FromByteArray(sys.stdin.buffer.read()) is None)
+"""
 CHORD_ERROR = 1e-4  # of the face's size: chords of a trim loop from the edge
 MOST_DISTANCE = 1e-3  # of the face's size: an edge from its face; modelling tolerances are smaller
 STARTS = 24  # samples along u and v, in every quarter, where the search may begin
@@ -36,8 +48,8 @@ def read(path: Path) -> list[NamedSurface]:
     """The surfaces of a file; ``SurfaceFileError`` names the object, ``MissingPackage`` the package rhino3dm."""
     require(f"{path}: a .3dm file", "rhino3dm")
     rhino3dm: Any = import_module("rhino3dm")
-    file = Location(path)
-    model = rhino3dm.File3dm.FromByteArray(read_bytes(path))
+    file, data = Location(path), read_bytes(path)
+    model = rhino3dm.File3dm.FromByteArray(data) if _is_readable(data) else None
     if model is None:
         raise file.error("is no openNURBS file, or a damaged one")
     out: list[NamedSurface] = []
@@ -45,6 +57,19 @@ def read(path: Path) -> list[NamedSurface]:
         name = item.Attributes.Name or f"object {number}"
         out += _object(file.at(f"object {number} ({item.Attributes.Id})"), rhino3dm, item.Geometry, name)
     return out
+
+
+def _is_readable(data: bytes) -> bool:
+    """Whether openNURBS comes to an end with it: damaged files can keep it busy for ever, and nothing but the end of
+    its process stops it. So another process reads it first, within a limit of processor time.
+    """
+    seconds = PATIENCE_S + len(data) / BYTES_PER_S
+    command = [sys.executable, "-P", "-c", TRIAL, str(seconds)]
+    try:
+        trial = subprocess.run(command, input=data, capture_output=True, timeout=30 * seconds, check=False)
+    except subprocess.TimeoutExpired:
+        return False
+    return trial.returncode == 0
 
 
 def _object(here: Location, rhino3dm: Any, shape: Any, name: str) -> list[NamedSurface]:

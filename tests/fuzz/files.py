@@ -161,6 +161,7 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, help="folder for files that had a fault")
     given = parser.parse_args()
     _KINDS.extend(kind for kind in kinds() if not given.only or kind.name in given.only)
+    warm_up(_KINDS)
     share = max(1, given.count // 10)
     jobs = [
         (k.name, share, 1000 * given.seed + part, given.keep) for k in _KINDS for part in range(given.count // share)

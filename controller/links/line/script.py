@@ -33,7 +33,7 @@ class _File(Settings):
     loop_s: _Seconds = 0.0
     frames_hz: Annotated[Number, Field(ge=0, le=200)] = 0.0
     marks: dict[str, _Seconds] = {}
-    steps: list[str] = []
+    steps: Annotated[list[str], Field(max_length=50_000)] = []
 
 
 @dataclass(frozen=True)

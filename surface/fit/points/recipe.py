@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from surface.base import files
 from surface.base.arrays import Ints
 from surface.fit.points.lid_seating import Eyeball, fit_sphere
 from surface.fit.points.refine import FitRequest
@@ -84,7 +84,7 @@ class Recipe:
 def recipe_for(mesh: FitMesh) -> Recipe | None:
     """The recipe made for meshes of this size; None for an unknown mesh."""
     for path in sorted(RECIPES.glob("*.toml")):
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = files.read_toml(path)
         if (table.pop("vertices"), table.pop("faces")) == (len(mesh.vertices), len(mesh.faces)):
             return Recipe(**table | {key: [_part(t) for t in table[key]] for key in ("parts", "teeth")})
     return None

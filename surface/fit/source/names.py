@@ -9,7 +9,6 @@ The table is ``names.toml`` beside this module; a user's own table comes before 
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -17,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from surface.base import files
 from surface.base.errors import FitError
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.parameters import SHAPES
@@ -87,7 +87,7 @@ def _made(shape: str, found: dict[str, dict[str, int]]) -> list[Source]:
 
 @cache
 def _table() -> dict[str, dict[str, list[str]]]:
-    return tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
+    return files.read_toml(Path(__file__).with_name("names.toml"))
 
 
 @cache
@@ -123,14 +123,12 @@ def read_names(path: Path) -> dict[str, str]:
 
     Raises FitError: the file cannot be read, or maps to something that is not one of ARKit's 52.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8")).get("names")
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as e:
-        raise FitError(f"{path}: cannot be read ({e})", hint=EXAMPLE) from e
+    with files.reading(path, FitError, hint=EXAMPLE):
+        table = files.read_toml(path).get("names")
     if not isinstance(table, dict):
         raise FitError(f"{path}: there is no table [names]", hint=EXAMPLE)
     for name, shape in table.items():
-        if shape not in SHAPES:
+        if not isinstance(shape, str) or shape not in SHAPES:
             raise FitError(f"{path}: names.{name}: {shape!r} is not one of ARKit's 52", hint="for example jawOpen")
     return table
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from surface.base import files
 from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.meshes import KEYS
-from surface.head.model.sidecar import DAMAGED
 
 VERSION = 1
 ANY = -1  # length of an axis that may have any
@@ -26,8 +26,11 @@ ARRAYS: dict[str, tuple[int | str, ...]] = {  # key of a part: its array's shape
 }  # fmt: skip
 
 
+HINT = "restore the file or make the head again: omote fit"
+
+
 def _error(path: Path, key: str, why: str) -> HeadFileError:
-    return HeadFileError(f"{path}: {key}: {why}", hint="restore the file or make the head again: omote fit")
+    return HeadFileError(f"{path}: {key}: {why}", hint=HINT)
 
 
 def _checked(path: Path, key: str, a: Array, shape: tuple[int, ...]) -> Array:
@@ -124,13 +127,15 @@ def load_data(path: str | Path) -> HeadData:
     )  # fmt: skip
 
 
+def _read(path: Path, read: Callable[[Path], dict[str, Any]]) -> dict[str, Any]:
+    if not path.exists():
+        raise _error(path, "file", "missing")
+    with files.reading(path, HeadFileError, hint=HINT):
+        return read(path)
+
+
 def _read_toml(path: Path) -> _Section:
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as e:
-        raise _error(path, "file", "missing") from e
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as e:
-        raise _error(path, "file", f"cannot be read ({e})") from e
+    table = _read(path, files.read_toml)
     version = table.get("format")
     if isinstance(version, int) and version > VERSION:
         raise HeadFileError(f"{path}: format: is {version}, this omote reads up to {VERSION}", hint="update omote")
@@ -140,13 +145,7 @@ def _read_toml(path: Path) -> _Section:
 
 
 def _read_npz(path: Path) -> _Arrays:
-    try:
-        with path.open("rb") as f, np.load(f, allow_pickle=False) as z:
-            return _Arrays(path, {k: z[k] for k in z.files})
-    except FileNotFoundError as e:
-        raise _error(path, "file", "missing") from e
-    except DAMAGED as e:
-        raise _error(path, "file", f"damaged or cut short ({e})") from e
+    return _Arrays(path, _read(path, files.read_npz))
 
 
 def _part(section: _Section, arrays: _Arrays) -> PartData:

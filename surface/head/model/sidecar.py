@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,15 +11,14 @@ import numpy as np
 
 from surface.base.arrays import Array
 from surface.base.errors import HeadFileError
+from surface.base.files import read_npz, reading
 
 Made = TypeVar("Made")
 VERSION = 1
 META = "omote/"  # keys that begin so are about the file, the others are its arrays
 FORMAT, CHECK = f"{META}format", f"{META}checksum/"
-DAMAGED = (
-    OSError, ValueError, TypeError, OverflowError, EOFError, KeyError, IndexError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
-"""What reading a damaged .npz file may raise."""
+DAMAGED = (ValueError, TypeError, OverflowError, LookupError)
+"""What reading arrays that are not as they should be may raise."""
 
 
 def sidecar_path(head: str | Path, file: str) -> Path:
@@ -44,11 +41,11 @@ def read_sidecar(path: Path, make: Callable[[Sidecar], Made], hint: str) -> Made
 
     Raises HeadFileError: the file is damaged or of a newer version, or ``make`` raised one of :data:`DAMAGED`.
     """
-    if not path.is_file():
+    if not path.exists():
         return None
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            every = {name: stored[name] for name in stored.files}
+        with reading(path, HeadFileError, hint):
+            every = read_npz(path)
         version = int(every[FORMAT][0]) if FORMAT in every else 0
         if version > VERSION:
             why = f"is of version {version}, this omote reads up to {VERSION}"

@@ -108,7 +108,7 @@ def test_control_points_go_with_the_mouse_and_are_worn_by_a_stage(
     head.pose(np.zeros(len(head.parameters)))
     assert part.vertices[:, 1].max() > 0
     handles.save(tmp_path / "dimple.json", "dimple")
-    name, shape = load_group(tmp_path / "dimple.json", head)
+    name, shape = load_group(tmp_path / "dimple.json", head.data)
     assert name == "dimple"
     assert len(shape.ids) == np.count_nonzero(np.linalg.norm(moved, axis=1) >= 0.01)
     handles.undo()

@@ -281,7 +281,7 @@ def test_a_reshaped_face_is_saved_or_the_reason_shown(tmp_path: Path, monkeypatc
     monkeypatch.chdir(tmp_path)
     mouse._save()
     assert mouse._message == f"wrote {tmp_path / 'mine.json'}"
-    assert load_group(tmp_path / "mine.json", head)[1].ids.tolist() == [7]
+    assert load_group(tmp_path / "mine.json", head.data)[1].ids.tolist() == [7]
     (tmp_path / "file").touch()
     mouse._name = "file/x"
     mouse._save()

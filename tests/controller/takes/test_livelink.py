@@ -116,7 +116,7 @@ def test_eye_angles_only_where_no_look_column_carries_anything(tmp_path: Path) -
         ("Timecode,JawOpen\n0:0:0:0,nan\n", "line 2, column JawOpen: 'nan'"),
         ("Timecode,JawOpen\n0:0:0,0.1\n", "line 2, column Timecode: '0:0:0' is not HH:MM:SS:FF.fff"),
         ("Timecode,JawOpen\n0:0:1:0,0.1\n0:0:0:0,0.1\n", "line 3, column Timecode: goes back in time"),
-        ("Timecode,JawOpen\n0:0:0:0,\xff\n", "not a CSV file"),
+        ("Timecode,JawOpen\n0:0:0:0,\xff\n", "not UTF-8 (line 2), but probably Latin-1"),
     ],
 )
 def test_a_broken_take_names_file_line_and_column(tmp_path: Path, text: str, message: str) -> None:

@@ -92,7 +92,7 @@ def test_a_tick_that_comes_out_differently_is_noticed(tmp_path: Path) -> None:
         ('["omote recording",1,0,[]]\n', "not a recording of version 1"),
         ('["omote recording",99,0,[]]\n', "is 99, written by a newer omote"),
         ('["omote recording",1,0,0.01,["jawOpen"]]\n', "other parameters"),
-        ("\xff", "not a recording"),
+        ("\xff", "line 1: damaged"),
     ],
 )
 def test_broken_files_say_why(tmp_path: Path, text: str, message: str) -> None:

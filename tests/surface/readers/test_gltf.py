@@ -47,7 +47,7 @@ JSON = chunk(0x4E4F534A, b'{"asset": {"version": "2.0"}, "buffers": [{"byteLengt
         (glb(chunk(0x004E4942, b"abcdefgh")), "there is no JSON chunk"),
         (glb(JSON, struct.pack("<II", 9, 0x004E4942) + b"abcd"), r"chunk at byte 84: says 9 bytes, 4 are left"),
         (glb(chunk(0x4E4F534A, b"[1]     ")), "JSON: is no object"),
-        (glb(chunk(0x4E4F534A, b'{"a": \xff}  ')), "JSON: cannot be read"),
+        (glb(chunk(0x4E4F534A, b'{"a": \xff}  ')), "JSON: not UTF-8"),
         (b'{"asset": {}}', "asset.version: is missing"),
         (b'{"asset": []}', r"JSON.asset: '\[\]' is no object"),
         (b'{"asset": {"version": "3.0"}}', "asset.version: is '3.0'"),
@@ -224,6 +224,6 @@ def test_buffers_inside_and_beside_the_text(tmp_path):
 def test_the_number_of_elements_is_limited(tmp_path):
     entry = {"componentType": FLOAT, "type": "SCALAR"}
     file = text_file(tmp_path, accessors=[{**entry, "count": MOST_ELEMENTS + 1}, {**entry, "count": 0}])
-    with pytest.raises(FitError, match="20000001 elements; 20000000 are the most"):
+    with pytest.raises(FitError, match="4000001 elements; 4000000 are the most"):
         file.floats(0, 1, "x")
     assert file.floats(1, 1, "x").shape == (0, 1)

@@ -72,10 +72,10 @@ def damage(change: Callable[[dict, dict], object]) -> str:
 
 
 BAD = {
-    "truncated": (json.dumps(good())[:-30], "line 1 column"),
+    "truncated": (json.dumps(good())[:-30], "line 1, column"),
     "NaN": ('{"format": "omote surface",\n"version": NaN}', "line 2: NaN"),
-    "binary": ("\x00\x01", "line 1 column 1"),
-    "nested": ("[" * 200_000, "nested too deep"),
+    "binary": ("\x00\x01", "line 1, column 1"),
+    "nested": ("[" * 200_000, "nested too deeply"),
     "no format": ("{}", '"format" must be'),
     "version": (damage(lambda t, s: t.update(version=2)), "version: must be 1"),
     "none": (damage(lambda t, s: t.update(surfaces=[])), "holds no surface"),

@@ -1,0 +1,60 @@
+"""Finds out which kind of settings a TOML file holds, by its keys and not by its name.
+
+Every kind of file has keys that belong to it; the kind that has most of a file's keys is the file's, so that a file
+with a misspelt key is still checked as what it is meant to be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from controller.layers.idle import IdleSettings
+from controller.layers.settings import LayerTable
+from controller.robot.calibration import CalibrationFile
+from controller.robot.settings import RobotSettings
+from controller.stage.stage import StageSettings
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """A kind of file.
+
+    name : for people. keys : that it may have. inside : keys of its tables, where their names are the user's own.
+    """
+
+    name: str
+    keys: frozenset[str] = frozenset()
+    inside: frozenset[str] = frozenset()
+
+    def likeness(self, table: Mapping[str, Any]) -> float:
+        """How much of a file is of this kind: a key counts less where other kinds have it, too."""
+        own = sum(1.0 / sum(key in kind.keys for kind in KINDS) for key in self.keys & set(table))
+        return own + sum(bool(self.inside & set(each)) for each in table.values() if isinstance(each, Mapping))
+
+
+CALIBRATION = FileKind("calibration", frozenset(CalibrationFile.known_keys()))
+ROBOT = FileKind("robot", frozenset(RobotSettings.known_keys()))
+STAGE = FileKind("stage", frozenset(StageSettings.known_keys()))
+SCRIPT = FileKind("script", frozenset({"name", "description", "loop_s", "frames_hz", "marks", "steps"}))
+LIFE = FileKind("life", frozenset(IdleSettings.known_keys()))
+PARAMETERS = FileKind("parameters", frozenset({"profile", "parameters", "aliases"}))
+UNITS = FileKind("action units", frozenset({"units", "emotions"}))
+VISEMES = FileKind("visemes", frozenset({"visemes", "rhubarb", "phonemes", "through"}))
+MOODS = FileKind("moods", frozenset({"anchors"}))
+LAYERS = FileKind("layers", inside=frozenset(LayerTable.known_keys()))
+EXPRESSIONS = FileKind(
+    "expressions",
+    inside=frozenset({"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "of", "weights"}),
+)
+KINDS = (STAGE, ROBOT, CALIBRATION, SCRIPT, LIFE, PARAMETERS, UNITS, VISEMES, MOODS, LAYERS, EXPRESSIONS)
+
+
+def kind_of(table: Mapping[str, Any]) -> FileKind | None:
+    """The kind of a file's table; None where no kind has any of its keys."""
+    likeness = {kind: kind.likeness(table) for kind in KINDS}
+    if isinstance(table.get("channels"), Mapping):
+        del likeness[ROBOT]  # its channels are a list
+    best = max(likeness, key=lambda kind: likeness[kind])
+    return best if likeness[best] > 0.0 else None
