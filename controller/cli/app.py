@@ -61,7 +61,7 @@ def main() -> None:
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in the background so
         signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        from controller.base.errors import OMOTE_ERRORS  # start-up: Ctrl-C ends it quietly from main() on
+        from controller.base.errors import OMOTE_ERRORS, exhausted  # start-up: Ctrl-C ends it quietly from main() on
 
         make_app()()
     except KeyboardInterrupt:
@@ -75,5 +75,8 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("OMOTE_DEBUG"):
             raise
+        if (plain := exhausted(error)) is not None:
+            report_error(plain)
+            sys.exit(1)
         report_error(error, "This is a fault in omote. OMOTE_DEBUG=1 shows where.")
         sys.exit(70)
