@@ -56,6 +56,13 @@ def _escape(text: str) -> str:
     return text.replace("[", r"\[")
 
 
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether Ctrl-C caused an error: Python wraps what is raised while a class is made."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__
+    return error is not None
+
+
 def main() -> None:
     """Entry point of the ``omote`` command; nothing is imported before Ctrl-C would end it quietly."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in the background so
@@ -73,6 +80,8 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except Exception as error:
+        if _is_interrupt(error):
+            sys.exit(130)
         if os.environ.get("OMOTE_DEBUG"):
             raise
         if (plain := exhausted(error)) is not None:
