@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+
 from drivers.base.errors import DriverError
 from surface.base.errors import SurfaceError
 
@@ -28,6 +31,25 @@ class LinkError(ControllerError):
 
 class TakeError(ControllerError):
     """A recorded take cannot be read."""
+
+
+_EXHAUSTED = {
+    errno.EMFILE: "raise the limit of open files of this process: ulimit -n 1024",
+    errno.ENFILE: "end programs that hold many files open: lsof | wc -l",
+    errno.ENOMEM: "end programs that hold much memory: free -h",
+    errno.EAGAIN: "end other processes, or raise their limit: ulimit -u",
+    errno.ENOSPC: "make room: df -h",
+}
+
+
+def exhausted(error: BaseException) -> ControllerError | None:
+    """An error of the system that says that something is used up, with what to do; None for any other error."""
+    if isinstance(error, MemoryError):
+        error = OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
+    if not isinstance(error, OSError) or error.errno not in _EXHAUSTED:
+        return None
+    where = f"{error.filename}: " if error.filename else ""
+    return ControllerError(f"{where}{os.strerror(error.errno)}", hint=_EXHAUSTED[error.errno])
 
 
 OMOTE_ERRORS = (ControllerError, DriverError, SurfaceError)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
@@ -54,8 +55,8 @@ class Voice:
     def check(self) -> None:
         """Raises TakeError where there is nothing at the path, or it may not be read."""
         if self.path != "-" and not os.access(self.path, os.R_OK):
-            why = "may not be read" if Path(self.path).exists() else "is not there"
-            raise TakeError(f"{self.path}: the voice {why}", hint=f"look at: ls -l {self.path}")
+            why = os.strerror(errno.EACCES if os.path.exists(self.path) else errno.ENOENT)
+            raise TakeError(f"{self.path}: cannot be read: {why}", hint=f"look at: ls -l {self.path}")
 
     def open(self) -> IO[bytes]:
         """Open the stream; raises TakeError when that fails."""

@@ -58,6 +58,13 @@ def _escape(text: str) -> str:
     return text.replace("[", r"\[")
 
 
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether Ctrl-C caused an error: Python wraps what is raised while a class is made."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__
+    return error is not None
+
+
 def main() -> None:
     """Entry point of the ``omote`` command; nothing is imported before Ctrl-C would end it quietly."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in the background so
@@ -94,7 +101,15 @@ def _run() -> int:
 
 
 def _report_fault(error: Exception) -> int:
+    """Report an error that no command expected; returns the exit code."""
+    from controller.base.errors import exhausted  # start-up: main() ends Ctrl-C quietly
+
+    if _is_interrupt(error):
+        return 130
     if os.environ.get("OMOTE_DEBUG"):
         raise error
+    if (plain := exhausted(error)) is not None:
+        report_error(plain)
+        return 1
     report_error(error, "This is a fault in omote. OMOTE_DEBUG=1 shows where.")
     return 70

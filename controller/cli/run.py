@@ -205,7 +205,9 @@ def _dry_run(
 def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and value of the most important entries of a run's report."""
     face = report.get("face")
-    return [*(_face(face) if face else []), *_control(report), *_buses(report.get("buses", []))]
+    parts = [(f"{part['part']} failed", f"{part['failures']} times, {part['state']} at the end: {part['why']}")
+             for part in report.get("parts", [])]  # fmt: skip
+    return [*(_face(face) if face else []), *_control(report), *_buses(report.get("buses", [])), *parts]
 
 
 def _face(face: dict[str, Any]) -> list[tuple[str, str]]:

@@ -17,17 +17,20 @@ from typing import TYPE_CHECKING, Any
 from controller.base.errors import ConfigError
 from controller.base.files import replacing
 from controller.base.parameters import PARAMETERS
+from controller.base.parts import Part
 from controller.base.signals import stop_flag
 from controller.body.messages import RunOptions
 from controller.body.preload import PreloadedBody
 from controller.body.process import BodyProcess, deadline
+from controller.body.sources import Voice
 from controller.face.face import HeadlessFace, HeadValues, Recorder
-from controller.stage.stage import check_identity, load_stage, with_picture
+from controller.stage.stage import Stage, check_identity, load_stage, with_picture
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
 from drivers.base.priority import lower_process_priority
 
 if TYPE_CHECKING:
+    from controller.face.window import WindowFace  # start-up: the body gets its orders first
     from surface.head import Head  # start-up: the body gets its orders first
 
 REPORT_FORMAT = 1
@@ -69,6 +72,8 @@ class StageRun:
             next(replay(options.take, PARAMETERS, make=stage.state), None)
         elif options.take is not None:
             load_take(options.take, PARAMETERS)
+        if (voice := _voice(stage, options)) is not None:
+            voice.check()
         if options.mirror and not stage.robots:
             raise ConfigError(f"{stage.path}: robots: a stage without a robot has nothing to mirror")
         self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
@@ -82,8 +87,8 @@ class StageRun:
         with self._body() as (body, flag):
             values, head = self._load_head(body)
             with closing(HeadlessFace(head, self.stage.settings.face, values, recorder)) as face:
-                face.run(self._begin(body, flag, seconds))
-            report = self._end(body, face.report())
+                failed = self._show(face, self._begin(body, flag, seconds))
+            report = self._end(body, None if failed else face.report(), failed)
         if recorder is not None and pictures is not None:
             self._status("writing the pictures")
             report["written"] = recorder.write(pictures)
@@ -96,8 +101,8 @@ class StageRun:
             from controller.face.window import WindowFace  # start-up: the body gets its orders first
 
             face = WindowFace(head, self.stage.settings.face, values, body.send, body.panel_state, self.stage.load_head)
-            face.run(self._begin(body, flag, seconds))
-            return self._end(body, face.report())
+            failed = self._show(face, self._begin(body, flag, seconds))
+            return self._end(body, None if failed else face.report(), failed)
 
     def run_without_face(self, seconds: float | None) -> dict[str, Any]:
         """Run links and servos only, as on a robot without OpenGL."""
@@ -131,10 +136,55 @@ class StageRun:
         in_time = deadline(seconds)
         return lambda: not flag.is_set() and in_time() and body.alive()
 
-    def _end(self, body: BodyProcess, face: dict[str, object] | None) -> dict[str, Any]:
+    def _show(self, face: HeadlessFace | WindowFace, keep_going: Callable[[], bool]) -> Part | None:
+        """Show the face while the run goes on; returns the part of a face that failed while servos follow.
+
+        Raises what ends the run, and an error of the face where no servo follows.
+        """
+        asked = _Asked(keep_going)
+        try:
+            face.run(asked)
+        except Exception as error:
+            if asked.ended or not self.stage.robots:
+                raise
+            part = Part("the picture", remedy="it comes back with the next start", effect="links and servos go on")
+            part.fail(error, time.monotonic())
+            while keep_going():
+                time.sleep(_IDLE_S)
+            return part
+        return None
+
+    def _end(self, body: BodyProcess, face: dict[str, object] | None, failed: Part | None = None) -> dict[str, Any]:
         self._status("stopping" if self._options.mirror else "bringing the servos to rest")
         body.stop()
-        return {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}
+        report: dict[str, Any] = {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}
+        if failed is not None:
+            report["parts"] = [*report.get("parts", []), failed.report()]
+        return report
+
+
+class _Asked:
+    """Asks whether the run goes on.
+
+    ended : the answer was an error, which ends the run; any other error is one of who asks.
+    """
+
+    def __init__(self, keep_going: Callable[[], bool]) -> None:
+        self._keep_going, self.ended = keep_going, False
+
+    def __call__(self) -> bool:
+        try:
+            return self._keep_going()
+        except BaseException:
+            self.ended = True
+            raise
+
+
+def _voice(stage: Stage, options: RunOptions) -> Voice | None:
+    """The voice that a run listens to; that of the options goes before that of the stage."""
+    if options.voice is not None or options.take is not None or stage.settings.voice is None:
+        return options.voice
+    return Voice(str(stage.file(stage.settings.voice)))
 
 
 def write_report(report: dict[str, Any], path: Path) -> None:

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import errno
+
 import pytest
 
-from controller.base.errors import OMOTE_ERRORS, ConfigError, ControllerError, LinkError, ParameterError, TakeError
+from controller.base.errors import (
+    OMOTE_ERRORS,
+    ConfigError,
+    ControllerError,
+    LinkError,
+    ParameterError,
+    TakeError,
+    exhausted,
+)
 from drivers.base.errors import DriverError, PortError
 from surface.base.errors import SurfaceError
 
@@ -22,3 +32,17 @@ def test_the_command_line_catches_the_errors_of_every_room_and_no_others() -> No
         with pytest.raises(OMOTE_ERRORS):
             raise error
     assert not issubclass(ValueError, OMOTE_ERRORS) and not issubclass(OSError, OMOTE_ERRORS)
+
+
+@pytest.mark.parametrize(
+    ("error", "text", "hint"),
+    [
+        (OSError(errno.EMFILE, "x", "/a"), "/a: Too many open files", "ulimit -n"),
+        (OSError(errno.ENOSPC, "x"), "No space left on device", "df -h"),
+        (MemoryError(), "Cannot allocate memory", "free -h"),
+    ],
+)
+def test_what_is_used_up_is_named_with_what_to_do(error: BaseException, text: str, hint: str) -> None:
+    found = exhausted(error)
+    assert found is not None and str(found) == text and hint in found.hint
+    assert exhausted(ValueError()) is None and exhausted(OSError(errno.ENOENT, "x")) is None

@@ -247,6 +247,32 @@ def test_interrupts_that_were_ignored_count_again_and_others_handlers_stay(
         signal.signal(signal.SIGINT, before)
 
 
+def test_ctrl_c_while_a_class_is_made_is_no_fault_of_omote(monkeypatch: pytest.MonkeyPatch) -> None:
+    def app() -> None:
+        raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
+
+    monkeypatch.setattr(module, "make_app", lambda: app)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 130
+
+
+def test_what_the_system_has_run_out_of_is_no_fault_of_omote(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def app() -> None:
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.delenv("OMOTE_DEBUG", raising=False)
+    monkeypatch.setattr(module, "make_app", lambda: app)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capsys.readouterr().err
+    assert (
+        ended.value.code == 1 and "Too many open files" in said and "ulimit -n" in said and "fault in omote" not in said
+    )
+
+
 def test_long_messages_are_not_broken_and_numbers_not_coloured(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,11 +16,8 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 STEP_NS = 10_000_000
 VOCABULARY = Vocabulary.load(P)
-SCRIPT = Script(
-    ((0.0, "NEUTRAL 0"), (0.0, "EXPR smile 1 0.05"), (0.03, "SET jawOpen 0.5"),
-     (0.05, "GAZE 2 0"), (0.07, "NEUTRAL 0")),
-    loop_s=0.08, name="short", marks={"middle": 0.05},
-)  # fmt: skip
+STEPS = [(0.0, "NEUTRAL 0"), (0.0, "EXPR smile 1 0.05"), (0.03, "SET jawOpen 0.5"), (0.05, "GAZE 20 0")]
+SCRIPT = Script((*STEPS, (0.07, "NEUTRAL 0")), loop_s=0.08, name="short", marks={"middle": 0.05})
 NOISE = np.random.default_rng(1).uniform(-1.0, 1.0, 160)
 
 seconds = st.sampled_from([0.0, 1e-9, 0.01, 0.05, 1.0, 60.0])

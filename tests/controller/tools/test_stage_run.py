@@ -16,6 +16,7 @@ import pytest
 
 from controller.base.errors import ConfigError, ControllerError, TakeError
 from controller.body.messages import RunOptions
+from controller.body.sources import Voice
 from controller.tools import stage_run as module
 from controller.tools.stage_run import REPORT_FORMAT, StageRun, has_display, write_report
 
@@ -118,7 +119,11 @@ class FakeBody:
 def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """What was done, in order; waits are told instead of waited."""
     found: list[str] = []
-    monkeypatch.setattr(module, "time", SimpleNamespace(sleep=lambda seconds: found.append(f"sleep {seconds}")))
+    monkeypatch.setattr(
+        module,
+        "time",
+        SimpleNamespace(sleep=lambda seconds: found.append(f"sleep {seconds}"), monotonic=time.monotonic),
+    )
     yield found
     gc.unfreeze()
 
@@ -242,3 +247,71 @@ def test_pictures_are_kept_only_where_a_folder_is_given(
     body.lives = 1
     report = StageRun(stage).run_headless(None)
     assert report["written"] == [] and isinstance(recorders[0], Recorder) and recorders[1] is None
+
+
+def test_a_picture_that_fails_leaves_the_servos_their_run(
+    told: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, stage: str
+) -> None:
+    class Headless:
+        def __init__(self, *words: Any) -> None:
+            pass
+
+        def run(self, keep_going: Any) -> None:
+            assert keep_going()
+            raise RuntimeError("the context is lost")
+
+        def report(self) -> dict[str, object]:
+            raise RuntimeError("no report either")
+
+        def close(self) -> None:
+            told.append("closed")
+
+    body: Any = FakeBody(told, 3)
+    body.mailbox = None
+    monkeypatch.setattr(module, "BodyProcess", body)
+    monkeypatch.setattr(module, "HeadValues", lambda *_: None)
+    monkeypatch.setattr(module, "lower_process_priority", lambda: None)
+    monkeypatch.setattr(module, "HeadlessFace", Headless)
+    report = StageRun("everything").run_headless(None)
+    assert told == ["ready", "begin", "sleep 0.05", "sleep 0.05", "closed", "stop", "left"]
+    assert report["face"] is None and report["parts"][0]["part"] == "the picture"
+    assert caplog.messages == [
+        "the picture failed: RuntimeError: the context is lost; links and servos go on; "
+        "it comes back with the next start"
+    ]
+    body.lives = 3
+    with pytest.raises(RuntimeError, match="context is lost"):  # nobody would see or feel anything
+        StageRun(stage).run_headless(None)
+
+
+def test_the_end_of_the_body_is_no_failure_of_the_picture(told: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    class Headless:
+        def __init__(self, *words: Any) -> None:
+            pass
+
+        def run(self, keep_going: Any) -> None:
+            keep_going()
+
+        def close(self) -> None:
+            pass
+
+    def gave_up() -> bool:
+        raise ControllerError("bus head: gave up")
+
+    body: Any = FakeBody(told, 1)
+    body.mailbox, body.alive = None, gave_up
+    monkeypatch.setattr(module, "BodyProcess", body)
+    monkeypatch.setattr(module, "HeadValues", lambda *_: None)
+    monkeypatch.setattr(module, "lower_process_priority", lambda: None)
+    monkeypatch.setattr(module, "HeadlessFace", Headless)
+    with pytest.raises(ControllerError, match="gave up"):
+        StageRun("everything").run_headless(None)
+
+
+def test_a_voice_that_is_not_there_is_refused_before_anything_starts(tmp_path: Path) -> None:
+    (tmp_path / "stage.toml").write_text('name = "mine"\nvoice = "none.wav"\n')
+    with pytest.raises(TakeError, match=r"none\.wav: cannot be read: No such file"):
+        StageRun(str(tmp_path / "stage.toml"))
+    with pytest.raises(TakeError, match=r"other\.wav: cannot be read: No such file"):
+        StageRun("everything", RunOptions(voice=Voice("other.wav")))
+    StageRun(str(tmp_path / "stage.toml"), RunOptions(voice=Voice("-")))
