@@ -103,7 +103,16 @@ class Body:
 
             anchors = load_anchors(robot, self.stage.head, parameters)
         return [
-            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors, limp=limp)
+            BusLoop(
+                bus,
+                robot.on_bus(bus.name),
+                parameters,
+                self.newest,
+                robot.rules,
+                anchors,
+                limp=limp,
+                stop_latch=self.state.stop_latch,
+            )
             for bus in robot.buses
         ]
 

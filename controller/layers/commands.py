@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from controller.base.parameters import Flags, Floats, Parameters
+from controller.base.stop_latch import StopLatch
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
 from controller.layers.idle import IdleMotion, IdleSettings
@@ -115,7 +116,8 @@ class CommandState:
 
     Attributes
     ----------
-    servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
+    stop_latch : keeps the servos off. servo_monitor : measures the servos; None without any.
+    shows : plays scripts; None where none can be.
 
     Raises ConfigError: the shipped expressions or figures cannot be read.
     """
@@ -143,6 +145,7 @@ class CommandState:
         self._speech = self.mixer["speech"]
         self._everything = np.ones(len(parameters), dtype=bool)
         self.servo_monitor: ServoMonitor | None = None
+        self.stop_latch = StopLatch()
         self.shows: Player | None = None
         self._lock = threading.Lock()
         self._journal: Journal | None = None
