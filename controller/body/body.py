@@ -113,6 +113,7 @@ class Body:
                 *(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors),
                 limp=limp,
                 feed_s=self.stage.period_s,
+                stop_latch=self.state.stop_latch,
             )
             for bus in robot.buses
         ]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.base.parameters import Floats
+from controller.base.parameters import Flags, Floats
 
 
 class JerkFilter:
@@ -43,6 +43,10 @@ class JerkFilter:
         self._history[:] = values
         self._steps_s.fill(np.inf)
         self._uniform = False
+
+    def reset_some(self, where: Flags, values: Floats) -> None:
+        """Let those of ``where`` : (n,) be at rest at ``values`` : (n,)."""
+        self._history[:, where] = values[where]
 
     def step(self, dt: float, values: Floats, out: Floats) -> Floats:
         """Take ``values`` : (n,) that were reached in ``dt`` s; write their mean to ``out`` : (n,)."""

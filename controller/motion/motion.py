@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.base.parameters import Floats, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.motion.jerk import JerkFilter
 
 _LONGEST_STEP_S = 0.1
@@ -130,6 +130,13 @@ class MotionLimiter:
         self._output[:] = self._position
         self._target[:] = self._position
         self._filter.reset(self._position)
+
+    def reset_some(self, where: Flags, values: Floats) -> None:
+        """Let those of ``where`` : (n,) be at ``values`` : (n,), at rest."""
+        self._position[where] = np.clip(values, self._low, self._high)[where]
+        self._velocity[where] = 0.0
+        self._output[where] = self._target[where] = self._position[where]
+        self._filter.reset_some(where, self._position)
 
     def step(self, dt: float, targets: Floats, out: Floats) -> Floats:
         """Move for ``dt`` seconds towards ``targets`` : (n,) and write the values to ``out`` : (n,).

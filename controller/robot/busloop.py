@@ -17,7 +17,8 @@ import numpy as np
 
 from controller.base.clock import Clock, Samples
 from controller.base.linked_clocks import FedClock
-from controller.base.parameters import Floats, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
+from controller.base.stop_latch import StopLatch
 from controller.robot.buses import BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.following import FollowingStatistics
@@ -50,6 +51,8 @@ class BusLoop:
     rules : the robot's safety rules. anchors : solver of the robot's anchored channels, on this bus or another.
     limp : switch the motors off and only read the positions of the servos.
     feed_s : time between calls of :meth:`feed`, after which cycles begin; 0 for a bus that cycles by itself.
+    stop_latch : while it is set, the motors are off, whatever else is asked, and the positions are read. Afterwards the
+        servos start again where they are.
     """
 
     def __init__(
@@ -63,6 +66,7 @@ class BusLoop:
         *,
         limp: bool = False,
         feed_s: float = 0.0,
+        stop_latch: StopLatch | None = None,
     ) -> None:
         self.settings = settings
         self._goals = GoalFilter(channels, parameters, rules, 1.0 / settings.rate_hz, anchors)
@@ -76,9 +80,11 @@ class BusLoop:
         self.limp = limp
         self.realtime = False
         self.error: Exception | None = None
-        self._newest = newest
+        self._newest, self._stop_latch = newest, stop_latch or StopLatch()
         self._last_stamp = 0
-        self._retry_ns: int | None = None  # when to try a lost port again; None while there is one
+        self._retry_ns: int | None = None  # when to try again what failed; None while nothing has
+        self._off = False  # the servos are off, or are being switched off, because of the latch
+        self._driven = self.bus.driven
         self._state: BusState | None = None
         self._stopping, self._begun = threading.Event(), threading.Event()
         self._last_reason = ""
@@ -91,12 +97,15 @@ class BusLoop:
         """
         try:
             self.bus.open()
-            self.bus.start()
+            stopped = self._stop_latch.stopped is not None
+            if not stopped:
+                self.bus.start()
+                self._resume()
+            self._off = stopped and not self.limp
             if self.limp:
                 self.bus.stop()
                 if not self.bus.measures:
                     log.warning("bus %s does not measure its servos: the face cannot follow", self.settings.name)
-            self._resume()
         except BaseException:
             self.bus.close()
             raise
@@ -127,44 +136,81 @@ class BusLoop:
 
     def _resume(self) -> None:
         """Continue from where the servos are, so that the first goals are a ramp from there."""
-        self._goals.restart(self._all_fresh().position_rad)
+        here = self._all_fresh().position_rad
+        self._goals.restart(np.where(np.isfinite(here), here, self._goals.sent))
+        self._driven = self.bus.driven
 
     def _all_fresh(self) -> BusState:
-        """Read until every servo has answered; raises NoReply when some do not: old positions are unsafe to use."""
+        """Read until every servo that is driven has answered; raises NoReply when some do not.
+
+        Old positions are unsafe to use. After the first start, servos that do not answer are not driven.
+        """
         for _ in range(_READS):
             state = self._state = self.bus.read()
-            if state.fresh.all() or not self.bus.measures:
+            missing = ~state.fresh & self.bus.measures & (self._needed() | (self._thread is None))
+            if not missing.any():
                 return state
-        names = [name for name, fresh in zip(self.table.names, state.fresh, strict=True) if not fresh]
+        names = [name for name, absent in zip(self.table.names, missing, strict=True) if absent]
         raise NoReply(
             f"bus {self.settings.name}: the position of {', '.join(names)} is not known, for no answer came",
             hint="look at its cable, then start again",
         )
 
+    def _needed(self) -> Flags:
+        """Servos whose positions must be known."""
+        return self.bus.driven & (not self.limp)
+
     def _run(self) -> None:
         self.realtime = request_realtime()
         try:
             for now in self.clock.run(lambda: not self._stopping.is_set()):
-                if self._retry_ns is None:
-                    self._cycle()
-                elif now >= self._retry_ns:
-                    self._reconnect(now)
+                self._tick(now)
             if not self.limp:
                 self._come_to_rest()
         except Exception as error:  # noqa: BLE001  the body raises it and stops the servos
             self.error = error
 
-    def _cycle(self) -> None:
+    def _tick(self, now: int) -> None:
+        """One cycle. The latch comes before anything else."""
         try:
-            if self.limp:
-                self._state = self.bus.read()
-            else:
-                self._drive()
+            if self._stop_latch.stopped is not None and not self.limp:
+                self._stay_off(now)
+            elif self._retry_ns is None and not self._off:
+                self._cycle()
+            elif self._retry_ns is None or now >= self._retry_ns:
+                self._come_back(now)
         except PortLost as error:
             log.warning("%s; trying again every %g s", error, _RETRY_NS / 1e9)
             self._retry_ns = 0
 
+    def _stay_off(self, now: int) -> None:
+        """Switch the servos off, again every second where some are not confirmed off, and only read their positions."""
+        if self.bus.running:
+            self._off, self._retry_ns = True, 0
+            log.warning("bus %s: the servos are off until START", self.settings.name)
+        if self._retry_ns is not None and now >= self._retry_ns:
+            self._switch_off(now)
+        if self.bus.is_open:
+            self._state = self.bus.read()
+
+    def _switch_off(self, now: int) -> None:
+        try:
+            self.bus.stop()
+            if not self.bus.is_open:
+                self.bus.reconnect()  # it only opens the port, for the bus is stopped
+        except DriverError as error:
+            self._try_later(now, "not off for certain", error)
+        else:
+            self._retry_ns = None
+
+    def _cycle(self) -> None:
+        if self.limp:
+            self._state = self.bus.read()
+        else:
+            self._drive()
+
     def _drive(self) -> None:
+        self._follow_absent()
         if not self._begun.is_set():
             self.bus.write(self._goals.sent)
             self._state = self.bus.read()
@@ -172,39 +218,60 @@ class BusLoop:
         values, stamp = self._newest()
         angles, held = self.table.angles(values)
         self.held += held
-        self.bus.write(self._goals.step(angles, self._state, self.clock.step_s))
+        wanted = np.where(self._driven, angles, self._goals.sent)
+        self.bus.write(self._goals.step(wanted, self._state, self.clock.step_s))
         if stamp > self._last_stamp:
             self._last_stamp = stamp
             self.latency_ms.add((time.monotonic_ns() - stamp) / 1e6)
         self._state = self.bus.read()
         self.following.add(angles, self._state)
 
+    def _follow_absent(self) -> None:
+        """Let the goals of servos that are not driven, or were not until the last read, begin where they are."""
+        driven = self.bus.driven
+        if driven is not self._driven or not driven.all():
+            absent = ~(driven & self._driven)
+            if self._state is not None:
+                self._goals.restart_some(absent, self._state.position_rad)
+            self._driven = driven
+
     def _come_to_rest(self) -> None:
         """Move the servos to the neutral face before torque is switched off, so that no part of the head drops."""
         rest = self.table.neutral_rad
         end_ns = time.monotonic_ns() + _REST_LIMIT_NS
         with suppress(DriverError):  # a bus that does not work is stopped as it is
-            for now in Clock(self.settings.rate_hz).run(lambda: self._retry_ns is None):
+            for now in Clock(self.settings.rate_hz).run(self._may_move):
+                self._follow_absent()
                 self.bus.write(self._goals.step(rest, self._state))
                 state = self._state = self.bus.read()
                 known = state.fresh | (not self.bus.measures)
-                away = np.where(known, np.abs(state.position_rad - rest), np.inf)
+                away = np.where(known, np.abs(state.position_rad - rest), np.where(self.bus.driven, np.inf, 0.0))
                 if now > end_ns or away.max() < _AT_REST_RAD:
                     return
 
-    def _reconnect(self, now: int) -> None:
-        """Try once to get a lost port back; motion continues from the measured positions."""
+    def _may_move(self) -> bool:
+        return self._retry_ns is None and not self._off and self._stop_latch.stopped is None
+
+    def _come_back(self, now: int) -> None:
+        """Try once to drive again after START or the loss of the port; motion continues from the measured positions."""
         try:
-            self.bus.reconnect()
+            if not self._off or not self.bus.is_open:
+                self.bus.reconnect()
+            if self._off:
+                self.bus.start(partly=True)
             self._resume()
         except DriverError as error:
-            if str(error) != self._last_reason:
-                self._last_reason = str(error)
-                log.warning("bus %s is not back: %s", self.settings.name, error)
-            self._retry_ns = now + _RETRY_NS
+            self._try_later(now, "not back", error)
         else:
             log.warning("bus %s is back", self.settings.name)
-            self._retry_ns = None
+            self._off, self._retry_ns, self._last_reason = False, None, ""
+
+    def _try_later(self, now: int, what: str, error: DriverError) -> None:
+        """Try again in a second; log why, once."""
+        if str(error) != self._last_reason:
+            self._last_reason = str(error)
+            log.warning("bus %s is %s: %s", self.settings.name, what, error)
+        self._retry_ns = now + _RETRY_NS
 
     def report(self) -> dict[str, object]:
         """Measurements: rate and jitter, command-to-wire latency, errors by kind, limits hit."""
@@ -218,5 +285,6 @@ class BusLoop:
             "rules": self._goals.guard.report(),
             "face_difference": self.following.report(),
             "bus": self.bus.report().as_dict(),
+            "stopped_by": stopped.who if (stopped := self._stop_latch.stopped) else None,
             "fault": str(self.error) if self.error else None,
         }

@@ -291,6 +291,12 @@ class GoalFilter:
         np.clip(position_rad, self.table.low_rad, self.table.high_rad, out=self.sent)
         self._limiter.reset(self.sent)
 
+    def restart_some(self, where: Flags, position_rad: Floats) -> None:
+        """As ``restart`` for those of ``where`` : (n,); from the last goal where a position is NaN."""
+        at = np.where(np.isfinite(position_rad), position_rad, self.sent)
+        self._limiter.reset_some(where, at)
+        self.sent[where] = np.clip(at, self.table.low_rad, self.table.high_rad)[where]
+
     def step(self, wanted: Floats, state: BusState | None = None, dt: float | None = None) -> Floats:
         """One cycle of ``dt`` s, by default the bus's own, towards angles (n,) rad, given the newest measurement.
 

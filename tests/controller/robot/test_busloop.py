@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS as P
+from controller.base.stop_latch import StopLatch
 from controller.robot import busloop as module
 from controller.robot.buses import read_bus
 from controller.robot.busloop import BusLoop
@@ -40,6 +41,8 @@ def channel(name: str, servo: int, mix: str, deg: float) -> ChannelSettings:
     )
 
 
+SHORT = {"margin_s": 0.05, "watchdog_ms": 0}
+"""For buses with a silent servo: the others wait for it."""
 CHANNELS = [channel("jaw", 1, "jawOpen", 30.0), channel("yaw", 2, "headYaw", 60.0)]
 
 
@@ -68,14 +71,14 @@ def ticked(loop: BusLoop, count: int) -> None:
     until(lambda: loop.clock.ticks >= before + count)
 
 
-def make(servos: SimulatedBus, face: Face, **more: Any) -> BusLoop:
-    table = {"name": "b", "kind": "dynamixel", "port": servos.path, "rate_hz": 50, "margin_s": 0.3}
+def make(servos: SimulatedBus, face: Face, options: dict[str, Any] | None = None, **more: Any) -> BusLoop:
+    table = {"name": "b", "kind": "dynamixel", "port": servos.path, "rate_hz": 50, "margin_s": 0.3} | (options or {})
     return BusLoop(read_bus(table), CHANNELS, P, face, **more)
 
 
 @contextmanager
-def running(servos: SimulatedBus, face: Face, **more: Any) -> Iterator[BusLoop]:
-    loop = make(servos, face, **more)
+def running(servos: SimulatedBus, face: Face, options: dict[str, Any] | None = None, **more: Any) -> Iterator[BusLoop]:
+    loop = make(servos, face, options, **more)
     loop.start()
     try:
         yield loop
@@ -208,37 +211,30 @@ def test_a_lost_port_comes_back_and_motion_goes_on_from_the_measured_pose(
     assert sum(message == "bus b is back" for message in messages) == 1
 
 
-def test_no_goal_is_sent_after_a_failed_reconnect(
-    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+def test_no_goal_is_sent_to_a_servo_that_does_not_say_where_it_is_after_a_reconnect(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The port is back and takes goals, but one servo does not say where it is: nothing may move."""
+    """The port is back and takes goals, and all servos came up, but one does not answer: it alone stays where it is."""
     monkeypatch.setattr(module, "_RETRY_NS", 20_000_000)
-    monkeypatch.setattr(module, "_READS", 2)
-    face, attempts = Face(), []
-    with running(servos, face) as loop, caplog.at_level(logging.WARNING):
+    face = Face()
+    with running(servos, face, SHORT) as loop:
         loop.begin()
         ticked(loop, 3)
         real = loop.bus.reconnect
 
         def reconnect() -> None:
-            servos.clear("silent")
             real()
-            attempts.append(degrees(servos, 1))
-            if len(attempts) <= 3:
-                servos.fault("silent:2")
+            servos.fault("silent:2")
+            face.values[[JAW, YAW]] = 1.0
 
         monkeypatch.setattr(loop.bus, "reconnect", reconnect)
-        writes: list[int] = []
-        write = loop.bus.write
-        monkeypatch.setattr(loop.bus, "write", lambda angles: (writes.append(len(attempts)), write(angles))[1])
-        face.values[JAW] = 1.0
         servos.fault("unplug:for=0.2s")
-        until(lambda: loop._retry_ns is not None)
-        until(lambda: len(attempts) == 4)
         until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
-        assert set(writes) <= {0, 4}  # none between the loss and the attempt that succeeded
+        assert loop.report()["bus"]["not_driven"] == (2,)  # type: ignore[index]
+        assert abs(degrees(servos, 2)) < 0.5
+        servos.clear()
+        until(lambda: abs(degrees(servos, 2) - 40.0) < 0.2)
         assert loop.error is None
-    assert any("bus b is not back: bus b: the position of yaw" in record.getMessage() for record in caplog.records)
 
 
 def test_a_limp_bus_is_only_read(servos: SimulatedBus) -> None:
@@ -275,3 +271,163 @@ def test_an_error_of_the_loop_is_kept_and_the_servos_are_switched_off(servos: Si
     loop.stop()
     assert str(loop.error) == "mine" == loop.report()["fault"]
     assert not servos.servo(1).torque
+
+
+# ---------------------------------------------------------------------------- STOP and START
+
+
+def stopping(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> tuple[Face, StopLatch]:
+    """A face with the jaw open, and a latch; failed attempts are repeated soon."""
+    monkeypatch.setattr(module, "_RETRY_NS", 50_000_000)
+    face = Face()
+    face.values[JAW] = 1.0
+    return face, StopLatch()
+
+
+def limp(servos: SimulatedBus) -> bool:
+    return not any(servos.servo(i).register("Torque Enable") for i in (1, 2))
+
+
+def test_stop_switches_off_and_start_ramps_from_where_the_servos_are(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    face, latch = stopping(servos, monkeypatch)
+    with running(servos, face, stop_latch=latch) as loop:
+        loop.begin()
+        until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
+        latch.stop("a test", 0)
+        ticked(loop, 2)
+        assert limp(servos) and loop.report()["stopped_by"] == "a test"
+        goal = servos.servo(1).goal
+        servos.servo(1).place(2048 - 25 * TICKS)
+        until(lambda: (state := loop.measured()) is not None and state.position_rad[0] < np.radians(-24.0))
+        ticked(loop, 3)
+        assert limp(servos) and servos.servo(1).goal == goal and loop.bus.is_open, "it is only read"
+        first = loop._goals.step
+        steps: list[float] = []
+        monkeypatch.setattr(loop._goals, "step", lambda *a: (steps.append(loop._goals.sent[0]), first(*a))[1])
+        latch.start()
+        until(lambda: bool(steps))
+        assert np.degrees(steps[0]) == pytest.approx(-25.0, abs=0.5)
+        until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
+        assert not limp(servos) and loop.report()["stopped_by"] is None
+    assert loop.error is None
+
+
+def test_stop_comes_before_anything_else_in_a_cycle(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between the latch and torque off there is no goal, and none until START."""
+    face, latch = stopping(servos, monkeypatch)
+    with running(servos, face, stop_latch=latch) as loop:
+        loop.begin()
+        ticked(loop, 3)
+        calls: list[str] = []
+        write, stop = loop.bus.write, loop.bus.stop
+        monkeypatch.setattr(loop.bus, "write", lambda angles: (calls.append("write"), write(angles))[1])
+        monkeypatch.setattr(loop.bus, "stop", lambda: (calls.append("stop"), stop())[1])
+        newest = loop._newest
+        monkeypatch.setattr(loop, "_newest", lambda: (latch.stop("the face itself", 0), newest())[1])
+        until(lambda: "stop" in calls)
+        ticked(loop, 3)
+        assert calls == ["write", "stop"]
+
+
+def test_stop_before_the_face_begins_and_before_the_start(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    face, latch = stopping(servos, monkeypatch)
+    latch.stop("a test", 0)
+    powered: list[bool] = []
+    with running(servos, face, stop_latch=latch) as loop:
+        ticked(loop, 3)
+        powered.append(limp(servos))
+        latch.start()
+        until(lambda: servos.servo(1).torque and servos.servo(2).torque)
+        latch.stop("a test", 0)
+        until(lambda: limp(servos))
+        loop.begin()
+        ticked(loop, 3)
+        powered.append(limp(servos))
+    assert powered == [True, True] and loop.error is None and limp(servos)
+
+
+def test_a_port_that_comes_back_while_stopped_switches_nothing_on(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    face, latch = stopping(servos, monkeypatch)
+    with running(servos, face, stop_latch=latch) as loop:
+        loop.begin()
+        ticked(loop, 3)
+        servos.fault("unplug:for=0.3s")
+        until(lambda: not loop.bus.is_open)
+        assert not limp(servos)
+        latch.stop("a test", 0)
+        until(lambda: limp(servos) and loop.bus.is_open and loop._retry_ns is None)
+        servos.fault("unplug:for=0.2s")
+        until(lambda: not loop.bus.is_open)
+        until(lambda: loop.bus.is_open and loop._retry_ns is None)
+        ticked(loop, 3)
+        assert limp(servos)
+        latch.start()
+        until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
+    assert loop.error is None
+
+
+def test_a_servo_that_is_not_confirmed_off_is_switched_off_when_it_answers(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    face, latch = stopping(servos, monkeypatch)
+    with running(servos, face, SHORT, stop_latch=latch) as loop, caplog.at_level(logging.WARNING):
+        loop.begin()
+        ticked(loop, 3)
+        servos.fault("mute:2")
+        latch.stop("a test", 0)
+        until(lambda: not servos.servo(1).torque and loop._retry_ns not in (None, 0))
+        assert servos.servo(2).torque
+        servos.clear()
+        until(lambda: limp(servos) and loop._retry_ns is None)
+        assert loop.bus.is_open
+    assert sum("not off for certain" in record.getMessage() for record in caplog.records) == 1
+
+
+def test_stop_ends_the_way_to_rest(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    face, latch = stopping(servos, monkeypatch)
+    with running(servos, face, stop_latch=latch) as loop:
+        loop.begin()
+        until(lambda: servos.servo(1).position_ticks > 2048 + 29 * TICKS)
+        real = loop.bus.read
+
+        def read() -> object:
+            if loop._stopping.is_set():
+                latch.stop("a test", 0)
+            return real()
+
+        monkeypatch.setattr(loop.bus, "read", read)
+    assert limp(servos) and servos.servo(1).position_ticks > 2048 + 15 * TICKS
+
+
+# ---------------------------------------------------------------------------- servos fail alone
+
+
+def test_with_a_silent_servo_the_others_are_driven_after_a_replug_and_it_joins_with_a_ramp(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_RETRY_NS", 50_000_000)
+    monkeypatch.setattr("drivers.core.wirebus.JOIN_S", 0.05)
+    monkeypatch.setattr("drivers.servos.telemetry.PROBE_S", 0.2)
+    face = Face()
+    with running(servos, face, SHORT) as loop:
+        loop.begin()
+        servos.fault("mute:2")
+        until(lambda: not loop.bus.driven[1])
+        servos.fault("unplug:for=0.2s")
+        until(lambda: not loop.bus.is_open)
+        until(lambda: loop.bus.is_open and loop._retry_ns is None)
+        face.values[[JAW, YAW]] = 1.0
+        until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
+        assert loop.report()["bus"]["not_driven"] == (2,)  # type: ignore[index]
+        assert abs(degrees(servos, 2)) < 0.5 and abs(np.degrees(loop._goals.sent[1])) < 0.5, "its goals wait for it"
+        servos.clear()
+        until(lambda: bool(loop.bus.driven.all()))
+        assert abs(np.degrees(loop._goals.sent[1])) < 39.0, "a ramp"
+        until(lambda: abs(degrees(servos, 2) - 40.0) < 0.2)
+    assert loop.error is None

@@ -225,7 +225,20 @@ def test_a_voltage_error_that_leaves_torque_alone_is_no_reason_to_reboot(wire: V
 # ---------------------------------------------------------------------------- 17: positions out of turn
 
 
-@pytest.mark.parametrize("position", [5568, -300, -(2**31)])
+@pytest.mark.parametrize("offset", [-512, 512])
+def test_the_turn_of_a_limp_servo_begins_at_its_homing_offset(wire: VirtualBus, offset: int) -> None:
+    """Beyond it, the servo would count from the other end once it is on, and a goal where it was would spin it."""
+    wire.servo(2).put("Homing Offset", offset)
+    wire.servo(2).place(offset + (4095 if offset < 0 else 0))
+    with bus_on(wire) as bus:
+        bus.start()
+        here = wire.servo(2).position_ticks
+        assert abs(wire.servo(2).goal - here) <= 1, "nothing moves at the start"
+    wire.servo(2).place(offset + (4096 if offset < 0 else -1))
+    assert "by hand" in refuses(wire, ServoFault, "outside one turn of 4096 steps").hint
+
+
+@pytest.mark.parametrize("position", [-30, -1, 4096, 5568, -300, -(2**31)])
 def test_a_position_outside_one_turn_is_refused(
     wire: VirtualBus, position: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

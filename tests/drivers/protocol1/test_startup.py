@@ -304,7 +304,7 @@ def test_17_feedback_over_several_turns_is_switched_off(head: Head) -> None:
 
 
 @over("sts3215")
-@pytest.mark.parametrize("position", [5568, -30 - 4096, -65])
+@pytest.mark.parametrize("position", [5568, 4096, -30, -30 - 4096])
 def test_17_a_position_outside_one_turn_is_never_a_goal(
     head: Head, position: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -165,6 +165,9 @@ def test_current_is_in_milliamperes_on_the_small_series():
 
 
 def test_modes_of_models_without_a_current_sensor():
+    for name in ("mx-28", "mx-64", "mx-106", "xl430-w250", "xc430-w150", "2xl430-w250", "xl330-m288", "xm540-w270"):
+        table = load_table(name)
+        assert ({0, 5} <= set(table["Operating Mode"].values)) == ("Goal Current" in table), name
     assert load_table("xl430-w250")["Operating Mode"].values == (1, 3, 4, 16)
     assert load_table("xm430-w350")["Operating Mode"].values == (0, 1, 3, 4, 5, 16)
 

@@ -265,6 +265,19 @@ def test_clear_brings_the_position_back_into_one_turn_at_rest_only():
     assert read(device, "Present Position", 70.0) == 9000 % 4096
 
 
+@pytest.mark.parametrize(("mode", "then"), [(3, 4066), (4, -30)])
+def test_switched_on_in_position_mode_a_turned_servo_counts_within_one_turn(mode: int, then: int):
+    """e-Manual, Present Position (132)."""
+    device = servo()
+    write(device, "Operating Mode", mode)
+    device.place(-30, 1.0)
+    assert read(device, "Present Position", 1.0) == -30, "limp, it counts on"
+    write(device, "Goal Position", 100, 1.0)
+    write(device, "Torque Enable", 1, 1.0)
+    assert read(device, "Present Position", 1.0) == then
+    assert device.goal == 100
+
+
 def test_leaving_the_table_is_an_access_error_without_data():
     assert servo().read(220, 9, 0.0) == (E.ACCESS, b"")
 
