@@ -102,10 +102,14 @@ class Body:
             from controller.robot.anchors import load_anchors  # start-up: loads the head
 
             anchors = load_anchors(robot, self.stage.head, parameters)
+        prefix = f"{robot.name}/" if len(self.stage.robots) > 1 else ""  # so that all buses have different names
         return [
-            BusLoop(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors, limp=limp)
+            BusLoop(
+                bus.model_copy(update={"name": prefix + bus.name}), robot.on_bus(bus.name), parameters, self.newest,
+                robot.rules, anchors, limp=limp,
+            )
             for bus in robot.buses
-        ]
+        ]  # fmt: skip
 
     def newest(self) -> tuple[Floats, int]:
         """The newest parameters and the arrival time (monotonic ns) of the command that caused them."""

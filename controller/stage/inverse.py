@@ -22,6 +22,7 @@ from controller.base.parameters import Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.robot.anchors import SkinSamples
 from controller.robot.terms import Finite
+from surface.base.extras import require
 from surface.head import Head
 
 if TYPE_CHECKING:
@@ -124,6 +125,7 @@ class SculptSolver:
     """
 
     def __init__(self, head: Head, part: str = "face", *, fairness: float = 10.0) -> None:
+        require("moving control points by hand", "scipy")
         from scipy.sparse import identity  # start-up: only sculpting needs it
         from scipy.sparse.linalg import splu  # start-up: only sculpting needs it
 
