@@ -13,11 +13,13 @@ import resource
 import time
 import tracemalloc
 from collections import Counter
+from contextlib import suppress
 
 import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.parameters import Floats
 from controller.base.paths import find_config
@@ -31,7 +33,8 @@ LAYERS = (*default_layers(), LayerSettings("show", 45, "max"), LayerSettings("tw
 DT = 0.01
 STEP_NS = 10_000_000
 SOURCES = ("speech", "capture", "show", "twitch")
-POISON = (np.nan, np.inf, -np.inf, -1e9, 1e9, 0.0, 1.0)
+FAR = (-1e9, 1e9, 0.0, 1.0)
+POISON = (np.nan, np.inf, -np.inf, *FAR)
 
 
 class Chain:
@@ -57,11 +60,13 @@ class Chain:
     def attack(self) -> None:
         """What a broken or hostile source might do: no numbers, jumps, old stamps, flicker, commands at random."""
         random, state, now = self._random, self.state, self.now_ns
-        values = random.choice(POISON, len(P)) if random.random() < 0.5 else random.choice([P.low, P.high])
+        kinds = random.choice(POISON, len(P)), random.choice(FAR, len(P)), random.choice([P.low, P.high])
+        values = kinds[random.choice(3, p=[0.25, 0.25, 0.5])]
         for name in SOURCES:
             if random.random() < 0.5:
                 stamp = now - int(random.integers(2)) * 10**9
-                state.write_layer(name, values, random.random(len(P)) < random.random(), stamp)
+                with suppress(ParameterError):  # not all values are finite: the source is told so
+                    state.write_layer(name, values, random.random(len(P)) < random.random(), stamp)
         at: list[int] = random.integers(0, len(P), 4).tolist()
         match random.integers(0, 6):
             case 0:

@@ -108,15 +108,15 @@ class Body:
             from controller.robot.anchors import load_anchors  # start-up: loads the head
 
             anchors = load_anchors(robot, self.stage.head, parameters)
+        prefix = f"{robot.name}/" if len(self.stage.robots) > 1 else ""  # so that all buses have different names
         return [
             BusLoop(
-                *(bus, robot.on_bus(bus.name), parameters, self.newest, robot.rules, anchors),
-                limp=limp,
-                feed_s=self.stage.period_s,
-                stop_latch=self.state.stop_latch,
+                bus.model_copy(update={"name": prefix + bus.name}), robot.on_bus(bus.name), parameters, self.newest,
+                robot.rules, anchors,
+                limp=limp, feed_s=self.stage.period_s, stop_latch=self.state.stop_latch,
             )
             for bus in robot.buses
-        ]
+        ]  # fmt: skip
 
     def _record(self, path: Path) -> None:
         seed, period_s = self.stage.settings.seed, self.stage.period_s

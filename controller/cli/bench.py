@@ -16,6 +16,7 @@ from controller.base.errors import ControllerError
 from controller.base.files import replacing
 from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
+from surface.base.extras import require
 
 PICTURES = (".png", ".svg", ".jpg", ".webp")
 _KEPT = {None: "", True: "kept", False: "missed"}
@@ -29,6 +30,10 @@ class Subject(StrEnum):
     quadtree = "quadtree"
     drift = "drift"
     bus = "bus"
+
+
+_NEEDS = {Subject.surface: ("scipy",)}
+"""What else is compared there."""
 
 
 def bench(
@@ -57,6 +62,7 @@ def bench(
 
     Example: omote bench surface --large --growth growth.svg
     """
+    require(f"omote bench {what}", *_NEEDS.get(what, ()), *(["moderngl"] if face else []), *(["PIL"] if out else []))
     if what is Subject.bus:
         _bench_bus(seconds, face, as_json)
         return

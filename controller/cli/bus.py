@@ -15,7 +15,10 @@ from controller.cli.completion import models, names_of
 from controller.cli.console import console, show_table
 
 Port = Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")]
-Protocol = Annotated[int, typer.Option(min=1, max=2, help="2 for Dynamixel X and XL-320, 1 for AX, MX and Feetech.")]
+Protocol = Annotated[
+    int | None,
+    typer.Option(min=1, max=2, help="2 (Dynamixel X, XL-320) or 1 (AX, MX, Feetech). Default: both are tried."),
+]
 
 
 def ports() -> None:
@@ -80,7 +83,7 @@ def set_id(
     old: Annotated[int, typer.Argument(min=0, max=252, help="Id that the servo has.")],
     new: Annotated[int, typer.Argument(min=0, max=252, help="New id of the servo.")],
     baud: Annotated[int, typer.Option(help="Baud rate of the servo; omote scan finds it.")] = 1_000_000,
-    protocol: Protocol = 2,
+    protocol: Protocol = None,
     release: Annotated[
         bool, typer.Option("--release", help="Switch its motor off first; support what it holds.")
     ] = False,
@@ -98,7 +101,7 @@ def set_id(
 def monitor(
     port: Port,
     baud: Annotated[int, typer.Option(help="Baud rate of the bus; omote scan finds it.")] = 1_000_000,
-    protocol: Protocol = 2,
+    protocol: Protocol = None,
     listen: Annotated[
         bool, typer.Option("--listen", help="Only listen: for a second adapter on a wire that another program drives.")
     ] = False,

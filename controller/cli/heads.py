@@ -13,6 +13,7 @@ from controller.base.errors import ConfigError
 from controller.cli.completion import expressions, identities, names_of
 from controller.cli.completion import settings as setting_names
 from controller.cli.console import console, show_table
+from surface.base.extras import require
 
 if TYPE_CHECKING:
     from surface.fit.points.report import FitReport  # start-up: --help does without it
@@ -78,6 +79,7 @@ def render(
 
     Example: omote render --set jawOpen=0.8 --size 800x800 -o out.png
     """
+    require("a picture", "moderngl", "PIL")
     from controller.face.still import Still, draw_sheet, draw_still  # start-up: --help does without it
     from controller.stage.picture import parse_background  # start-up: --help does without it
 

@@ -14,6 +14,7 @@ from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
 from controller.cli.heads import Identity
 from drivers.base.permission import ports_forbidden
+from surface.base.extras import require
 
 Seconds = Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write what was measured to this JSON file.")]
@@ -139,6 +140,8 @@ def _run(
 ) -> None:
     from controller.body.preload import PreloadedBody, garbage_collection_off  # start-up: --help does without it
 
+    if not no_face:
+        require("a face (--no-face runs without one)", "moderngl", *(["PIL"] if pictures else []))
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: its threads would spin where others have work
     with console.status("starting") as status, PreloadedBody() as preloaded, garbage_collection_off():
         # start-up: the body's process loads its code at the same time
@@ -154,6 +157,7 @@ def _run(
         elif headless or not has_display():
             measured = session.run_headless(seconds, pictures)
         else:
+            require("a window (--headless runs without one)", "imgui_bundle")
             measured = session.run_window(seconds)
         if report is not None:
             write_report(measured, report)
@@ -189,17 +193,25 @@ def _dry_run(
         if voice is not None:
             with Voice(voice, voice_hz).open() as stream:
                 heard = voice_take(stream, "voice", PARAMETERS, raw_hz=voice_hz, longest_s=seconds)
-        channels, sent = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS, heard, alone=alone)
-    if channels:
-        table = Table(*channels[0], title="dry run: no port was opened", title_justify="left")
-        for channel in channels:
+        found = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS, heard, alone=alone)
+    if found.rows:
+        title = f"dry run: no port was opened; computed {_share_played(found.seconds, found.length_s)}"
+        table = Table(*found.rows[0], title=title, title_justify="left")
+        for channel in found.rows:
             table.add_row(*channel.values())
         show_table(table)
+        if found.seconds < found.length_s:
+            console.print(f"The rest was not computed; --seconds {found.length_s:.1f} computes all.", soft_wrap=True)
     else:
         console.print("This stage has no robot; nothing would be sent.", soft_wrap=True)
     if report is not None:
-        write_report({"stage": stage, "dry_run": True, "buses": sent}, report)
+        length = {"played_s": found.seconds, "length_s": found.length_s}
+        write_report({"stage": stage, "dry_run": True, **length, "buses": found.buses}, report)
         console.print(f"wrote {report}", soft_wrap=True)
+
+
+def _share_played(seconds: float, length_s: float) -> str:
+    return f"{seconds:.1f} s" if seconds >= length_s else f"the first {seconds:.1f} s of {length_s:.1f} s"
 
 
 def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:

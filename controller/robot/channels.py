@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controller.base.parameters import Floats, Indices, Parameters
+from controller.base.parameters import Flags, Floats, Indices, Parameters
 from controller.motion.motion import MotionLimiter
 from controller.robot.settings import ChannelSettings
 from controller.robot.terms import curve_corners
@@ -20,6 +20,8 @@ from drivers.base.bus import ServoSpec
 
 if TYPE_CHECKING:
     from controller.robot.anchors import AnchorSolver  # start-up: loads the head
+
+_AT_LIMIT_RAD = 1e-9  # rounding of degrees
 
 
 @dataclass(frozen=True)
@@ -132,8 +134,11 @@ class ChannelTable:
     def angles(self, values: Floats) -> tuple[Floats, int]:
         """Angles (n,) inside the limits for parameters (p,), and how many channels the limits held back."""
         wanted = self.curves(self.mixed(values))
-        held = np.clip(wanted, self.low_rad, self.high_rad)
-        return held, int(np.count_nonzero(held != wanted))
+        return np.clip(wanted, self.low_rad, self.high_rad), int(np.count_nonzero(self.beyond(wanted)))
+
+    def beyond(self, wanted_rad: Floats) -> Flags:
+        """(n,) whether an angle lies beyond its limits; one that rests at a limit on purpose does not."""
+        return (wanted_rad < self.low_rad - _AT_LIMIT_RAD) | (wanted_rad > self.high_rad + _AT_LIMIT_RAD)
 
     def limiter(self, period_s: float) -> MotionLimiter:
         """Keeps the limits of position (rad) and motion on a bus that cycles every ``period_s``."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,20 @@ _LONGEST_S = 600.0
 _EACH_S = 1.5
 
 
+@dataclass
+class Rehearsal:
+    """What a dry run computed.
+
+    rows : what each channel was sent, in words. buses : for each bus every angle of every cycle (deg).
+    seconds : how much was played of ``length_s``, the length of what plays.
+    """
+
+    rows: list[dict[str, str]] = field(default_factory=list)
+    buses: list[dict[str, object]] = field(default_factory=list)
+    seconds: float = 0.0
+    length_s: float = 0.0
+
+
 def dry_run(
     stage: Stage,
     take: Path | None,
@@ -39,7 +54,7 @@ def dry_run(
     voice: Take | None = None,
     *,
     alone: bool = False,
-) -> tuple[list[dict[str, str]], list[dict[str, object]]]:
+) -> Rehearsal:
     """Play a take, or what a stage plays by itself, to each of the stage's robots.
 
     Without a take that is the scripts of its simulated hosts, its show, its take and its voice, or else every named
@@ -50,20 +65,22 @@ def dry_run(
     take : a take or a recording. voice : plays as well; only it where ``alone``.
     seconds : how much of it; without, the longest of what plays, a script that repeats once, 10 minutes at most.
 
-    Returns a row for each channel, and for each bus every angle of every cycle (deg).
+    Two robots may have buses of one name, so with more than one robot the rows have the robot's name before the bus's.
     """
-    rows: list[dict[str, str]] = []
-    report: list[dict[str, object]] = []
+    found = Rehearsal()
     for robot in stage.robots:
         state = stage.state(parameters)
         state.live(stage.settings.liveliness, 0)
         feed, length_s = _feed(stage, take, state, voice, alone)
         anchors = load_anchors(robot, stage.head, parameters)
         offline = OfflineRun(robot, state, feed, stage.settings.control_hz, anchors)
-        offline.run(min(length_s, _LONGEST_S) if seconds is None else seconds)
-        rows += offline.rows()
-        report += offline.report()
-    return rows, report
+        found.length_s = length_s
+        found.seconds = min(length_s, _LONGEST_S) if seconds is None else seconds
+        offline.run(found.seconds)
+        prefix = f"{robot.name}/" if len(stage.robots) > 1 else ""
+        found.rows += [row | {"servo": prefix + row["servo"]} for row in offline.rows()]
+        found.buses += offline.report()
+    return found
 
 
 class OfflineRun:
@@ -99,9 +116,9 @@ class OfflineRun:
             self._state.tick(now_ns, self._dt, values)
             for name, bus in self._buses.items():
                 while len(rows[name]) * bus.period_s <= (tick + 1) * self._dt:
-                    wanted = bus.table.angles(values)[0]
-                    self._limited[name] += (wanted <= bus.table.low_rad) | (wanted >= bus.table.high_rad)
-                    rows[name].append(bus.step(wanted).copy())
+                    wanted = bus.table.curves(bus.table.mixed(values))
+                    self._limited[name] += bus.table.beyond(wanted)
+                    rows[name].append(bus.step(np.clip(wanted, bus.table.low_rad, bus.table.high_rad)).copy())
         self.sent_rad = {name: np.array(each) for name, each in rows.items()}
 
     def rows(self) -> Iterator[dict[str, str]]:

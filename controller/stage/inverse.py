@@ -24,6 +24,7 @@ from controller.base.solve import BoundedSolver
 from controller.robot.anchors import SkinSamples
 from controller.robot.terms import Finite
 from surface.base import files
+from surface.base.extras import require
 from surface.head import Head
 from surface.head.model.data import HeadData
 
@@ -128,6 +129,7 @@ class SculptSolver:
     """
 
     def __init__(self, head: Head, part: str = "face", *, fairness: float = 10.0) -> None:
+        require("moving control points by hand", "scipy")
         from scipy.sparse import identity  # start-up: only sculpting needs it
         from scipy.sparse.linalg import splu  # start-up: only sculpting needs it
 

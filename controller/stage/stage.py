@@ -70,7 +70,10 @@ def check_identity(head: Path, wanted: Mapping[str, float]) -> None:
     for name in wanted:
         if name not in known:
             there = ", ".join(known) or "none"
-            raise ConfigError(f"{head}: no identity {name!r}; there are {there}", hint="see docs/heads.md")
+            raise ConfigError(
+                f"{head}: no identity {name!r}; there are {there}",
+                hint="omote fit --help tells how --identities adds some",
+            )
 
 
 class StageSettings(Settings):

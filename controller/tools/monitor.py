@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -17,7 +17,7 @@ from rich.text import Text
 
 from controller.tools.scan import scan_port
 from drivers import open_bus
-from drivers.base.bus import Bus, BusState, ServoSpec
+from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
 from drivers.port.serialport import SerialPort, tapped
@@ -40,14 +40,15 @@ def make_decoder(protocol: int, tables: Mapping[int, ControlTable], model: str =
 
 
 def listen_to_bus(
-    port: str, baud: int, protocol: int, console: Console, keep_going: Callable[[], bool], model: str = ""
+    port: str, baud: int, protocol: int | None, console: Console, keep_going: Callable[[], bool], model: str = ""
 ) -> None:
     """Show the traffic of a bus without sending a byte: an adapter that only receives is enough.
 
+    ``protocol`` : None is that of ``model``, or 2 without one.
     ``model`` : of servos whose model is not seen in the traffic, for the names of registers; may be empty.
     Raises PortError, or DriverError when there is no such model.
     """
-    decoder = make_decoder(protocol, {}, model)
+    decoder = make_decoder(protocol or (load_table(model).protocol if model else 2), {}, model)
     view = BusView(f"listening on {port} at {baud} baud", lambda: _heard_rows(decoder), decoder, console)
     link = SerialPort(port, baud)
     link.open()
@@ -59,13 +60,14 @@ def listen_to_bus(
 
 
 def poll_servos(
-    port: str, baud: int, protocol: int, console: Console, keep_going: Callable[[], bool], rate_hz: float
+    port: str, baud: int, protocol: int | None, console: Console, keep_going: Callable[[], bool], rate_hz: float
 ) -> None:
     """Find the servos on a port, then read their states at a rate and show them with all traffic.
 
+    ``protocol`` : None tries both and takes the first in which servos answer, 2 before 1.
     Raises PortError, or NoReply when no servo answers.
     """
-    found = [item.servo for item in scan_port(port, [(protocol, baud)]) if item.servo]
+    protocol, found = _find_servos(port, baud, (2, 1) if protocol is None else (protocol,))
     tables: dict[int, ControlTable] = {}
     for info in found:
         with suppress(DriverError):  # an unknown model is shown by addresses
@@ -84,6 +86,15 @@ def poll_servos(
         reader = _Reader(bus, 1.0 / rate_hz)
         view.rows = reader.rows
         view.run(keep_going, reader.step)
+
+
+def _find_servos(port: str, baud: int, protocols: Sequence[int]) -> tuple[int, list[ServoInfo]]:
+    """The first protocol in which servos answer, and what answered."""
+    for protocol in protocols:
+        found = [item.servo for item in scan_port(port, [(protocol, baud)]) if item.servo]
+        if found:
+            break
+    return protocol, found
 
 
 class _Reader:

@@ -122,7 +122,7 @@ class LineOutBus(BoardBus):
                 raise self._error(
                     NoReply,
                     f"no head answers in the line protocol on {self.path} at {self._port.baud} baud",
-                    "check its power, its cable, its baud rate, and that it runs a sketch as in docs/boards.md",
+                    "check its power, its cable, its baud rate, and that its sketch takes the omote line protocol",
                 )
 
     def _refusal(self, group: Sequence[str], answer: Answer) -> BusError:

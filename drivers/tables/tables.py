@@ -231,7 +231,7 @@ def check_dynamixel(model: str) -> None:
     if load_table(model).model.startswith(FEETECH):
         raise DriverError(
             f"servo model {model!r} is no Dynamixel",
-            hint='set the kind of its bus to the family it is of, as "feetech"; docs/drivers.md lists them',
+            hint='set the kind of its bus to the family it is of, as "feetech"; omote plugins lists them',
         )
 
 

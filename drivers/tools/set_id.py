@@ -63,23 +63,23 @@ def _write(registers: Registers[Any], servo: int, name: str, value: int) -> None
     registers.port.sleep(REPLY_S)
 
 
-def set_id(port: str, baud: int, protocol: int, old: int, new: int, *, release: bool = False) -> ServoInfo:
+def set_id(port: str, baud: int, protocol: int | None, old: int, new: int, *, release: bool = False) -> ServoInfo:
     """Give the servo ``old`` the id ``new``; returns it under its new id.
 
-    port, baud, protocol : where it is; Protocol 2 or 1 (AX, MX, Feetech).
+    port, baud : where it is. protocol : 2, or 1 (AX, MX, Feetech); None tries both.
     release : switch its motor off where it is on.
 
     Raises ValueError: an id that no servo may have. NoReply, CorruptReply: no servo, or more than one, has the old id.
-    ServoRefused: the new id is taken, the motor is on, or the servo kept its id. Nothing was changed.
+    ServoRefused: the new id is taken, the motor is on, servos of both protocols have the old id, or the servo kept its
+    id. Nothing was changed.
     """
     for name, servo in (("old", old), ("new", new)):
         if not 0 <= servo <= MAX_ID:
             raise ValueError(f"{name}: an id is 0 to {MAX_ID}, got {servo}")
-    with _registers(port, baud, protocol) as registers:
+    with _registers(port, baud, protocol or _protocol_of(port, baud, old)) as registers:
         info = _find(registers, old)
         if info is None:
-            message = f"no servo has the id {old} on {port} at {baud} baud"
-            raise NoReply(message, hint=f"omote scan {port}", port=port, servo_ids=(old,))
+            raise _nobody(port, baud, old)
         taken = _find(registers, new) if new != old else None
         if taken is not None:
             raise _error(f"the id {new} on {port} is taken by another {taken.model}", "choose a free id", port, new)
@@ -99,6 +99,25 @@ def set_id(port: str, baud: int, protocol: int, old: int, new: int, *, release: 
         if locks and changed.model.startswith(FEETECH):  # an AX opens only without power
             _write(registers, new, "Lock", 1)
         return changed
+
+
+def _protocol_of(port: str, baud: int, servo: int) -> int:
+    """The protocol in which a servo answers. Raises NoReply where it does in none, ServoRefused where in both."""
+    found = []
+    for protocol in (2, 1):
+        with _registers(port, baud, protocol) as registers:
+            found += [protocol] if _find(registers, servo) is not None else []
+    if len(found) > 1:
+        message = f"a servo of Protocol 2.0 and one of Protocol 1.0 have the id {servo} on {port}"
+        raise _error(message, "add --protocol 2 or --protocol 1", port, servo)
+    if not found:
+        raise _nobody(port, baud, servo)
+    return found[0]
+
+
+def _nobody(port: str, baud: int, servo: int) -> NoReply:
+    message = f"no servo has the id {servo} on {port} at {baud} baud"
+    return NoReply(message, hint=f"omote scan {port}", port=port, servo_ids=(servo,))
 
 
 def _await(registers: Registers[Any], servo: int) -> ServoInfo | None:

@@ -54,7 +54,7 @@ class LineError(LinkError):
     """
 
     def __init__(self, code: Code, reason: str, *, tag: int | None = None, checked: bool = False) -> None:
-        super().__init__(reason, hint="docs/line-protocol.md lists the commands and the error codes")
+        super().__init__(reason, hint="the scripts in omote's folder configs/scripts hold examples of commands")
         self.code = code
         self.tag = tag
         self.checked = checked

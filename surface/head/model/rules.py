@@ -23,7 +23,10 @@ class Drivers:
         for row, (i, term) in zip(self._mix, terms, strict=True):
             for name, share in term.items():
                 if name not in SHAPES:
-                    raise HeadFileError(f"{where}: rules[{i}]: no shape {name!r}", hint="see docs/heads.md for names")
+                    raise HeadFileError(
+                        f"{where}: rules[{i}]: no shape {name!r}",
+                        hint="names are ARKit's, as omote render --sheet -o sheet.png shows them",
+                    )
                 row[SHAPES.index(name)] = share
         self._first = np.cumsum([0, *(len(r.terms) for r in rules)])[:-1]
         self._power = np.array([r.power for r in rules])

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.base.errors import ViewError
+from surface.base.extras import require
 from surface.view.draw.programs import build, set_uniforms
 from surface.view.scene.parts import ViewHead, ViewPart
 from surface.view.scene.sampling import is_software
@@ -141,6 +142,7 @@ class GpuEvaluator(Evaluator):
 
     def _sparse(self, part: ViewPart, ids: np.ndarray) -> tuple[Any, np.ndarray]:
         """Matrix (k, points) that gives vertices `ids` of a part before the head turns, and their shares (k,)."""
+        require("vertices from the graphics processor", "scipy")
         from scipy.sparse import csr_matrix  # takes a moment to import
 
         vertices = self._ranges[part.name][0] + np.asarray(ids)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from surface.base.extras import require
 from surface.head import Head, load_data
 from surface.head.posing.baked import shade_path, write_shade
 from surface.view.draw.programs import build, set_uniforms
@@ -60,6 +61,7 @@ def smoothed(values: np.ndarray, triangles: np.ndarray, passes: int = 2) -> np.n
 
     The directions are few, and the noise this causes between neighbours shows as streaks where skin stretches.
     """
+    require("baked shade", "scipy")
     from scipy.sparse import coo_array  # takes a moment to import
 
     start, end = np.asarray(triangles).T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
@@ -74,6 +76,7 @@ def smoothed(values: np.ndarray, triangles: np.ndarray, passes: int = 2) -> np.n
 
 def thinness(part: ViewPart) -> np.ndarray:
     """How near the skin's other side lies, (m, 1): 1 touches, 0 is further than `_THICK_MM`."""
+    require("baked shade", "scipy")
     from scipy.spatial import cKDTree
 
     vertices, normals = np.asarray(part.vertices, float), np.asarray(part.normals, float)

@@ -139,7 +139,7 @@ def test_set_id_is_given_the_usual_rate_and_protocol(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(set_id_module, "set_id", change)
     assert said("set-id", "p", "0", "252") == "m: permanent id 0 -> 252, written and read back on p"
     said("set-id", "p", "252", "0", "--protocol", "1", "--baud", "9600", "--release")
-    assert calls == [("p", 1_000_000, 2, 0, 252, {"release": False}), ("p", 9600, 1, 252, 0, {"release": True})]
+    assert calls == [("p", 1_000_000, None, 0, 252, {"release": False}), ("p", 9600, 1, 252, 0, {"release": True})]
     for words in (("253", "1"), ("1", "253"), ("1", "2", "--protocol", "3"), ("1", "2", "--protocol", "0")):
         assert omote("set-id", "p", *words).exit_code == 2
 
@@ -161,8 +161,8 @@ def test_a_monitor_asks_ten_times_a_second_unless_it_is_told(monkeypatch: pytest
     said("monitor", "p", "--listen")
     said("monitor", "p", "--listen", "--model", "ax-12a")
     assert calls == [
-        ("p", 1_000_000, 2, 10.0, True), ("p", 9600, 1, 0.1, True), ("p", 1_000_000, 2, 200.0, True),
-        ("p", 1_000_000, 2, "", True), ("p", 1_000_000, 2, "ax-12a", True),
+        ("p", 1_000_000, None, 10.0, True), ("p", 9600, 1, 0.1, True), ("p", 1_000_000, None, 200.0, True),
+        ("p", 1_000_000, None, "", True), ("p", 1_000_000, None, "ax-12a", True),
     ]  # fmt: skip
     for words in (("--rate", "0.09"), ("--rate", "200.1"), ("--seconds", "0.09"), ("--protocol", "3")):
         assert omote("monitor", "p", *words).exit_code == 2

@@ -18,7 +18,7 @@ from controller.base.paths import find_config
 from controller.cli.app import make_app
 from controller.layers.commands import CommandState
 from controller.robot.robot import load_robot
-from controller.stage.dry_run import OfflineRun, dry_run
+from controller.stage.dry_run import OfflineRun, Rehearsal, dry_run
 from controller.stage.stage import load_stage
 from controller.takes.recording import recorded
 
@@ -43,7 +43,8 @@ def test_every_channel_has_a_row_with_its_mix(root: Path) -> None:
 
 
 def test_without_anything_to_play_every_expression_is_shown(tmp_path: Path) -> None:
-    rows, report = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), None, 8.0, PARAMETERS)
+    found = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), None, 8.0, PARAMETERS)
+    rows, report = found.rows, found.buses
     sent = dict(zip(report[0]["channels"], zip(*report[0]["sent_deg"], strict=True), strict=True))
     assert len(report[0]["sent_deg"]) == 8 * HZ + 1
     assert max(sent["lipCornerUpLeft"]) > 20 and max(sent["neckYaw"]) < 10
@@ -54,7 +55,8 @@ def test_without_anything_to_play_every_expression_is_shown(tmp_path: Path) -> N
 def test_a_script_is_rehearsed_with_rules_and_limits(tmp_path: Path) -> None:
     (tmp_path / "open.toml").write_text('steps = ["0 SET jawOpen 1", "9 NEUTRAL"]')
     path = stage_file(tmp_path, f'[[links]]\nport = "simulated"\nscript = "{tmp_path / "open.toml"}"')
-    rows, report = dry_run(load_stage(str(path), PARAMETERS), None, None, PARAMETERS)
+    found = dry_run(load_stage(str(path), PARAMETERS), None, None, PARAMETERS)
+    rows, report = found.rows, found.buses
     jaw = next(row for row in rows if row["channel"] == "jawOpen")
     assert "timing" in jaw["held by"]
     way = [sent[3] for sent in report[0]["sent_deg"]]
@@ -65,7 +67,7 @@ def test_a_script_is_rehearsed_with_rules_and_limits(tmp_path: Path) -> None:
 def test_a_take_is_rehearsed(tmp_path: Path) -> None:
     take = tmp_path / "a.tsv"
     take.write_text("0.0\taa\n0.6\tPP\n1.0\tsil\n")
-    rows, _ = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), take, None, PARAMETERS)
+    rows = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), take, None, PARAMETERS).rows
     sent = next(row for row in rows if row["channel"] == "jawOpen")["sent (deg)"]
     assert float(sent.split()[-1]) > 10
 
@@ -82,15 +84,53 @@ def test_the_command_opens_no_port_and_writes_every_angle(tmp_path: Path) -> Non
 
 
 def test_a_stage_without_a_robot_sends_nothing() -> None:
-    assert dry_run(load_stage("serial", PARAMETERS), None, None, PARAMETERS) == ([], [])
+    assert dry_run(load_stage("serial", PARAMETERS), None, None, PARAMETERS) == Rehearsal()
 
 
 def test_the_show_of_a_stage_lies_beside_it_and_is_played(tmp_path: Path) -> None:
     (tmp_path / "act.toml").write_text('name = "act"\nloop_s = 2.0\nsteps = ["0.0 SET headYaw 0.5"]\n')
-    _, report = dry_run(load_stage(str(stage_file(tmp_path, 'show = "act.toml"\n')), PARAMETERS), None, 2.0, PARAMETERS)
+    stage = load_stage(str(stage_file(tmp_path, 'show = "act.toml"\n')), PARAMETERS)
+    report = dry_run(stage, None, 2.0, PARAMETERS).buses
     sent = dict(zip(report[0]["channels"], zip(*report[0]["sent_deg"], strict=True), strict=True))
     assert sent["neckYaw"][-1] == pytest.approx(30.0, abs=0.1)
     assert max(sent["lipCornerUpLeft"]) < 0.1
+
+
+def test_a_long_take_says_how_much_of_it_was_played(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    take, report = tmp_path / "a.tsv", tmp_path / "r.json"
+    take.write_text("0.0\taa\n2.0\tsil\n")
+    whole = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), take, None, PARAMETERS)
+    assert whole.seconds == whole.length_s >= 2.0
+    monkeypatch.setattr("controller.stage.dry_run._LONGEST_S", 1.0)
+    words = ["play", str(take), "--stage", str(stage_file(tmp_path)), "--dry-run", "--report", str(report)]
+    said = " ".join(CliRunner().invoke(make_app(), words).output.split())
+    assert f"dry run: no port was opened; computed the first 1.0 s of {whole.length_s:.1f} s" in said
+    assert f"--seconds {whole.length_s:.1f} computes all" in said
+    written = json.loads(report.read_text())
+    assert (written["played_s"], written["length_s"]) == (1.0, whole.length_s)
+
+
+@pytest.mark.parametrize(("limit", "held"), [(28.0, False), (20.0, True)])
+def test_resting_at_a_limit_on_purpose_is_not_held_by_it(root: Path, limit: float, held: bool) -> None:
+    robot, jaw = load_robot(root / "configs/robots/head24.toml", PARAMETERS), PARAMETERS.index("jawOpen")
+    channels = list(robot.channels)
+    assert channels[3].map.deg[-1] == 28.0  # where an open jaw rests
+    channels[3] = channels[3].model_copy(update={"limit_deg": (channels[3].limit_deg[0], limit)})
+    robot = robot.model_copy(update={"rules": type(robot.rules)(), "channels": channels})
+    state = CommandState(PARAMETERS)
+    offline = OfflineRun(robot, state, lambda now_ns: state.set_parameters([jaw], [1.0], now_ns))
+    offline.run(1.0)
+    (row,) = (row for row in offline.rows() if row["channel"] == "jawOpen")
+    assert ("limit" in row["held by"]) == held, row
+
+
+def test_buses_of_two_robots_have_different_names(tmp_path: Path, root: Path) -> None:
+    robot = (root / "configs/robots/head24.toml").read_text()
+    (tmp_path / "other.toml").write_text(robot.replace('name = "head24"', 'name = "other"'))
+    path = tmp_path / "two.toml"
+    path.write_text('name = "two"\nrobots = ["head24", "other.toml"]\n')
+    found = dry_run(load_stage(str(path), PARAMETERS), None, 0.1, PARAMETERS)
+    assert {row["servo"].split()[0] for row in found.rows} == {"head24/head", "other/head"}
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +191,7 @@ def sent_of(report: list[dict[str, object]], name: str) -> list[float]:
 def test_a_script_without_a_loop_runs_a_moment_longer_than_its_last_step(tmp_path: Path) -> None:
     (tmp_path / "act.toml").write_text('steps = ["0 SET jawOpen 0.5", "1 NEUTRAL"]')
     stage = load_stage(str(stage_file(tmp_path, 'show = "act.toml"\n')), PARAMETERS)
-    _, report = dry_run(stage, None, None, PARAMETERS)
+    report = dry_run(stage, None, None, PARAMETERS).buses
     assert len(sent_of(report, "jawOpen")) == round(2.5 * HZ) + 1
 
 
@@ -181,7 +221,7 @@ def test_a_recording_is_played_from_its_first_face(tmp_path: Path) -> None:
             if i == 50:
                 state.set_parameters([PARAMETERS.index("jawOpen")], [1.0], 10**9 + i * 10_000_000)
             state.tick(10**9 + i * 10_000_000, 0.01, PARAMETERS.neutral())
-    _, report = dry_run(stage, tmp_path / "a.rec", None, PARAMETERS)
+    report = dry_run(stage, tmp_path / "a.rec", None, PARAMETERS).buses
     jaw = sent_of(report, "jawOpen")
     assert len(jaw) == pytest.approx(1.5 * HZ, abs=2)
     assert max(jaw[:20]) < 0.1 and jaw[-1] == pytest.approx(28.0, abs=0.5)
@@ -192,7 +232,7 @@ def test_a_lively_stage_moves_by_itself(tmp_path: Path) -> None:
     still = 'show = "act.toml"\n'
     moved = []
     for text in (still, f"liveliness = 1.0\n{still}"):
-        _, report = dry_run(load_stage(str(stage_file(tmp_path, text)), PARAMETERS), None, 6.0, PARAMETERS)
+        report = dry_run(load_stage(str(stage_file(tmp_path, text)), PARAMETERS), None, 6.0, PARAMETERS).buses
         moved.append(max(np.ptp(np.array(report[0]["sent_deg"]), axis=0)))
     assert moved[0] < 0.01 < 1.0 < moved[1]
 
@@ -227,13 +267,13 @@ def test_a_voice_on_standard_input_is_computed_without_a_port(tmp_path: Path) ->
 def test_a_long_take_is_computed_to_its_end(tmp_path: Path) -> None:
     (tmp_path / "long.tsv").write_text("0.0\taa\n40.0\tsil\n")
     stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
-    _, report = dry_run(stage, tmp_path / "long.tsv", None, PARAMETERS)
+    report = dry_run(stage, tmp_path / "long.tsv", None, PARAMETERS).buses
     assert len(sent_of(report, "jawOpen")) > 40 * HZ
 
 
 def test_the_stages_own_take_and_voice_are_played_too(tmp_path: Path) -> None:
     (tmp_path / "own.tsv").write_text("0.0\taa\n2.0\tsil\n")
     stage = load_stage(str(stage_file(tmp_path, 'take = "own.tsv"\n')), PARAMETERS)
-    _, report = dry_run(stage, None, None, PARAMETERS)
+    report = dry_run(stage, None, None, PARAMETERS).buses
     jaw = sent_of(report, "jawOpen")
     assert len(jaw) == pytest.approx(2.15 * HZ, abs=10) and max(jaw) > 10.0

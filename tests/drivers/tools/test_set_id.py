@@ -110,3 +110,21 @@ def test_the_first_and_the_last_id_are_allowed_and_its_own_id_is_not_taken() -> 
         assert set_id(bus.path, 1_000_000, 2, 251, 0).id == 0
         assert set_id(bus.path, 1_000_000, 2, 0, 0).id == 0
         assert bus.servo(0).register("ID") == 0
+
+
+@pytest.mark.parametrize(("model", "protocol"), [("xl330-m288", 2), ("sts3215", 1)])
+def test_both_protocols_are_tried(model: str, protocol: int) -> None:
+    with SimulatedBus([1, 5], model=model) as bus:
+        assert set_id(bus.path, 1_000_000, None, 1, 7).model == model
+        assert bus.servo(7).register("ID") == 7
+        with pytest.raises(NoReply, match="no servo has the id 1 "):
+            set_id(bus.path, 1_000_000, None, 1, 8)
+
+
+def test_a_servo_of_each_protocol_with_the_old_id_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    with SimulatedBus([1], model="xl330-m288") as bus:
+        monkeypatch.setattr(module, "_find", lambda registers, servo: ServoInfo(servo, 1200, "any", 1))
+        with pytest.raises(ServoRefused, match=r"2\.0 and one of Protocol 1\.0 have the id 1") as caught:
+            set_id(bus.path, 1_000_000, None, 1, 7)
+        assert "--protocol" in caught.value.hint
+        assert bus.servo(1).eeprom_writes == {}

@@ -1,0 +1,234 @@
+"""Every shell line of README, CONTRIBUTING and docs is run, or checked by a rule that says why it is not run.
+
+A shell line is a line of a code block without a language, or a piece of text in backticks, that begins with a program.
+Ports, files and placeholders of a reader become those of the test; what would go on until a person ends it gets a time.
+A line that no rule covers fails.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+import wave
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.main import get_command
+
+from controller.cli.app import make_app
+from drivers.sim import SimulatedBus
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
+PROGRAM = r"(?:omote|make|python|pip|ffmpeg|arecord|sudo|fuser|apt-get|git|sh|bash|cd|mkdir|export)"
+SHELL_LINE = re.compile(rf"^{PROGRAM} ")
+QUOTED = re.compile(r"`([^`\n]+)`")
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+READERS = {
+    "/dev/ttyUSB0": "{port}", "PORT": "{port}", "STAGE": "my-stage.toml", "TAKE": "a.tsv", "FILE": "a.tsv",
+    "FOLDER": "ict", "ROBOT": "head24", "NAME": "head24", "OLD": "1", "NEW": "12", "MESH": "me.glb", "...": "dynamixel",
+    "configs/stages/serial.toml": "serial.toml", "heads/me": "ict", "myhead.toml": "my-robot.toml",
+}  # fmt: skip
+"""What only a reader has, and what the test has in its place; the other names are files that the test writes."""
+MORE = {
+    "run": ["--no-face", "--seconds", "0.3"], "play": ["--no-face", "--seconds", "0.3"],
+    "monitor": ["--seconds", "0.3"],
+    "scan": ["--baud", "1000000"], "render": ["--size", "32x32"],
+}  # fmt: skip
+"""Options that end a command soon; the last one counts where a line has the same."""
+PARSED = {"simulate", "calibrate", "fit", "bench"}
+"""Commands that serve until they are interrupted, wait for keys, or work for minutes: their options are parsed only."""
+MESSAGES = {"omote needs Python 3.11 or newer": MAKEFILE}
+"""Messages that begin like a command, and the file that prints them."""
+
+RUNNER = """
+import contextlib, io, json, os, sys
+from controller.cli.app import main
+for line in json.load(open(sys.argv[1])):
+    sys.argv, out, err, code = line["words"], io.StringIO(), io.StringIO(), 0
+    os.dup2(os.open(line["input"], os.O_RDONLY), 0)
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code or 0
+    print(json.dumps([line["line"], code, out.getvalue() + err.getvalue()]), flush=True)
+"""
+LIVELINK = "Timecode,JawOpen\n0:0:0:0,0.1\n0:0:0:6,0.4\n0:0:0:12,0.1\n"
+ROBOT = (ROOT / "configs" / "robots" / "head24.toml").read_text(encoding="utf-8")
+
+
+def shell_lines(text: str) -> Iterator[str]:
+    """The shell lines of a page."""
+    language: str | None = None
+    for line in text.splitlines():
+        if line.startswith("```"):
+            language = line[3:].strip() if language is None else None
+        elif language is None:
+            yield from (words for words in QUOTED.findall(line) if SHELL_LINE.match(words))
+        elif language in ("", "sh", "bash", "console"):
+            words = re.sub(r"\s+#.*", "", line).removeprefix("$ ").strip()
+            if SHELL_LINE.match(words):
+                yield words
+
+
+LINES = sorted({line for page in PAGES for line in shell_lines(page.read_text(encoding="utf-8"))})
+PIPED = re.compile(r"^(?:arecord|ffmpeg) .*\| (omote .*)$")
+"""A program that records a voice: what follows the pipe hears a file."""
+OMOTE = {line: (found[1] if (found := PIPED.match(line)) else line) for line in LINES if "omote " in line}
+RUN = [line for line, own in OMOTE.items() if line not in MESSAGES and own.split()[1] not in PARSED and " " in own[6:]]
+
+
+def words_of(line: str, port: str = "PORT") -> list[str]:
+    """The words of a line of omote with what the test has in the place of what a reader has."""
+    words = [READERS.get(word, word).replace("{port}", port) for word in shlex.split(OMOTE[line])]
+    if words[1] == "export":
+        words = [word.replace("a.tsv", "head.glb") for word in words]
+    return [*words, *([] if "--dry-run" in words else MORE.get(words[1], []))]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a reader: a robot, a stage, a take, a voice, a recording's place, expressions, a group."""
+    here = tmp_path_factory.mktemp("reader")
+    (here / "my-robot.toml").write_text(ROBOT)
+    (here / "my-stage.toml").write_text('name = "mine"\nrobots = ["my-robot.toml"]\n')
+    (here / "mine").write_text((here / "my-stage.toml").read_text())
+    serial = (ROOT / "configs" / "stages" / "serial.toml").read_text(encoding="utf-8")
+    (here / "serial.toml").write_text(re.sub(r'(?m)^port = ".*"', 'port = "simulated"', serial))
+    (here / "a.tsv").write_text("0.0\taa\n0.4\tsil\n")
+    (here / "take.csv").write_text(LIVELINK)
+    with wave.open(str(here / "voice.wav"), "wb") as file:
+        file.setparams((1, 2, 16_000, 0, "NONE", ""))
+        file.writeframes((9000 * np.sin(np.arange(16_000) * 0.1)).astype("<i2").tobytes())
+    (here / "hello.wav").write_bytes((here / "voice.wav").read_bytes())
+    (here / "mine.toml").write_text("[glee]\nweights = { mouthSmile = 1 }\n")
+    (here / "dimple.json").write_text('{"format": 1, "name": "dimple", "part": "face", "ids": [1], '
+                                      '"moves_mm": [[0, 0, 1]]}')  # fmt: skip
+    (here / "voice.raw").write_bytes((here / "voice.wav").read_bytes()[44:])
+    (here / "out").mkdir()
+    return here
+
+
+@pytest.fixture(scope="module")
+def said(folder: Path) -> Iterator[dict[str, tuple[int, str]]]:
+    """Exit code and text of every line that is run, by the line; those about recordings in order."""
+    recorded = sorted((line for line in RUN if "a.rec" in line), key=lambda line: "--record" not in line)
+    others = [line for line in RUN if line not in recorded]
+    with SimulatedBus([1, 2]) as bus, SimulatedBus([1, 2]) as other:
+        groups = (recorded + others[::2], bus.path), (others[1::2], other.path)
+        running = [start(folder, lines, port) for lines, port in groups]
+        outputs = [process.communicate(timeout=240) for process in running]
+    assert [process.returncode for process in running] == [0, 0], outputs
+    lines = [json.loads(line) for out, _ in outputs for line in out.splitlines()]
+    yield {line: (code, text) for line, code, text in lines}
+
+
+def start(folder: Path, lines: list[str], port: str) -> subprocess.Popen[str]:
+    """A process that runs lines one after the other."""
+    own = folder / f"lines{len(lines)}.json"
+    own.write_text(json.dumps([orders(folder, line, port) for line in lines]))
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "COLUMNS": "100"}
+    pipe = subprocess.PIPE
+    command = [sys.executable, "-c", RUNNER, str(own)]
+    return subprocess.Popen(command, cwd=folder, env=environment, stdout=pipe, stderr=pipe, text=True)
+
+
+def orders(folder: Path, line: str, port: str) -> dict[str, Any]:
+    """What a process is told of a line: its words, and the file that is its standard input."""
+    heard = "voice.raw" if "--voice-rate" in line else "voice.wav" if "-" in line.split() else os.devnull
+    return {"line": line, "words": words_of(line, port=port), "input": str(folder / heard)}
+
+
+@pytest.mark.parametrize("line", RUN)
+def test_a_line_runs(line: str, said: dict[str, tuple[int, str]]) -> None:
+    code, text = said[line]
+    if "no OpenGL" in text:
+        pytest.skip("needs OpenGL without a display")
+    assert code == 0, text
+
+
+# ---------------------------------------------------------------------------- lines that are not run, by rule
+
+
+def parse(line: str) -> None:
+    """Read the words of a line as omote does, without running it; of a command that is only mentioned, ask for help."""
+    words = words_of(line)[1:]
+    with pytest.raises(SystemExit) as end:  # --help ends the command after its other options were read
+        make_app()([*words, "--help"])
+    assert end.value.code == 0
+    if len(line.split()) > 2:
+        command, rest = get_command(make_app()), words
+        while hasattr(command, "get_command"):
+            command, rest = (
+                command.get_command(command.make_context("omote", rest, resilient_parsing=True), rest[0]),
+                rest[1:],
+            )
+        command.make_context("omote", rest)
+
+
+def has_target(line: str) -> None:
+    """A target of the Makefile, and variables that it knows."""
+    _, target, *variables = line.split()
+    assert re.search(rf"^{target}:.*## ", MAKEFILE, re.M)
+    assert all(re.search(rf"^{each.partition('=')[0]} \?=|\({each.partition('=')[0]}\)", MAKEFILE, re.M)
+               for each in variables)  # fmt: skip
+
+
+def has_packages(line: str) -> None:
+    """Packages that pyproject.toml names, with extras that it has, or the checkout itself."""
+    extras = tomllib.loads(PROJECT)["project"]["optional-dependencies"]
+    for word in shlex.split(line)[2:]:
+        name, _, extra = word.partition("[")
+        assert name in ("--editable", ".", "omote") or name in PROJECT, word
+        assert not extra or extra.rstrip("]") in extras, word
+
+
+def has_program(line: str) -> None:
+    """A script of the checkout, or code that imports what is there."""
+    first, *more = shlex.split(line)[1:]
+    if first == "-c":
+        exec(more[0].partition(";")[0])
+    else:
+        assert (ROOT / first).is_file()
+
+
+def is_printed(line: str) -> None:
+    """A message that begins like a command."""
+    assert line in MESSAGES[line]
+
+
+RULES: tuple[tuple[str, Callable[[str], object]], ...] = (
+    ("omote needs", is_printed),
+    ("omote ", parse),
+    ("make ", has_target),
+    ("pip install", has_packages),
+    ("python ", has_program),
+    ("sudo apt-get install", lambda line: None),  # changes the system of whoever reads it
+    ("sudo usermod", lambda line: None),  # the same
+    ("fuser -v ", lambda line: None),  # a program of the system
+)
+"""What is checked of a line that is not run, by how it begins; the first that fits."""
+
+
+@pytest.mark.parametrize("line", [line for line in LINES if line not in RUN])
+def test_a_line_that_is_not_run_is_checked(line: str) -> None:
+    rules = [rule for begin, rule in RULES if line.startswith(begin)]
+    assert rules, f"no rule covers {line!r}: run it, or add a rule that says why not"
+    rules[0](line)
+
+
+def test_lines_are_found_in_blocks_and_in_text() -> None:
+    page = "`omote ports` and `port`\n```\nomote check a   # good\n> SET\n```\n`make x`\n```python\nomote.no()\n```\n"
+    assert list(shell_lines(page)) == ["omote ports", "omote check a", "make x"]
+    assert len(RUN) > 25
