@@ -256,3 +256,15 @@ def test_a_deadline_counts_from_the_first_question(monkeypatch: pytest.MonkeyPat
     now[0] = 502.0
     assert not in_time()
     assert deadline(None)() and not deadline(0.0)()
+
+
+def test_a_body_that_a_signal_ended_has_left_its_report() -> None:
+    class Gone(Ended):
+        def send(self, message: object) -> None:
+            raise BrokenPipeError
+
+    body = body_of(Gone(1, messages.Ready(), messages.Report({"a": 1})))
+    body.stop()
+    assert body.report == {"a": 1}
+    with pytest.raises(ControllerError, match="ended by itself"):
+        body_of(Gone(1, EOFError())).stop()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
+from controller.layers.settings import default_layers
 
 STEP_NS = 10_000_000
 SMILE, YAW, LID = P.index("mouthSmileLeft"), P.index("headYaw"), P.index("eyeBlinkLeft")
@@ -105,3 +107,14 @@ def test_a_source_that_never_works_is_switched_off_and_the_others_go_on(
     assert face.values[SMILE] > 0.8 and abs(face.values[YAW]) < 0.2
     assert face.run(8.0)[:, LID].max() > 0.3  # it blinks
     assert face.state.parts.report()[0]["state"] == "switched off"
+
+
+def test_a_source_begins_again_only_when_its_layer_has_faded_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    face = Face()
+    slow = [replace(each, fade_out_s=4.0) for each in default_layers()]
+    face.state = CommandState(P, layers=slow)
+    face.state.expression("happiness", 1.0, None, face.now)
+    face.run(1.0)
+    monkeypatch.setattr(face.state._player, "update", fail)
+    smiles = face.run(6.0)[:, SMILE]
+    assert -np.diff(smiles).min() < 0.01 and smiles[-1] < 1e-6  # a new source would set it to neutral after 1 s

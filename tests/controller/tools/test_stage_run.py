@@ -284,7 +284,9 @@ def test_a_picture_that_fails_leaves_the_servos_their_run(
         StageRun(stage).run_headless(None)
 
 
-def test_the_end_of_the_body_is_no_failure_of_the_picture(told: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_end_of_the_body_is_no_failure_of_the_picture(
+    told: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     class Headless:
         def __init__(self, *words: Any) -> None:
             pass
@@ -306,6 +308,7 @@ def test_the_end_of_the_body_is_no_failure_of_the_picture(told: list[str], monke
     monkeypatch.setattr(module, "HeadlessFace", Headless)
     with pytest.raises(ControllerError, match="gave up"):
         StageRun("everything").run_headless(None)
+    assert caplog.messages == []
 
 
 def test_a_voice_that_is_not_there_is_refused_before_anything_starts(tmp_path: Path) -> None:
