@@ -12,7 +12,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check mutate bench setup api lock clean
+.PHONY: help demo test check mutate bench soak setup api lock clean
 
 help: ## print this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
@@ -33,6 +33,10 @@ mutate: setup ## mutation testing of a room, 50 changed lines: make mutate ROOM=
 
 bench: setup ## measure the engine on this machine
 	@$(BIN)/omote bench
+
+soak: setup ## inject faults for long: pairs and triples on simulated buses, and killed processes (SECONDS=3600)
+	@$(PY) benchmarks/fault_soak.py $(or $(SECONDS),3600)
+	@test ! -e benchmarks/process_kill.py || $(PY) benchmarks/process_kill.py
 
 setup: $(VENV)/.installed $(VENV)/.opengl $(VENV)/.compiled ## install and compile everything
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError, PortLost
+from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import Packets
@@ -77,6 +78,7 @@ class DynamixelBus(ServoBus):
         self._group({})
         self._remapped: Counter[int] = Counter()
         self._heard_s = 0.0
+        self._warn = RateLimitedLogger(log, clock)
 
     # ------------------------------------------------------------------ looking, starting, stopping
 
@@ -158,7 +160,9 @@ class DynamixelBus(ServoBus):
             except PortLost:
                 raise
             except BusError as error:
-                log.warning("watchdog not cleared yet: %s", error)  # and not forgotten: its register may read 0 now
+                label = self._registers.label(servo)  # it is not forgotten: its register may read 0 now
+                self._warn("watchdog of servo %s is not cleared yet", label)
+                log.debug("%s", error)
                 continue
             self._telemetry.tripped.discard(servo)
             index = self.ids.index(servo)

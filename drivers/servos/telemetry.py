@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -66,6 +66,7 @@ class Telemetry(ABC):
         self._missed: set[int] = set()
         self._log = RateLimitedLogger(log, self._port.clock)
         self._silent: deque[int] = deque()
+        self._in_vain: Counter[int] = Counter()  # greetings of each silent servo without an answer
         self._probe_s = -np.inf
         self._urgent: deque[ReadRequest] = deque()
 
@@ -95,6 +96,7 @@ class Telemetry(ABC):
         self._seen_s[:] = -np.inf
         self._missed.clear()
         self._silent.clear()
+        self._in_vain.clear()
         self._urgent.clear()
         self._turns = slow_requests(self._groups, self._slow_group)
         self._turn, self._turn_s = 0, -np.inf
@@ -173,18 +175,22 @@ class Telemetry(ABC):
             self._probe(now)
 
     def _probe(self, now: float) -> None:
-        """Greet silent servos in turn until one does not answer."""
+        """Greet silent servos until one does not answer, first those that were greeted least.
+
+        What disturbs one servo often disturbs others for a moment; these do not wait for its turns.
+        """
         self._probe_s = now + PROBE_S
         while self._silent:
-            servo = self._silent[0]
+            servo = min(self._silent, key=self._in_vain.__getitem__)
             if not self._packets.revive(self._port, servo):
-                self._silent.rotate(-1)
+                self._in_vain[servo] += 1
                 return
-            self._silent.popleft()
+            self._silent.remove(servo)
             self._returned(servo)
 
     def _returned(self, servo: int) -> None:
         self._missed.discard(servo)
+        del self._in_vain[servo]
         self._check_first(servo)  # it may have lost its supply, and its torque with it
         self._log("servo %s answers again", self._registers.label(servo))
 

@@ -273,6 +273,7 @@ class BusContract:
             goals, away = np.array([0.3, -0.3, 0.3]), np.array([-0.2, 0.3, -0.2])
             link._line.faults.add([fault], bus._clock())
             read_until(bus, lambda state: not bus.driven[1])
+            servo.registers.put("Goal Position", servo.goal + 5)  # where it receives, a goal would undo this
             goal, end = servo.goal, bus._clock() + 2.5
             while bus._clock() < end:
                 assert watch.cycle(away) == 0.0

@@ -1,0 +1,48 @@
+"""benchmarks/fault_soak.py, shortly: groups of faults on real drivers in time that does not pass by itself."""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from drivers.sim.wire.faults import KINDS
+
+
+@pytest.fixture
+def program(root: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("fault_soak", root / "benchmarks" / "fault_soak.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules["fault_soak"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("family", ["dynamixel", "feetech", "both protocols"])
+def test_groups_of_faults_cost_no_wrong_value_no_jump_and_no_healthy_servo(program: ModuleType, family: str) -> None:
+    result = program.Result()
+    head = program.Head(family, 5, result)
+    head.start()
+    head.run(("hw:{i}:0x20", "mute:{i}", "unplug"))
+    head.finish()
+    assert result.failures == []
+    assert (result.groups, result.replugs) == (1, 1) and result.healthy > 500
+
+
+def test_every_pair_of_all_faults_comes(program: ModuleType) -> None:
+    kinds = [spec.partition(":")[0] for spec in program.FAULTS]
+    assert sorted(kinds) == sorted(KINDS)
+    pairs = {tuple(sorted(pair)) for group in program.groups(1) for pair in itertools.combinations(group, 2)}
+    assert {tuple(sorted(pair)) for pair in itertools.combinations(program.FAULTS, 2)} <= pairs
+    assert any(len(group) == 3 for group in program.groups(1))
+
+
+def test_what_is_wrong_is_told(program: ModuleType) -> None:
+    bad = program.Result(wrong=1, jumps=1, left_on=1, healthy=100, driven=98, wanted=2)
+    assert len(bad.failures) == 5
+    assert program.Result(healthy=100, driven=99).failures == []
