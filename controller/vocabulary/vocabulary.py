@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from controller.base.errors import ParameterError
-from controller.base.numbers import plain_number
 from controller.base.parameters import Parameters, did_you_mean, fold
 from controller.base.paths import config_dir
+from controller.base.plain_numbers import plain_number
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.expression import Expression, read_expressions
 from controller.vocabulary.facs import Facs, is_formula

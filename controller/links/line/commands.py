@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from controller.base.errors import ParameterError
-from controller.base.numbers import plain_number
 from controller.base.parameters import Parameters, did_you_mean
+from controller.base.plain_numbers import plain_number
 from controller.links.line.checksums import CHECKSUMS
 from controller.links.line.protocol import Code, LineError, Words, parse_words
 

@@ -10,7 +10,7 @@ from functools import cache, cached_property
 from importlib import metadata
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
-from controller.base.numbers import plain_number
+from controller.base.plain_numbers import plain_number
 from controller.layers.commands import CommandSink, Player
 from controller.links.line.checksums import ChecksumRule
 from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Command, Grammar, Request

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from controller.base.numbers import plain_number
+from controller.base.plain_numbers import plain_number
 
 
 @pytest.mark.parametrize(
