@@ -115,7 +115,7 @@ class Run:
         self._servos = closers.enter_context(SimulatedBus(range(1, 25)))
         self._port = closers.enter_context(HostPort())
         self._decoder = LineDecoder(MAX_REPLY)
-        self._tag = FIRST_TAG
+        self._tag, self._answered = FIRST_TAG, False
         self._values = np.zeros(len(PARAMETERS))
         stage = write_stage(folder, self._port.path, self._servos.path)
         self._limits = {
@@ -143,7 +143,7 @@ class Run:
                 self._round()
                 if not warm_mb and found.lines >= WARM_SHARE * count:
                     warm_mb = self._memory_mb()
-            found.growth_mb = self._memory_mb() - warm_mb
+            found.growth_mb = self._memory_mb() - (warm_mb or self._memory_mb())
             if found.growth_mb > GROWTH_MB:
                 found.faults["memory grew"] += 1
             self._body.stop()
@@ -165,13 +165,14 @@ class Run:
         lines = self._lines.flood() if self._draw.random() < 0.03 else some
         if self._draw.random() < 0.3:
             lines += [b"\nHELLO checksum=optional\n", b"START\n"]
-        self._tag += 1
+        self._tag, self._answered = self._tag + 1, False
         data = b"".join(lines) + b"\n" + format_words(["PING"], tag=self._tag, checked=True)
         size = self._draw.choice((7, 64, 4096))
         sent_s = time.monotonic()
         for at in range(0, len(data), size):
             sent_s = time.monotonic()
             self._port.write(data[at : at + size])
+            self._hear(0.0)  # whoever does not read while writing loses answers
         self.findings.lines += len(lines) + 1
         self._listen(sent_s)
         self._body.alive()
@@ -179,14 +180,19 @@ class Run:
 
     def _listen(self, sent_s: float) -> None:
         """Read until the probe is answered."""
-        while time.monotonic() - sent_s < ANSWER_S:
-            answered = [self._is_answer(line) for line in self._decoder.feed(self._port.read(0.5))]
-            if any(answered):
-                self.findings.probes += 1
-                self.findings.answer_ms.append((time.monotonic() - sent_s) * 1e3)
-                return
+        while not self._answered and time.monotonic() - sent_s < ANSWER_S:
+            self._hear(0.5)
             self._body.alive()
-        self.findings.faults["hangs"] += 1
+        if self._answered:
+            self.findings.probes += 1
+            self.findings.answer_ms.append((time.monotonic() - sent_s) * 1e3)
+        else:
+            self.findings.faults["hangs"] += 1
+
+    def _hear(self, wait_s: float) -> None:
+        """Take what has arrived; waits for the first byte at most so long."""
+        for line in self._decoder.feed(self._port.read(wait_s)):
+            self._answered |= self._is_answer(line)
 
     def _is_answer(self, line: bytes) -> bool:
         try:
