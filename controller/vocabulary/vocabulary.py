@@ -12,7 +12,7 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean, fold
 from controller.base.paths import config_dir
-from controller.base.plain_number import plain_number
+from controller.base.plain_numbers import plain_number
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.expression import Expression, read_expressions
 from controller.vocabulary.facs import Facs, is_formula

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean
-from controller.base.plain_number import plain_number
+from controller.base.plain_numbers import plain_number
 from controller.links.line.checksums import CHECKSUMS
 from controller.links.line.protocol import Code, LineError, Words, parse_words
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-LIMIT = 16_384
-"""Bytes that wait at most; a peer that does not read loses lines beyond it, whole ones."""
+LIMIT = 65_536
+"""Bytes that wait at most: room for the answers to all lines of a read. A peer that does not read loses whole lines."""
 
 
 class Outbox:

@@ -15,7 +15,7 @@ from controller.base.config import Number, Settings, load
 from controller.base.errors import ConfigError
 from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import config_dir, find_config
-from controller.base.plain_number import plain_number
+from controller.base.plain_numbers import plain_number
 from controller.links.line.commands import Grammar, quoted
 from controller.links.line.protocol import LineError
 from controller.vocabulary.vocabulary import Vocabulary

@@ -10,7 +10,7 @@ from functools import cache, cached_property
 from importlib import metadata
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
-from controller.base.plain_number import plain_number
+from controller.base.plain_numbers import plain_number
 from controller.layers.commands import CommandSink, Player
 from controller.links.line.checksums import ChecksumRule
 from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Command, Grammar, Request
@@ -33,6 +33,11 @@ from controller.links.line.protocol import (
 from controller.vocabulary.reading import Readings
 
 log = logging.getLogger(__name__)
+
+_LOGGED = 50
+"""Kinds of errors that a link logs."""
+_SHOWN = 100
+"""Characters of an error that its answer shows."""
 
 
 class LineSession:
@@ -76,6 +81,7 @@ class LineSession:
         self.unanswered = 0
         self.faults = 0
         self.last_fault = ""
+        self._logged: set[str] = set()
         self._stops_waiting = 0
 
     def feed(self, data: bytes, now_ns: int) -> bytes:
@@ -164,7 +170,7 @@ class LineSession:
         if isinstance(error, OMOTE_ERRORS):
             return LineError(Code.BUSY, str(error))
         self.fault(error, "it goes on with the next line")
-        return LineError(Code.FAULT, f"an error in omote, see its log: {self.last_fault}")
+        return LineError(Code.FAULT, f"an error in omote, see its log: {self.last_fault[:_SHOWN]}")
 
     def _do(self, request: Request, now_ns: int) -> str:
         """Act on a request; returns the text of the reply."""
@@ -186,11 +192,11 @@ class LineSession:
         return _receipt(command)
 
     def fault(self, error: Exception, consequence: str) -> None:
-        """Count an error of omote itself, and log it once for each kind."""
-        text = f"{type(error).__name__}: {error}"
-        if text != self.last_fault:
-            log.error("%s: %s; %s", self._name, text, consequence, exc_info=error)
-        self.faults, self.last_fault = self.faults + 1, text
+        """Count an error of omote itself, and log it once for each kind, at most some kinds."""
+        self.faults, self.last_fault = self.faults + 1, f"{type(error).__name__}: {error}"
+        if self.last_fault not in self._logged and len(self._logged) < _LOGGED:
+            self._logged.add(self.last_fault)
+            log.error("%s: %s; %s", self._name, self.last_fault, consequence, exc_info=error)
 
     def _act(self, command: Command, now_ns: int) -> bool:
         """Pass a command that changes the face to the sink; False when it is a question."""

@@ -196,6 +196,19 @@ def test_an_error_of_a_loop_ends_the_wait(tmp_path: Path, pipe: tuple[Connection
             _wait(body, pipe[1], threading.Event(), None)
 
 
+def test_a_robot_gets_shows_by_name_and_the_stage_by_path(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    for name in ("act.toml", "sub/act.toml"):
+        (tmp_path / name).write_text('steps = ["0 PING"]\n')
+    with running(stage_of(tmp_path, 'show = "sub/act.toml"\n')) as (body, _):
+        shows = body.state.shows
+        assert shows is not None and shows.status().startswith("act@")
+        shows.start("act")
+        for path in ("sub/act.toml", str(tmp_path / "act.toml"), "/etc/passwd"):
+            with pytest.raises(ConfigError, match="no script"):
+                shows.start(path)
+
+
 def test_the_show_of_a_stage_begins_with_the_run(tmp_path: Path) -> None:
     (tmp_path / "act.toml").write_text('steps = ["0 SET jawOpen 1"]')
     with running(stage_of(tmp_path, 'show = "act.toml"\n')) as (body, _):

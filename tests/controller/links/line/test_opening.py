@@ -37,6 +37,13 @@ def test_a_real_port_is_opened_and_closed_with_the_context() -> None:
         assert not link.connected
 
 
+def test_the_stage_chooses_when_checksums_are_demanded() -> None:
+    with HostPort() as port, ExitStack() as closers:
+        open_line(LineSettings(port=port.path, checksum="required"), LinkContext(CommandState(P), closers))
+        port.write(b"PING\n")
+        assert port.read(20.0).startswith(b"ERR 13 ")
+
+
 def test_a_missing_port_is_an_error() -> None:
     with ExitStack() as closers, pytest.raises(PortMissing):
         open_line(LineSettings(port="/dev/none"), LinkContext(CommandState(P), closers))

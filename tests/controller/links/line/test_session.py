@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -323,3 +325,20 @@ def test_only_plain_numbers_are_times_of_a_show(talk: Talk, to: str) -> None:
     talk.state.shows = Shows(lambda name: script, talk.state)
     assert talk.say("SHOW mine").ok and talk.say("SHOW SEEK 10").ok
     assert talk.say(f"SHOW SEEK {to}").kind == "ERR" and "show=mine@10" in talk.say("STATUS").text
+
+
+def test_faults_are_logged_once_a_kind_and_shown_in_part(
+    talk: Talk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    kinds = itertools.cycle(["one", "two"])
+
+    def broken(amount: float, stamp_ns: int) -> None:
+        raise ZeroDivisionError(next(kinds) + 300 * "x")
+
+    monkeypatch.setattr(talk.state, "live", broken)
+    assert all(len(talk.say("LIFE 1").text) < 150 for _ in range(6))
+    assert caplog.text.count("it goes on with the next line") == 2 and talk.session.faults == 6
+    kinds = (str(i) for i in itertools.count())
+    for _ in range(100):
+        talk.say("LIFE 1")
+    assert caplog.text.count("it goes on with the next line") == 50

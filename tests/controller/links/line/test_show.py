@@ -107,6 +107,14 @@ def test_a_show_is_steered_over_a_link() -> None:
     assert say("SHOW STOP") == "OK SHOW STOP" and say("SHOW STOP").startswith("ERR 30")
 
 
+def test_a_show_stops_the_servos_and_cannot_start_them() -> None:
+    state = CommandState(P)
+    show = Show(Script(((0.0, "STOP"), (0.1, "START")), name="mine"), state)
+    show.playing = True
+    assert run(show, 0.0, 1.0) == ["STOP", "START"]
+    assert state.stop_latch.stopped is not None and state.stop_latch.stopped.who == "show mine"
+
+
 def test_the_hint_lists_the_marks_there_are(show: Show) -> None:
     with pytest.raises(ParameterError) as caught:
         show.seek("nowhere")
