@@ -1,8 +1,8 @@
 """The DCP engine: control-point surfaces, their tessellation and their deformation.
 
 In: control points, surface files, head folders, meshes to fit, values of parameters. Out: vertices and normals that
-follow, pictures, heads, files for other programs. Imports numpy, numba and scipy, OpenGL under ``view`` alone, and
-neither ``drivers`` nor ``controller``.
+follow, pictures, heads, files for other programs. Imports numpy and numba; scipy where
+something is fitted, OpenGL under ``view`` alone, and neither ``drivers`` nor ``controller``.
 
 The errors are imported at once; the rest is imported on first use, because it imports numpy.
 """

@@ -216,6 +216,7 @@ RULES: tuple[tuple[str, Callable[[str], object]], ...] = (
     ("python ", has_program),
     ("sudo apt-get install", lambda line: None),  # changes the system of whoever reads it
     ("sudo usermod", lambda line: None),  # the same
+    ("export NUMBA_CACHE_DIR=/", lambda line: None),  # a variable of numba
     ("fuser -v ", lambda line: None),  # a program of the system
 )
 """What is checked of a line that is not run, by how it begins; the first that fits."""

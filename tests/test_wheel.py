@@ -175,8 +175,26 @@ def test_configs_are_found_wherever_an_installer_puts_them(
 
 def test_a_head_is_checked(installed: Installed) -> None:
     done = installed.omote("check", "ict")
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stderr.splitlines() if not line.startswith("compiling the kernels")] == []
     assert done.stdout.rstrip().endswith("good")
+
+
+def test_an_installation_that_cannot_be_written_keeps_compiled_code_with_the_user(
+    installed: Installed, tmp_path: Path
+) -> None:
+    site, cache = tmp_path / "site", tmp_path / "cache"
+    for room in ROOMS:
+        shutil.copytree(installed.packages / room, site / room, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in [path for path in site.rglob("*") if path.is_dir()]:
+        (folder / "__pycache__").touch()  # a file, so that not even root can write there
+    before, program = sorted(site.rglob("*")), "from controller.cli.app import main; main()"
+    words = ("-c", program, "run", "demo", "--dry-run", "--seconds", "0.1")
+    where = {"PYTHONPATH": str(site), "XDG_CACHE_HOME": str(cache), "COLUMNS": "60"}
+    first, second = installed.run(*words, **where), installed.run(*words, **where)
+    assert (first.returncode, second.returncode) == (0, 0), first.stderr + second.stderr
+    assert first.stderr.startswith("compiling the kernels of controller for this machine") and second.stderr == ""
+    assert list(cache.rglob("*.nbi")) and sorted(site.rglob("*")) == before
 
 
 def test_a_picture_is_drawn(installed: Installed) -> None:

@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from controller.tools.scan import scan_port
+from controller.tools.tables import fitted
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
@@ -212,15 +213,16 @@ class BusView:
         self._log.extend(self.lines())
         left_out = self._passed - self._taken - len(self._pieces)
         note = f"  ({left_out} pieces left out)" if left_out > 0 else ""
-        traffic = Text("\n".join(self._log), no_wrap=True, overflow="ellipsis")
-        return Group(Text(f"{self.title}   Ctrl-C ends{note}", style="bold"), table_of(self.rows()), traffic)
+        title = Text(f"{self.title}   Ctrl-C ends{note}", style="bold")
+        servos = fitted(table_of(self.rows()), self._console, self._console.width)
+        return Group(title, *servos, Text("\n".join(self._log), overflow="fold"))
 
 
 def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
     """Mappings as a table; unknown values stay empty."""
     listed = list(rows)
     names = list(dict.fromkeys(name for row in listed for name in row))
-    table = Table(*names)
+    table = Table(*names, box=None, pad_edge=False)
     for row in listed:
         table.add_row(*(_cell(row.get(name)) for name in names))
     return table

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-<<<<<<<< HEAD:tests/controller/base/test_plain_number.py
-from controller.base.plain_number import plain_number
-========
 from controller.base.plain_numbers import plain_number
->>>>>>>> line:tests/controller/base/test_plain_numbers.py
 
 
 @pytest.mark.parametrize(
