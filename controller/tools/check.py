@@ -87,7 +87,10 @@ def _check_head(folder: Path) -> str:
     for name in known:
         with_identities(head.data, known, {name: 1.0}, str(folder))
     for name in head.parameters:
-        head.pose(head.values({name: 1.0}))
+        try:
+            head.pose(head.values({name: 1.0}))
+        except (ArithmeticError, LookupError, ValueError) as error:
+            raise ConfigError(f"{folder}: {name} = 1 cannot be posed: {error}", hint="make the head again") from error
         bad = [part.name for part in head.parts if not np.isfinite(part.vertices).all()]
         if bad:
             raise ConfigError(f"{folder}: {name} = 1 throws vertices of {', '.join(bad)} out of space")
