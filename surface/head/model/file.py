@@ -16,7 +16,6 @@ from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.meshes import KEYS
-from surface.head.model.parameters import SHAPES
 
 VERSION = 1
 ANY = -1  # length of an axis that may have any
@@ -112,9 +111,6 @@ def load_data(path: str | Path) -> HeadData:
     top, arrays = _read_toml(folder / "head.toml"), _read_npz(folder / "head.npz")
     jaw, parts = top.section("jaw"), top.sections("parts")
     tilts = jaw.section("tilts")
-    for shape in tilts.table:
-        if shape not in SHAPES:
-            raise tilts.error(shape, "is no shape")
     names = [p.read(name=str)["name"] for p in parts]
     return HeadData(
         **top.read(name=str, paint=list),

@@ -101,11 +101,6 @@ def test_a_file_cut_short(folder, keep):
     broken(folder, r"head\.npz: not a sound archive")
 
 
-def test_tilts_of_what_is_no_shape_are_refused(folder):
-    edit(folder, "jawForward", "jawForwards")
-    broken(folder, r"head\.toml: jaw\.tilts\.jawForwards: is no shape")
-
-
 def test_a_flipped_byte(folder):
     data = bytearray((folder / "head.npz").read_bytes())
     for at in range(200, len(data) // 2, 37):
