@@ -12,7 +12,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check mutate bench soak setup api lock clean
+.PHONY: help demo test check mutate fuzz bench soak setup api lock clean
 
 help: ## print this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
@@ -30,6 +30,11 @@ check: setup ## check style and types
 mutate: setup ## mutation testing of a room, 50 changed lines: make mutate ROOM=drivers SEED=1
 	@$(PY) -c 'import cosmic_ray' 2>/dev/null || $(if $(UV),$(UV) pip install --python $(PY),$(PY) -m pip install) --quiet 'cosmic-ray>=8.4'
 	@$(PY) -m tests.mutate $(ROOM) --seed $(or $(SEED),1)
+
+# COUNT files of each kind and lines; the same seed damages them in the same way.
+fuzz: setup ## read damaged files of every kind, and damaged lines: make fuzz COUNT=1000 SEED=1
+	@$(PY) -m tests.fuzz.files --count $(or $(COUNT),1000) --seed $(or $(SEED),1)
+	@$(PY) -m tests.fuzz.lines
 
 bench: setup ## measure the engine on this machine
 	@$(BIN)/omote bench

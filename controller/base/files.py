@@ -33,7 +33,8 @@ def replacing(path: Path) -> Iterator[Path]:
         os.chmod(temporary, 0o666 & ~_umask())
         temporary.replace(path)
     except OSError as error:
-        raise ControllerError(f"{path}: cannot be written: {error.strerror}") from error
+        hint = "make room on the disk, or choose another place with -o"
+        raise ControllerError(f"{path}: cannot be written: {error.strerror}", hint=hint) from error
     finally:
         temporary.unlink(missing_ok=True)
 

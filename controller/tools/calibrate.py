@@ -95,7 +95,11 @@ def _save(screen: CalibrationScreen, robot: RobotSettings, name: str, target: Pa
         screen.ask(f"replace {target}? (y/n)")
         return False
     captured = screen.captured()
-    save_calibration(target, name, robot.name, captured)
+    try:
+        save_calibration(target, name, robot.name, captured)
+    except ControllerError as error:  # what was captured is still here: once there is room, s saves it
+        screen.not_saved(f"not saved: {error}")
+        return False
     left_out = [channel.name for channel in screen.channels if channel.name not in captured]
     screen.saved(f"saved {len(captured)} channels" + (f"; not complete: {', '.join(left_out)}" if left_out else ""))
     return True

@@ -122,6 +122,10 @@ class CalibrationScreen:
         self.saving = self.changed = False
         self.message = message
 
+    def not_saved(self, message: str) -> None:
+        """The file could not be written: show why; what was captured stays."""
+        self.saving, self.message = False, message
+
     def ask(self, question: str) -> None:
         """Ask before a file is replaced; ``y`` sets ``saving`` again."""
         self.saving, self.question = False, question

@@ -80,10 +80,17 @@ def _describe(path: Path) -> Iterator[str]:
 def _check_head(folder: Path) -> str:
     """Pose every parameter alone at its end: every vertex must be finite."""
     from surface.head import Head  # start-up: only heads and groups need it
+    from surface.head.model.identity import load_identities, with_identities  # start-up: the same
 
     head = Head.load(folder)
+    known = load_identities(folder)
+    for name in known:
+        with_identities(head.data, known, {name: 1.0}, str(folder))
     for name in head.parameters:
-        head.pose(head.values({name: 1.0}))
+        try:
+            head.pose(head.values({name: 1.0}))
+        except (ArithmeticError, LookupError, ValueError) as error:
+            raise ConfigError(f"{folder}: {name} = 1 cannot be posed: {error}", hint="make the head again") from error
         bad = [part.name for part in head.parts if not np.isfinite(part.vertices).all()]
         if bad:
             raise ConfigError(f"{folder}: {name} = 1 throws vertices of {', '.join(bad)} out of space")

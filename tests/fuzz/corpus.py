@@ -19,13 +19,16 @@ from controller.takes.recording import recorded
 from surface.base.errors import SurfaceError
 from surface.fit.source.load import load_mesh
 from surface.fit.source.mesh import FitMesh
-from surface.head import save_data
+from surface.head import Head, save_data
+from surface.head.model.data import Contact, Rule
+from surface.head.model.identity import Identity, fingerprint, save_identities
+from surface.head.posing.baked import write_decimated, write_shade
 from surface.readers.common import NamedSurface
 from surface.readers.plain import write_surfaces
 from tests.surface.meshfiles import glb, write_obj
 from tests.surface.readers.test_gismo import geometry, hierarchy, tensor
 from tests.surface.readers.test_tsm import Writer, cells
-from tests.surface.small_head import sheet, small_head
+from tests.surface.small_head import all_points, sheet, small_head
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
@@ -192,8 +195,22 @@ def _meshes(folder: Path) -> list[Kind]:
     ]
 
 
+def _save_head(folder: Path) -> None:
+    """A small head with everything that a folder can hold."""
+    u, v = np.meshgrid(np.linspace(0.3, 0.7, 5), np.linspace(0.05, 0.4, 6), indexing="ij")
+    places = np.stack([np.stack([u, 0.5 + v], axis=-1), np.stack([u, 0.5 - v], axis=-1)])
+    rule = Rule("frown", ({"mouthPucker": 0.5, "jawOpen": 0.5},), 2.0)
+    data = small_head(contacts=[Contact("lips", "a", ("b",), -1, 60.0, 0.5, places)], rules=[rule])
+    save_data(folder, data)
+    head = Head.load(folder)
+    wide = Identity("wide", {"a": all_points("wide", (1, 0, 0))}, {}, np.zeros((2, 3)), np.zeros(3), fingerprint(data))
+    save_identities(folder, [wide])
+    write_shade(folder, {part.name: np.full(len(part.vertices), 0.5) for part in head.parts}, head.parts)
+    write_decimated(folder, head.parts, {f"{part.name}/full": part.triangles for part in head.parts})
+
+
 def _heads(folder: Path) -> list[Kind]:
-    save_data(folder / "head", small_head())
+    _save_head(folder / "head")
     files = {path.name: path.read_bytes() for path in sorted((folder / "head").iterdir())}
     return [
         Kind(name, f"head/{name}", [data], check, {n: d for n, d in files.items() if n != name})

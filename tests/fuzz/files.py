@@ -157,20 +157,24 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000, help="files of each kind (default 1000)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--minutes", type=float, default=600.0, help="begin nothing new after so long")
     parser.add_argument("--only", nargs="*", help="kinds (default all)")
     parser.add_argument("--keep", type=Path, help="folder for files that had a fault")
     given = parser.parse_args()
     _KINDS.extend(kind for kind in kinds() if not given.only or kind.name in given.only)
     warm_up(_KINDS)
-    share = max(1, given.count // 10)
+    share = max(1, min(given.count // 10, 100))
     jobs = [
-        (k.name, share, 1000 * given.seed + part, given.keep) for k in _KINDS for part in range(given.count // share)
+        (k.name, share, 1000 * given.seed + part, given.keep) for part in range(given.count // share) for k in _KINDS
     ]
+    end = time.monotonic() + 60.0 * given.minutes
     totals: Counter[str] = Counter()
     faults: dict[str, list[str]] = {}
     worst: dict[str, tuple[float, float]] = {}
     with get_context("fork").Pool(given.jobs) as pool:
         for name, seed, found in pool.imap_unordered(_job, jobs):
+            if time.monotonic() > end:
+                break
             totals[name] += len(found)
             longest, largest = worst.get(name, (0.0, 0.0))
             worst[name] = (

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import random
 import re
+import zipfile
 from collections.abc import Callable
 
 Mutator = Callable[[bytes, random.Random], bytes]
@@ -115,8 +117,23 @@ MUTATORS: tuple[Mutator, ...] = (
 )
 
 
+def inside_archive(data: bytes, draw: random.Random) -> bytes:
+    """Damage one member of a zip file, whose checksums are made to fit: otherwise nothing inside is ever looked at."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    name = draw.choice(list(members))
+    members[name] = draw.choice(MUTATORS)(members[name], draw)
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for each, content in members.items():
+            archive.writestr(each, content)
+    return out.getvalue()
+
+
 def mutate(data: bytes, draw: random.Random) -> bytes:
     """One to three damages, one after the other."""
+    if data.startswith(b"PK") and draw.random() < 0.8:
+        return inside_archive(data, draw)
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
         if data:
             data = draw.choice(MUTATORS)(data, draw)

@@ -78,14 +78,12 @@ def unpack(
     """
     if any(key not in arrays for key in KEYS):
         return None
-    made = arrays["mesh_made"]
-    uv, triangles = np.asarray(arrays["mesh_uv"], float), np.asarray(arrays["mesh_triangles"], np.int32)
-    start, list_start, ids = (arrays[k] for k in ("mesh_cell_start", "mesh_list_start", "mesh_list_ids"))
-    if made.shape != (5,) or tuple(made[:3]) != tuple(map(float, budget)):
+    uv, triangles, side, start, list_start, ids, made = (arrays[key] for key in KEYS)
+    if made.shape != (5,) or not np.isfinite(made).all() or tuple(made[:3]) != tuple(map(float, budget)):
         return None
-    if not _indices_valid(uv, triangles, start, list_start, ids, surface.n):
+    if not (_kinds_valid(arrays, len(uv)) and _indices_valid(uv, triangles, start, list_start, ids, surface.n)):
         return None
-    side = arrays["mesh_side"].astype(np.int64)
+    uv, triangles, side = uv.astype(float), triangles.astype(np.int32), side.astype(np.int64)
     cell = np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start))
     if rough:
         sums = np.add.reduceat(surface.points[ids], list_start[:-1]) / np.diff(list_start)[:, None]
@@ -99,9 +97,17 @@ def unpack(
     )  # fmt: skip
 
 
+def _kinds_valid(arrays: dict[str, Array], vertices: int) -> bool:
+    """Are the arrays numbers of the right shapes, and no list empty?"""
+    uv, triangles, side, *lists = (arrays[key] for key in KEYS[:-1])
+    shaped = uv.shape == (vertices, 2) and triangles.shape[1:] == (3,) and side.shape == (vertices,)
+    whole = all(a.dtype.kind in "iu" for a in (triangles, side, *lists)) and uv.dtype.kind == "f"
+    return bool(shaped and whole and all(a.ndim == 1 and len(a) for a in lists) and np.isfinite(uv).all())
+
+
 def _indices_valid(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
     """Are all indices in range?"""
-    if uv.ndim != 2 or triangles.ndim != 2 or not len(triangles) or len(start) != len(list_start):
+    if not len(triangles) or len(start) != len(list_start):
         return False
     whole = start[0] == 0 and start[-1] == len(uv) and list_start[0] == 0 and list_start[-1] == len(ids)
     rising = bool((np.diff(start) > 0).all() and (np.diff(list_start) > 0).all())

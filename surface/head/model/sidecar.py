@@ -17,7 +17,7 @@ Made = TypeVar("Made")
 VERSION = 1
 META = "omote/"  # keys that begin so are about the file, the others are its arrays
 FORMAT, CHECK = f"{META}format", f"{META}checksum/"
-DAMAGED = (ValueError, TypeError, OverflowError, LookupError)
+DAMAGED = (ValueError, TypeError, ArithmeticError, LookupError)
 """What reading arrays that are not as they should be may raise."""
 
 

@@ -13,8 +13,9 @@ from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data
 from surface.head.model.identity import load_identities, with_identities
 from surface.head.model.meshes import make_surface, tessellate, unpack
-from surface.head.model.parameters import NAMES, read_pose, rotation
+from surface.head.model.parameters import NAMES, SHAPES, read_pose, rotation
 from surface.head.model.rules import Drivers
+from surface.head.model.sidecar import DAMAGED
 from surface.head.posing.baked import apply_decimated, apply_shade, read_decimated, read_shade
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
@@ -55,9 +56,16 @@ class Head:
         data = load_data(path)
         if identity:
             data = with_identities(data, load_identities(path), identity, str(path))
-        head = cls(data, str(path))
-        apply_shade(head.parts, read_shade(path, head.parts))
-        apply_decimated(head.parts, read_decimated(path, head.parts))
+        for shape in data.jaw.tilts:
+            if shape not in SHAPES:
+                raise HeadFileError(f"{path}: jaw.tilts.{shape}: is no shape", hint="see docs/heads.md for names")
+        try:
+            head = cls(data, str(path))
+            apply_shade(head.parts, read_shade(path, head.parts))
+            apply_decimated(head.parts, read_decimated(path, head.parts))
+        except DAMAGED as error:
+            hint = "take it from a copy, or make the head again: omote fit"
+            raise HeadFileError(f"{path}: its files are damaged: {error}", hint=hint) from error
         return head
 
     @property

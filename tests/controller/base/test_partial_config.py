@@ -117,3 +117,26 @@ def test_nothing_is_left_of_a_table_that_lacks_a_key_at_its_top() -> None:
     with pytest.raises(ValidationError) as caught:
         Item.model_validate({"size": 2})
     assert PartialConfig({"size": 2}, Item, caught.value).read is None
+
+
+def test_places_in_lists_of_lists_are_those_of_the_file_however_often_something_is_removed() -> None:
+    class Point(BaseModel, extra="forbid"):
+        at: list[int] = []
+
+    class Line(BaseModel, extra="forbid"):
+        name: str
+        points: list[Point] = []
+
+    class Drawing(BaseModel, extra="forbid"):
+        lines: list[Line]
+
+    good = {"name": "a", "points": [{"at": [1]}, {"at": [1, "x", 2]}, {"at": "y"}, {"at": [3]}]}
+    table = {"lines": [{"points": [{"at": ["x"]}, {"at": [1]}]}, good, {"name": 3}, good]}
+    with pytest.raises(ValidationError) as caught:
+        Drawing.model_validate(table)
+    rest = PartialConfig(table, Drawing, caught.value)
+    assert rest.read is not None and [line.points[1].at for line in rest.read.lines] == [[1, 2], [1, 2]]
+    told = ["lines[1].points[1].at[1]: wrong", "lines[0].points[3]: wrong", "lines[9].points[0]: wrong"]
+    assert rest.relocate(told) == [
+        "lines[3].points[1].at[2]: wrong", "lines[1].points[3]: wrong", "lines[9].points[0]: wrong"
+    ]  # fmt: skip

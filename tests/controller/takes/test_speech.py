@@ -15,7 +15,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.takes.livelink import TakePlayer
 from controller.takes.reader import load_take
-from controller.takes.speech import Cue, speech_take
+from controller.takes.speech import Cue, cue_take, speech_take
 from controller.vocabulary.visemes import Visemes
 
 VISEMES = Visemes.load(P)
@@ -150,3 +150,17 @@ def test_talking_keeps_the_smile_and_the_brows(tmp_path: Path) -> None:
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         object.__new__(Cue).anything = 1
+
+
+@pytest.mark.parametrize("text", ["0.0\tA\n1e12\tB\n", "0.0\tA\n3600.5\tX\n"])
+def test_times_of_more_than_an_hour_are_refused_before_anything_is_made(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.tsv").write_text(text)
+    with pytest.raises(TakeError, match="0 to 3600 s are read"):
+        cue_take(tmp_path / "a.tsv", P)
+
+
+@pytest.mark.parametrize("end", ["1e15", "NaN", "Infinity", "-1", "1e999"])
+def test_an_end_no_sound_has_is_refused(tmp_path: Path, end: str) -> None:
+    (tmp_path / "a.json").write_text(f'{{"mouthCues": [{{"start": 0, "end": {end}, "value": "A"}}]}}')
+    with pytest.raises(TakeError):
+        cue_take(tmp_path / "a.json", P)

@@ -16,7 +16,15 @@ import pytest
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
-from controller.takes.voice import VoiceEnvelope, VoiceListener, samples, wav_take
+from controller.takes.voice import (
+    VoiceEnvelope,
+    VoiceListener,
+    _loudness,
+    _loudness_of,
+    samples,
+    voice_take,
+    wav_take,
+)
 
 RATE = 16000
 JAW, STRETCH = P.index("jawOpen"), P.index("mouthStretchLeft")
@@ -244,3 +252,44 @@ def test_every_width_fills_its_range_exactly() -> None:
     assert samples(bytes([0, 128, 192]), 1, 1).tolist() == [-1.0, 0.0, 0.5]
     assert samples(np.array([-(2**15), 2**14, 2**14, -(2**14)], "<i2").tobytes(), 2, 2).tolist() == [-0.25, 0.0]
     assert samples(np.array([-(2**31), 2**29], "<i4").tobytes() + b"abc", 4, 1).tolist() == [-1.0, 0.25]
+
+
+@pytest.mark.parametrize("cut", [1, 3, 101, 102])
+def test_a_file_cut_at_any_byte_is_read_as_far_as_it_goes(tmp_path: Path, cut: int) -> None:
+    data = wav(tone(200, 0.5))
+    (tmp_path / "v.wav").write_bytes(data[:-cut])
+    assert wav_take(tmp_path / "v.wav", P).frames in (49, 50)
+
+
+def test_a_file_that_says_it_is_longer_than_it_is_costs_no_more_than_it_is(tmp_path: Path) -> None:
+    data = bytearray(wav(tone(200, 0.003)))
+    data[40:44] = struct.pack("<I", 2_000_000_000)
+    (tmp_path / "v.wav").write_bytes(data)
+    asked = []
+
+    class Sound(io.BytesIO):
+        def read(self, size: int | None = -1) -> bytes:
+            asked.append(size or 0)
+            return super().read(size)
+
+    assert voice_take(Sound(bytes(data)), "v", P).frames == 1
+    assert max(asked) <= 2 * RATE and wav_take(tmp_path / "v.wav", P).frames == 1
+
+
+@pytest.mark.parametrize(("at", "layout", "value"), [(24, "<I", 4_000_000_000), (22, "<H", 40_000), (24, "<I", 10)])
+def test_rates_and_channels_no_microphone_has_are_refused(tmp_path: Path, at: int, layout: str, value: int) -> None:
+    data = bytearray(wav(tone(200, 0.1)))
+    struct.pack_into(layout, data, at, value)
+    (tmp_path / "v.wav").write_bytes(data)
+    with pytest.raises(TakeError, match=r"384000 Hz|not WAV"):
+        wav_take(tmp_path / "v.wav", P)
+
+
+@pytest.mark.parametrize("rate", [11025, 16000, 44100])
+def test_a_long_sound_is_heard_as_in_one_piece(rate: int) -> None:
+    sound = np.sin(np.arange(int(2.7 * rate)) * 0.11) * np.linspace(0, 1, int(2.7 * rate))
+    size = int(0.03 * rate)
+    starts = np.arange(len(sound) * 100 // rate) * rate // 100
+    whole = _loudness(np.concatenate([sound, np.zeros(size)])[starts[:, None] + np.arange(size)], rate)
+    pieces = (sound[at : at + rate] for at in range(0, len(sound), rate))
+    np.testing.assert_allclose(_loudness_of(pieces, rate), whole, atol=1e-12)

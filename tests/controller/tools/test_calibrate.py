@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import resource
 import subprocess
 import sys
 import time
@@ -320,3 +321,31 @@ def test_keys_of_a_terminal_are_told_apart() -> None:
     keys = "\x1b[A\x1b[B\x1b[C\x1b[D\x1bOA\x1bOB\x1bOC\x1bOD\nq"
     assert split_keys(keys) == ["up", "down", "right", "left", "up", "down", "right", "left", "\n", "q"]
     assert split_keys("\x1b") == [] and split_keys("") == []
+
+
+def test_what_was_captured_stays_where_it_cannot_be_saved_until_it_can(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    angles = iter([-10.0, 3.0, 20.0])
+    read, save, refusals = Servos.read, module.save_calibration, iter([True])
+
+    def moving(servos: Servos) -> SimpleNamespace:
+        servos.angle_deg = np.array([next(angles, 3.0), 3.0])
+        return read(servos)
+
+    def save_later(path: Path, *rest: Any) -> None:
+        """First with a disk on which no byte fits."""
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0 if next(refusals, False) else before[0], before[1]))
+        try:
+            save(path, *rest)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+    monkeypatch.setattr(Servos, "read", moving)
+    monkeypatch.setattr(module, "save_calibration", save_later)
+    keys = [["t"], ["N"], [], [], ["s"], [], ["s"], []]
+    written, _, _, shown = calibrated(monkeypatch, tmp_path, keys)
+    assert "not saved: " in shown and "saved 1 channels" in shown and written
+    assert tomllib.loads((tmp_path / "c.toml").read_text())["channels"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "pair.toml"]

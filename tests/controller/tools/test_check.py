@@ -19,8 +19,10 @@ from controller.takes.recording import recorded
 from controller.tools.check import check_anything
 from controller.vocabulary.vocabulary import Vocabulary
 from surface import DCPSurface, Domain, Slit, SurfaceFileError
+from surface.base.errors import HeadFileError
 from surface.head import Head
 from surface.head.model.file import save_data
+from surface.head.model.identity import Identity, save_identities
 from surface.readers import NamedSurface, write_surfaces
 from tests.surface.small_head import part, small_head
 
@@ -117,3 +119,71 @@ def test_what_a_stage_has_and_has_not(tmp_path: Path) -> None:
     assert check_anything("demo") == ["stage demo: head ict, links: line on simulated, robots: head24: good"]
     (tmp_path / "bare.toml").write_text('name = "bare"\n')
     assert check_anything(str(tmp_path / "bare.toml")) == ["stage bare: head ict, links: none, robots: none: good"]
+
+
+SHIPPED = {
+    "vocabularies/arkit.toml": "parameters arkit.toml: 59",
+    "vocabularies/facs.toml": "action units facs.toml: 48 with sides, 8 emotions",
+    "vocabularies/affect.toml": "moods affect.toml: 9 anchors",
+    "vocabularies/visemes.toml": "visemes visemes.toml: 15, 41 phonemes",
+    "vocabularies/layers.toml": "layers layers.toml: expression, idle, gaze, speech, capture, manual",
+    "life/natural.toml": "life natural.toml: a blink every 2 to 6 s",
+}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_file_of_settings_is_checked_as_what_it_is(name: str) -> None:
+    assert check_anything(str(config_dir() / name)) == [f"{SHIPPED[name]}: good"]
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "wrong", "told"),
+    [
+        ("vocabularies/facs.toml", "browInnerUp", "browInnerUpp", "unknown parameter"),
+        ("vocabularies/affect.toml", "anchors.", "anchor.", "anchor: unknown key, did you mean 'anchors'"),
+        ("vocabularies/visemes.toml", "duration =", "durasion =", "durasion: unknown key, did you mean 'duration'"),
+        ("vocabularies/layers.toml", "priority = 10", "priority = 'x'", "priority: input should be a valid integer"),
+        ("vocabularies/arkit.toml", 'region = "jaw"', 'region = "jam"', "region: input should be"),
+        ("life/natural.toml", "[breath]", "[breathe]", "breath: missing"),
+    ],
+)
+def test_faults_are_those_of_the_kind(tmp_path: Path, name: str, good: str, wrong: str, told: str) -> None:
+    text = (config_dir() / name).read_text(encoding="utf-8")
+    assert good in text
+    path = tmp_path / Path(name).name
+    path.write_text(text.replace(good, wrong, 1), encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        check_anything(str(path))
+    assert told in str(caught.value)
+
+
+def test_a_layer_that_is_no_table_is_a_fault_of_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "layers.toml"
+    path.write_text((config_dir() / "vocabularies" / "layers.toml").read_text() + "\n[more]\npriority = 99\n")
+    path.write_text("gaze_2 = 3\n" + path.read_text())
+    with pytest.raises(ConfigError, match=r"layers\.gaze_2: must be a table"):
+        check_anything(str(path))
+
+
+def test_a_file_of_no_kind_says_so(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text("colour = 3\nshape = 4\n")
+    with pytest.raises(ConfigError, match="no kind of file has the keys colour, shape"):
+        check_anything(str(tmp_path / "a.toml"))
+
+
+def test_names_of_vocabularies_scripts_and_life_are_found() -> None:
+    assert check_anything("facs")[0].startswith("action units") and check_anything("natural")[0].startswith("life")
+
+
+def test_what_a_file_says_is_printed_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text('name = "[/bold] [red]"\nsteps = []')
+    result = CliRunner().invoke(make_app(), ["check", str(tmp_path / "s.toml")])
+    assert result.exit_code == 0 and "script [/bold] [red]: 0 steps" in result.output
+
+
+def test_identities_that_do_not_fit_the_head_are_found(tmp_path: Path) -> None:
+    save_data(tmp_path / "small", small_head())
+    stranger = Identity("wide", {}, {}, np.zeros((2, 3)), np.zeros(3), 5)
+    save_identities(tmp_path / "small", [stranger])
+    with pytest.raises(HeadFileError, match="another fit"):
+        check_anything(str(tmp_path / "small"))

@@ -13,6 +13,7 @@ import pytest
 
 from surface import DCPSurface, SurfaceError, SurfaceFileError
 from surface.readers import NamedSurface, read_surface
+from surface.readers import rhino as reader
 from surface.readers.common import Location
 from surface.readers.rhino import invert, polyline
 from tests.surface import shapes
@@ -241,3 +242,23 @@ def test_a_hole_in_a_closed_face_is_a_hole(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_hole_across_the_seam_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SurfaceFileError, match=r"face 0, loop 1: crosses the seam"):
         face(monkeypatch, 0.0)
+
+
+def test_what_keeps_opennurbs_busy_is_refused_within_a_limit(
+    tmp_path: Path, rhino: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saved(tmp_path, rhino, net(rhino))
+    monkeypatch.setattr(
+        reader, "TRIAL", reader.TRIAL.replace("import sys, rhino3dm", "import sys").split("sys.exit")[0]
+    )
+    monkeypatch.setattr(reader, "TRIAL", reader.TRIAL + "while True: pass")
+    monkeypatch.setattr(reader, "PATIENCE_S", 0.05)
+    with pytest.raises(SurfaceFileError, match="is no openNURBS file, or a damaged one"):
+        read_surface(tmp_path / "a.3dm")
+
+
+def test_a_crash_of_opennurbs_ends_only_the_trial(tmp_path: Path, rhino: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    saved(tmp_path, rhino, net(rhino))
+    monkeypatch.setattr(reader, "TRIAL", "import os; os.abort()")
+    with pytest.raises(SurfaceFileError, match="is no openNURBS file, or a damaged one"):
+        read_surface(tmp_path / "a.3dm")

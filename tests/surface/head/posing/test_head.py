@@ -252,3 +252,11 @@ def test_what_a_part_follows_is_checked(tmp_path):
 def test_unknown_parts_are_named(head):
     with pytest.raises(KeyError, match="no part 'nose'"):
         head.part("nose")
+
+
+def test_tilts_of_what_is_no_shape_are_refused(tmp_path):
+    save_data(tmp_path, small_head())
+    file = tmp_path / "head.toml"
+    file.write_text(file.read_text().replace("jawForward", "jawForwards"))
+    with pytest.raises(HeadFileError, match=r"jaw\.tilts\.jawForwards: is no shape"):
+        Head.load(tmp_path)
