@@ -50,6 +50,13 @@ def test_scan_lists_every_servo_or_says_what_to_look_at(servos: SimulatedBus) ->
     assert empty.startswith(f"No servo answered on {servos.path}. Check its power")
 
 
+def test_a_narrow_terminal_breaks_no_message(monkeypatch: pytest.MonkeyPatch, servos: SimulatedBus) -> None:
+    monkeypatch.setattr(console, "width", 30)
+    empty = omote("scan", servos.path, "--baud", "1000000", "--protocol", "2").output
+    assert f"No servo answered on {servos.path}. Check its power, the wiring and the adapter's direction" in empty
+    assert "written and read back on" in omote("set-id", servos.path, "3", "5", "--baud", "57600").output
+
+
 def test_set_id_says_what_it_wrote(servos: SimulatedBus) -> None:
     text = said("set-id", servos.path, "3", "5", "--baud", "57600")
     assert text == f"xl330-m288: permanent id 3 -> 5, written and read back on {servos.path}"

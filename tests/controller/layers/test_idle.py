@@ -101,6 +101,30 @@ def test_a_large_gaze_shift_often_brings_a_blink(settings: IdleSettings) -> None
     assert not any(blinked(0.1, seed) for seed in range(50))
 
 
+class Lowest(random.Random):
+    """Draws the lowest share every time, and one deviation of a spread."""
+
+    def random(self) -> float:
+        return 0.0
+
+    def gauss(self, mu: float = 0.0, sigma: float = 1.0) -> float:
+        return mu + sigma
+
+
+def test_a_share_of_zero_never_happens(settings: IdleSettings) -> None:
+    blink = settings.blink.model_copy(update={"shift_share": 0.0, "double_share": 0.0})
+    eyes = settings.eyes.model_copy(update={"home_share": 0.0})
+    life = IdleMotion(P, settings.model_copy(update={"blink": blink, "eyes": eyes}))
+    life.liveliness, life._random = 1.0, Lowest()
+    life.update(0.0, looking=False)
+    assert life.eye_yaw_rad != 0.0  # not at home
+    soon = life._next_blink_s
+    life.shift(1.0, 0.01)
+    assert life._next_blink_s == soon
+    life.update(soon, looking=False)
+    assert len(life._blinks) == 1
+
+
 def test_a_wrong_file_lists_every_fault(tmp_path: Path, root: Path) -> None:
     text = (root / "configs" / "life" / "natural.toml").read_text()
     path = tmp_path / "own.toml"

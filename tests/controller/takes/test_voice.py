@@ -186,7 +186,13 @@ def mouth(voice: float, hiss: float) -> dict[str, float]:
 
 EDGES = tone(2500, 0.05, 0.3) + tone(4000, 0.05, 0.3)  # just outside of both bands
 SPOKEN = np.concatenate(
-    [tone(200, 0.1), np.zeros(800), tone(6000, 0.06, 0.2), tone(300, 0.05) + tone(5000, 0.05), EDGES]
+    [
+        np.linspace(0.2, 1.0, 1600) * tone(200, 0.1),  # no two pieces are as loud
+        np.zeros(800),
+        np.linspace(0.5, 1.0, 960) * tone(6000, 0.06, 0.2),
+        tone(300, 0.05) + tone(5000, 0.05),
+        EDGES,
+    ]
 )
 
 

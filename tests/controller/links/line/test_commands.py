@@ -162,6 +162,27 @@ def test_refusals_say_why(line: str, code: Code, part: str) -> None:
     assert part in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["SET", "FRAME", "RELEASE", "EXPR", "GAZE", "LIFE", "SHOW", "GET", "MEASURED", "READ", "INFO", "SUB", "LIST"],
+)
+def test_commands_that_need_arguments_say_so(name: str) -> None:
+    with pytest.raises(LineError, match=f"0 arguments; usage: {name}") as caught:
+        GRAMMAR.parse(name.encode())
+    assert caught.value.code == Code.ARGUMENTS
+
+
+def test_long_words_are_cut_in_refusals() -> None:
+    for line, shown in (("%s", "'%s'"), ("LIFE %s", "'%s' is not a finite number"), ("LIST %s", "unknown list '%s'")):
+        with pytest.raises(LineError) as caught:
+            GRAMMAR.parse((line % ("Q" * 33)).encode())
+        assert shown % ("Q" * 32) in str(caught.value)
+
+
+def test_points_may_be_as_far_as_the_limit() -> None:
+    assert parse("GAZE AT 1000000 -1000000 0") == Command("GAZE AT", (), (1e6, -1e6, 0.0))
+
+
 def test_a_checked_refusal_is_answered_checked() -> None:
     body = b"#5 SET jawOpen 2"
     with pytest.raises(LineError) as caught:
