@@ -169,6 +169,12 @@ def test_life_blinks_by_itself_and_stops(face: Face) -> None:
     assert np.abs(face.run(3.0)).max() < 1e-6
 
 
+def test_the_amount_of_life_stays_between_none_and_all(face: Face) -> None:
+    for amount, kept in ((-1.0, 0.0), (0.25, 0.25), (2.0, 1.0)):
+        face.state.live(amount, face.now)
+        assert face.state.status()["life"] == kept
+
+
 def test_life_gives_way_to_set(face: Face) -> None:
     face.state.live(1.0, face.now)
     face.state.set_parameters([0, 7], [0.0, 0.0], face.now)

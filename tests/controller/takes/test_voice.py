@@ -65,6 +65,12 @@ def test_noise_of_a_silent_room_moves_nothing() -> None:
     assert heard(VoiceEnvelope(P, RATE), room).max() == 0.0
 
 
+@pytest.mark.parametrize(("rms", "heard_of"), [(0.0029, False), (0.0033, True)])
+def test_a_voice_counts_from_the_loudness_of_silence_on(rms: float, heard_of: bool) -> None:
+    face = heard(VoiceEnvelope(P, RATE), tone(1000, 0.3, rms * math.sqrt(2)))
+    assert (face[10:, JAW].max() > 0.1) == heard_of and (heard_of or not face[10:-1].any())
+
+
 def test_a_stream_moves_the_speech_layer_until_it_ends() -> None:
     state, out = CommandState(P), P.neutral()
     listener = VoiceListener(io.BytesIO(wav(tone(200, 0.3))), state)

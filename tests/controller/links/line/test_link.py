@@ -164,6 +164,20 @@ def test_a_port_that_vanishes_is_found_again(tmp_path: Path, state: CommandState
     assert not link.connected
 
 
+def test_every_count_begins_at_nothing_and_bytes_are_counted_both_ways(port: HostPort, state: CommandState) -> None:
+    link = LineLink(port.path, 115200, state)
+    assert link.report() == {
+        "port": port.path, "connected": False, "accepted": 0, "refused": {}, "bytes_in": 0, "bytes_out": 0,
+        "streamed": 0, "dropped": 0, "reconnects": 0, "faults": 0, "last_fault": "",
+    }  # fmt: skip
+    with link:
+        peer = Peer(port)
+        peer.send(b"PING abc\n")
+        assert peer.next().text == "PONG abc"
+        eventually(lambda: link.report()["bytes_out"])
+        assert (link.report()["bytes_in"], link.report()["bytes_out"]) == (9, len(b"OK PONG abc\n"))
+
+
 def test_a_missing_port_is_one_clear_error(tmp_path: Path, state: CommandState) -> None:
     with pytest.raises(PortMissing, match="no port"):
         LineLink(str(tmp_path / "none"), 115200, state).start()
