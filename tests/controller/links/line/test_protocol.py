@@ -104,7 +104,7 @@ def test_what_has_no_checksum_says_so() -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        (b"PING*0f", "checksum is 0F but the line sums up to %02X" % checksum(b"PING")),
+        (b"PING*0f", f"checksum is 0F but the line sums up to {checksum(b'PING'):02X}"),
         (b"x" * 1025, "a line has at most 1024 bytes"),
         (b"*", "two hexadecimal digits at the end"),
     ],
