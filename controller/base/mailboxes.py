@@ -85,7 +85,7 @@ class Mailbox:
     def unlink(self) -> None:
         """Remove the file; processes that have mapped it keep it. Does nothing where a file in use must stay."""
         with suppress(OSError):
-            Path(self.path).unlink(missing_ok=True)
+            Path(self.path).unlink()
 
     def close(self) -> None:
         """Unmap the memory; the process that created the file also removes it."""

@@ -46,6 +46,7 @@ def test_the_file_goes_with_its_maker() -> None:
 def test_without_a_name_the_memory_is_shared_as_before() -> None:
     with Mailbox.create(3) as box, Mailbox(box.path, 3) as other:
         other.unlink()
+        other.unlink()
         assert not Path(box.path).exists()
         other.publish(np.array([1.0, 2.0, 3.0]), 42)
         out = np.zeros(3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from pathlib import Path
 
@@ -99,6 +100,35 @@ def test_a_large_gaze_shift_often_brings_a_blink(settings: IdleSettings) -> None
     share = np.mean([blinked(0.5, seed) for seed in range(200)])
     assert 0.35 < share < 0.65
     assert not any(blinked(0.1, seed) for seed in range(50))
+
+
+def test_a_shift_of_the_gaze_counts_from_its_angle_on(settings: IdleSettings) -> None:
+    blink = settings.blink.model_copy(update={"shift_deg": math.degrees(0.3), "shift_share": 1.0})
+    for angle_rad, blinks_soon in ((0.3, True), (-0.3, True), (0.29, False), (-0.29, False)):
+        life = IdleMotion(P, settings.model_copy(update={"blink": blink}))
+        life.liveliness = 1.0
+        life.update(0.0, looking=True)
+        life.shift(angle_rad, 0.5)
+        assert (life._next_blink_s == 0.5) == blinks_soon
+        before = life._next_blink_s
+        life.shift(0.3, 1.5)  # one that is due before stays so
+        assert life._next_blink_s == min(before, 1.5)
+
+
+@pytest.mark.parametrize("looking", [False, True])
+def test_the_eyes_rest_between_two_glances(settings: IdleSettings, looking: bool) -> None:
+    eyes = settings.eyes.model_copy(
+        update={"interval_s": (2.0, 2.0), "micro_interval_s": (0.5, 0.5), "home_share": 0.0}
+    )
+    life = IdleMotion(P, settings.model_copy(update={"eyes": eyes}), 3)
+    life.liveliness = 1.0
+    seen = []
+    for i in range(401):
+        life.update(10.0 + i / 100, looking=looking)
+        seen.append((life.eye_yaw_rad, life.eye_pitch_rad))
+    changes = [i for i in range(1, 401) if seen[i] != seen[i - 1]]
+    every = 50 if looking else 200
+    assert np.abs(np.diff([0, *changes]) - every).max() <= 2 and len(changes) == 400 // every
 
 
 class Lowest(random.Random):

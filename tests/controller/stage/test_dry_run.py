@@ -6,6 +6,7 @@ import importlib.util
 import json
 import os
 import sys
+import wave
 from pathlib import Path
 from types import ModuleType
 
@@ -65,6 +66,17 @@ def test_a_take_is_rehearsed(tmp_path: Path) -> None:
     rows, _ = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), take, None, PARAMETERS)
     sent = next(row for row in rows if row["channel"] == "jawOpen")["sent (deg)"]
     assert float(sent.split()[-1]) > 10
+
+
+def test_the_voice_of_a_stage_is_rehearsed_where_it_is_a_file(tmp_path: Path) -> None:
+    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
+        file.setparams((1, 2, 16000, 0, "NONE", ""))
+        file.writeframes((9000 * np.sin(np.arange(16000) / 16)).astype("<i2").tobytes())
+    for more, moves in (("", True), ("voice_hz = 16000\n", False)):
+        stage = load_stage(str(stage_file(tmp_path, f'voice = "a.wav"\n{more}')), PARAMETERS)
+        rows, _ = dry_run(stage, None, 1.0, PARAMETERS)
+        jaw = next(row for row in rows if row["channel"] == "jawOpen")["sent (deg)"]
+        assert (float(jaw.split()[-1]) > 5) == moves
 
 
 def test_the_command_opens_no_port_and_writes_every_angle(tmp_path: Path) -> None:

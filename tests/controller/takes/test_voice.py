@@ -196,7 +196,7 @@ SPOKEN = np.concatenate(
         np.linspace(0.2, 1.0, 1600) * tone(200, 0.1),  # no two pieces are as loud
         np.zeros(800),
         np.linspace(0.5, 1.0, 960) * tone(6000, 0.06, 0.2),
-        tone(300, 0.05) + tone(5000, 0.05),
+        np.linspace(1.0, 0.4, 800) * (tone(300, 0.05) + tone(5000, 0.05)),
         EDGES,
     ]
 )

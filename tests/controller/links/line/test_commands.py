@@ -169,6 +169,22 @@ def test_commands_that_need_arguments_say_so(name: str) -> None:
     assert caught.value.code == Code.ARGUMENTS
 
 
+@pytest.mark.parametrize(
+    ("name", "most"),
+    [
+        ("HELLO", 0), ("VERSION", 0), ("EXPR", 3), ("GAZE", 4), ("NEUTRAL", 1), ("LIFE", 1), ("SHOW", 2), ("READ", 2),
+        ("INFO", 1), ("STATUS", 0), ("UNSUB", 0), ("LIST", 1),
+    ],
+)  # fmt: skip
+def test_commands_refuse_more_arguments_than_they_have(name: str, most: int) -> None:
+    with pytest.raises(LineError, match=f"{most + 1} arguments; usage: {name}"):
+        GRAMMAR.parse((name + (most + 1) * " x").encode())
+
+
+def test_a_request_has_no_tag_and_no_checksum_unless_it_says_so() -> None:
+    assert Request(Command("PING")) == Request(Command("PING"), None, False) == GRAMMAR.parse(b"PING")
+
+
 def test_long_words_are_cut_in_refusals() -> None:
     for line, shown in (("%s", "'%s'"), ("LIFE %s", "'%s' is not a finite number"), ("LIST %s", "unknown list '%s'")):
         with pytest.raises(LineError) as caught:

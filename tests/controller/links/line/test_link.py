@@ -213,6 +213,15 @@ def test_a_fault_of_its_own_is_told_once_and_the_link_goes_on(
     assert caplog.text.count("goes on with the next line") == 1
 
 
+def test_faults_that_repeat_leave_the_processor_to_others(
+    port: HostPort, state: CommandState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    link, waits = LineLink(port.path, 115200, state), list[float]()
+    monkeypatch.setattr(link._stopping, "wait", waits.append)
+    link._log_fault(ValueError("mine"))
+    assert link.faults == 1 and len(waits) == 1 and 0.0 < waits[0] < 0.5
+
+
 def test_replies_beyond_the_buffer_are_dropped_whole_and_counted(port: HostPort, link: LineLink) -> None:
     count = 120
     for i in range(count):  # one after the other: what arrives at once is dropped at once
