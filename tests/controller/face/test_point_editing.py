@@ -166,6 +166,16 @@ def test_points_on_the_other_side_of_the_head_are_not_taken(handles: PointEditor
             handles.release()
 
 
+def test_points_lie_where_the_moved_control_points_show_them(handles: PointEditor) -> None:
+    model, values = handles._model, P.neutral()
+    assert model is not None
+    before = handles._places(model, values)[0]
+    handles._set_moves(np.tile([1.0, 3.0, -2.0], (len(handles._rest), 1)))
+    np.testing.assert_allclose(handles._places(model, values)[0] - before, [[1.0, 3.0, -2.0]] * len(before), atol=1e-6)
+    handles.undo()
+    np.testing.assert_allclose(handles._places(model, values)[0], before)
+
+
 def test_only_control_points_that_moved_are_kept(handles: PointEditor, head: Head, tmp_path: Path) -> None:
     moves = np.zeros_like(handles._rest)
     moves[[3, 5, 7], [0, 1, 2]] = 0.01, -0.0099, -2.0

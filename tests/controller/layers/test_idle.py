@@ -131,6 +131,21 @@ def test_the_eyes_rest_between_two_glances(settings: IdleSettings, looking: bool
     assert np.abs(np.diff([0, *changes]) - every).max() <= 2 and len(changes) == 400 // every
 
 
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_double_blink_comes_after_its_gap(settings: IdleSettings, share: float) -> None:
+    figures = {"interval_s": (5.0, 5.0), "double_share": share, "double_gap_s": (0.3, 0.3), "hold_s": (0.05, 0.05)}
+    blink = settings.blink.model_copy(update=figures)
+    path = live(settings.model_copy(update={"blink": blink}), 20.0)
+    closed = (path[:, LID] > 0.5).astype(int)
+    begins = np.flatnonzero(np.diff(closed) > 0) / 100
+    once = blink.close_s + 0.05 + blink.open_s
+    if share:
+        assert len(begins) == 6 and np.diff(begins)[::2] == pytest.approx([once + 0.3] * 3, abs=0.021)
+        assert np.diff(begins)[1::2] == pytest.approx([once + 5.0] * 2, abs=0.021)
+    else:
+        assert np.diff(begins) == pytest.approx([once + 5.0] * (len(begins) - 1), abs=0.021) and len(begins) == 3
+
+
 class Lowest(random.Random):
     """Draws the lowest share every time, and one deviation of a spread."""
 

@@ -55,6 +55,8 @@ def test_a_script_is_rehearsed_with_rules_and_limits(tmp_path: Path) -> None:
     rows, report = dry_run(load_stage(str(path), PARAMETERS), None, None, PARAMETERS)
     jaw = next(row for row in rows if row["channel"] == "jawOpen")
     assert "timing" in jaw["held by"]
+    fastest, most = map(float, jaw["fastest (deg/s)"].split(" of "))
+    assert 0.1 * most < fastest <= most + 0.1
     way = [sent[3] for sent in report[0]["sent_deg"]]
     assert max(way) == pytest.approx(28.0, abs=0.1) and way[int(3.5 * 50)] == pytest.approx(18.0, abs=0.1)
     assert report[0]["rules"][0]["rule"] == "timing jawOpen toward high"
