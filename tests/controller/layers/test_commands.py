@@ -88,6 +88,11 @@ def test_gaze_turns_eyes_and_head_and_off_returns(face: Face) -> None:
     assert face.run(1.0)[P.index("leftEyeYaw")] < 0 < face.values[P.index("rightEyeYaw")]
 
 
+def test_straight_ahead_has_no_sign(face: Face) -> None:
+    face.state.gaze(-0.0, -0.0, face.now)
+    assert face.state.status()["gaze"] == "0.0,0.0"
+
+
 def test_neutral_releases_everything(face: Face) -> None:
     face.state.set_parameters(list(range(59)), [0.5] * 59, face.now)
     face.state.expression("anger", 1.0, None, face.now)

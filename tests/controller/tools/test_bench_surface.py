@@ -107,13 +107,16 @@ def test_growth_scales_its_sizes_down_to_a_least(monkeypatch: pytest.MonkeyPatch
     asked: list[tuple[tuple[int, ...], tuple[int, ...]]] = []
     monkeypatch.setattr(bench_surface.growth, "growth", lambda sizes, points, *_: asked.append((sizes, points)) or [])
     monkeypatch.setattr(bench_surface.growth, "plot", lambda series, out: out.write_text("drawn"))
+    titles = []
     for vertices in (100_000, 50_000, 1_000):
         ((title, _),) = bench_growth(0.1, lambda text: None, tmp_path / "a.svg", vertices)
+        titles.append(title)
     assert asked == [
         ((10_000, 30_000, 100_000, 300_000, 1_000_000), (100, 1_000, 10_000, 100_000)),
         ((5_000, 15_000, 50_000, 150_000, 500_000), (50, 500, 5_000, 50_000)),
         ((256, 300, 1_000, 3_000, 10_000), (25, 25, 100, 1_000)),
     ]
+    assert titles[1] == "growth, from 5,000 to 500,000 vertices and from 50 to 50,000 control points"
     assert title == "growth, from 256 to 10,000 vertices and from 25 to 1,000 control points"
     assert (tmp_path / "a.svg").read_text() == "drawn"
 
