@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from controller.base.solve import BoundedSolver
+from controller.base.solve import BoundedSolver, _newton_step, _reach, _solve
 
 
 def problem(seed: int, m: int = 150, n: int = 52) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -111,3 +111,76 @@ def test_the_ridge_decides_what_rows_leave_open() -> None:
         solver = BoundedSolver(one, -np.ones(1), np.ones(1), sparsity=sparsity, tolerance=1e-12)
         assert solver.solve(np.array([1.0])) == pytest.approx([value], abs=1e-8)
         assert solver.solve(np.array([-1.0])) == pytest.approx([-value], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("x", "step", "low", "high", "share"),
+    [
+        (0.5, 0.25, 0.0, 1.0, 1.0),  # ends inside
+        (0.5, 0.5, 0.0, 1.0, 1.0),  # ends on the bound
+        (0.5, 1.0, 0.0, 1.0, 0.5),  # would pass the upper bound
+        (0.5, -1.0, -1.0, 1.0, 0.5),  # would pass zero from above
+        (0.5, -0.5, -1.0, 1.0, 1.0),
+        (0.5, -0.5, 0.25, 1.0, 0.5),  # the lower bound comes before zero
+        (-0.5, -1.0, -1.0, 1.0, 0.5),  # would pass the lower bound
+        (-0.5, 1.0, -1.0, 1.0, 0.5),  # would pass zero from below
+        (-0.5, 0.25, -1.0, 1.0, 1.0),
+        (-0.5, 0.5, -1.0, -0.25, 0.5),  # the upper bound comes before zero
+        (2.0, -4.0, -3.0, 3.0, 0.5),
+        (-2.0, 4.0, -3.0, 3.0, 0.5),
+        (0.0, 2.0, -1.0, 1.0, 0.5),  # from zero, any way is free up to the bound
+        (0.0, -2.0, -1.0, 1.0, 0.5),
+        (0.5, 0.0, 0.0, 1.0, 1.0),
+    ],
+)
+def test_a_step_ends_at_a_bound_and_at_zero(x: float, step: float, low: float, high: float, share: float) -> None:
+    assert _reach(x, step, low, high) == share
+
+
+def test_linear_systems_are_solved_with_every_sign_and_order_of_rows() -> None:
+    random = np.random.default_rng(5)
+    for n in (1, 2, 3, 5):
+        for _ in range(40):
+            matrix = random.integers(-2, 3, (n, n)).astype(float)  # many zeros, ones and equal rows
+            if abs(np.linalg.det(matrix)) < 0.5:
+                continue
+            right = random.normal(size=n)
+            found = right.copy()
+            _solve(matrix.copy(), found)
+            np.testing.assert_allclose(matrix @ found, right, atol=1e-9)
+    with pytest.raises(ValueError, match="do not determine each other"):
+        _solve(np.array([[1.0, 2.0], [2.0, 4.0]]), np.ones(2))
+
+
+def test_a_value_that_newtons_step_brings_to_zero_is_exactly_zero() -> None:
+    for x in np.linspace(0.1, 0.9, 50):
+        for sign in (-1.0, 1.0):
+            values = np.array([sign * x])
+            _newton_step(np.eye(1), 3.3 * values, -np.ones(1), np.ones(1), 0.0, values)
+            assert values[0] == 0.0
+
+
+def test_values_at_a_bound_or_at_zero_stay_in_newtons_step() -> None:
+    x = np.array([-1.0, 1.0, 0.0, 0.5, -0.5])
+    _newton_step(np.eye(5), np.full(5, 0.125), -np.ones(5), np.ones(5), 0.0, x)
+    np.testing.assert_array_equal(x, [-1.0, 1.0, 0.0, 0.375, -0.625])
+    x = np.array([0.5, -0.5])
+    _newton_step(np.eye(2), np.zeros(2), -np.ones(2), np.ones(2), 0.125, x)  # sparsity pulls both to zero
+    np.testing.assert_array_equal(x, [0.375, -0.375])
+
+
+def test_the_least_ridge_is_relative_to_the_columns_but_not_below_that_of_ones() -> None:
+    small = BoundedSolver(np.array([[1e-6]]), -np.full(1, 1e9), np.full(1, 1e9), ridge=0.0)
+    assert small.solve(np.ones(1)) == pytest.approx([1e-6 / 2e-12])
+    large = BoundedSolver(np.diag([2e6, 1.0]), -np.full(2, 9.0), np.full(2, 9.0), ridge=0.0)
+    assert large.solve(np.ones(2))[1] == pytest.approx(1 / (1 + 1e-12 * (4e12 + 1) / 2))
+    assert BoundedSolver(np.ones((1, 1)), np.zeros(1), np.ones(1)).solve(np.full(1, 0.5)) == pytest.approx([0.5])
+
+
+def test_the_rounds_are_limited() -> None:
+    matrix, low, high, wanted = problem(3)
+    solver = BoundedSolver(matrix, low, high, tolerance=0.0)
+    solver.solve(wanted)
+    assert solver.rounds == 200
+    solver.solve(np.zeros(len(wanted)))
+    assert solver.rounds == 200  # no change is less than none

@@ -54,6 +54,16 @@ def test_a_report_that_comes_or_goes_while_it_is_measured_is_no_share(
     assert counted.share() is None
 
 
+def test_a_short_time_has_a_share_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steal_time, "STAT", told(tmp_path, 1000))
+    monkeypatch.setattr(os, "cpu_count", lambda: None)  # not known: as one
+    now = iter([10.0, 10.5])
+    monkeypatch.setattr(time, "monotonic", lambda: next(now))
+    counted = StealTime()
+    told(tmp_path, 1000 + round(0.25 / TICK_S))
+    assert counted.share() == pytest.approx(0.5)
+
+
 def test_no_time_has_no_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(steal_time, "STAT", told(tmp_path, 1000))
     monkeypatch.setattr(time, "monotonic", lambda: 5.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import pytest
 
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS
+from controller.body import preload as module
 from controller.body.messages import BodyOrders, Failed, RunOptions
 from controller.body.preload import PreloadedBody
 from controller.body.process import BodyProcess
@@ -35,6 +37,15 @@ def test_it_does_as_it_is_told_and_is_left_alone_then() -> None:
     assert waiting.process.exitcode == 0
     waiting.pipe.close()
     waiting.voice.close()
+
+
+def test_a_process_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_END_S", 0.001)
+    with PreloadedBody() as waiting:
+        monkeypatch.setattr(waiting.process, "terminate", lambda: None)  # the signal is lost
+        os.kill(waiting.process.pid or 0, signal.SIGSTOP)  # nor does it notice that its pipe has ended
+    waiting.process.join(60.0)
+    assert waiting.process.exitcode == -signal.SIGKILL
 
 
 def test_it_ends_when_main_is_gone() -> None:

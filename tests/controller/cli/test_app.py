@@ -71,6 +71,12 @@ def omote(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -
     return run
 
 
+def test_a_traceback_that_is_asked_for_is_pythons_own_and_no_shell_is_changed() -> None:
+    app = make_app()
+    assert app.pretty_exceptions_enable is False
+    assert "completion" not in CliRunner().invoke(app, ["--help"]).output
+
+
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_every_command_has_help_with_an_example(command: tuple[str, ...]) -> None:
     result = CliRunner().invoke(make_app(), [*command, "--help"])

@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.progress import Progress, TaskID
 from typer.testing import CliRunner, Result
 
 from controller.base.errors import ConfigError, ControllerError
+from controller.cli import bus as bus_module
 from controller.cli.app import make_app
 from controller.cli.console import console
 from controller.tools import calibrate as calibrate_module
@@ -48,6 +50,27 @@ def test_scan_lists_every_servo_or_says_what_to_look_at(servos: SimulatedBus) ->
     assert text.count("xl330-m288") == 2 and " 17 " in text
     empty = said("scan", servos.path, "--baud", "1000000", "--protocol", "2")
     assert empty.startswith(f"No servo answered on {servos.path}. Check its power")
+
+
+def test_a_scan_says_how_much_there_is_to_do(monkeypatch: pytest.MonkeyPatch, servos: SimulatedBus) -> None:
+    totals: list[float] = []
+
+    class Told(Progress):
+        def add_task(self, description: str, *words: Any, total: float | None = None, **more: Any) -> TaskID:
+            totals.append(total or 0.0)
+            return super().add_task(description, *words, total=total, **more)
+
+    monkeypatch.setattr(bus_module, "Progress", Told)
+    monkeypatch.setattr(scan_module, "scan_port", lambda port, plan, report: iter(()))
+    said("scan", servos.path, "--baud", "57600")
+    assert totals == [2 * scan_module.STEPS]  # both protocols
+
+
+def test_a_narrow_terminal_breaks_no_message(monkeypatch: pytest.MonkeyPatch, servos: SimulatedBus) -> None:
+    monkeypatch.setattr(console, "width", 30)
+    empty = omote("scan", servos.path, "--baud", "1000000", "--protocol", "2").output
+    assert f"No servo answered on {servos.path}. Check its power, the wiring and the adapter's direction" in empty
+    assert "written and read back on" in omote("set-id", servos.path, "3", "5", "--baud", "57600").output
 
 
 def test_set_id_says_what_it_wrote(servos: SimulatedBus) -> None:

@@ -91,6 +91,13 @@ def test_a_narrow_terminal_gets_paragraphs_that_name_what_they_tell() -> None:
     assert "│" not in text
 
 
+def test_columns_that_need_little_get_all_of_it() -> None:
+    table = Table("a", "b", "c", box=None, padding=0)
+    table.add_row("aaaaaaaaaa a", "b b b b b b b b b b b b b b b b b b b bb", "c" * 30 + " c")  # 12, 40 and 32 cells
+    show_table(table, Console(file=io.StringIO(), width=10 + 2 + 30 + 10, force_terminal=True))
+    assert [column.width for column in table.columns] == [12, 8, 32]
+
+
 def test_a_file_gets_every_row_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = shown(30, terminal=False).splitlines()
     assert sum("neckPitch" in line and "12.5" in line for line in lines) == 1

@@ -123,6 +123,69 @@ def test_control_points_go_with_the_mouse_and_are_worn_by_a_stage(
     assert "good" in check_anything(str(tmp_path / "stage.toml"))[0]
 
 
+def test_a_picture_is_projected_to_pixels_from_its_upper_left_corner() -> None:
+    camera = Camera.front()
+    screen, towards = Screen(camera, SIZE), np.array(camera.target) - np.array(camera.eye)
+    away = np.linalg.norm(towards)
+    right, up = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    places = np.array(camera.target) + np.array([0 * up, 10 * up, 10 * right, 0.5 * towards])
+    middle, above, beside, behind = screen.project(places)
+    np.testing.assert_allclose(middle, [640.0, 360.0, away], rtol=1e-5)
+    assert above[1] < 360.0 and above[0] == pytest.approx(640.0, abs=1e-2)
+    assert beside[0] > 640.0 and beside[1] == pytest.approx(360.0, abs=1e-2)
+    assert beside[0] - 640.0 == pytest.approx(360.0 - above[1], rel=1e-4)  # pixels are square
+    assert behind[2] == pytest.approx(1.5 * away, rel=1e-5)
+
+
+def test_a_point_is_taken_within_sixteen_pixels(handles: PointEditor) -> None:
+    screen, values, model = Screen(Camera.front(), SIZE), P.neutral(), handles._model
+    assert model is not None
+    shown = screen.project(model.skin.rest)[:, :2]
+    lowest = shown[np.argmax(np.where(model.normals[:, 2] > 0.7, shown[:, 1], 0.0))]
+    others = shown[np.linalg.norm(shown - lowest, axis=1) > 0.0]
+    for dx, dy in ((15.0, 0.0), (-15.0, 0.0), (0.0, 15.0)):
+        assert handles.take((lowest[0] + dx, lowest[1] + dy), screen, values)
+        handles.release()
+    down = lowest + np.array([0.0, 17.0])
+    alone = np.linalg.norm(others - down, axis=1).min() > 17.0
+    assert alone and not handles.take((down[0], down[1]), screen, values)
+
+
+def test_points_on_the_other_side_of_the_head_are_not_taken(handles: PointEditor) -> None:
+    screen, values, model = Screen(Camera.front(), SIZE), P.neutral(), handles._model
+    assert model is not None
+    for place in model.skin.rest[::30]:
+        x, y = pixel(screen, place)
+        if handles.take((x, y), screen, values):
+            held = handles._held
+            assert held is not None
+            depths = screen.project(model.skin.rest)
+            near = np.hypot(*(depths[:, :2] - [x, y]).T) < 16.0
+            facing = model.normals @ np.array([0.0, 0.0, 1.0]) > 0.3
+            assert screen.project(held.place[None])[0, 2] <= depths[near & facing, 2].min(initial=np.inf) + 40.0
+            handles.release()
+
+
+def test_points_lie_where_the_moved_control_points_show_them(handles: PointEditor) -> None:
+    model, values = handles._model, P.neutral()
+    assert model is not None
+    before = handles._places(model, values)[0]
+    handles._set_moves(np.tile([1.0, 3.0, -2.0], (len(handles._rest), 1)))
+    np.testing.assert_allclose(handles._places(model, values)[0] - before, [[1.0, 3.0, -2.0]] * len(before), atol=1e-6)
+    handles.undo()
+    np.testing.assert_allclose(handles._places(model, values)[0], before)
+
+
+def test_only_control_points_that_moved_are_kept(handles: PointEditor, head: Head, tmp_path: Path) -> None:
+    moves = np.zeros_like(handles._rest)
+    moves[[3, 5, 7], [0, 1, 2]] = 0.01, -0.0099, -2.0
+    handles._set_moves(moves)
+    handles.save(tmp_path / "a.json", "a")
+    assert load_group(tmp_path / "a.json", head)[1].ids.tolist() == [3, 7]
+    handles.undo()
+    assert not handles.sculpted
+
+
 def test_a_stage_names_groups_that_are_missing(tmp_path: Path) -> None:
     (tmp_path / "stage.toml").write_text('name = "mine"\n[groups]\n"none.json" = 1\n')
     with pytest.raises(ConfigError, match=r"groups\[0\]: no group 'none.json'"):

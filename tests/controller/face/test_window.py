@@ -212,6 +212,31 @@ def test_the_panel_sends_what_its_widgets_ask_for(screen: Screen, monkeypatch: p
     assert isinstance(sent[-1], Neutral) and sent[-1].seconds > 0.0
 
 
+def test_three_buttons_fill_a_row(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
+    imgui, real = screen.imgui, screen.imgui.button
+    seen: list[tuple[float, float, float, float]] = []
+
+    def button(label: str, size: Any) -> bool:
+        pressed = bool(real(label, size))
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        seen.append((low.x, high.x, low.y, imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x))
+        return pressed
+
+    monkeypatch.setattr(imgui, "button", button)
+    panel = Panel(PARAMETERS.neutral, lambda request: None)
+    for _ in range(3):
+        seen.clear()
+        screen.frame(panel)
+    gap = imgui.get_style().item_spacing.x
+    rows = [seen[i : i + 3] for i in range(0, len(seen) - 2, 3)]
+    assert len(rows) > 1 and all(len({y for _, _, y, _ in row}) == 1 for row in rows)
+    assert rows[0][0][2] < rows[1][0][2]
+    for (left, right, _, _), (next_left, next_right, _, _) in zip(rows[0], rows[0][1:], strict=False):
+        assert right - left == pytest.approx(next_right - next_left, abs=1.0)
+        assert next_left - right == pytest.approx(gap, abs=1.0)
+    assert rows[0][2][1] == pytest.approx(rows[0][2][3], abs=1.5)
+
+
 def test_the_panel_shows_who_holds_a_parameter_and_what_the_servos_show(
     screen: Screen, monkeypatch: pytest.MonkeyPatch
 ) -> None:

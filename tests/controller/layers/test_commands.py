@@ -49,8 +49,9 @@ def test_set_arrives_eased_and_stays(face: Face) -> None:
 
 
 def test_the_stamp_of_the_newest_command_comes_out_with_the_next_tick(face: Face) -> None:
-    face.run(0.02)
-    assert face.stamp == 0
+    for _ in range(2):
+        face.run(0.01)
+        assert face.stamp == 0
     face.state.set_parameters([JAW], [0.8], face.now + 5)
     face.state.gaze(0.1, 0.0, face.now + 3)
     face.run(0.01)
@@ -85,6 +86,11 @@ def test_gaze_turns_eyes_and_head_and_off_returns(face: Face) -> None:
     assert abs(face.run(3.0)[P.index("headYaw")]) < 1e-3
     face.state.gaze_at(0.0, 0.0, 300.0, face.now)
     assert face.run(1.0)[P.index("leftEyeYaw")] < 0 < face.values[P.index("rightEyeYaw")]
+
+
+def test_straight_ahead_has_no_sign(face: Face) -> None:
+    face.state.gaze(-0.0, -0.0, face.now)
+    assert face.state.status()["gaze"] == "0.0,0.0"
 
 
 def test_neutral_releases_everything(face: Face) -> None:
@@ -177,6 +183,12 @@ def test_life_blinks_by_itself_and_stops(face: Face) -> None:
     assert face.state.holder(P.index("headRoll")) == "expression"
     face.state.live(0.0, face.now)
     assert np.abs(face.run(3.0)).max() < 1e-6
+
+
+def test_the_amount_of_life_stays_between_none_and_all(face: Face) -> None:
+    for amount, kept in ((-1.0, 0.0), (0.25, 0.25), (2.0, 1.0)):
+        face.state.live(amount, face.now)
+        assert face.state.status()["life"] == kept
 
 
 def test_life_gives_way_to_set(face: Face) -> None:

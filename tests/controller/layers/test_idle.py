@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from pathlib import Path
 
@@ -99,6 +100,74 @@ def test_a_large_gaze_shift_often_brings_a_blink(settings: IdleSettings) -> None
     share = np.mean([blinked(0.5, seed) for seed in range(200)])
     assert 0.35 < share < 0.65
     assert not any(blinked(0.1, seed) for seed in range(50))
+
+
+def test_a_shift_of_the_gaze_counts_from_its_angle_on(settings: IdleSettings) -> None:
+    blink = settings.blink.model_copy(update={"shift_deg": math.degrees(0.3), "shift_share": 1.0})
+    for angle_rad, blinks_soon in ((0.3, True), (-0.3, True), (0.29, False), (-0.29, False)):
+        life = IdleMotion(P, settings.model_copy(update={"blink": blink}))
+        life.liveliness = 1.0
+        life.update(0.0, looking=True)
+        life.shift(angle_rad, 0.5)
+        assert (life._next_blink_s == 0.5) == blinks_soon
+        before = life._next_blink_s
+        life.shift(0.3, 1.5)  # one that is due before stays so
+        assert life._next_blink_s == min(before, 1.5)
+
+
+@pytest.mark.parametrize("looking", [False, True])
+def test_the_eyes_rest_between_two_glances(settings: IdleSettings, looking: bool) -> None:
+    eyes = settings.eyes.model_copy(
+        update={"interval_s": (2.0, 2.0), "micro_interval_s": (0.5, 0.5), "home_share": 0.0}
+    )
+    life = IdleMotion(P, settings.model_copy(update={"eyes": eyes}), 3)
+    life.liveliness = 1.0
+    seen = []
+    for i in range(401):
+        life.update(10.0 + i / 100, looking=looking)
+        seen.append((life.eye_yaw_rad, life.eye_pitch_rad))
+    changes = [i for i in range(1, 401) if seen[i] != seen[i - 1]]
+    every = 50 if looking else 200
+    assert np.abs(np.diff([0, *changes]) - every).max() <= 2 and len(changes) == 400 // every
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_double_blink_comes_after_its_gap(settings: IdleSettings, share: float) -> None:
+    figures = {"interval_s": (5.0, 5.0), "double_share": share, "double_gap_s": (0.3, 0.3), "hold_s": (0.05, 0.05)}
+    blink = settings.blink.model_copy(update=figures)
+    path = live(settings.model_copy(update={"blink": blink}), 20.0)
+    closed = (path[:, LID] > 0.5).astype(int)
+    begins = np.flatnonzero(np.diff(closed) > 0) / 100
+    once = blink.close_s + 0.05 + blink.open_s
+    if share:
+        assert len(begins) == 6 and np.diff(begins)[::2] == pytest.approx([once + 0.3] * 3, abs=0.021)
+        assert np.diff(begins)[1::2] == pytest.approx([once + 5.0] * 2, abs=0.021)
+    else:
+        assert np.diff(begins) == pytest.approx([once + 5.0] * (len(begins) - 1), abs=0.021) and len(begins) == 3
+
+
+class Lowest(random.Random):
+    """Draws the lowest share every time, and one deviation of a spread."""
+
+    def random(self) -> float:
+        return 0.0
+
+    def gauss(self, mu: float = 0.0, sigma: float = 1.0) -> float:
+        return mu + sigma
+
+
+def test_a_share_of_zero_never_happens(settings: IdleSettings) -> None:
+    blink = settings.blink.model_copy(update={"shift_share": 0.0, "double_share": 0.0})
+    eyes = settings.eyes.model_copy(update={"home_share": 0.0})
+    life = IdleMotion(P, settings.model_copy(update={"blink": blink, "eyes": eyes}))
+    life.liveliness, life._random = 1.0, Lowest()
+    life.update(0.0, looking=False)
+    assert life.eye_yaw_rad != 0.0  # not at home
+    soon = life._next_blink_s
+    life.shift(1.0, 0.01)
+    assert life._next_blink_s == soon
+    life.update(soon, looking=False)
+    assert len(life._blinks) == 1
 
 
 def test_a_wrong_file_lists_every_fault(tmp_path: Path, root: Path) -> None:

@@ -23,12 +23,22 @@ def test_a_stage_changes_single_keys_and_adds_layers() -> None:
     assert layers["show"].mode == "max"
 
 
+def test_weights_and_gains_reach_their_limits() -> None:
+    for weight, gain in ((0, 0), (1, 4)):
+        layers = {layer.name: layer for layer in load_layers({"capture": {"weight": weight, "gains": {"brows": gain}}})}
+        assert (layers["capture"].weight, layers["capture"].gains) == (weight, {"brows": gain})
+
+
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
         ({"capture": {"gain": {}}}, "layers.capture.gain: unknown key"),
         ({"capture": {"gains": {"brow": 0.5}}}, "no region called 'brow', did you mean 'brows'?"),
         ({"capture": {"weight": 2}}, "layers.capture.weight: "),
+        ({"capture": {"weight": 1.01}}, "layers.capture.weight: "),
+        ({"capture": {"weight": -0.01}}, "layers.capture.weight: "),
+        ({"capture": {"gains": {"brows": 4.01}}}, "layers.capture.gains.brows: "),
+        ({"capture": {"gains": {"brows": -0.01}}}, "layers.capture.gains.brows: "),
         ({"show": {}}, "layers.show.priority: missing"),
         ({"show": {"priority": 40}}, "layers.show.priority: 40 is that of speech"),
         ({"gaze": {"mode": "mix"}}, "layers.gaze.mode: "),

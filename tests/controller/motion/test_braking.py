@@ -31,6 +31,18 @@ def test_it_takes_the_speed_that_the_way_left_allows(way: float) -> None:
     assert step(way * 0.004, 0.0, way * 0.2)[1] == pytest.approx(way * (0.004 - 0.001) / 0.025)  # the linear end
 
 
+@pytest.mark.parametrize("dt", [0.001, 0.01, 0.03])
+@pytest.mark.parametrize(("accel", "response"), [(40.0, 0.02), (3.0, 0.2)])
+def test_the_way_left_after_the_step_is_just_enough_to_brake(dt: float, accel: float, response: float) -> None:
+    knee = accel * response  # below this speed, speed is proportional to the distance
+    for distance in np.linspace(0.0, 3 * accel * (response**2 + response * dt), 50):
+        speed = braking._braking_speed(dt, distance, accel, response)
+        left = distance - 0.5 * dt * speed
+        needed = speed * response if speed <= knee else speed**2 / (2 * accel) + 0.5 * accel * response**2
+        assert left == pytest.approx(needed, rel=1e-9, abs=1e-12)
+    assert speed > knee
+
+
 def test_limits_of_speed_and_acceleration_hold_it_back_and_are_told() -> None:
     assert step(5.0, 0.0, 0.0) == (pytest.approx(0.5 * ACCEL * DT**2), pytest.approx(ACCEL * DT), True)
     assert step(5.0, 0.0, SPEED)[1:] == (SPEED, True)

@@ -71,6 +71,12 @@ def test_a_simulated_bus_takes_the_options_of_its_family(family: str) -> None:
         assert driver.path.startswith("socket://127.0.0.1:")
 
 
+def test_a_bus_that_says_nothing_has_the_usual_settings() -> None:
+    bus = read_bus({"name": "b", "kind": "simulated"})
+    assert (bus.port, bus.baud, bus.rate_hz, bus.simulates, bus.transport) == ("", 1_000_000, 50.0, "dynamixel", None)
+    assert (bus.faults, bus.wire, bus.latency_s, bus.seed) == ([], False, 0.0, 0)
+
+
 def test_what_is_not_given_is_left_to_the_driver() -> None:
     bus = read_bus({"name": "head", "kind": "maestro", "port": "x"})
     assert bus.options() == {"baud": 115_200, "port": "x"}

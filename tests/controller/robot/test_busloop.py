@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -235,6 +236,35 @@ def test_no_goal_is_sent_to_a_servo_that_does_not_say_where_it_is_after_a_reconn
         servos.clear()
         until(lambda: abs(degrees(servos, 2) - 40.0) < 0.2)
         assert loop.error is None
+
+
+def resting(servos: SimulatedBus, measures: bool, states: list[tuple[bool, float]]) -> int:
+    """How many goals lead to rest while the jaw answers or not, and is so many degrees away; then no more is read."""
+    loop, reads = make(servos, Face()), iter(states)
+
+    def read() -> SimpleNamespace:
+        fresh, deg = next(reads, (None, 0.0))
+        if fresh is None:
+            raise NoReply("no more")
+        at = loop.table.neutral_rad + np.radians([deg, 0.0])
+        return SimpleNamespace(fresh=np.array([fresh, measures]), position_rad=at)
+
+    sent: list[object] = []
+    loop.bus = SimpleNamespace(measures=measures, write=sent.append, read=read)  # type: ignore[assignment]
+    loop._goals = SimpleNamespace(step=lambda goal, state: goal)  # type: ignore[assignment]
+    loop._come_to_rest()
+    return len(sent)
+
+
+def test_servos_are_led_to_rest_until_each_of_them_says_that_it_is_there(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent, far, near, there = (False, 0.0), (True, 3.0), (True, -1.2), (True, 0.0)
+    assert resting(servos, True, [far, silent, near, there]) == 4
+    assert resting(servos, True, [(True, -3.0), (True, 1.1), there]) == 2
+    assert resting(servos, False, [silent, there]) == 1  # where nothing is measured, the goal counts
+    monkeypatch.setattr(module, "_REST_LIMIT_NS", -(10**9))
+    assert resting(servos, True, [far, far]) == 1  # not longer than the limit
 
 
 def test_a_limp_bus_is_only_read(servos: SimulatedBus) -> None:

@@ -113,6 +113,13 @@ def test_a_newer_file_is_refused_for_that_alone(tmp_path: Path) -> None:
     assert "1 fault" in str(caught.value)
 
 
+def test_a_calibration_of_no_channel_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text('name = "desk"\nrobot = "head24"\n[channels]\n')
+    with pytest.raises(ConfigError, match="channels: "):
+        calibrated(load_robot(HEAD, PARAMETERS), path)
+
+
 def test_the_neutral_angle_may_be_an_end() -> None:
     for angles in ((-4, -4, 9), (-4, 9, 9)):
         low, rest, high = angles

@@ -126,6 +126,29 @@ def test_an_overloaded_servo_gives_way_from_where_it_stands_and_comes_back() -> 
     assert line.guard.report()[0]["times"] == 1
 
 
+def test_a_servo_that_is_overloaded_again_gives_way_from_there() -> None:
+    line = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    line.run(1.0, 40.0)
+    for stuck_deg in (20.0, 30.0):
+        stuck, free = (measured(np.radians([stuck_deg]), np.array([current])) for current in (0.9, 0.1))
+        held = [float(line.step(40.0, state=stuck)[0]) for _ in range(100)]
+        assert held[-1] == pytest.approx(stuck_deg - 12.0, abs=0.1)
+        assert min(held) > stuck_deg - 12.1
+        began = next(i for i, deg in enumerate(held) if deg < 39.9)
+        assert max(held[began + 8 : began + 10]) > stuck_deg - 9.0  # it gives way slowly, from where it stands
+        for _ in range(200):
+            line.step(40.0, state=free)
+    assert line.guard.report()[0]["times"] == 2
+
+
+def test_a_current_at_the_limit_is_none_too_many() -> None:
+    line = Line(RuleSettings(load=[LOAD]), table_of("a"))
+    line.run(1.0, 40.0)
+    for _ in range(100):
+        line.step(40.0, state=measured(np.radians([20.0]), np.array([0.5])))
+    assert line.guard.report() == []
+
+
 def test_a_servo_pushed_down_gives_way_upwards() -> None:
     line = Line(RuleSettings(load=[LOAD]), table_of("a"))
     line.run(1.0, -30.0)

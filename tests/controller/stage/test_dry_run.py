@@ -6,6 +6,7 @@ import importlib.util
 import json
 import os
 import sys
+import wave
 from pathlib import Path
 from types import ModuleType
 
@@ -59,6 +60,8 @@ def test_a_script_is_rehearsed_with_rules_and_limits(tmp_path: Path) -> None:
     rows, report = found.rows, found.buses
     jaw = next(row for row in rows if row["channel"] == "jawOpen")
     assert "timing" in jaw["held by"]
+    fastest, most = map(float, jaw["fastest (deg/s)"].split(" of "))
+    assert 0.1 * most < fastest <= most + 0.1
     way = [sent[3] for sent in report[0]["sent_deg"]]
     assert max(way) == pytest.approx(28.0, abs=0.1) and way[int(3.5 * HZ)] == pytest.approx(18.0, abs=0.1)
     assert report[0]["rules"][0]["rule"] == "timing jawOpen toward high"
@@ -70,6 +73,17 @@ def test_a_take_is_rehearsed(tmp_path: Path) -> None:
     rows = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), take, None, PARAMETERS).rows
     sent = next(row for row in rows if row["channel"] == "jawOpen")["sent (deg)"]
     assert float(sent.split()[-1]) > 10
+
+
+def test_the_voice_of_a_stage_is_rehearsed_where_it_is_a_file(tmp_path: Path) -> None:
+    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
+        file.setparams((1, 2, 16000, 0, "NONE", ""))
+        file.writeframes((9000 * np.sin(np.arange(16000) / 16)).astype("<i2").tobytes())
+    for more, moves in (("", True), ("voice_hz = 16000\n", False)):
+        stage = load_stage(str(stage_file(tmp_path, f'voice = "a.wav"\n{more}')), PARAMETERS)
+        rows, _ = dry_run(stage, None, 1.0, PARAMETERS)
+        jaw = next(row for row in rows if row["channel"] == "jawOpen")["sent (deg)"]
+        assert (float(jaw.split()[-1]) > 5) == moves
 
 
 def test_the_command_opens_no_port_and_writes_every_angle(tmp_path: Path) -> None:

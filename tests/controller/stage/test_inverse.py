@@ -12,7 +12,7 @@ import pytest
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
-from controller.robot.anchors import head_order, sample_skin, skin_points
+from controller.robot.anchors import SkinSamples, head_order, sample_skin, skin_points
 from controller.stage.inverse import GroupMoves, PointSolver, SculptSolver, load_group, save_group
 from surface.head import Group, Head
 
@@ -75,6 +75,30 @@ def test_one_dragged_corner_of_the_mouth_is_a_few_parameters(head: Head) -> None
     found = one.solve(wanted)
     assert 1 <= np.count_nonzero(found > 0.01) <= 6
     assert missing(one, wanted, found) < 0.5
+
+
+def one_shape(*quarters: float, **more: float) -> PointSolver:
+    """A point whose only shape moves it upwards by so many mm on each quarter of its way."""
+    moves = np.zeros((1, 3, 1, 4))
+    moves[0, 1, 0] = quarters
+    skin = SkinSamples("face", np.zeros((1, 2)), np.zeros((1, 3)), moves, np.zeros(1))
+    return PointSolver(skin, np.array([P.index("cheekPuff")]), P, **more)
+
+
+def test_a_little_less_is_found_than_wanted_for_the_sake_of_small_values() -> None:
+    found = one_shape(2.5, 2.5, 2.5, 2.5).solve(np.array([[0.0, 5.0, 0.0]]))
+    assert found[P.index("cheekPuff")] == pytest.approx((10 * 5 - 0.02) / (10**2 + 1e-3), rel=1e-9)
+    found = one_shape(2.5, 2.5, 2.5, 2.5, sparsity=4.0).solve(np.array([[0.0, 5.0, 0.0]]))
+    assert found[P.index("cheekPuff")] == pytest.approx((10 * 5 - 4.0) / (10**2 + 1e-3), rel=1e-9)
+    assert np.count_nonzero(found) == 1
+
+
+@pytest.mark.parametrize(
+    ("height", "value"), [(1.0, 0.25), (2.0, 0.375), (3.0, 0.5), (6.0, 0.75), (10.0, 1.0), (99.0, 1.0)]
+)
+def test_a_shape_that_is_not_straight_is_followed_along_its_way(height: float, value: float) -> None:
+    found = one_shape(1.0, 2.0, 3.0, 4.0).solve(np.array([[0.0, height, 0.0]]))
+    assert found[P.index("cheekPuff")] == pytest.approx(value, abs=0.02)
 
 
 def test_values_stay_in_range_for_places_out_of_reach(dragger: PointSolver) -> None:

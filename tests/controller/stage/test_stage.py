@@ -9,7 +9,7 @@ import pytest
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS
-from controller.stage.stage import Stage, load_stage, parse_identity, with_picture
+from controller.stage.stage import Stage, check_identity, load_stage, parse_identity, with_picture
 
 
 def stage_file(tmp_path: Path, text: str) -> str:
@@ -107,6 +107,15 @@ def test_identities_are_names_and_amounts():
     for wrong in ("broad=2", "broad=-0.1", "broad=x", "=1", "broad=nan"):
         with pytest.raises(ParameterError, match="--identity"):
             parse_identity(wrong)
+
+
+def test_identities_are_those_of_the_head() -> None:
+    head = load_stage("demo", PARAMETERS).head
+    check_identity(head, {})
+    check_identity(head, {"broad": 0.5})
+    with pytest.raises(ConfigError, match=r"no identity 'brod'; there are .*broad") as caught:
+        check_identity(head, {"broad": 1.0, "brod": 1.0})
+    assert "docs/heads.md" in caught.value.hint
 
 
 def test_a_record_cannot_be_changed() -> None:

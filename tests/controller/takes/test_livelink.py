@@ -27,6 +27,13 @@ def take(shared: Path) -> Take:
     return Take.load(shared / "data" / "livelink" / "alex_rom_3.csv", P)
 
 
+def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
+    one = Take.load(write(tmp_path / "a.csv", "Timecode,BlendshapeCount,JawOpen", "0:0:0:0,61,0.1"), P)
+    for array in (one.times_s, one.values, one.mask):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
 def test_a_real_take(take: Take) -> None:
     assert take.frames == 4030
     assert take.rate_hz == pytest.approx(30.0, abs=1e-6)

@@ -118,6 +118,15 @@ def test_files_that_cannot_be_opened(tmp_path: Path) -> None:
         pass
 
 
+def test_a_replay_without_a_tick_is_finished_at_once(tmp_path: Path) -> None:
+    path, out = tmp_path / "a.rec", P.neutral()
+    with recorded(CommandState(P), path):
+        pass
+    player = Replay(path, P)
+    assert (player.finished, player.ticks, player.played_s) == (False, 0, 0.0)
+    assert player.tick(5, 0.01, out) == 0 and player.finished and player.ticks == 0 and not out.any()
+
+
 def test_a_replay_ticks_at_its_own_pace_whatever_the_clock(tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     recorded, out = perform(path, 2.0), P.neutral()

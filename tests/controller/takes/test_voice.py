@@ -73,6 +73,12 @@ def test_noise_of_a_silent_room_moves_nothing() -> None:
     assert heard(VoiceEnvelope(P, RATE), room).max() == 0.0
 
 
+@pytest.mark.parametrize(("rms", "heard_of"), [(0.0029, False), (0.0033, True)])
+def test_a_voice_counts_from_the_loudness_of_silence_on(rms: float, heard_of: bool) -> None:
+    face = heard(VoiceEnvelope(P, RATE), tone(1000, 0.3, rms * math.sqrt(2)))
+    assert (face[10:, JAW].max() > 0.1) == heard_of and (heard_of or not face[10:-1].any())
+
+
 def test_a_stream_moves_the_speech_layer_until_it_ends() -> None:
     state, out = CommandState(P), P.neutral()
     listener = VoiceListener(io.BytesIO(wav(tone(200, 0.3))), state)
@@ -194,7 +200,13 @@ def mouth(voice: float, hiss: float) -> dict[str, float]:
 
 EDGES = tone(2500, 0.05, 0.3) + tone(4000, 0.05, 0.3)  # just outside of both bands
 SPOKEN = np.concatenate(
-    [tone(200, 0.1), np.zeros(800), tone(6000, 0.06, 0.2), tone(300, 0.05) + tone(5000, 0.05), EDGES]
+    [
+        np.linspace(0.2, 1.0, 1600) * tone(200, 0.1),  # no two pieces are as loud
+        np.zeros(800),
+        np.linspace(0.5, 1.0, 960) * tone(6000, 0.06, 0.2),
+        np.linspace(1.0, 0.4, 800) * (tone(300, 0.05) + tone(5000, 0.05)),
+        EDGES,
+    ]
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import os
 import re
 import resource
@@ -150,6 +151,18 @@ def test_a_head_is_calibrated_by_hand_and_by_keys_and_saved(tmp_path: Path, open
         assert not servo.torque
     captured = tomllib.loads((tmp_path / "pair.desk.calibration.toml").read_text())
     assert captured["channels"]["jaw"] == pytest.approx({"min_deg": -10, "neutral_deg": 5, "max_deg": 18}, abs=0.1)
+
+
+def test_keys_of_a_windows_console_have_the_same_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    typed = list("a\xe0H\x00P\xe0M\xe0Kb\xe0X")
+    console = SimpleNamespace(kbhit=lambda: bool(typed), getwch=lambda: typed.pop(0))
+    now = itertools.count(10.0, 0.0625)
+    slept: list[float] = []
+    monkeypatch.setitem(sys.modules, "msvcrt", console)
+    monkeypatch.setattr(module.time, "monotonic", lambda: next(now))
+    monkeypatch.setattr(module.time, "sleep", slept.append)
+    assert module._windows_keys(1.0) == ["a", "up", "down", "right", "left", "b"]
+    assert len(slept) == 8 and all(0.0 < seconds < 0.1 for seconds in slept)  # until the second is over
 
 
 def test_a_calibration_that_exists_is_not_replaced_without_a_yes(tmp_path: Path, opened: Opened) -> None:

@@ -86,6 +86,15 @@ def test_every_kind_of_file_is_told_apart(tmp_path: Path) -> None:
         check_anything(str(tmp_path / "b.rec"))
 
 
+def test_a_recording_without_a_tick_and_a_json_that_is_no_text(tmp_path: Path) -> None:
+    with recorded(CommandState(PARAMETERS), tmp_path / "a.rec"):
+        pass
+    assert check_anything(str(tmp_path / "a.rec"))[0].startswith("recording a.rec: 0 ticks, 0.0 s, all came out")
+    (tmp_path / "b.json").write_bytes(b'\xff"moves_mm"')
+    with pytest.raises((TakeError, SurfaceFileError), match=r"b\.json"):
+        check_anything(str(tmp_path / "b.json"))
+
+
 def test_a_head_whose_vertices_leave_space_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_data(tmp_path, small_head(parts=[part("face", -40)], seams=[], paint=[]))
     (line,) = check_anything(str(tmp_path))

@@ -12,7 +12,7 @@ import pytest
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS
 from controller.takes.reader import TAKES, load_take, reader_of
-from controller.tools.plugins import EXPORTERS, SORTS, Listed, listed
+from controller.tools.plugins import EXPORTERS, SORTS, Listed, added_exporters, listed
 from drivers import open_bus
 from drivers.base.bus import ServoSpec
 from drivers.base.errors import PluginError
@@ -80,6 +80,13 @@ def test_an_exporter_takes_no_suffix_of_ours(install: Install) -> None:
     with pytest.raises(PluginError, match=r"\.glb is written by the built-in kind 'glb'"):
         EXPORTERS.get("aaa")
     assert [one.kind for one in EXPORTERS.all()] == ["glb", "obj"]
+
+
+def test_added_exporters_are_those_of_other_packages_one_a_suffix(install: Install) -> None:
+    assert added_exporters() == []
+    for kind, suffix in (("aaa", ".one"), ("bbb", ".one"), ("ccc", ".two")):
+        install("exporters", kind, EXPORTER.format(kind=kind, suffix=suffix))
+    assert [one.kind for one in added_exporters()] == ["aaa", "ccc"]
 
 
 def test_a_family_without_a_simulator_is_driven_but_not_stood_in_for(install: Install) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import FrozenInstanceError, replace
+from types import SimpleNamespace
 
 import pytest
 
+from controller.tools import scan as module
 from controller.tools.scan import BAUDS, STEPS, Found, plan_scan, scan_port
 from drivers.base.bus import ServoInfo
 from drivers.base.errors import PortMissing
@@ -42,6 +44,20 @@ def test_an_adapter_that_echoes_makes_no_servos_up() -> None:
 
 def test_damage_without_an_answer_is_told() -> None:
     assert Found(57_600, 1, None).row[2:4] == ("?", "answers are damaged: two servos with one id, or noise")
+
+
+@pytest.mark.parametrize(
+    ("ids", "noise", "told"), [((), True, [None]), ((), False, []), ((3, 5), True, [3, 5]), ((3,), False, [3])]
+)
+def test_noise_is_told_only_where_no_servo_answers(
+    monkeypatch: pytest.MonkeyPatch, ids: tuple[int, ...], noise: bool, told: list[int | None]
+) -> None:
+    monkeypatch.setattr(module, "SerialPort", lambda port, baud: SimpleNamespace(open=lambda: 0, close=lambda: 0))
+    monkeypatch.setattr(module, "ping_all", lambda link, step: SimpleNamespace(ids=ids, noise=noise))
+    monkeypatch.setattr(module, "describe", lambda link, servo: servo)
+    found = list(scan_port("port", [(1, 57_600)]))
+    assert [item.servo for item in found] == told
+    assert all((item.baud, item.protocol) == (57_600, 1) for item in found)
 
 
 def test_all_rates_are_planned_the_usual_ones_first() -> None:

@@ -8,7 +8,7 @@ import pytest
 from controller.base.parameters import PARAMETERS as P
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.facs import Facs
-from controller.vocabulary.reading import Readings
+from controller.vocabulary.reading import Readings, _Levels
 from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
 
@@ -48,6 +48,20 @@ def test_visemes(readings: Readings) -> None:
         best = max(shown, key=lambda each: each[1])[0]
         alike = np.abs(visemes.matrix - face[:, None]).max(axis=0) < 1e-9  # some visemes have one mouth
         assert best in {visemes.names[i] for i in np.flatnonzero(alike)}, name
+
+
+def test_levels_stay_between_nothing_and_everything() -> None:
+    levels = _Levels(np.diag([1.0, 2.0, 0.5, 1.0])).solve(np.array([-1.0, 3.0, 0.25, 0.0]))
+    assert levels == pytest.approx([0.0, 1.0, 0.5, 0.0], abs=0.01)
+    assert (levels[0], levels[1], levels[3]) == (0.0, 1.0, 0.0) and levels[2] < 0.5  # few and small ones are preferred
+
+
+def test_only_what_shows_is_told(readings: Readings) -> None:
+    face = Facs.load(P)
+    for intensity, shown in ((0.03, set()), (0.2, {"26"})):
+        assert {name for name, _ in readings.read("UNITS", face.expand("26", intensity))} == shown
+    with pytest.raises(KeyError):
+        readings.read("WEATHER", P.neutral())
 
 
 def test_moods(readings: Readings) -> None:

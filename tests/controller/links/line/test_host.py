@@ -117,6 +117,95 @@ def test_a_process_of_its_own_outlives_interrupts_and_ends_with_its_input(tmp_pa
             process.kill()
 
 
+class TimedPort:
+    """A port on a clock of its own: a read takes all of its time, and every line from ``answers_s`` on is accepted."""
+
+    dropped = 0
+
+    def __init__(self, answers_s: float = 0.0) -> None:
+        self.now_s, self._answers_s = 0.0, answers_s
+        self.sent: list[tuple[float, str]] = []
+        self.waits: list[float] = []
+        self._replies = b""
+
+    def read(self, timeout_s: float) -> bytes:
+        self.waits.append(timeout_s)
+        self.now_s += max(timeout_s, 1e-7)  # time never stands still
+        replies, self._replies = self._replies, b""
+        return replies
+
+    def write(self, data: bytes) -> None:
+        tag, line = data.decode().rpartition("*")[0].split(" ", 1)
+        self.sent.append((round(self.now_s, 5), line))
+        if self.now_s >= self._answers_s:
+            self._replies += f"{tag} OK\n".encode()
+
+
+def played(script: Script, until_s: float, answers_s: float = 0.0) -> tuple[TimedPort, RobotHost]:
+    port = TimedPort(answers_s)
+    host = RobotHost(port, script, P, now_s=lambda: port.now_s)  # type: ignore[arg-type]
+    host.run(lambda: port.now_s < until_s)
+    return port, host
+
+
+def test_it_greets_ten_times_a_second_until_it_is_answered_and_steps_count_from_then() -> None:
+    script = Script(((0.0, "PING a"), (0.0, "PING b"), (0.25, "PING c"), (0.251, "PING d")))
+    port, host = played(script, 1.0, answers_s=0.25)
+    greetings = [(0.0, "HELLO"), (0.1, "HELLO"), (0.2, "HELLO"), (0.3, "HELLO")]
+    assert port.sent == [*greetings, (0.4, "PING a"), (0.4, "PING b"), (0.65, "PING c"), (0.651, "PING d")]
+    assert all(wait <= 0.02 + 1e-9 for wait in port.waits[4:])  # it looks often whether it shall end
+    assert (host.counts["accepted"], host.counts["unasked"], host.counts["unanswered"]) == (5, 0, 0)
+
+
+def test_a_loop_repeats_its_steps_in_its_own_time() -> None:
+    port, _ = played(Script(((0.0, "PING a"), (0.125, "PING b")), loop_s=0.25), 0.7)
+    start = 0.1  # after the greeting
+    assert [(round(at - start, 5), line[-1]) for at, line in port.sent[1:]] == [
+        (0.0, "a"), (0.125, "b"), (0.25, "a"), (0.375, "b"), (0.5, "a")
+    ]  # fmt: skip
+
+
+def test_frames_come_at_their_rate_and_those_that_were_missed_are_left_out() -> None:
+    port, host = played(Script((), frames_hz=20.0), 0.42)
+    assert [round(at - 0.1, 5) for at, _ in port.sent[1:]] == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3])
+    assert all(line.startswith("FRAME ") and len(line.split()) == 60 for _, line in port.sent[1:])
+    assert host._send_frame(2, 0.5) == 11  # ten periods and the first: one is sent for those between
+    assert host._send_frame(11, 0.5) == 11 and len(port.sent) == 9
+    assert len(played(Script(()), 0.5)[0].sent) == 1  # the greeting
+
+
+def test_an_answer_is_waited_for_one_second() -> None:
+    port = TimedPort(answers_s=99.0)
+    host = RobotHost(port, Script(()), P, now_s=lambda: port.now_s)  # type: ignore[arg-type]
+    host._greeted = True
+    host.send("PING")
+    host._listen(1.0)
+    assert host.counts["unanswered"] == 0
+    host._listen(1.01)
+    assert host.counts["unanswered"] == 1 and not host._waiting
+
+
+def test_the_first_twenty_refusals_are_kept_and_round_trips_are_in_milliseconds() -> None:
+    port = TimedPort(answers_s=99.0)
+    host = RobotHost(port, Script(()), P, now_s=lambda: port.now_s)  # type: ignore[arg-type]
+    for i in range(1, 22):
+        host.send(f"PING {i}")
+    port.now_s = 0.25
+    for i in range(1, 22):
+        host._take(f"#{i} ERR 21 no".encode())
+    assert host.counts["refused"] == 21 and len(host.refusals) == 20 and host.refusals[-1] == "PING 20 -> ERR 21 no"
+    assert host.round_trip_ms.summary()["max"] == pytest.approx(250.0)
+    assert host.report() == {
+        "script": "", "sent": 21, "accepted": 0, "refused": 21, "unanswered": 0, "damaged": 0, "unasked": 0,
+        "streamed": 0, "dropped_bytes": 0, "refusals": host.refusals, "round_trip_ms": host.round_trip_ms.summary(),
+    }  # fmt: skip
+    host._take(b"")
+    host._take(b"OK without a tag")
+    host._take(b"P 1 jawOpen=0")
+    host._take(b"F 1 0")
+    assert (host.counts["unasked"], host.counts["streamed"], host.counts["damaged"]) == (1, 2, 0)
+
+
 def test_tags_have_nine_digits_at_most_and_begin_again_at_one(port: HostPort) -> None:
     host = RobotHost(port, Script(()), P)
     host.send("PING")

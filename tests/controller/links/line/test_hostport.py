@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from pathlib import Path
 
@@ -30,6 +31,32 @@ def test_a_full_wire_drops_and_counts() -> None:
     with HostPort() as port:
         port.write(b"x" * 200_000)
         assert 0 < port.dropped < 200_000
+
+
+def test_a_read_waits_for_the_first_byte() -> None:
+    with HostPort() as port:
+        device = SerialPort(port.path, 115200)
+        device.open()
+        later = threading.Timer(0.05, device.write, [b"late"])
+        later.start()
+        assert port.read(30.0) == b"late"
+        assert port.read(-1.0) == b""  # a time that has passed asks without waiting
+        later.join()
+        device.close()
+
+
+def test_a_write_waits_for_room_and_loses_nothing_while_the_other_side_reads() -> None:
+    sent, got = bytes(range(256)) * 400, bytearray()
+    with HostPort() as port:
+        device = SerialPort(port.path, 115200)
+        device.open()
+        writer = threading.Thread(target=port.write, args=[sent])
+        writer.start()
+        while len(got) < len(sent) - port.dropped:
+            got += device.read(time.monotonic() + 5)
+        writer.join()
+        assert port.dropped == 0 and bytes(got) == sent
+        device.close()
 
 
 def test_link_is_made_replaced_and_removed(tmp_path: Path) -> None:

@@ -164,6 +164,20 @@ def test_a_port_that_vanishes_is_found_again(tmp_path: Path, state: CommandState
     assert not link.connected
 
 
+def test_every_count_begins_at_nothing_and_bytes_are_counted_both_ways(port: HostPort, state: CommandState) -> None:
+    link = LineLink(port.path, 115200, state)
+    assert link.report() == {
+        "port": port.path, "connected": False, "accepted": 0, "refused": {}, "bytes_in": 0, "bytes_out": 0,
+        "streamed": 0, "dropped": 0, "reconnects": 0, "faults": 0, "last_fault": "",
+    }  # fmt: skip
+    with link:
+        peer = Peer(port)
+        peer.send(b"PING abc\n")
+        assert peer.next().text == "PONG abc"
+        eventually(lambda: link.report()["bytes_out"])
+        assert (link.report()["bytes_in"], link.report()["bytes_out"]) == (9, len(b"OK PONG abc\n"))
+
+
 def test_a_missing_port_is_one_clear_error(tmp_path: Path, state: CommandState) -> None:
     with pytest.raises(PortMissing, match="no port"):
         LineLink(str(tmp_path / "none"), 115200, state).start()
@@ -199,6 +213,15 @@ def test_a_fault_of_its_own_is_told_once_and_the_link_goes_on(
     assert link.report()["faults"] == 2
     assert link.report()["last_fault"] == "ZeroDivisionError: life is short"
     assert caplog.text.count("goes on with the next line") == 1
+
+
+def test_faults_that_repeat_leave_the_processor_to_others(
+    port: HostPort, state: CommandState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    link, waits = LineLink(port.path, 115200, state), list[float]()
+    monkeypatch.setattr(link._stopping, "wait", waits.append)
+    link._log_fault(ValueError("mine"))
+    assert link.faults == 1 and len(waits) == 1 and 0.0 < waits[0] < 0.5
 
 
 def test_replies_beyond_the_buffer_are_dropped_whole_and_counted(port: HostPort, link: LineLink) -> None:

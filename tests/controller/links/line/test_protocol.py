@@ -95,6 +95,36 @@ def test_refused_lines(line: bytes, code: Code) -> None:
     assert caught.value.code == code
 
 
+def test_what_has_no_checksum_says_so() -> None:
+    assert Words(("PING",)) == Words(("PING",), None, False) == parse_words(b"PING")
+    assert Reply("OK") == Reply("OK", "", None, None, False) == parse_reply(b"OK")
+    plain = LineError(Code.TAG, "why")
+    assert (plain.tag, plain.checked) == (None, False)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (b"PING*0f", f"checksum is 0F but the line sums up to {checksum(b'PING'):02X}"),
+        (b"x" * 1025, "a line has at most 1024 bytes"),
+        (b"*", "two hexadecimal digits at the end"),
+    ],
+)
+def test_refusals_say_what_is_wrong(line: bytes, message: str) -> None:
+    with pytest.raises(LineError, match=message):
+        parse_words(line)
+
+
+def test_lines_and_tags_have_their_longest_length() -> None:
+    assert parse_words(b"x" * 1024) == Words(("x" * 1024,))
+    assert parse_words(b"#123456789 PING") == Words(("PING",), 123456789)
+    long = format_ok("y" * 3000, checked=True)
+    assert len(long) == 2048 + 1 and parse_reply(long[:-1]) == Reply("OK", "y" * 2042, checked=True)
+    assert len(format_ok("y" * 3000)) == 2048 - 3 + 1
+    with pytest.raises(LineError, match=r"not a reply: b'z{32}'$"):
+        parse_reply(b"z" * 40)
+
+
 def test_blank_lines_are_nothing() -> None:
     assert parse_words(b"") is None and parse_words(b" \t ") is None
 
