@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 import shapes
@@ -182,7 +184,7 @@ def cells_of(lattice: Lattice, level: int) -> np.ndarray:
 
 def borders_of(lines: np.ndarray, level: int) -> np.ndarray:
     """Borders of the cells of a level: every root in equal parts."""
-    parts = [np.linspace(a, b, 1 << level, endpoint=False) for a, b in zip(lines, lines[1:], strict=False)]
+    parts = [np.linspace(a, b, 1 << level, endpoint=False) for a, b in itertools.pairwise(lines)]
     return np.concatenate([*parts, lines[-1:]])
 
 
