@@ -222,6 +222,8 @@ def test_the_back_is_what_less_than_four_tenths_as_many_shapes_move() -> None:
     (face, _), (back, _) = parts
     assert face.request.points == 2450  # three times 40,000 mm^2 are less than a face has
     assert back.request.points == round(2450 * 2 / 3 - 0.5)
+    assert (face.request.coarse, face.request.neutral_mm) == (0.1, 0.25)
+    assert (back.request.coarse, back.request.neutral_mm) == (0.1, 0.4)
     still = generic._skin(replace(mesh, deltas=0 * mesh.deltas), np.ones(5, bool), 1.0)
     assert [part.name for part, _ in still] == ["face"]
     small = generic._skin(moving(squares((0, 0, 200, 0), (300, 0, 10, 0)), [9.0, 0.0]), np.ones(2, bool), 1.0)
