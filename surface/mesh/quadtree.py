@@ -182,7 +182,6 @@ def _templates() -> Ints:
     Pattern bits: below, right, above, left. Pattern 16 is pattern 0 with the other diagonal.
     """
     base = {
-        0b0000: [(0, 1, 2), (0, 2, 3)],
         0b0001: [(0, 4, 3), (4, 2, 3), (4, 1, 2)],
         0b0011: [(4, 1, 5), (0, 4, 3), (4, 5, 3), (5, 2, 3)],
         0b0101: [(0, 4, 6), (0, 6, 3), (4, 1, 2), (4, 2, 6)],

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import shapes
 
-from surface import Domain, blending
+from surface import DCPSurface, Domain, blending
+from surface.deform import edits
 from surface.deform.edits import change_weights
-from surface.deform.lists import Lists
+from surface.deform.lists import Lists, build_lists
 
 
 def rows(lists: Lists) -> dict[tuple[int, int], np.ndarray]:
@@ -94,3 +95,26 @@ def test_changed_weights_name_the_cells_that_they_reach() -> None:
     assert deformation.basis.weights[[33, 34]].tolist() == [2, 3]
     none = change_weights(deformation.basis, deformation.lists, mesh, np.zeros(0, dtype=np.int64), np.zeros(0))
     assert none.shape == (0,)
+
+
+def test_vertices_that_only_one_point_covers_are_found() -> None:
+    """Ten points over the unit square, drawn where anything covers it: many vertices have only one point."""
+    rng = np.random.default_rng(4)
+    low = rng.uniform(0.0, 0.6, (10, 2))
+    knots = [np.linspace(low[:, k], low[:, k] + 0.4, 4, axis=1) for k in range(2)]
+    surface = DCPSurface(rng.normal(size=(10, 3)), np.ones(10), *knots)
+    mesh = surface.tessellate(min_depth=5, max_depth=5, roots=(1, 1), chord_error=1e9)
+    lists = build_lists(surface, mesh, False)
+    covering = surface.basis_matrix(mesh.uv, side=mesh.side).toarray() > 0
+    away = [np.array([5.0, 6.0, 7.0])] * 2
+    alone = 0
+    for i in range(10):
+        found = np.zeros(len(mesh.uv), dtype=np.int64)
+        entries = lists.entries_of(i)
+        count = edits._only_covering(*entries, lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found)
+        wanted = np.flatnonzero(covering[:, i] & (covering.sum(axis=1) == 1))
+        assert sorted(found[:count].tolist()) == wanted.tolist()
+        assert edits._first_uncovered(lists, mesh, i, away) == (found[0] if count else -1)
+        assert edits._first_uncovered(lists, mesh, i, [row[i] for row in knots]) == -1  # it reaches them as before
+        alone += count
+    assert alone > 50

@@ -8,8 +8,9 @@ import pytest
 from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
+from surface.fit import reportfile
 from surface.fit.api import fit_mesh
-from surface.fit.points.nurbsnet import uniform_nets
+from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds
 from surface.fit.reportfile import EXCLUDED, _colours, write_report
 from surface.fit.source.chart import make_chart
@@ -94,3 +95,14 @@ def test_uniform_nets_grow_until_they_are_as_good():
     assert 80 < nets[0].points < 130 and nets[0].rms > 0.3
     assert nets[-1].rms <= 0.05 or len(nets) == 5
     assert len(uniform_nets(chart, targets, 100, 1e9)) == 1
+
+
+def test_the_verdict_on_uniform_nets_is_the_first_that_is_as_good() -> None:
+    def lines(*nets: tuple[int, float]) -> list[str]:
+        return reportfile._net_lines([UniformNet(points, rms) for points, rms in nets])
+
+    good = lines((100, 0.5), (110, 0.9), (250, 0.5), (400, 0.3))
+    assert good[2:6] == ["| this head's | 100 | 0.500 |", "| uniform | 110 | 0.900 |", "| uniform | 250 | 0.500 |",
+                         "| uniform | 400 | 0.300 |"]  # fmt: skip
+    assert good[-1] == "As good a uniform net needs 2.5 times the points."
+    assert lines((100, 0.5), (110, 0.9), (430, 0.51))[-1] == "With 4.3 times the points it is still not as good."

@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surface import DCPSurface, Domain, Slit
+from surface.mesh import tessellate as tessellation
+from surface.mesh import trim
 from tests.surface import shapes
 
 
@@ -243,3 +245,160 @@ def test_a_flipped_mesh_is_reversed() -> None:
     assert np.array_equal(flipped.normals, -mesh.normals)
     assert np.array_equal(flipped.triangles, mesh.triangles[:, ::-1])
     assert (mesh.flip, flipped.flip) == (False, True)
+
+
+def plane(slope_u: float = 3.0, slope_v: float = 5.0) -> DCPSurface:
+    """A flat sheet over the unit square, stretched by two factors."""
+    net = np.array([[[0.0, 0, 0], [0, slope_v, 0]], [[slope_u, 0, 0], [slope_u, slope_v, 0]]])
+    return DCPSurface.from_nurbs(1, 1, [0, 0, 1, 1], [0, 0, 1, 1], net)
+
+
+def test_lengths_per_unit_are_means_over_what_is_drawn() -> None:
+    """x = u^2 and y = 4 v^2: the mean slopes over an interval are the sum of its ends, and four times that."""
+    net = np.array([[[x, y, 0.0] for y in (0.0, 0.0, 4.0)] for x in (0.0, 0.0, 1.0)])
+    surface = DCPSurface.from_nurbs(2, 2, [0, 0, 0, 1, 1, 1], [0, 0, 0, 1, 1, 1], net)
+    assert tessellation._lengths(surface, Domain((0.2, 0.7, 0.5, 0.9))) == pytest.approx((0.9, 5.6))
+    loop = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.25], [0.0, 0.25]]
+    assert tessellation._lengths(surface, Domain((0, 1, 0, 1), [loop])) == pytest.approx((0.5, 1.0))
+    assert tessellation._lengths(surface, Domain((2, 3, 2, 3))) == (1.0, 1.0)  # nothing is covered
+    flat = surface.with_points(surface.points * [1, 0, 0])
+    assert tessellation._lengths(flat, Domain((0, 1, 0, 1))) == pytest.approx((1.0, 1e-6), rel=1e-9)
+    flat = surface.with_points(surface.points * [0, 1, 0])
+    assert tessellation._lengths(flat, Domain((0, 1, 0, 1))) == pytest.approx((4e-6, 4.0), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rect", "scale", "joined", "shape"),
+    [
+        ((1, 3, 2, 3), (10.0, 5.0), (False, False), (4, 1)),  # squares as wide as the shorter side
+        ((2, 3, 1, 3), (5.0, 10.0), (False, False), (1, 4)),
+        ((1, 3, 2, 3), (100.0, 1.0), (False, False), (24, 1)),  # but 24 along the longer at most
+        ((0, 1, 0, 1), (1.0, 10.0), (True, False), (3, 10)),  # a ring needs three
+        ((0, 1, 0, 1), (10.0, 1.0), (False, True), (10, 3)),
+        ((5, 6, 5, 6), (1.0, 1.0), (True, True), (3, 3)),
+        ((5, 6, 5, 6), (1.0, 12.0), (False, True), (1, 12)),
+    ],
+)
+def test_roots_are_roughly_square_on_the_surface(
+    rect: tuple[float, float, float, float], scale: tuple[float, float], joined: tuple[bool, bool],
+    shape: tuple[int, int],
+) -> None:  # fmt: skip
+    lattice = tessellation._lattice(Domain(rect), scale, 5, None, joined)
+    assert lattice.shape == shape and lattice.joined == joined and lattice.depth == 5
+    np.testing.assert_allclose(lattice.lines_u, np.linspace(*rect[:2], shape[0] + 1))
+    np.testing.assert_allclose(lattice.lines_v, np.linspace(*rect[2:], shape[1] + 1))
+
+
+def test_roots_are_bordered_by_slits_and_hardly_larger_than_the_narrowest_part_between_them() -> None:
+    rect = (1.0, 3.0, 2.0, 3.0)
+    across = tessellation._lattice(Domain(rect, slits=[Slit("u", 2.25, 1.5, 2.0)]), (10.0, 10.0), 3, None, (False,) * 2)
+    # parts of 2.5 along v, so cells of about 3: 5, 5 and 10 wide, 2.5 and 7.5 high
+    np.testing.assert_allclose(across.lines_u, [1, 1.25, 1.5, 1.75, 2, 7 / 3, 8 / 3, 3])
+    np.testing.assert_allclose(across.lines_v, [2, 2.25, 2.625, 3])
+    along = tessellation._lattice(Domain(rect, slits=[Slit("v", 1.25, 2.5, 9.0)]), (10.0, 10.0), 3, None, (False,) * 2)
+    np.testing.assert_allclose(along.lines_u, [1, 1.25, *np.linspace(1.25, 3, 7)[1:]])
+    np.testing.assert_allclose(along.lines_v, [2, 2.25, 2.5, 2.75, 3])
+    given = tessellation._lattice(
+        Domain(rect, slits=[Slit("v", 1.25, 2.5, 9.0)]), (10.0, 10.0), 3, (4, 2), (False,) * 2
+    )
+    np.testing.assert_allclose(given.lines_u, [1, 1.25, *np.linspace(1.25, 3, 5)[1:]])
+    np.testing.assert_allclose(given.lines_v, [2, 2.5, 3])
+
+
+def test_progress_rises_from_stage_to_stage_up_to_the_end() -> None:
+    loops = [shapes.circle(0.5, 0.5, 0.3)]
+    for domain, stages in (
+        (Domain((0, 1, 0, 1)), ["quad tree", "triangles", "vertices", "cells"]),
+        (Domain((0, 1, 0, 1), loops), ["quad tree", "triangles", "trimming", "vertices", "cells"]),
+    ):
+        said: list[tuple[str, float]] = []
+        shapes.hills().tessellate(chord_error=1.0, domain=domain, progress=lambda *args, to=said: to.append(args))
+        assert list(dict.fromkeys(stage for stage, _ in said)) == stages
+        shares = [share for _, share in said]
+        assert shares == sorted(shares) and 0 < shares[0] < 0.05 and shares[-1] == 1.0
+        assert min(np.diff(sorted({max(s for stage, s in said if stage == name) for name in stages}))) > 0.02
+
+
+def test_vertices_are_evaluated_in_parts_of_131072(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert tessellation.CHUNK == 131072
+    whole = shapes.hills().tessellate(chord_error=0.3)
+    monkeypatch.setattr(tessellation, "CHUNK", 100)
+    said: list[tuple[str, float]] = []
+    parts = shapes.hills().tessellate(chord_error=0.3, progress=lambda *args: said.append(args))
+    np.testing.assert_array_equal(parts.vertices, whole.vertices)
+    np.testing.assert_array_equal(parts.triangles, whole.triangles)
+    shares = [share for stage, share in said if stage == "vertices"]
+    assert len(shares) == -(-len(whole.vertices) // 100)
+    np.testing.assert_allclose(np.diff(shares), shares[1] - shares[0], atol=1e-12)
+
+
+def test_leaves_are_numbered_root_by_root_in_morton_order() -> None:
+    surface = plane()
+    domain, depth = Domain((0, 1, 0, 1)), 3
+    lattice = tessellation._lattice(domain, (1.0, 1.0), depth, (3, 2), (False, False))
+    leaves, inner = tessellation.quadtree.grow(lattice, lambda level, cells: np.full(len(cells), level < 2))
+    corners, owner = tessellation.quadtree.triangulate(lattice, leaves, inner)
+    nodes, _, triangles = tessellation.keys.unique(corners)
+    flat = trim.Flat(lattice.uv(*lattice.point(nodes)), triangles, owner)
+    code = tessellation._codes(flat, lattice, leaves)
+
+    def number(u: float, v: float) -> int:
+        i, j = int(u * 12 + 1e-9), int(v * 8 + 1e-9)  # leaves are quarters of roots; depth 3 is one level below
+        inner_i, inner_j = i % 4, j % 4
+        morton = sum((inner_i >> bit & 1) << (2 * bit) | (inner_j >> bit & 1) << (2 * bit + 1) for bit in range(2))
+        return (((j // 4) * 3 + i // 4) << (2 * depth)) | (morton << 2)
+
+    for place, found in zip(flat.uv, code, strict=True):
+        around = [number(u, v) for u in place[0] + [-0.01, 0.01] for v in place[1] + [-0.01, 0.01]
+                  if 0 < u < 1 and 0 < v < 1]  # fmt: skip
+        assert found in around
+    assert surface.tessellate(roots=(3, 2), min_depth=2, max_depth=2).leaves == 96
+    unused = trim.Flat(np.vstack([flat.uv, [9.0, 9.0]]), flat.triangles, flat.owner)
+    code = tessellation._codes(unused, lattice, leaves)
+    assert code[-1] == np.iinfo(np.int64).max
+    order = tessellation._used_in_order(unused, code)
+    assert len(order) == len(flat.uv) and (np.diff(code[order]) >= 0).all()
+
+
+def test_normals_where_the_slopes_are_parallel_are_the_mean_of_the_triangles_by_area() -> None:
+    points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 1], [5.0, 5, 5]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    su, sv = np.tile([1.0, 0, 0], (5, 1)), np.tile([0.0, 1, 0], (5, 1))
+    sv[[0, 4]] = su[[0, 4]]  # no direction of their own
+    normals = tessellation.unit_normals(points, su, sv, triangles)
+    np.testing.assert_allclose(normals[0], np.array([3.0, 0, 6]) / np.sqrt(45))
+    np.testing.assert_allclose(normals[1:4], [[0, 0, 1]] * 3)
+    np.testing.assert_array_equal(normals[4], 0.0)  # no triangle either
+
+
+def test_a_point_without_size_and_an_empty_domain_are_drawn() -> None:
+    surface = plane(0.0, 0.0)
+    assert len(surface.tessellate().vertices) >= 4
+    nothing = plane().tessellate(domain=Domain((0, 1, 0, 1), [shapes.circle(5.0, 5.0, 0.1)]))
+    assert nothing.vertices.shape == (0, 3) and nothing.cell_start.tolist() == [0]
+
+
+def test_a_surface_closed_both_ways_has_one_vertex_where_its_seams_meet() -> None:
+    mesh = shapes.torus().tessellate(chord_error=1.0)
+    assert (shapes.edge_uses(mesh.triangles)[1] == 2).all()
+    assert len(mesh.vertices) - len(np.unique(np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1),
+                                              axis=0)) + len(mesh.triangles) == 0  # Euler: a torus  # fmt: skip
+    assert mesh.uv.min() == 0.0 and mesh.uv.max() < 1.0
+    cut = shapes.torus().tessellate(chord_error=1.0, domain=Domain((0, 1, 0, 1), slits=[Slit("v", 0.5, 0.2, 0.6)]))
+    used = shapes.edge_uses(cut.triangles)[1]
+    assert np.count_nonzero(used == 1) > 2 and used.max() == 2
+    rim = cut.uv[shapes.border(cut)].reshape(-1, 2)
+    assert (rim[:, 0] == 0.5).all() and rim[:, 1].min() == 0.2 and rim[:, 1].max() == 0.6
+
+
+def test_a_slit_through_a_seam_stays_open_there() -> None:
+    """One that runs along u over the seam at u = 0 and 1: each of its sides is joined to itself."""
+    torus = shapes.torus()
+    slits = [Slit("u", 0.5, -0.5, 0.25), Slit("u", 0.5, 0.75, 1.5)]
+    mesh = torus.tessellate(chord_error=1.0, domain=Domain((0, 1, 0, 1), slits=slits))
+    shapes.check_manifold(mesh)
+    at_seam = (mesh.uv == [0.0, 0.5]).all(axis=1)
+    assert at_seam.sum() == 2 and sorted(mesh.side[at_seam].tolist()) == [0, 2]
+    assert not (mesh.uv[:, 0] == 1.0).any()
+    rim = mesh.uv[shapes.border(mesh)].reshape(-1, 2)
+    assert (rim[:, 1] == 0.5).all()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from surface import Domain
+from surface import Domain, Slit
 from surface.mesh import trim
 from surface.mesh.trim import Flat
 from tests.surface import shapes
@@ -106,3 +106,141 @@ def test_a_flat_triangle_at_the_border_is_dropped() -> None:
     uv = np.array([[0.0, 0], [1, 0], [2, 0], [1, 1]])
     flat = trim._without_flat(Flat(uv, np.array([[0, 2, 3], [0, 1, 2]]), np.arange(2)))
     assert flat.triangles.tolist() == [[0, 2, 3]]
+
+
+def clipped(ring: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
+    """A convex polygon's part where ``normal @ p <= offset`` (Sutherland and Hodgman)."""
+    out = []
+    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        da, db = normal @ a - offset, normal @ b - offset
+        if da <= 0:
+            out.append(a)
+        if (da < 0) != (db < 0) and da != db:
+            out.append(a + da / (da - db) * (b - a))
+    return np.array(out)
+
+
+def ring_area(ring: np.ndarray) -> float:
+    x, y = ring.T
+    return 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+
+
+@pytest.mark.parametrize("n", [5, 8])
+def test_a_loop_across_the_rectangle_leaves_exactly_what_lies_on_its_side(n: int) -> None:
+    """Half planes, as large quadrilaterals, cut the square; vertices on its border slide along that."""
+    rng, square = np.random.default_rng(n), DOMAINS["the whole square"][0]
+    for _ in range(40):
+        angle = rng.uniform(0, 2 * np.pi)
+        normal = np.array([np.cos(angle), np.sin(angle)])
+        offset = normal @ rng.uniform(0.15, 0.85, 2)
+        along, foot = np.array([-normal[1], normal[0]]), offset * normal
+        loop = np.array(
+            [foot + 9 * along, foot - 9 * along, foot - 9 * along - 9 * normal, foot + 9 * along - 9 * normal]
+        )
+        scale = (1.0, float(rng.choice([1.0, 0.3, 4.0])))
+        flat = trim.trim(grid(n), Domain((0, 1, 0, 1), loops=[loop]), scale)
+        part = clipped(square, normal, offset)
+        assert areas(flat).min() > 0
+        assert areas(flat).sum() == pytest.approx(ring_area(part), rel=1e-9)
+        directed = flat.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        back = {(b, a) for a, b in directed.tolist()}
+        for a, b in directed.tolist():
+            if (a, b) not in back:  # a border edge: on the line, or on one side of the square
+                on_line = np.abs(flat.uv[[a, b]] @ normal - offset).max() < 1e-9
+                assert on_line or ((flat.uv[a] == flat.uv[b]) & np.isin(flat.uv[a], (0, 1))).any()
+        assert ((flat.uv >= 0) & (flat.uv <= 1)).all()
+        assert set(flat.owner.tolist()) <= set(range(n * n))
+
+
+def test_triangles_stay_in_the_leaf_that_they_came_from() -> None:
+    """A straight cut leaves every triangle where it was, up to vertices that are moved by part of a cell."""
+    flat = trim.trim(grid(8), Domain((0, 1, 0, 1), loops=[shapes.circle(0.5, 0.5, 0.37)]), (1.0, 1.0))
+    middle = flat.uv[flat.triangles].mean(axis=1)
+    i, j = np.divmod(flat.owner, 8)
+    cell = np.column_stack([i + 0.5, j + 0.5]) / 8
+    assert np.abs(middle - cell).max() < 1.5 / 8
+    assert np.median(np.abs(middle - cell).max(axis=1)) < 0.5 / 8
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0), (1.0, 5.0)])
+def test_marks_anywhere_become_vertices_and_nothing_folds(scale: tuple[float, float]) -> None:
+    rng, around = np.random.default_rng(4), np.array([[-1.0, -1], [2, -1], [2, 2], [-1, 2]])
+    for _ in range(60):
+        marks = rng.uniform(0.02, 0.98, (3, 2))
+        domain = Domain((0, 1, 0, 1), loops=[around], marks=marks)
+        flat = trim.trim(grid(5), domain, scale)
+        assert areas(flat).min() >= 0 and areas(flat).sum() == pytest.approx(1.0, rel=1e-9)
+        for mark in marks:
+            assert (np.abs(flat.uv - mark).max(axis=1) < 0.1 / 5).any()
+
+
+def test_a_point_moves_the_free_vertex_next_to_it_or_splits_its_triangle() -> None:
+    """By its greatest barycentric share: above 0.7 the vertex moves, below 0.9 the triangle is split."""
+    free, none = np.full(9, -1), np.zeros(9, bool)
+    for share, line, fixed, moves, splits in (
+        (0.71, -1, False, True, False),
+        (0.69, -1, False, False, True),
+        (0.71, 2, False, False, True),  # on the rectangle's border
+        (0.71, -1, True, False, True),  # already put somewhere
+        (0.89, 2, False, False, True),
+        (0.91, 2, False, False, False),  # so near that a split would leave a sliver
+        (0.91, -1, False, True, False),
+    ):
+        start = grid(2)
+        corners = start.uv[start.triangles[0]]
+        point = share * corners[0] + (1 - share) * 0.5 * (corners[1] + corners[2])
+        lines, held = free.copy(), none.copy()
+        lines[start.triangles[0, 0]], held[start.triangles[0, 0]] = line, fixed
+        flat, lines, held = trim._place(start, point, lines, held)
+        if moves:
+            assert len(flat.uv) == 9 and np.allclose(flat.uv[start.triangles[0, 0]], point)
+            assert held[start.triangles[0, 0]]
+        elif splits:
+            assert len(flat.uv) == 10 and np.allclose(flat.uv[9], point) and lines[9] == -1 and held[9]
+            assert areas(flat).sum() == pytest.approx(1.0) and len(flat.triangles) in (10, 11)
+        else:
+            assert len(flat.uv) == 9 and not np.allclose(flat.uv[start.triangles[0, 0]], point)
+    outside = trim._place(grid(2), np.array([1.2, 0.5]), free, none)[0]
+    assert len(outside.uv) == 9
+
+
+def test_a_split_near_an_edge_takes_both_its_triangles() -> None:
+    start = grid(2)
+    diagonal = start.uv[start.triangles[0]][[0, 2]].mean(axis=0)  # between the two triangles of a square
+    for towards in (0.0, 0.14 * 3, 0.16 * 3):
+        corners = start.uv[start.triangles[0]]
+        point = diagonal + towards * (corners.mean(axis=0) - diagonal)
+        share = trim._weights_in(grid(2), point)[0]
+        flat = trim._insert(grid(2), point, 0, share)
+        near = share.min() < 0.15
+        assert len(flat.triangles) == 10
+        directed = flat.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        assert len(np.unique(directed, axis=0)) == len(directed)
+        used = (flat.triangles == 9).any(axis=1).sum()
+        assert used == (4 if near else 3)
+        assert areas(flat).min() >= 0 and areas(flat).sum() == pytest.approx(1.0)
+        assert set(flat.owner.tolist()) == set(range(4))
+
+
+def test_vertices_know_the_line_that_they_may_slide_along() -> None:
+    uv = np.array([[0.0, 0.5], [1.0, 0.5], [0.5, 0.0], [0.5, 1.0], [0.0, 0.0], [1.0, 1.0], [0.3, 0.3],
+                   [0.25, 0.75], [0.75, 0.75], [0.6, 0.75], [0.6, 0.6]])  # fmt: skip
+    domain = Domain((0, 1, 0, 1), slits=[Slit("u", 0.75, 0.25, 0.75), Slit("v", 0.6, 0.2, 0.9)])
+    assert trim._lines(uv, domain).tolist() == [0, 1, 2, 3, -2, -2, -1, -2, -2, -2, 5]
+    assert trim.lines_of_edges(uv, domain).tolist() == [0, 0, 0, 0, 0, 0, 0, 1, 1, 3, 2]
+
+
+def test_vertices_that_none_uses_are_dropped() -> None:
+    flat = trim.compact(Flat(np.arange(10.0).reshape(5, 2), np.array([[4, 1, 2]]), np.array([7])))
+    assert flat.uv.tolist() == [[2, 3], [4, 5], [8, 9]] and flat.triangles.tolist() == [[2, 0, 1]]
+    assert flat.owner.tolist() == [7]
+
+
+def test_a_triangle_that_turns_no_way_is_kept_inside_the_mesh() -> None:
+    """Without area, but with neighbours on two sides: to drop it would tear them apart."""
+    uv = np.array([[0.0, 0], [1, 0], [2, 0], [1, 1], [1, -1]])
+    triangles = np.array([[0, 2, 3], [0, 1, 2], [1, 0, 4], [2, 1, 4]])
+    flat = trim._without_flat(Flat(uv, triangles, np.arange(4)))
+    assert flat.triangles.tolist() == triangles.tolist()
+    chain = np.array([[0, 2, 3], [0, 1, 2]])
+    assert trim._without_flat(Flat(uv, chain, np.arange(2))).owner.tolist() == [0]

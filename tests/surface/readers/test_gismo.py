@@ -9,7 +9,8 @@ import pytest
 from scipy.interpolate import BSpline
 
 from surface import SurfaceFileError
-from surface.readers import read_surface
+from surface.readers import gismo, read_surface
+from surface.readers.common import Location
 
 OPEN = "0 0 0 0.25 0.5 0.75 1 1 1"
 GRID = np.stack(np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 37)), axis=-1).reshape(-1, 2)
@@ -272,6 +273,58 @@ def test_levels_that_are_not_nested_are_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(SurfaceFileError, match="not nested"):
         read_surface(save(tmp_path, text))
+
+
+@pytest.mark.parametrize("before", [0, 3])
+def test_lines_are_counted_from_the_first_one_of_the_file(tmp_path: Path, before: int) -> None:
+    """G+Smo writes empty lines before the declaration, too."""
+    good = geometry("TensorBSpline2", tensor(), np.zeros((36, 3)))
+    damage = (
+        (good.replace("</Geometry>", "</Geometrie>"), "is not XML"),
+        (good.replace("<xml>", '<!DOCTYPE xml [<!ENTITY a "b">]><xml>'), "declares an entity"),
+        (good.replace('degree="2"', 'degree="x"', 1), "must be a whole number"),
+    )
+    for text, why in damage:
+        with pytest.raises(SurfaceFileError, match=why) as caught:
+            read_surface(save(tmp_path, "\n" * before + text))
+        changed = next(
+            k for k, (a, b) in enumerate(zip(good.splitlines(), text.splitlines(), strict=True), 1) if a != b
+        )
+        assert f"line {changed + before}" in str(caught.value)
+
+
+@pytest.mark.parametrize(("dimension", "fits"), [(1, False), (2, True), (3, True), (4, False), (9, False), (10, False)])
+def test_surfaces_are_in_the_plane_or_in_space(tmp_path: Path, dimension: int, fits: bool) -> None:
+    text = geometry("TensorBSpline2", tensor(), np.ones((36, dimension)))
+    if fits:
+        assert (read_surface(save(tmp_path, text))[0].surface.points[:, :dimension] == 1).all()
+        return
+    with pytest.raises(SurfaceFileError, match="geoDim"):
+        read_surface(save(tmp_path, text))
+
+
+def test_whole_numbers_may_be_their_limits(tmp_path: Path) -> None:
+    element = gismo.Element("a", {"n": "3", "word": "x", "minus": "-1", "spaced": " 4 "})
+    element.location = Location(tmp_path / "a.xml")
+    assert element.integer("n", 3, 3) == 3 and element.integer("n", 0, 3) == 3 and element.integer("n", 3, 9) == 3
+    assert element.integer("spaced", 0, 9) == 4
+    for name, low, high in (("n", 4, 9), ("n", 0, 2), ("word", 0, 9), ("minus", -5, 9)):
+        with pytest.raises(SurfaceFileError, match=f"must be a whole number from {low} to {high}"):
+            element.integer(name, low, high)
+
+
+def test_knots_nearer_than_can_be_told_apart_are_refused(tmp_path: Path) -> None:
+    """Near is meant in parts of the whole, however large the numbers are."""
+    for scale in (1e-3, 1.0, 1e3):
+        for gap, fits in ((0.9 * gismo.CLOSE, False), (1.1 * gismo.CLOSE, True)):
+            knots = np.array([0, 0, 0, 0.5, 0.5 + gap, 1, 1, 1]) * scale
+            text = tensor(" ".join(repr(float(x)) for x in knots))
+            text = geometry("TensorBSpline2", text, np.zeros((30, 3)))
+            if fits:
+                read_surface(save(tmp_path, text))
+            else:
+                with pytest.raises(SurfaceFileError, match="knots 3 and 4 are too close"):
+                    read_surface(save(tmp_path, text))
 
 
 def test_a_finest_level_with_too_many_functions_is_refused(tmp_path: Path) -> None:

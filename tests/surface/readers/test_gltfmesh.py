@@ -12,6 +12,7 @@ from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
 from surface.fit.source.load import LoadOptions, load_mesh
+from surface.readers import gltfmesh
 from surface.readers.gltfmesh import read_gltf
 
 
@@ -326,6 +327,93 @@ def test_skin_weights_blend_joints_and_need_not_sum_to_one(tmp_path):
     assert "joints and weights do not fit" in refused(write(tmp_path, builder))
     builder.document["skins"] = [{"joints": [1, 9]}]
     assert "names a joint that is not in the scene" in refused(write(tmp_path, builder))
+
+
+def only(tmp_path, points: np.ndarray, index: list[int] | None = None, **primitive) -> GlbBuilder:
+    """One mesh of points with nothing else."""
+    builder = GlbBuilder()
+    if index is not None:
+        primitive["indices"] = builder.accessor(np.uint32(index), UINT, "SCALAR")
+    attributes = {"POSITION": builder.accessor(np.float32(points), FLOAT, "VEC3")}
+    builder.document["meshes"] = [{"primitives": [{"attributes": attributes, **primitive}]}]
+    builder.document["nodes"] = [{"mesh": 0, "name": "n"}]
+    return builder
+
+
+@pytest.mark.parametrize("count", [3, 4, 7, 8])
+def test_strips_and_fans_of_any_length_face_one_way(tmp_path, count):
+    """A zigzag as a strip, and an arc around its first point as a fan: every triangle counts, all anticlockwise."""
+    k = np.arange(count)
+    zigzag = np.column_stack([k, k % 2, 0 * k]) * [1.0, -1.0, 1.0]
+    angle = np.linspace(0.1, 2.5, count - 1)
+    arc = np.vstack([[0.0, 0, 0], np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])])
+    for mode, points in ((5, zigzag), (6, arc)):
+        got = read_gltf(write(tmp_path, only(tmp_path, points, mode=mode)))
+        corners = got.vertices[got.faces[:, :3]]
+        up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
+        assert len(corners) == count - 2 and ((up > 0).all() or (mode == 5 and (up < 0).all()))
+        if mode == 5:
+            wanted = [{i, i + 1, i + 2} for i in range(count - 2)]
+        else:
+            wanted = [{0, i + 1, i + 2} for i in range(count - 2)]
+        at = nearest(points, got.vertices)
+        assert [set(at[face].tolist()) for face in got.faces[:, :3]] == wanted
+    assert up[0] > 0
+
+
+@pytest.mark.parametrize(("indices", "faces"), [(3, 1), (4, 1), (5, 1), (6, 2)])
+def test_indices_that_make_no_whole_triangle_are_left_out(tmp_path, indices, faces):
+    points = np.random.default_rng(1).normal(size=(6, 3))
+    assert len(read_gltf(write(tmp_path, only(tmp_path, points, list(range(indices))))).faces) == faces
+
+
+def test_materials_name_pieces_where_there_are_such(tmp_path):
+    for material, name in ((0, "n/skin"), (1, "n/1"), (2, "n"), (-1, "n"), ("0", "n")):
+        builder = only(tmp_path, np.eye(3), material=material)
+        builder.document["materials"] = [{"name": "skin"}, {}]
+        assert read_gltf(write(tmp_path, builder)).pieces == (name,)
+
+
+def test_vertices_without_a_weight_go_to_the_middle_not_to_nowhere(tmp_path):
+    builder = GlbBuilder()
+    attributes = {
+        "POSITION": builder.accessor(np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), FLOAT, "VEC3"),
+        "JOINTS_0": builder.accessor(np.zeros((3, 4), np.uint8), 5121, "VEC4"),
+        "WEIGHTS_0": builder.accessor(np.float32([[1, 0, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0]]), FLOAT, "VEC4"),
+    }
+    builder.document |= {
+        "meshes": [{"primitives": [{"attributes": attributes}]}], "skins": [{"joints": [1]}],
+        "nodes": [{"mesh": 0, "skin": 0}, {"translation": [4.0, 0, 0]}], "scenes": [{"nodes": [0, 1]}],
+    }  # fmt: skip
+    np.testing.assert_allclose(read_gltf(write(tmp_path, builder)).vertices, [[4, 0, 0], [5, 0, 0], [0, 0, 0]])
+
+
+def test_triangles_have_area_where_their_corners_differ():
+    rows = np.array([[0, 1, 2], [0, 0, 2], [0, 1, 1], [2, 1, 2], [3, 3, 3]])
+    assert gltfmesh._has_area(rows).tolist() == [True, False, False, False, False]
+
+
+def test_edges_of_more_than_two_triangles_or_two_in_one_direction_are_no_surface():
+    for triangles, wanted in (
+        ([[0, 1, 2], [1, 0, 3]], []),
+        ([[0, 1, 2], [0, 1, 3]], [0, 1]),  # both run from 0 to 1
+        ([[0, 1, 2], [1, 0, 3], [1, 0, 4]], [0, 1]),
+        ([[0, 1, 2], [1, 0, 3], [0, 1, 1]], []),  # what has no area does not count
+        ([[5, 6, 7], [0, 1, 2], [0, 1, 3], [6, 5, 4]], [0, 1]),
+    ):
+        assert gltfmesh._non_manifold(np.array(triangles), 8).tolist() == wanted, triangles
+
+
+def test_only_vertices_of_borders_are_welded(tmp_path):
+    """Two pyramids that touch with their tips: the tips are inside their sheets and stay two."""
+    base = np.array([[1.0, 0, -1], [0, 1, -1], [-1, 0, -1], [0, -1, -1]])
+    points = np.vstack([[0.0, 0, 0], base, [0.0, 0, 0], base * [1, 1, -1]])
+    fan = [x for k in range(4) for x in (0, 1 + k, 1 + (k + 1) % 4)]
+    other = [x for k in range(4) for x in (5, 6 + (k + 1) % 4, 6 + k)]
+    got = read_gltf(write(tmp_path, only(tmp_path, points, fan + other)))
+    assert len(got.vertices) == 10 and len(got.faces) == 8
+    open_ = read_gltf(write(tmp_path, only(tmp_path, points, fan[:-3] + other[:-3])))
+    assert len(open_.vertices) == 9  # with a gap in each, the tips are on the borders
 
 
 @pytest.mark.parametrize(("gap", "count"), [(0.5e-6, 4), (2e-6, 6)])

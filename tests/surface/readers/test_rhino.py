@@ -239,6 +239,33 @@ def test_a_hole_in_a_closed_face_is_a_hole(monkeypatch: pytest.MonkeyPatch) -> N
     assert domain.inside([[1.7, 0.5], [1.7, 0.8], [3.0, 0.5]]).tolist() == [False, True, True]
 
 
+def test_a_straight_curve_has_eight_equal_chords_from_end_to_end() -> None:
+    points = polyline(lambda t: np.array([t, 2.0, -t]), 3.0, 7.0, 1e-6)
+    np.testing.assert_allclose(points, [[t, 2.0, -t] for t in np.linspace(3, 7, 9)])
+
+
+def test_chords_are_halved_until_they_stray_less_and_not_further() -> None:
+    """The sagitta of a chord that spans an angle is 1 - cos of half of it; of 8 chords of a half circle, 0.0192."""
+
+    def arc(t: float) -> Any:
+        return np.array([np.cos(t), np.sin(t), 0.0])
+
+    for error, chords in ((0.02, 8), (0.019, 16), (0.0049, 16), (0.0048, 32)):
+        points = polyline(arc, 0.0, np.pi, error)
+        np.testing.assert_allclose(points, [arc(t) for t in np.linspace(0, np.pi, chords + 1)], atol=1e-12)
+
+
+def test_parameters_are_looked_for_from_every_quarter_of_the_rectangle(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = shapes.hills(8)
+    grids: list[np.ndarray] = []
+    evaluate = DCPSurface.evaluate
+    monkeypatch.setattr(DCPSurface, "evaluate", lambda self, uv: grids.append(np.asarray(uv)) or evaluate(self, uv))
+    invert(surface, surface.points[:1])
+    starts = [grid for grid in grids if len(grid) > 1]
+    boxes = [(*grid.min(axis=0).tolist(), *grid.max(axis=0).tolist()) for grid in starts]
+    assert boxes == [(0, 0, 0.5, 0.5), (0, 0.5, 0.5, 1), (0.5, 0, 1, 0.5), (0.5, 0.5, 1, 1)]
+
+
 def test_a_hole_across_the_seam_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SurfaceFileError, match=r"face 0, loop 1: crosses the seam"):
         face(monkeypatch, 0.0)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surface import blending
+from surface.spline import basis
 
 
 @settings(max_examples=40, deadline=None)
@@ -74,3 +75,29 @@ def test_bad_arguments_are_named(arguments: tuple, message: str) -> None:
         blending(*arguments)
     with pytest.raises(ValueError, match="side"):
         blending([0, 1], [0], side="up")
+
+
+def test_padded_knots_are_checked_row_by_row_and_padded_anew() -> None:
+    rows = np.array([[0.0, 1, 2, 9, 7], [0, 0, 1, 2, 4], [1, 2, 9, 9, 0]])
+    kept, degrees = basis.check_padded([[0, 1, 2, 2, 2], [0, 0, 1, 2, 4], [1, 2, 2, 2, 2]], [1, 3, 0], "u", 3)
+    assert kept.tolist() == [[0, 1, 2, 2, 2], [0, 0, 1, 2, 4], [1, 2, 2, 2, 2]] and degrees.tolist() == [1, 3, 0]
+    rising = np.array([[0.0, 1, 2, 5, 7], [0, 0, 1, 2, 4], [1, 2, 3, 4, 5]])  # more than a point needs
+    kept, _ = basis.check_padded(rising, [1, 3, 0], "u", 3)
+    assert kept.tolist() == [[0, 1, 2, 2, 2], [0, 0, 1, 2, 4], [1, 2, 2, 2, 2]]
+    for knots, per_point, message in (
+        (rising, [1, 4, 0], r"degrees_v\[1\]: 4 needs more knots than the 5 per row"),
+        (rising[:2], [1, 3, 0], "knots_v: 2 rows for 3 points"),
+        (rising, [1, 3], "degrees_v: 2 rows for 3 points"),
+        (rows, [1, 3, 0], r"knots_v\[0\]: knots decrease at knot 4 \(7.0 after 9.0\)"),
+        (rising * [[1], [0], [1]], [1, 3, 0], r"knots_v\[1\]: fewer than two distinct knots \(all are 0.0\)"),
+        (
+            np.where(rising == 4, np.nan, rising),
+            [1, 3, 3],
+            r"knots_v\[1\]: knots must be finite, got \[0.0, 0.0, 1.0, 2.0, nan\]",
+        ),
+        (rising, [1, -1, 0], r"knots_v\[1\]: 1 knots; a point has degree \+ 2 knots"),
+        (np.tile(np.arange(12.0), (3, 1)), [1, 8, 0], r"knots_v\[1\]: 10 knots"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            basis.check_padded(knots, per_point, "v", 3)
+    assert basis.check_padded(np.tile(np.arange(12.0), (3, 1)), [7, 7, 0], "v", 3)[1].tolist() == [7, 7, 0]

@@ -6,6 +6,7 @@ from face_measures import lips_gap
 from slit_sheet import slit_sheet
 from small_head import all_points, part, small_head
 
+from surface import DCPSurface
 from surface.fit.features.finish import (
     COLUMNS,
     FADE_ROWS,
@@ -114,3 +115,27 @@ def test_columns_keep_their_place_across_the_opening(data):
     places = sample_places(surface, loop, 6.0, 4.0)
     x = surface.evaluate(places.reshape(-1, 2)).reshape(*places.shape[:3], 3)[..., 0]
     assert np.abs(x - x[..., :1])[:, 3:-3].max() < 1.5
+
+
+def almond() -> np.ndarray:
+    """A hole of 0.3 by 0.1 in (u, v) around (0.5, 0.45)."""
+    t = np.linspace(-1, 1, 25)
+    upper = np.column_stack([0.5 + 0.15 * t, 0.45 + 0.05 * np.cos(t * np.pi / 2)])
+    return np.vstack([upper, (upper * [1, -1] + [0, 0.9])[::-1][1:-1]])
+
+
+def test_samples_of_an_opening_go_outwards_at_constant_x_by_their_length_on_the_skin():
+    """A plane, 200 by 100 mm, tilted so that a millimetre along it is 0.8 mm of height."""
+    net = np.array([[[x, 80.0 * v, 60.0 * v] for v in (0.0, 1.0)] for x in (-100.0, 100.0)])
+    surface = DCPSurface.from_nurbs(1, 1, [0, 0, 1, 1], [0, 0, 1, 1], net)
+    loop = almond()
+    places = sample_places(surface, loop, 8.0, 5.0)
+    assert places.shape == (2, COLUMNS, ROWS + FADE_ROWS, 2)
+    at = surface.evaluate(places.reshape(-1, 2)).reshape(*places.shape[:3], 3)
+    x = np.linspace(-30 + 0.03 * 60, 30 - 0.03 * 60, COLUMNS)  # the hole is 60 mm wide
+    np.testing.assert_allclose(at[..., 0], np.broadcast_to(x[None, :, None], at.shape[:3]), atol=0.4)
+    half = np.cos(x / 30 * np.pi / 2) * 5.0  # of the hole's height, mm along the skin
+    wanted = np.concatenate([np.linspace(0.0, 8.0, ROWS), 8.0 + np.linspace(1.0, 5.0, FADE_ROWS)])
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        along = sign * (at[side, :, :, 1] / 0.8 - 45.0)
+        np.testing.assert_allclose(along, half[:, None] + wanted, atol=0.15)

@@ -9,8 +9,9 @@ from meshfiles import remapped
 from slit_sheet import SIZE_MM, slit_sheet
 
 from surface.base.errors import FitError
+from surface.fit.features import generic
 from surface.fit.features.generic import MOST_ISLANDS, POINTS, make_plan
-from surface.fit.source.mesh import FitMesh
+from surface.fit.source.mesh import FitMesh, face_areas
 
 EYES = {"eyeBlinkLeft": 32.7, "eyeBlinkRight": -32.7}  # where they are, mm
 
@@ -107,3 +108,239 @@ def test_texture_coordinates_without_area_are_refused():
     mesh = slit_sheet()
     with pytest.raises(FitError, match="texture coordinates have no area"):
         make_plan(replace(mesh, uv=mesh.uv * [1.0, 0.0]))
+
+
+def squares(*corners: tuple[float, float, float, float], names: tuple[str, ...] = ()) -> FitMesh:
+    """Squares apart from each other, each a piece of its own: x and y of its low corner, its size, its depth z."""
+    one = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    vertices = np.vstack([one * size + [x, y, z] for x, y, size, z in corners])
+    faces = np.arange(len(vertices)).reshape(-1, 4)
+    uv = np.vstack([one[:, :2] + [2.0 * k, 0] for k in range(len(corners))])
+    piece = np.arange(len(corners)) if names else np.zeros(0, np.int64)
+    return FitMesh(vertices, faces, uv, faces, (), np.zeros((0, len(vertices), 3)), piece, names)
+
+
+def moving(mesh: FitMesh, *amounts: list[float]) -> FitMesh:
+    """The squares of ``mesh`` move forward: by so many mm in each of the shapes, one number for every square."""
+    deltas = np.stack([np.repeat(np.array(row), 4)[:, None] * np.array([0.0, 0, 1]) for row in amounts])
+    return replace(mesh, deltas=deltas, names=tuple(f"shape{k}" for k in range(len(amounts))))
+
+
+def test_pieces_hang_together_by_vertices_and_are_of_one_material() -> None:
+    mesh = squares((0, 0, 1, 0), (5, 0, 2, 0), (9, 0, 3, 0), names=("skin", "Tongue", "Skin too"))
+    label, sizes = generic._pieces(mesh)
+    assert label.tolist() == [0, 1, 2] and sizes.tolist() == [1, 4, 9]
+    faces = mesh.faces.copy()
+    faces[1, 0] = faces[2, 0] = 2  # both others begin at a corner of the first
+    label, sizes = generic._pieces(replace(mesh, faces=faces))
+    assert label[0] == label[2] != label[1] and len(sizes) == 2
+    faces[:, 3] = -1
+    triangles = replace(squares((0, 0, 1, 0), (5, 0, 2, 0), (9, 0, 3, 0)), faces=faces)
+    label, sizes = generic._pieces(triangles)
+    assert label.tolist() == [0, 0, 0] and sizes[0] == pytest.approx(face_areas(triangles.vertices, faces).sum())
+
+
+def test_a_piece_is_as_present_as_its_area_times_the_shapes_that_move_it() -> None:
+    mesh = squares((0, 0, 1, 0), (5, 0, 2, 0), (9, 0, 3, 0))
+    mesh = moving(mesh, [1.9, 2.1, 0.0], [-2.1, 9.0, 0.0], [0.0, -2.5, 1.0])
+    mesh = replace(mesh, faces=np.vstack([mesh.faces[:2], [[8, 9, 10, -1]]]))
+    label, sizes = np.array([0, 1, 2]), np.array([1.0, 4.0, 4.5])
+    found = generic._presence(mesh, label, sizes, 2.0)  # what moves less than 2 mm here does not count
+    assert found.tolist() == [2.0, 16.0, 4.5]
+    odd = moving(squares((0, 0, 1, 0), (5, 0, 2, 0)), [0.0, 9.0])
+    assert generic._presence(odd, np.array([0, 1]), np.array([1.0, 1.0]), 1.0).tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("other", "radius"),
+    [
+        (((-33, 40, 20), 12), 12.0),
+        (((-38, 40, 20), 12), 12.0),  # half a radius beside the mirrored place, nearly
+        (((-40, 40, 20), 12), 0.0),
+        (((-33, 45, 20), 12), 12.0),
+        (((-33, 47, 20), 12), 0.0),
+        (((-33, 40, 25), 12), 12.0),
+        (((-33, 40, 27), 12), 0.0),
+        (((-33, 40, 20), 11), 12.0),  # the larger one's radius, to a tenth
+        (((-33, 40, 20), 10.5), 0.0),
+    ],
+)
+def test_eyes_mirror_each_other_to_half_a_radius_and_have_nearly_one_size(other, radius) -> None:
+    mesh = joined([("face", slit_sheet()), ("a", ball((33, 40, 20), 12)), ("b", ball(*other))])
+    assert make_plan(mesh).eyes[1] == pytest.approx(radius)
+
+
+def test_the_largest_of_several_pairs_of_balls_are_the_eyes() -> None:
+    places = (33, 40, 12), (60, 0, 14), (20, -50, 9)
+    pairs = [(("a", ball((x, y, 20), r)), ("b", ball((-x, y, 20), r))) for x, y, r in places]
+    for order in (pairs, pairs[::-1]):
+        plan = make_plan(joined([("face", slit_sheet()), *(piece for pair in order for piece in pair)]))
+        assert plan.eyes[1] == pytest.approx(14.0)
+        np.testing.assert_allclose(plan.eyes[0], [[60, 0, 20], [-60, 0, 20]], atol=1e-6)
+
+
+def test_what_is_a_ball() -> None:
+    """Of heads 200 high, balls have radii from 4 to 28, and at least their front half is there."""
+    whole = ball((10, 20, 30), 10).vertices
+    assert generic._ball(whole, 200.0)[1] == pytest.approx(10.0)
+    np.testing.assert_allclose(generic._ball(whole, 200.0)[0], [10, 20, 30], atol=1e-6)
+    for radius, found in ((3.9, False), (4.1, True), (27.9, True), (28.1, False)):
+        assert (generic._ball(ball((0, 0, 0), radius).vertices, 200.0) is not None) == found
+    for depth, found in ((-1.0, True), (0.1, True), (0.8, False)):  # of the radius, where the back is cut off
+        cut = whole[whole[:, 2] > 30 + 10 * depth]
+        assert (generic._ball(cut, 200.0) is not None) == found, depth
+    assert generic._ball(whole * [1.0, 1.0, 0.0], 200.0) is None  # flat
+    assert generic._ball(whole * [1.0, 1.0, 1.35], 200.0) is None  # an egg
+    assert generic._ball(whole * [1.0, 1.0, 1.1], 200.0) is not None  # nearly round
+    assert generic._ball(whole * [1.0, 3.0, 1.0], 200.0) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "gone"),
+    [("Lens", 1.1, True), ("Lens", 1.35, False), ("Cornea", 0.5, True), ("Eyelid", 0.5, False), ("Lash", 0.5, False),
+     ("EyeSocket", 0.5, False), ("Brow", 0.5, False)],
+)  # fmt: skip
+def test_what_lies_within_a_ball_goes_with_it_unless_its_name_is_of_skin_or_hair(name, size, gone) -> None:
+    eye, other = ball((33, 40, 20), 12), ball((-33, 40, 20), 12)
+    inside = ball((33, 40, 20), 12 * size)
+    inside = replace(inside, vertices=(inside.vertices - [33, 40, 20]) * [1, 1, 0.5] + [33, 40, 20])  # no ball
+    mesh = joined([("face", slit_sheet()), ("a", eye), ("b", other), (name, inside)])
+    plan = make_plan(mesh)
+    assert plan.eyes[1] == pytest.approx(12.0)
+    assert (plan.notes[0] == "3 pieces are eyeballs, replaced by exact ones") == gone
+    assert (len(plan.parts) == 1) == gone
+
+
+def test_the_back_is_what_less_than_four_tenths_as_many_shapes_move() -> None:
+    # five islands of one skin; the most mobile is moved by five shapes
+    corners = [(300.0 * k, 0.0, 200.0, 0.0) for k in range(5)]
+    amounts = [[9.0, 9.0 if k < 2 else 0.5, 9.0 if k < 1 else 0.5, 0.0, 1.5] for k in range(5)]
+    mesh = moving(squares(*corners), *amounts)
+    parts = generic._skin(mesh, np.ones(5, bool), 1.0)
+    sizes = {part.name: [int(i.vertex.min()) // 4 for i in islands] for part, islands in parts}
+    assert sizes == {"face": [0, 1, 4], "back": [2, 3]}
+    (face, _), (back, _) = parts
+    assert face.request.points == 2450  # three times 40,000 mm^2 are less than a face has
+    assert back.request.points == round(2450 * 2 / 3 - 0.5)
+    assert (face.request.coarse, face.request.neutral_mm) == (0.1, 0.25)
+    assert (back.request.coarse, back.request.neutral_mm) == (0.1, 0.4)
+    still = generic._skin(replace(mesh, deltas=0 * mesh.deltas), np.ones(5, bool), 1.0)
+    assert [part.name for part, _ in still] == ["face"]
+    small = generic._skin(moving(squares((0, 0, 200, 0), (300, 0, 10, 0)), [9.0, 0.0]), np.ones(2, bool), 1.0)
+    assert small[1][0].request.points == 560
+    many = squares((0, 0, 200, 0), *((300 + 20 * k, 0, 10, 0) for k in range(20)))
+    assert generic._skin(moving(many, [9.0] + [0.0] * 20), np.ones(21, bool), 1.0)[1][0].request.points == 800
+    wide = squares((0, 0, 200, 0), (300, 0, 900, 0))
+    assert generic._skin(moving(wide, [9.0, 0.0]), np.ones(2, bool), 1.0)[1][0].request.points == 2450
+
+
+@pytest.mark.parametrize(("scale", "points"), [(1.0, 3769), (0.5, 4900), (2.0, 2450)])
+def test_a_face_larger_than_a_head_of_that_size_has_gets_up_to_twice_the_points(scale: float, points: int) -> None:
+    mesh = moving(squares((0, 0, 447.2136, 0)), [9.0])  # 200,000 mm^2, 130,000 is a face
+    assert generic._skin(mesh, np.ones(1, bool), scale)[0][0].request.points == pytest.approx(points, abs=1)
+
+
+def test_limits_of_a_part_are_those_of_a_head_of_its_size() -> None:
+    mesh, islands = slit_sheet(), generic._separated(slit_sheet(), np.ones(len(slit_sheet().faces), bool))
+    for scale in (1.0, 0.1):
+        given = "skin", 500, 0.1, 0.25, scale, islands, mesh
+        (face, _), (other, _) = generic._part("face", *given), generic._part("back", *given)
+        for part in (face, other):
+            assert part.request.neutral_mm == pytest.approx(0.25 * scale)
+            assert part.request.shape_mm == pytest.approx(0.45 * scale)
+            assert (part.request.points, part.request.coarse, part.request.finest) == (500, 0.1, 0.9)
+            assert part.doubt_slivers and (part.budget[0], part.budget[2]) == (0, 8)
+        assert (face.request.growth, other.request.growth) == (1.12, 1.25)
+        assert (face.budget[1], other.budget[1]) == (pytest.approx(0.24 * scale), pytest.approx(0.5 * scale))
+
+
+@pytest.mark.parametrize(("count", "depth"), [(1, 8), (12, 8), (13, 9), (24, 9), (25, 10)])
+def test_cells_get_deeper_where_more_islands_share_the_24_roots(count: int, depth: int) -> None:
+    mesh = squares(*((300.0 * k, 0.0, 200.0, 0.0) for k in range(count)))
+    islands = generic._separated(mesh, np.ones(count, bool))
+    assert len(islands) == count
+    assert generic._part("back", "skin", 500, 0.1, 0.25, 1.0, islands, mesh)[0].budget[2] == depth
+
+
+def test_islands_without_area_in_uv_are_dropped() -> None:
+    mesh = squares((0, 0, 1, 0), (5, 0, 1, 0), (9, 0, 1, 0))
+    for factors, count in (((1.0, 1.0), 3), ((1.0, 0.0), 0), ((0.0, 1.0), 0), ((1e-2, 1e-2), 3)):
+        assert len(generic._separated(replace(mesh, uv=mesh.uv * factors), np.ones(3, bool))) == count
+    assert len(generic._separated(mesh, np.array([True, False, True]))) == 2
+
+
+def test_the_area_of_an_island_is_that_of_its_faces() -> None:
+    mesh = joined([("a", slit_sheet())])
+    (island,) = generic._separated(mesh, np.ones(len(mesh.faces), bool))
+    assert generic._area(mesh, island) == pytest.approx(face_areas(mesh.vertices, mesh.faces).sum(), rel=1e-3)
+    turned = squares((3, 4, 2, 5))
+    turned = replace(turned, vertices=turned.vertices @ np.linalg.qr(np.arange(9.0).reshape(3, 3) ** 2 + np.eye(3))[0])
+    assert generic._area(turned, generic._separated(turned, np.ones(1, bool))[0]) == pytest.approx(4.0)
+
+
+def test_small_pieces_without_a_name_are_teeth_from_twelve_on() -> None:
+    for count, size, material in ((11, 20, "skin"), (12, 20, "teeth"), (12, 25, "skin")):
+        mesh = squares(*((50.0 * k, 0, size, 0) for k in range(count)), names=("Mesh",) * count)
+        mesh = replace(mesh, piece=np.zeros(count, np.int64), pieces=("Mesh",))
+        assert generic._by_material(mesh, np.arange(count), list(range(count)), 1.0) == {
+            ("Mesh", material): list(range(count))
+        }
+        assert list(generic._by_material(mesh, np.arange(count), list(range(count)), 2.0)) == [
+            ("Mesh", "teeth" if count == 12 else "skin")
+        ]
+
+
+def test_others_get_points_by_their_share_of_the_skin() -> None:
+    mesh = squares(*((300.0 * k, 0, 100.0, 0) for k in range(4)), names=("Tongue", "Gum", "Box", "Hat"))
+    label, notes = np.arange(4), list[str]()
+    parts = generic._others(mesh, label, [0, 1, 2], 40_000.0, 1.0, notes)
+    assert [(p.name, p.material, p.request.points) for p, _ in parts] == [
+        ("tongue_1", "tongue", 918), ("gums_2", "gums", 918), ("piece_3", "skin", 918),
+    ]  # fmt: skip
+    assert notes == ["'Tongue': 1 islands as tongue_1", "'Gum': 1 islands as gums_2", "'Box': 1 islands as piece_3"]
+    assert {(p.request.coarse, p.request.neutral_mm) for p, _ in parts} == {(0.34, 0.5)}
+    assert generic._others(mesh, label, [0], 4e6, 1.0, [])[0][0].request.points == 120
+    assert generic._others(mesh, label, [0], 1e3, 1.0, [])[0][0].request.points == 2450
+    assert generic._others(replace(mesh, uv=mesh.uv * [1, 0]), label, [0], 1e3, 1.0, notes) == []
+    assert notes[-1] == "'Tongue': left out: no area in (u, v)"
+
+
+def swinging(angle_deg: float, mm: float = 90.0, rows: float = 0.0) -> tuple[FitMesh, dict[str, np.ndarray]]:
+    """The sheet; what lies below turns about an axis so far above it that it moves by about so many mm."""
+    mesh, angle = slit_sheet(), np.radians(angle_deg)
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    below = mesh.vertices[:, 1] < rows
+    hinge = np.array([0.0, mm / angle - 60.0, 0.0])
+    swing = np.where(below[:, None], (mesh.vertices - hinge) @ turn.T + hinge - mesh.vertices, 0.0)
+    return mesh, {"jawOpen": swing}
+
+
+@pytest.mark.parametrize(("angle", "found"), [(3.9, False), (4.1, True), (49.0, True), (51.0, False)])
+def test_a_jaw_turns_by_4_to_50_degrees(angle: float, found: bool) -> None:
+    mesh, shapes = swinging(angle)
+    hinge, chin = generic._hinge(mesh, shapes, 1.0)
+    assert (len(chin) > 0) == found
+    if found:
+        np.testing.assert_allclose(hinge, [0.0, 90.0 / np.radians(angle) - 60.0, 0.0], atol=1e-4)
+        length = np.linalg.norm(shapes["jawOpen"], axis=1)
+        assert chin.tolist() == np.flatnonzero(length > 0.8 * length.max()).tolist()
+
+
+def test_a_jaw_moves_by_three_millimetres_and_twelve_vertices_at_least() -> None:
+    mesh, shapes = swinging(10.0, mm=20.0)
+    most = np.linalg.norm(shapes["jawOpen"], axis=1).max()
+    assert len(generic._hinge(mesh, shapes, most / 3.01)[1]) > 0
+    assert len(generic._hinge(mesh, shapes, most / 2.99)[1]) == 0
+    moved = np.argsort(np.linalg.norm(shapes["jawOpen"], axis=1))
+    for count in (11, 12):
+        few = {"jawOpen": np.zeros_like(shapes["jawOpen"])}
+        few["jawOpen"][moved[-count:]] = shapes["jawOpen"][moved[-count:]]
+        assert len(generic._hinge(mesh, few, 1.0)[1]) == (12 if count == 12 else 0)
+    assert len(generic._hinge(mesh, {"mouthClose": shapes["jawOpen"]}, 1.0)[1]) == 0
+
+
+def test_names_of_materials_are_found_in_any_spelling() -> None:
+    for name, material in (("EyeLashes_L", "lash"), ("eyebrow", "brow"), ("HAIR", "brow"), ("Beard.001", "brow"),
+                           ("lower teeth", "teeth"), ("Tooth12", "teeth"), ("tongue", "tongue"), ("Gums", "gums"),
+                           ("mouth_bag", "mouth"), ("OralCavity", "mouth"), ("Head", "skin")):  # fmt: skip
+        assert generic._kind(name) == material

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from surface.fit.points.eyeball import BACK, CORNEA, IRIS, LIMBUS_V, eyeball_surface
+from surface.fit.points import eyeball
+from surface.fit.points.eyeball import BACK, CORNEA, IRIS, LIMBUS, LIMBUS_V, eyeball_surface, surface_height
 from surface.head.posing.contact_kernels import CORNEA_AT, CORNEA_RADIUS
 
 CENTRE, RADIUS = np.array([31.0, 36.0, 84.0]), 12.0
@@ -45,3 +46,18 @@ def test_lids_are_held_on_the_cornea_that_is_drawn():
     limbus, edge = np.arcsin(IRIS), np.arcsin(IRIS / CORNEA)
     assert CORNEA_RADIUS == CORNEA
     assert abs(CORNEA_AT - (np.cos(limbus) - CORNEA * np.cos(edge))) < 1e-4
+
+
+def test_heights_lie_on_the_ball_or_on_the_corneas_own_sphere():
+    rng = np.random.default_rng(2)
+    directions, gaze = (rng.normal(size=(400, 3)) for _ in range(2))
+    directions, gaze = (rows / np.linalg.norm(rows, axis=1, keepdims=True) for rows in (directions, gaze))
+    gaze[:200] = directions[:200] + 0.2 * gaze[:200]
+    gaze /= np.linalg.norm(gaze, axis=1, keepdims=True)
+    places = surface_height(directions, gaze)[:, None] * directions
+    on_cornea = np.abs(np.linalg.norm(places - eyeball.CORNEA_AT * gaze, axis=1) - CORNEA) < 1e-9
+    on_ball = np.abs(np.linalg.norm(places, axis=1) - 1.0) < 1e-9
+    ahead = (directions * gaze).sum(axis=1) > np.cos(LIMBUS)
+    assert on_cornea[ahead].all() and on_ball[~ahead].all() and 100 < ahead.sum() < 300
+    one = surface_height(directions, gaze[0])
+    np.testing.assert_array_equal(one, surface_height(directions, np.tile(gaze[0], (400, 1))))

@@ -5,9 +5,10 @@ import pytest
 from slit_sheet import ROW, SIZE_MM, SLIT, N, slit_sheet
 
 from surface.fit.points.refine import FitRequest, fit_chart
+from surface.fit.source import chart as chart_module
 from surface.fit.source.chart import TILE, face_slopes, join_slopes, make_chart, slit_of
 from surface.fit.source.islands import Island, find_islands
-from surface.fit.source.mesh import FitMesh
+from surface.fit.source.mesh import FitMesh, face_areas
 
 
 def test_samples_are_vertices_face_centres_and_border_edges():
@@ -113,3 +114,93 @@ def test_a_sliver_in_uv_raises_no_spike():
         chart = make_chart(mesh, find_islands(mesh), normalise=False, doubt_slivers=doubt)
         worst.append(fit_chart(mesh, chart, FitRequest(200, coarse=0.2)).error.max())
     assert worst[0] < 1.0 < 3.0 < worst[1]
+
+
+def apart(stretches: list[float]) -> FitMesh:
+    """Unit squares of (u, v) without a common corner; each is so many times as long and wide in space."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    vertices = np.vstack([square * s + [20.0 * k, 0, 0] for k, s in enumerate(stretches)])
+    uv = np.vstack([square[:, :2] + [2.0 * k, 0] for k in range(len(stretches))])
+    faces = np.arange(len(vertices)).reshape(-1, 4)
+    return FitMesh(vertices, faces, uv, faces, (), np.zeros((0, len(vertices), 3)))
+
+
+def test_a_fold_begins_at_four_and_a_half_times_the_usual_stretch_and_is_full_at_seven() -> None:
+    stretches = [2.0] * 9 + [8.9, 9.1, 10.0, 11.5, 13.9, 14.1, 40.0]  # the median is 2
+    mesh = apart(stretches)
+    island = Island(np.arange(len(mesh.uv)), mesh.uv, mesh.faces)
+    fold = chart_module._fold(mesh, island).reshape(-1, 4)
+    wanted = np.clip((np.array(stretches) - 9.0) / 5.0, 0.0, 1.0)
+    np.testing.assert_allclose(fold, np.tile(wanted[:, None], (1, 4)), atol=1e-9)
+    weights = chart_module._loosened(wanted)
+    np.testing.assert_allclose(weights, 1.0 - 0.95 * wanted)
+
+
+def test_a_corner_lies_as_deep_as_its_faces_do_on_average() -> None:
+    """Triangles and a square around one corner, which have 1, 49 and 25 times their areas of (u, v)."""
+    mesh = apart([1.0] * 9 + [7.0, 5.0])
+    uv, vertices, faces = mesh.uv.copy(), mesh.vertices, mesh.faces.copy()
+    faces[9:, 0] = faces[8, 0]  # their first corner is that of the ninth
+    faces[9, 3] = -1
+    island = Island(np.arange(len(uv)), uv, faces)
+    fold = chart_module._fold(mesh, island)
+    areas3, areas2 = face_areas(vertices, faces), face_areas(np.pad(uv, ((0, 0), (0, 1))), faces)
+    stretch = np.sqrt(areas3 / areas2)
+    depth = np.clip((stretch / np.median(stretch) - 4.5) / 2.5, 0, 1)
+    assert fold[faces[8, 0]] == pytest.approx(depth[8:].mean())
+    assert fold[faces[9, 1]] == pytest.approx(depth[9]) and fold[faces[10, 3]] == pytest.approx(depth[10])
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_an_island_fills_its_tile_and_runs_anticlockwise(mirrored: bool) -> None:
+    lean = np.array([[3.0, 5.0], [7.0, 5.5], [4.0, 7.0], [8.0, 6.5]]) * ([-1.0, 1.0] if mirrored else [1.0, 1.0])
+    island = Island(np.arange(4), lean, np.array([[0, 1, 2, -1], [1, 3, 2, -1]]))
+    for k in (0, 3):
+        placed = chart_module._place(island, k)
+        assert placed.uv.min(axis=0).tolist() == [TILE * k, 0.0]
+        assert np.ptp(placed.uv, axis=0).max() == pytest.approx(1.0)
+        factor = -5.0 if mirrored else 5.0
+        np.testing.assert_allclose((placed.uv[1:] - placed.uv[0]) * [factor, 5.0], lean[1:] - lean[0])
+    point = Island(np.arange(3), np.ones((3, 2)), np.array([[0, 1, 2, -1]]))
+    assert np.isfinite(chart_module._place(point, 0).uv).all()
+
+
+def test_samples_know_the_longest_step_of_the_mesh_around_them() -> None:
+    uv = np.array([[0.0, 0.0], [1.0, 0.1], [1.2, 3.0], [0.0, 0.5], [5.0, 0.0]])
+    island = Island(np.arange(5), uv, np.array([[0, 1, 2, 3], [1, 4, 2, -1]]))
+    np.testing.assert_allclose(
+        chart_module._spacing(island), [[1.0, 0.5], [4.0, 2.9], [3.8, 3.0], [1.2, 2.5], [4.0, 3.0]]
+    )
+
+
+@pytest.mark.parametrize(("height", "slit"), [(0.0, True), (1.39, True), (1.41, False), (3.0, False)])
+def test_a_hole_lower_than_seven_tenths_of_its_width_is_a_slit(height: float, slit: bool) -> None:
+    hole = np.array([[1.0, 4.0], [2.0, 4.0 - height / 2], [3.0, 4.1], [2.2, 4.0 + height / 2]])
+    found = slit_of(np.where(height == 0.0, hole * [1, 0] + [0, 4.0], hole))
+    assert (found is not None) == slit
+    if found is not None:
+        assert (found.v, found.start, found.end) == (pytest.approx(4.0), 1.0, 3.0)
+
+
+def test_the_hole_next_to_an_eye_is_its_own() -> None:
+    mesh = slit_sheet()
+    chart = make_chart(mesh, find_islands(mesh), normalise=False)
+    middles = [mesh.vertices[ids].mean(axis=0) for ids in chart.loop_vertices]
+    for k, middle in enumerate(middles):
+        assert chart.hole_near(mesh.vertices, middle + np.array([0.0, 0.0, 3.0])) == k
+    moved = mesh.vertices * [1.0, 1.0, -1.0] + [50.0, 0.0, 0.0]  # of the vertices that are given
+    assert chart.hole_near(moved, middles[1] * [1.0, 1.0, -1.0] + [50.0, 0.0, 0.0]) == 1
+
+
+def test_border_samples_weigh_eight_times_as_much() -> None:
+    mesh = slit_sheet()
+    chart = make_chart(mesh, find_islands(mesh), normalise=False)
+    rows = (N + 1) ** 2
+    border = np.zeros(len(chart.uv), bool)
+    border[:rows] = np.isin(np.arange(rows), np.concatenate(chart.loop_vertices))
+    border[rows + len(mesh.faces) :] = True
+    clear = ~chart.folded
+    np.testing.assert_allclose(chart.weight[border & clear] / chart.weight[~border & clear].max(), 8.0)
+    ends = chart.uv[rows + len(mesh.faces) :]
+    halves = np.concatenate([0.5 * (loop + np.roll(loop, -1, axis=0)) for loop in chart.loops])
+    np.testing.assert_allclose(ends, halves)

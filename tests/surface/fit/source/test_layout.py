@@ -7,6 +7,7 @@ import pytest
 from meshfiles import remapped
 from slit_sheet import SIZE_MM, slit_sheet
 
+from surface.fit.source import layout
 from surface.fit.source.chart import TILE
 from surface.fit.source.islands import Island, boundary_loops, find_islands
 from surface.fit.source.layout import OPEN, lay_out, open_flat_holes, separate, signed_areas
@@ -189,3 +190,68 @@ def test_a_flat_hole_is_opened_to_four_tenths_of_its_width_and_what_is_far_stays
         if abs(v[k]) > 0.3 * width:
             t = outside[k] / 1.2
             assert shift[k] == pytest.approx(shift[same[0]] * (1.0 - t * t * (3.0 - 2.0 * t)))
+
+
+def mixed() -> Island:
+    """A square, two triangles beside it and one more square: 0 1 4 3, 1 2 5, 1 5 4 and 3 4 7 6."""
+    uv = np.array([[0.0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0, 2], [1, 2]])
+    return Island(np.arange(8), uv, np.array([[0, 1, 4, 3], [1, 2, 5, -1], [1, 5, 4, -1], [3, 4, 7, 6]]))
+
+
+def test_neighbours_share_an_edge_whatever_their_corners() -> None:
+    one, two = layout._neighbours(mixed())
+    assert {tuple(sorted(pair)) for pair in zip(one.tolist(), two.tolist(), strict=True)} == {(0, 2), (1, 2), (0, 3)}
+    assert len(one) == 3
+
+
+def test_small_pieces_join_the_large_one_that_they_reach_first() -> None:
+    chain = np.arange(6)  # faces 0 to 6 in a row
+    label, large = np.array([0, 0, 1, 2, 3, 4, 4]), np.array([True, False, False, False, True])
+    for one, two in ((chain, chain + 1), (chain + 1, chain), (chain[::-1], chain[::-1] + 1)):
+        joined = layout._join_small(label, large, one, two)
+        assert joined[:2].tolist() == [0, 0] and joined[5:].tolist() == [4, 4]
+        assert joined[2] == 0 and joined[4] == 4 and joined[3] in (0, 4)
+    apart = layout._join_small(np.array([0, 1]), np.array([True, False]), chain[:0], chain[:0])
+    assert apart.tolist() == [0, 1]
+    assert label.tolist() == [0, 0, 1, 2, 3, 4, 4]
+
+
+def test_slopes_are_those_of_the_map_and_slivers_and_cliffs_do_not_count() -> None:
+    grid = np.stack(np.meshgrid(np.arange(7.0), np.arange(3.0), indexing="ij"), axis=-1).reshape(-1, 2)
+    at = np.arange(21).reshape(7, 3)
+    faces = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    turn = np.array([[2.0, 0.5, -1.0], [0.0, 3.0, 1.0]])  # along u and along v
+    mesh = slit_sheet().__class__(grid @ turn, faces, grid, faces, (), np.zeros((0, 21, 3)))
+    slope, weight = layout._slopes(mesh, Island(np.arange(21), grid, faces))
+    np.testing.assert_allclose(slope, np.tile(turn, (12, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(weight, 1.0)
+    uv, steep = grid.copy(), mesh.vertices.copy()
+    uv[0] = uv[1] + [0.99999, -1e-5]  # the first face is as good as a line
+    steep[20] += [0.0, 0.0, 40.0]  # the last one, whose third corner it is, a cliff
+    slope, weight = layout._slopes(replace(mesh, vertices=steep), Island(np.arange(21), uv, faces))
+    assert weight[0] == 0.0 and not slope[0].any() and weight[11] == 0.0
+    np.testing.assert_allclose(weight[1:11], 1.0)
+    over = Island(np.arange(21), grid * [-1.0, 1.0], faces)  # clockwise: nothing to go by
+    assert not layout._slopes(mesh, over)[1].any()
+
+
+def test_several_flat_holes_are_levelled_by_their_length() -> None:
+    """Two slits in one sheet, tilted by 10 and -5 degrees, three and one long: the sheet turns by 6.25."""
+    ring = 10 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    loops = [ring]
+    for degrees, length, y in ((10.0, 3.0, 4.0), (-5.0, 1.0, -4.0)):
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        slit = 0.5 * length * np.array([[-1.0, -0.05], [1, -0.05], [1, 0.05], [-1, 0.05]])
+        loops.append(slit @ np.array([[c, s], [-s, c]]) + [0.0, y])
+    uv = np.vstack(loops)
+    island = Island(np.arange(12), uv, np.zeros((0, 4), np.int64))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(layout, "boundary_loops", lambda _: [np.arange(4 * k, 4 * k + 4) for k in range(3)])
+        turned = layout._levelled(island).uv
+        angle = np.arctan2(*(turned[1] - turned[0])[::-1])
+        assert np.degrees(angle) == pytest.approx(-6.25, abs=0.01)
+        patch.setattr(layout, "boundary_loops", lambda _: [np.arange(4)])
+        assert layout._levelled(island) is island
+        tall = replace(island, uv=uv @ np.array([[0.0, 1.0], [-1.0, 0.0]]))  # upright holes are no slits
+        patch.setattr(layout, "boundary_loops", lambda _: [np.arange(4 * k, 4 * k + 4) for k in range(3)])
+        assert layout._levelled(tall) is tall

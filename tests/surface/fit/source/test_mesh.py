@@ -1,10 +1,13 @@
 """Reading meshes: units, and a clear refusal of everything that cannot be fitted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from slit_sheet import slit_sheet, write_npz
 
 from surface.base.errors import FitError
+from surface.fit.source import mesh as mesh_module
 from surface.fit.source.frame import find_frame
 from surface.fit.source.load import load_mesh
 from surface.fit.source.mesh import (
@@ -142,3 +145,81 @@ def test_rays_meet_triangles_where_they_should():
     assert np.isnan(distance[1:]).all()  # behind, and beside
     each, _, _ = intersect(tri, np.array([[1.0, 2, 0], [1, 2, 7], [0.2, 1, 8]]), rays)
     np.testing.assert_allclose(each, [[5.0, 9.0], [2.0, np.nan], [np.nan, 1.25]])
+
+
+def wall() -> FitMesh:
+    """A square and two triangles on the same plane, of two pieces."""
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0]]) * 50
+    faces = np.array([[0, 1, 4, 3], [1, 2, 5, -1], [1, 5, 4, -1]])
+    return FitMesh(vertices, faces, vertices[:, :2] / 100, faces.copy(), (), np.zeros((0, 6, 3)),
+                   np.array([0, 0, 1]), ("left", "right"))  # fmt: skip
+
+
+@pytest.mark.parametrize("key", ["faces", "face_uv"])
+@pytest.mark.parametrize(
+    ("face", "corner", "index", "named"),
+    [(0, 3, 6, 6), (0, 0, 6, 6), (2, 1, 7, 7), (1, 3, -2, -2), (2, 0, -2, -2), (1, 2, -1, -1)],
+)
+def test_corners_point_at_what_is_there(key: str, face: int, corner: int, index: int, named: int) -> None:
+    mesh = wall()
+    mesh_module.check_mesh(mesh, "m")
+    changed = getattr(mesh, key).copy()
+    changed[face, corner] = index
+    why = rf"m: {key}\[{face}\] points at {named}, but there are 6|no texture coordinates"
+    with pytest.raises(FitError, match=why):
+        mesh_module.check_mesh(replace(mesh, **{key: changed}), "m")
+
+
+def test_a_face_without_texture_is_named_with_its_piece() -> None:
+    mesh = wall()
+    bare = mesh.face_uv.copy()
+    bare[2] = -1
+    with pytest.raises(FitError, match=r"m: faces\[2\] \(of 'right'\) has no texture coordinates"):
+        mesh_module.check_mesh(replace(mesh, face_uv=bare), "m")
+    bare[1, 1] = -1
+    with pytest.raises(FitError, match=r"m: faces\[1\] \(of 'left'\) has no texture coordinates"):
+        mesh_module.check_mesh(replace(mesh, face_uv=bare), "m")
+    with pytest.raises(FitError, match=r"m: faces\[1\] has no texture coordinates"):  # there is only one piece
+        mesh_module.check_mesh(replace(mesh, face_uv=bare, pieces=("all",), piece=np.zeros(3, int)), "m")
+    for nothing in (replace(mesh, uv=np.zeros((0, 2))), replace(mesh, face_uv=np.full((3, 4), -1))):
+        with pytest.raises(FitError, match="m: the mesh has no texture coordinates"):
+            mesh_module.check_mesh(nothing, "m")
+
+
+def test_an_edge_of_three_faces_is_named_with_the_piece_of_the_first() -> None:
+    mesh = wall()
+    mesh_module.check_manifold(mesh, "m")
+    third = np.vstack([mesh.faces, [[5, 1, 3, -1]]])
+    crowded = replace(mesh, faces=third, face_uv=third, piece=np.array([0, 0, 1, 1]))
+    with pytest.raises(FitError, match=r"vertices \d and \d of 'left' belongs to 3 faces") as caught:
+        mesh_module.check_manifold(crowded, "m")
+    assert "between vertices 5 and 1" in str(caught.value) or "between vertices 1 and 5" in str(caught.value)
+    turned = mesh.faces.copy()
+    turned[2, :3] = turned[2, 2::-1]
+    with pytest.raises(FitError, match=r"vertices \d and \d of '\w+' is run through twice"):
+        mesh_module.check_manifold(replace(mesh, faces=turned), "m")
+
+
+def test_rays_hit_triangles_where_they_cross_them() -> None:
+    """Random rays and triangles: the place on the ray is the mix of the corners."""
+    rng = np.random.default_rng(5)
+    tri, origins, rays = rng.normal(size=(30, 3, 3)), rng.normal(size=(40, 3)), rng.normal(size=(40, 3))
+    distance, a, b = mesh_module.intersect(tri, origins, rays)
+    hits = 0
+    for r in range(40):
+        for t in range(30):
+            system = np.column_stack([tri[t, 1] - tri[t, 0], tri[t, 2] - tri[t, 0], -rays[r]])
+            u, v, d = np.linalg.solve(system, origins[r] - tri[t, 0])
+            if min(u, v, d, 1 - u - v) > 1e-3:
+                assert (a[r, t], b[r, t], distance[r, t]) == (pytest.approx(u), pytest.approx(v), pytest.approx(d))
+                hits += 1
+            elif min(u, v, d, 1 - u - v) < -1e-3:
+                assert np.isnan(distance[r, t])
+    assert hits > 20
+    along = mesh_module.intersect(tri[:1], tri[:1, 0] - [[1.0, 0, 0]], (tri[0, 1] - tri[0, 0])[None])[0]
+    assert np.isnan(along).all()  # within the plane, or beside it
+    flat = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    for x, y, met in ((0.2, 0.2, True), (0.0, 0.0, True), (0.5, 0.5, True), (-0.01, 0.5, False), (0.51, 0.51, False)):
+        found = mesh_module.intersect(flat, np.array([[x, y, 3.0]]), np.array([[0.0, 0, -1]]))[0]
+        assert (found[0, 0] == 3.0) if met else np.isnan(found[0, 0])
+    assert np.isnan(mesh_module.intersect(flat, np.array([[0.2, 0.2, 0.0]]), np.array([[0.0, 0, 1]]))[0]).all()

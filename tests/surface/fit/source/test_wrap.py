@@ -6,6 +6,7 @@ import pytest
 from surface.fit.features.joins import find_seams
 from surface.fit.points.refine import FitRequest, fit_chart
 from surface.fit.points.solve import basis
+from surface.fit.source import wrap
 from surface.fit.source.islands import Island
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.wrap import wrap_chart
@@ -84,3 +85,61 @@ def test_rays_that_meet_nothing_take_their_nearest_neighbour_and_are_not_counted
     assert 0 < chart.folded.sum() < 0.2 * len(chart.uv)
     assert (chart.weight[chart.folded & (chart.uv[:, 0] < 1.0)] == 0.05).all()
     np.testing.assert_allclose(chart.mix.sum(axis=1), 1.0)
+
+
+def test_the_tile_has_a_hole_at_the_tip_and_one_line_along_both_sides(wrapped):
+    _, chart, _ = wrapped
+    (loop,), (sewn,) = chart.loops, chart.loop_vertices
+    assert loop.tolist() == [[0, 0], [0.997, 0], [0.997, 1], [0, 1]] and sewn.tolist() == [-1, -2, -2, -1]
+    tip = chart.uv[:, 0] == 1.0
+    assert tip.sum() == wrap.AROUND
+    assert (chart.weight[tip] == 8.0).all() and set(chart.weight[~tip].tolist()) <= {1.0, 0.05}
+    np.testing.assert_array_equal(chart.weight[~tip] == 0.05, chart.folded[~tip])
+    steps = [np.diff(np.unique(chart.uv[:, k].round(12))) for k in range(2)]
+    for k in range(2):
+        np.testing.assert_allclose(steps[k], chart.spacing[0, k], rtol=1e-6)
+    assert (chart.spacing == chart.spacing[0]).all()
+    assert (chart.uv.min(axis=0).tolist(), chart.uv.max(axis=0).tolist()) == ([0.0, -0.125], [1.0, 1.125])
+
+
+def test_rays_go_out_around_a_line_and_over_its_end():
+    points = np.array([[-2.0, 10.0, 100.0], [4.0, 18.0, 200.0], [0.0, 12.0, 150.0]])
+    origins, rays, uv = wrap._rays(points)
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1.0)
+    np.testing.assert_allclose(origins[:, :2], [[1.0, 14.0]] * len(origins))  # in the middle
+    z = origins[:, 2].reshape(-1, wrap.AROUND)
+    assert (z == z[:, :1]).all() and z[0, 0] == pytest.approx(112.0) and z[-1, 0] == pytest.approx(178.0)
+    along = uv[:, 0].reshape(-1, wrap.AROUND)[:, 0]
+    straight, turning = slice(0, wrap.STATIONS), slice(wrap.STATIONS, None)
+    np.testing.assert_allclose(z[straight, 0], np.linspace(112.0, 178.0, wrap.STATIONS))
+    np.testing.assert_allclose(z[turning, 0], 178.0)
+    np.testing.assert_allclose(along, np.linspace(0, 1, wrap.STATIONS + wrap.FAN))
+    by_row = rays.reshape(len(along), wrap.AROUND, 3)
+    # from below over the subject's right, the top and the left
+    for v, way in ((0.0, [0, -1, 0]), (0.25, [-1, 0, 0]), (0.5, [0, 1, 0]), (0.75, [1, 0, 0]), (1.0, [0, -1, 0])):
+        column = int(np.argmin(np.abs(uv[: wrap.AROUND, 1] - v)))
+        assert uv[column, 1] == pytest.approx(v, abs=1e-9)
+        np.testing.assert_allclose(by_row[straight, column], [way] * wrap.STATIONS, atol=1e-12)
+        # then they turn by equal steps until all look ahead, 45 degrees down
+        turns = by_row[wrap.STATIONS - 1 :, column]
+        if way[0]:
+            rise = turns[:, 0] * way[0]
+            np.testing.assert_allclose(rise, np.cos(np.linspace(0, np.pi / 2, wrap.FAN + 1)), atol=1e-12)
+    np.testing.assert_allclose(by_row[-1], [[0.0, -np.sqrt(0.5), np.sqrt(0.5)]] * wrap.AROUND, atol=1e-12)
+
+
+def test_rays_that_lie_in_one_plane_turn_evenly_within_it():
+    _, rays, uv = wrap._rays(np.array([[-1.0, -1, 0], [1.0, 1, 10]]))
+    middle = rays.reshape(-1, wrap.AROUND, 3)[:, wrap.AROUND // 2]  # over the top: from up to down ahead
+    assert uv[wrap.AROUND // 2, 1] == pytest.approx(0.5)
+    angle = np.degrees(np.arctan2(middle[wrap.STATIONS - 1 :, 1], middle[wrap.STATIONS - 1 :, 2]))
+    np.testing.assert_allclose(angle, np.linspace(90.0, -45.0, wrap.FAN + 1), atol=1e-9)
+
+
+def test_triangles_and_squares_are_wrapped_alike():
+    mesh, islands = body()
+    split = [Island(i.vertex, i.uv, np.vstack([np.column_stack([i.faces[:, [0, 1, 2]], 0 * i.faces[:, 0] - 1]),
+                                               np.column_stack([i.faces[:, [0, 2, 3]], 0 * i.faces[:, 0] - 1])]))
+             for i in islands]  # fmt: skip
+    whole, cut = wrap_chart(mesh, islands), wrap_chart(mesh, split)
+    np.testing.assert_allclose(cut.mix @ mesh.vertices, whole.mix @ mesh.vertices, atol=1e-6)

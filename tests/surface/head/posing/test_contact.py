@@ -8,6 +8,7 @@ from small_head import small_head
 
 from surface import DCPSurface
 from surface.head.model.data import Contact
+from surface.head.posing import contact as contact_module
 from surface.head.posing.contact import (
     CONTACT_SHARE,
     HOLD_MM,
@@ -199,3 +200,183 @@ def test_weights_are_those_of_the_surface_and_add_up() -> None:
 
 def test_two_thirds_of_the_rows_can_touch() -> None:
     assert pytest.approx(2 / 3) == CONTACT_SHARE and contact_rows(contact()) == 6
+
+
+def ball_lids(height: float, eye: int = 0) -> tuple[DCPSurface, Contact]:
+    """A patch so many mm above an eyeball of :func:`small_head`, and the contact of two lids on it, well below the
+    cornea of an eye that looks up: the upper side is the higher half."""
+    surface = bowl(height)
+    centre = small_head().eyes[eye]
+    moved = surface.with_points(surface.points + centre)
+    u, out = np.meshgrid(np.linspace(0.2, 0.8, COLUMNS), np.linspace(0.0, 0.2, ROWS), indexing="ij")
+    places = np.stack([np.stack([u, v0 + sign * out], axis=-1) for sign, v0 in ((1.0, 0.62), (-1.0, 0.38))])
+    return moved, Contact("lids", "a", ("b",), eye, 3.0, 0.5, places)
+
+
+@pytest.mark.parametrize("eye", [0, 1])
+def test_lids_are_held_where_they_rested_on_the_eyeball(eye: int) -> None:
+    """Lids that rest 0.4 mm above the ball: both sides return towards that height."""
+    surface, lids = ball_lids(0.4, eye)
+    head = small_head()
+    solver = ContactSolver(lids, surface, head)
+    samples = surface.evaluate(lids.places.reshape(-1, 2))
+
+    def height(points: np.ndarray) -> np.ndarray:
+        at = surface.with_points(points).evaluate(lids.places.reshape(-1, 2)) - head.eyes[eye]
+        return np.linalg.norm(at, axis=1) - RADIUS
+
+    ground = height(surface.points)
+    assert len(samples) == 2 * COLUMNS * ROWS and ground.min() > 0.0 and ground.max() < 1.2
+    for off in (-0.9, 0.8):
+        away = surface.points - head.eyes[eye]
+        points = surface.points + off * away / np.linalg.norm(away, axis=1, keepdims=True)
+        before = height(points)
+        push = solver.apply(np.array([0.0, 0.0, -1.0]), points)  # it looks away: no cornea here
+        after = height(points)
+        assert np.abs(before - ground).min() > 0.5
+        assert np.abs(after - ground).max() < 0.75 * np.abs(before - ground).min()
+        assert push.shape == (2 * 2 * COLUMNS * contact_rows(lids),)
+        # what other parts are told: how far the samples that can touch slid, and how far they were lifted
+        slid, lifted = push.reshape(2, -1)
+        inner = after.reshape(2, COLUMNS, ROWS)[:, :, :6] - before.reshape(2, COLUMNS, ROWS)[:, :, :6]
+        np.testing.assert_allclose(lifted, inner.ravel(), atol=0.02)
+        assert np.abs(slid).max() < 0.3
+
+
+def test_a_lid_that_slides_takes_along_what_is_next_to_it() -> None:
+    """Points beside single samples slide round the ball and are lifted as those samples are, less with distance."""
+    surface, lids = ball_lids(0.4)
+    centre = small_head().eyes[0]
+    at = surface.evaluate(lids.places.reshape(-1, 2)).reshape(2, COLUMNS, ROWS, 3)
+    chosen = [(0, 3, 0), (0, 5, 4), (1, 7, 2), (1, 2, 5)]
+    rest = np.array([at[k] for k in chosen])
+    out = (rest - centre) / np.linalg.norm(rest - centre, axis=1, keepdims=True)
+    for off, share in ((0.0, 1.0), (1.5, 0.5)):  # of a reach of 3 mm
+        points = rest + off * out
+        follower = Follower(lids, points, surface, small_head())
+        for k, (side, column, row) in enumerate(chosen):
+            for kind in (0, 1):
+                push = np.zeros((2, 2, COLUMNS, 6))
+                push[kind, side, column if off == 0.0 else slice(None), row] = 0.5
+                after = points.copy()
+                follower.apply(push.ravel(), after)
+                before, now = points[k] - centre, after[k] - centre
+                turned = np.arctan2(now[1], now[2]) - np.arctan2(before[1], before[2])
+                up = RADIUS * turned if kind == 0 else np.linalg.norm(now) - np.linalg.norm(before)
+                assert up == pytest.approx(0.5 * share, abs=0.06), (off, kind, k)
+                push[kind, side] = 0.0
+                push[kind, 1 - side] = 0.5  # the other side is none of its business
+                follower.apply(push.ravel(), still := points.copy())
+                np.testing.assert_array_equal(still[k], points[k])
+
+
+def test_followers_of_lips_move_by_the_corrections_of_the_two_columns_beside_them() -> None:
+    surface, c = lips(0.0), contact(share=0.6)
+    at = surface.evaluate(c.places.reshape(-1, 2)).reshape(2, COLUMNS, ROWS, 3)
+    x = at[0, :, 0, 0]
+    rng = np.random.default_rng(3)
+    across = np.concatenate([rng.uniform(x[0], x[-1], 12), x[[0, 4]], [x[0] - 1.0, x[-1] + 1.0]])
+    push = rng.uniform(0.1, 1.0, (2, COLUMNS))
+    for side, share in ((0, 0.6), (1, -0.4)):
+        row = at[side, :, :6].mean(axis=0)[:, 1:]  # height and depth of the samples
+        rest = np.column_stack([across, *np.tile(row[2], (len(across), 1)).T])
+        follower, points = Follower(c, rest, surface, small_head()), rest.copy()
+        follower.apply(push.ravel(), points)
+        t = np.linalg.norm(rest[:, None] - at[side, :, :6].reshape(-1, 3), axis=2).min(axis=1) / 10.0  # of the reach
+        wanted = share * np.interp(across, x, push[side]) * (1.0 - t * t * (3.0 - 2.0 * t))
+        np.testing.assert_allclose(points[:, 1] - rest[:, 1], wanted, rtol=1e-3)
+        np.testing.assert_array_equal(points[:, [0, 2]], rest[:, [0, 2]])
+
+
+def test_what_follows_lips_fades_out_over_the_reach_of_their_contact() -> None:
+    surface, c = lips(0.0), contact()
+    at = surface.evaluate(c.places.reshape(-1, 2)).reshape(2, COLUMNS, ROWS, 3)
+    rim = at[0, 5, 0]
+    for off, share in ((0.0, 1.0), (2.5, 0.84375), (5.0, 0.5), (7.5, 0.15625), (10.1, 0.0)):
+        rest = np.array([rim, rim - np.array([0.0, 0.0, off])])  # behind the rim, towards nothing else
+        distance = np.linalg.norm(at[:, :, :6].reshape(-1, 3) - rest[1], axis=1).min()
+        assert distance == pytest.approx(off, abs=1e-6)
+        points = rest.copy()
+        Follower(c, rest, surface, small_head()).apply(np.ones(2 * COLUMNS), points)
+        for moved, wanted in zip(points[:, 1] - rest[:, 1], (1.0, share), strict=True):
+            assert abs(moved) == pytest.approx(wanted * (0.75 if moved > 0.0 else 0.25))
+
+
+def test_columns_move_by_their_share_and_less_beyond_what_touches() -> None:
+    moves = contact_module._column_moves(contact(share=0.75)).reshape(2, COLUMNS, ROWS, 2, COLUMNS)
+    fade = np.array([1.0] * 6 + [1 - 7 / 27, 1 - 20 / 27, 0.0])  # a third, two thirds and all of the way: 3 t^2 - 2 t^3
+    for side, share in ((0, 0.75), (1, -0.25)):
+        for k in range(COLUMNS):
+            np.testing.assert_allclose(moves[side, k, :, side, k], share * fade, atol=1e-12)
+    assert np.count_nonzero(moves) == 2 * COLUMNS * 8
+
+
+def test_points_are_moved_by_least_squares_and_only_those_that_act_near_the_samples() -> None:
+    """Against numpy's least squares with the damping as rows of its own."""
+    rng = np.random.default_rng(5)
+    dense = np.zeros((6, 9))
+    dense[:, :4] = rng.uniform(0.1, 1.0, (6, 4))
+    dense[:, 5] = 0.019  # too little of every sample
+    dense[2, 6] = 0.021  # just enough of one
+    dense[:, 7] = 0.05
+    points = rng.uniform(-3, 3, (12, 3))
+    points[7] = [60.0, 0, 0]  # far from every sample
+    start = np.arange(7) * 9
+    ids, share = np.tile(np.arange(9), 6), dense.ravel()
+    used, table = contact_module._inverse(start, ids, share, points, 0.05)
+    assert used.tolist() == [0, 1, 2, 3, 6]
+    system = np.vstack([dense[:, used], np.sqrt(0.05) * np.eye(5)])
+    for k in range(6):
+        wanted = np.concatenate([np.eye(6)[k], np.zeros(5)])
+        np.testing.assert_allclose(table[k], np.linalg.lstsq(system, wanted, rcond=None)[0])
+
+
+def test_lips_and_lids_have_their_own_damping_and_lips_no_eyeball() -> None:
+    surface, c = lips(1.0), contact()
+    places = c.places.reshape(-1, 2)
+    plain = EyeballClearance(surface, places, np.zeros(3), 0.0)
+    assert plain.lift(AHEAD, surface.points.copy()) == 0.0
+    np.testing.assert_allclose(plain.samples, surface.evaluate(places), atol=0.15)
+    eyed = EyeballClearance(surface, places, np.zeros(3), RADIUS)
+    start, ids, share = weights_at(surface, places)
+    for clearance, damping in ((plain, 0.02), (eyed, 0.05)):
+        used, table = contact_module._inverse(start, ids, share, surface.points, damping)
+        np.testing.assert_array_equal(clearance.ids, used)
+        np.testing.assert_array_equal(clearance.table, table)
+
+
+def test_distances_are_those_of_the_nearest_point() -> None:
+    rng = np.random.default_rng(6)
+    points, others = rng.normal(size=(20, 3)) + 40.0, rng.normal(size=(30, 3)) + 40.0
+    wanted = np.linalg.norm(points[:, None] - others, axis=2).min(axis=1)
+    np.testing.assert_allclose(contact_module._nearest(points, others), wanted, atol=1e-6)
+    assert contact_module._nearest(others[:1], others)[0] < 1e-5
+
+
+def test_an_eye_is_that_of_its_side() -> None:
+    head = small_head()
+    assert contact_module.eye_of(contact(-1), head)[1] == 0.0
+    for eye in (0, 1):
+        centre, radius = contact_module.eye_of(contact(eye), head)
+        assert radius == 12.0 and centre.tolist() == head.eyes[eye].tolist()
+
+
+def test_sides_are_parted_until_little_is_left_and_three_times_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface, overlaps = lips(1.5), []
+    part = ContactSolver._part_sides
+
+    def record(self: ContactSolver, points: np.ndarray) -> float:
+        overlaps.append(part(self, points))
+        return overlaps[-1]
+
+    monkeypatch.setattr(ContactSolver, "_part_sides", record)
+    ContactSolver(contact(), surface, small_head()).apply(AHEAD, surface.points.copy())
+    assert 2 <= len(overlaps) <= 3 and (overlaps[-1] < 0.1 or len(overlaps) == 3)
+    assert all(overlap >= 0.1 for overlap in overlaps[:-1])
+    overlaps.clear()
+    ContactSolver(contact(), lips(0.3), small_head()).apply(AHEAD, lips(0.3).points.copy())
+    assert len(overlaps) == 1 and 0.0 < overlaps[0] < 0.1
+    monkeypatch.setattr(contact_module, "move_points", lambda *_: None)  # nothing helps
+    overlaps.clear()
+    ContactSolver(contact(), surface, small_head()).apply(AHEAD, surface.points.copy())
+    assert len(overlaps) == 3

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from small_head import JAW, all_points, part, small_head
 
-from surface.head.model.data import Group
+from surface.head.model.data import Contact, Group, Seam
+from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import NAMES, read_pose
+from surface.head.posing import rig as rig_module
 from surface.head.posing.rig import LID_MM, Moves, SkinRig, jaw_path, rigid_motion
 
 HEAD = small_head()
@@ -142,3 +144,79 @@ def test_a_rig_rests_while_nothing_changes_and_wakes_when_it_is_told_to():
     rig.invalidate()
     np.testing.assert_allclose(rig.apply(pose(mouthPucker=0.5))[0] - points[0], 1.0)
     assert rig.version == version + 1
+
+
+def lined(**other):
+    """Part "b" lies behind the lids of "a": the eye, 12 mm large, is under its middle."""
+    border = np.linspace(0, 1, 6)
+    seam = Seam("a", "b", np.column_stack([np.ones(6), border]), np.column_stack([np.zeros(6), border]))
+    places = np.stack(np.meshgrid(np.linspace(0.2, 0.8, 5), np.linspace(0.5, 0.7, 4), indexing="ij"), axis=-1)
+    lids = Contact("lids", "a", ("b",), 0, 60.0, 0.5, np.stack([places, places[:, :, ::-1] * [1, -1] + [0, 0.95]]))
+    fields = {"eyes": np.array([[20.0, 0, 22.5], [-30, 0, 12]]), "contacts": [lids], "seams": [seam], **other}
+    return small_head(parts=[part("a", -40), part("b", 0.5)], **fields)
+
+
+def test_what_is_sewn_behind_lids_is_kept_out_of_their_eyeball():
+    head = lined()
+    ((eye, clearance),) = rig_module._clearances(head.parts[1], head)
+    assert eye == 0 and clearance.radius == 12.0
+    surface = make_surface(head.parts[1])
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 72), np.linspace(0, 1, 36)), axis=-1).reshape(-1, 2)
+    local = surface.evaluate(grid) - head.eyes[0]
+    near = grid[(np.linalg.norm(local, axis=1) < 1.4 * 12.0) & (local[:, 2] > 0.0)]
+    assert 50 < len(near) < len(grid) / 2 and len(clearance.samples) == len(near)
+    np.testing.assert_allclose(clearance.samples[:, 0], surface.evaluate(near)[:, 0] - head.eyes[0][0], atol=0.3)
+
+
+def test_only_what_is_sewn_to_lids_near_an_eye_is_kept_out_of_it():
+    (lids,), (seam,) = lined().contacts, lined().seams
+    for changes in (
+        {"contacts": []},
+        {"contacts": [replace(lids, followers=())]},
+        {"contacts": [replace(lids, eye=-1)]},
+        {"seams": []},
+        {"seams": [replace(seam, part_a="b", part_b="a")]},
+        {"seams": [replace(seam, part_a="other")]},
+        {"eyes": np.array([[20.0, 0, -90.0], [0, 0, 0]])},
+    ):
+        head = lined(**changes)
+        assert rig_module._clearances(head.parts[1], head) == [], changes
+    head = lined()
+    assert rig_module._clearances(head.parts[0], head) == []  # the lids themselves
+
+
+def test_each_part_solves_its_own_contacts_and_follows_those_of_others():
+    head = lined()
+    face, lining = (SkinRig(p, head) for p in head.parts)
+    now = pose()
+    face.apply(now)
+    assert list(now.pushes) == ["lids"]
+    lining.apply(now)
+    assert list(now.pushes) == ["lids"]
+    rested = lining.points.copy()
+    now.pushes["lids"] = np.full_like(now.pushes["lids"], 0.5)
+    moved_points = lining.apply(now)
+    assert np.abs(moved_points - rested).max() > 0.1  # it goes along with what it follows
+    bare = SkinRig(head.parts[1], lined(contacts=[]))
+    np.testing.assert_array_equal(bare.apply(pose()), head.parts[1].points)
+
+
+def test_lips_take_back_the_jaw_by_how_far_mouth_close_moves_them():
+    moves = np.zeros((25, 3), np.float32)
+    moves[:4] = [[0, 5, 0], [0, 20, 0], [0, 60, 0], [3, 0, -4]]
+    closing = replace(all_points("mouthClose", (0, 0, 0)), moves=moves)
+    p = part("a", 0, groups=[closing, all_points("mouthPucker", (0, 0, 90))])
+    share = rig_module._undo_share(p)
+    np.testing.assert_allclose(share[:5], [0.25, 1.0, 1.0, 0.25, 0.0])
+
+
+def test_what_rigid_parts_depend_on_is_named():
+    head = small_head()
+    p = pose(jawOpen=0.5, jawForward=0.25, leftEyeYaw=1.0, rightEyePitch=0.5)
+    assert rig_module.motion_key("jaw", head, p) == (0.5, 0.25)
+    assert rig_module.motion_key("left_eye", head, p) == tuple(p.gaze[0].tolist())
+    assert rig_module.motion_key("right_eye", head, p) == tuple(p.gaze[1].tolist())
+    assert rig_module.motion_key("skull", head, p) == ()
+    linear, shift = rigid_motion("right_eye", head, p)
+    np.testing.assert_allclose(linear @ head.eyes[1] + shift, head.eyes[1])
+    np.testing.assert_allclose(linear[:, 2], rig_module.optical_axis(p.gaze[1]))

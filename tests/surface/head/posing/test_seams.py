@@ -1,13 +1,16 @@
 """Seams show no crack, whatever the pose."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from small_head import all_points, part, small_head
 
 from surface.head import Head
+from surface.head.model.data import Seam
 from surface.head.posing.part import border_edges
-from surface.head.posing.seams import _around
+from surface.head.posing.seams import SeamStitch, _around
 
 
 def border_points(p, x: float) -> np.ndarray:
@@ -77,3 +80,75 @@ def test_a_closed_line_goes_on_at_both_ends_and_an_open_one_does_not() -> None:
     same_ids, same_at = _around(ids, at, opened)
     assert same_ids.tolist() == [7, 3, 9] and same_at.tolist() == [0.5, 1.5, 2.5]
     assert len(_around(ids[:0], at[:0], closed)[0]) == 0
+
+
+class Patch:
+    """What a seam needs of a part: triangles in the plane, whose (u, v) are their places at rest."""
+
+    def __init__(self, places: list[tuple[float, float]], triangles: list[list[int]]) -> None:
+        uv = np.array(places)
+        self.mesh, self.changed, self.touched = SimpleNamespace(uv=uv), True, 0
+        self.vertices = np.column_stack([uv, 0 * uv[:, 0]]).astype(np.float32)
+        self.normals = np.tile(np.float32([0, 0, 1]), (len(uv), 1))
+        self.triangles = np.array(triangles)
+        self.borders = border_edges(self.triangles)
+
+    def append(self, like: np.ndarray, triangles: np.ndarray) -> None:
+        self.vertices = np.vstack([self.vertices, self.vertices[like]])
+        self.normals = np.vstack([self.normals, self.normals[like]])
+        self.triangles = np.vstack([self.triangles, triangles])
+
+    def touch(self) -> None:
+        self.touched += 1
+
+    def areas(self) -> np.ndarray:
+        a, b, c = (self.vertices[self.triangles[:, k], :2].astype(float) for k in range(3))
+        return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+
+
+HEIGHTS = [0.0, 0.2, 0.4, 0.5, 0.9, 1.0]
+
+
+@pytest.mark.parametrize("reversed_", [False, True])
+def test_slivers_fill_exactly_what_lies_between_a_fine_border_and_a_coarse_one(reversed_: bool) -> None:
+    """The first patch has six vertices along the seam at x = 0, the second three; then the seam bows."""
+    ends = len(HEIGHTS)
+    first = Patch([*((0.0, v) for v in HEIGHTS), (-1.0, 0.5)], [[ends, k, k + 1] for k in range(ends - 1)])
+    corners = [[0, 3, 1], [1, 3, 2]]
+    corners = [t[::-1] for t in corners] if reversed_ else corners
+    second = Patch([(0.0, 0.0), (0.0, 0.5), (0.0, 1.0), (1.0, 0.5)], corners)
+    line = np.array([[0.0, v] for v in np.linspace(0, 1, 5)])
+    stitch = SeamStitch(Seam("a", "b", line, line), first, second)
+    assert len(second.vertices) == 7 and len(second.triangles) == 5  # three of the first's stand between
+    first.vertices[:ends, 0] = [0.0, -0.1, -0.3, -0.2, -0.25, 0.0]
+    first.normals[2] = [1.0, 0.0, 0.0]
+    stitch.close()
+    border = first.vertices[:ends, :2].astype(float)
+    ring = np.vstack([border[::-1], [[1.0, 0.5]]])
+    whole = 0.5 * abs((ring[:, 0] * np.roll(ring[:, 1], -1) - np.roll(ring[:, 0], -1) * ring[:, 1]).sum())
+    areas = second.areas() * (-1 if reversed_ else 1)
+    assert areas.sum() == pytest.approx(whole, rel=1e-5)
+    edges = second.vertices[np.unique(border_edges(second.triangles)), :2]
+    assert np.abs(border[:, None] - edges).max(axis=2).min(axis=1).max() < 1e-5
+    directed = second.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    assert len(np.unique(directed, axis=0)) == len(directed)
+    at = np.flatnonzero(np.abs(second.vertices[:, :2] - border[2]).max(axis=1) < 1e-6)
+    assert second.normals[at].tolist() == [[1.0, 0.0, 0.0]]
+    assert second.touched == 1
+    first.changed = second.changed = False
+    stitch.close()
+    assert second.touched == 1
+
+
+def test_vertices_between_two_of_the_first_part_are_put_on_its_edge() -> None:
+    first = Patch([(0.0, 0.0), (0.0, 1.0), (-1.0, 0.5)], [[2, 0, 1]])
+    second = Patch([(0.0, 0.0), (0.0, 0.25), (0.0, 1.0), (1.0, 0.5), (0.0, 1.2)], [[0, 3, 1], [1, 3, 2], [2, 3, 4]])
+    line = np.array([[0.0, 0.0], [0.0, 0.5], [0.0, 1.0]])
+    stitch = SeamStitch(Seam("a", "b", line, line), first, second)
+    assert stitch.ids.tolist() == [0, 1, 2]  # the last one of the second lies beyond the seam
+    np.testing.assert_allclose(stitch.share, [0.0, 0.25, 1.0], atol=1e-6)
+    assert set(zip(stitch.low.tolist(), stitch.high.tolist(), strict=True)) == {(0, 1)}
+    first.vertices[1] = [0.5, 2.0, 0.0]
+    stitch.close()
+    np.testing.assert_allclose(second.vertices[:3, :2], [[0, 0], [0.125, 0.5], [0.5, 2.0]], atol=1e-6)
+    np.testing.assert_allclose(second.vertices[4, :2], [0.0, 1.2])
