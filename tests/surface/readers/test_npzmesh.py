@@ -91,5 +91,5 @@ def test_an_archive_that_unpacks_to_gigabytes_is_refused_before_it_does(tmp_path
         zeros = bytes(16 << 20)
         for _ in range(65):
             member.write(zeros)
-    with pytest.raises(FitError, match=r"m\.npz: unpacks to 1040 MB, more than 1024 MB"):
+    with pytest.raises(FitError, match=r"m\.npz: .*unpacks to 1040 MB, more than 1024 MB"):
         read_npz(path)

@@ -117,7 +117,7 @@ def test_missing_files_other_suffixes_and_bytes_are_named(tmp_path: Path) -> Non
     with pytest.raises(SurfaceFileError, match=r"ends in \.step"):
         read_surface(tmp_path / "a.step")
     (tmp_path / "b.json").write_bytes(b"\xff\xfe")
-    with pytest.raises(SurfaceFileError, match="not text"):
+    with pytest.raises(SurfaceFileError, match="not UTF-8"):
         read_surface(tmp_path / "b.json")
     with pytest.raises(SurfaceFileError, match="cannot be written"):
         write_surfaces(tmp_path / "no" / "a.json", [])
