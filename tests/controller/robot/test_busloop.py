@@ -19,7 +19,7 @@ from controller.robot import busloop as module
 from controller.robot.buses import read_bus
 from controller.robot.busloop import BusLoop
 from controller.robot.settings import ChannelSettings, RuleSettings, TimingRule
-from drivers.base.errors import NoReply
+from drivers.base.errors import NoReply, PortBusy
 from drivers.sim import SimulatedBus
 
 JAW, YAW = P.index("jawOpen"), P.index("headYaw")
@@ -461,3 +461,14 @@ def test_with_a_silent_servo_the_others_are_driven_after_a_replug_and_it_joins_w
         assert abs(np.degrees(loop._goals.sent[1])) < 39.0, "a ramp"
         until(lambda: abs(degrees(servos, 2) - 40.0) < 0.2)
     assert loop.error is None
+
+
+def test_a_second_instance_on_one_port_is_refused_and_the_first_goes_on(servos: SimulatedBus) -> None:
+    face = Face()
+    with running(servos, face) as loop:
+        loop.begin()
+        with pytest.raises(PortBusy, match="port"):
+            make(servos, Face()).start()
+        face.values[JAW] = 1.0
+        until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
+        assert loop.error is None and loop.report()["bus"]["errors"].get("port_lost") is None  # type: ignore[index]
