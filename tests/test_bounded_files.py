@@ -20,7 +20,6 @@ ALLOWED = {
     "surface/base/files.py": "is the place",
     "surface/base/jit.py": "omote's own modules",
     "surface/view/draw/programs.py": "omote's own shaders",
-    "controller/base/mailboxes.py": "shared memory that omote made",
     "controller/base/steal_time.py": "the kernel's counters",
     "controller/body/sources.py": "a voice may come from a named pipe or a device",
     "controller/face/face.py": "the kernel's counters",

@@ -119,7 +119,7 @@ def _describe_toml(path: Path) -> Iterator[str]:
     kind = file_kinds.kind_of(table)
     if kind is None and table:
         why = f"no kind of file has the keys {', '.join(table)[:200]}"
-        raise ConfigError(f"{path}: {why}", hint="compare it with the files in configs/, or see docs/expression.md")
+        raise ConfigError(f"{path}: {why}", hint="compare it with the file of its kind in omote's folder configs")
     yield from _READERS.get(kind or file_kinds.STAGE, _describe_stage)(path)
 
 

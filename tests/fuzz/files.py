@@ -9,6 +9,7 @@ milliseconds. Bounded by ``--count`` files of each kind; the same seed damages t
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import random
 import resource
@@ -105,7 +106,7 @@ def _wait(child: int) -> tuple[int, resource.struct_rusage]:
 
 def warm_up(kinds: list[Kind]) -> None:
     """Read every good file once in this process, so that what is forked from it has everything imported."""
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as folder, Path(os.devnull).open("w") as nowhere:
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
         for kind in kinds:
             path = Path(folder) / kind.name / kind.file
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -113,7 +114,7 @@ def warm_up(kinds: list[Kind]) -> None:
                 (path.parent / name).write_bytes(data)
             for seed in kind.seeds:
                 path.write_bytes(seed)
-                with redirect_stdout(nowhere), redirect_stderr(nowhere):
+                with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
                     kind.read(path)
 
 

@@ -58,7 +58,10 @@ class Head:
             data = with_identities(data, load_identities(path), identity, str(path))
         for shape in data.jaw.tilts:
             if shape not in SHAPES:
-                raise HeadFileError(f"{path}: jaw.tilts.{shape}: is no shape", hint="see docs/heads.md for names")
+                raise HeadFileError(
+                    f"{path}: jaw.tilts.{shape}: is no shape",
+                    hint="name a shape of the head",
+                )
         try:
             head = cls(data, str(path))
             apply_shade(head.parts, read_shade(path, head.parts))

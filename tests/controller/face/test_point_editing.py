@@ -181,7 +181,7 @@ def test_only_control_points_that_moved_are_kept(handles: PointEditor, head: Hea
     moves[[3, 5, 7], [0, 1, 2]] = 0.01, -0.0099, -2.0
     handles._set_moves(moves)
     handles.save(tmp_path / "a.json", "a")
-    assert load_group(tmp_path / "a.json", head)[1].ids.tolist() == [3, 7]
+    assert load_group(tmp_path / "a.json", head.data)[1].ids.tolist() == [3, 7]
     handles.undo()
     assert not handles.sculpted
 

@@ -250,7 +250,8 @@ def resting(servos: SimulatedBus, measures: bool, states: list[tuple[bool, float
         return SimpleNamespace(fresh=np.array([fresh, measures]), position_rad=at)
 
     sent: list[object] = []
-    loop.bus = SimpleNamespace(measures=measures, write=sent.append, read=read)  # type: ignore[assignment]
+    driven = np.ones(2, dtype=bool)
+    loop.bus = SimpleNamespace(measures=measures, driven=driven, write=sent.append, read=read)  # type: ignore[assignment]
     loop._goals = SimpleNamespace(step=lambda goal, state: goal)  # type: ignore[assignment]
     loop._come_to_rest()
     return len(sent)

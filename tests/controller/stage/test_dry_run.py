@@ -81,7 +81,7 @@ def test_the_voice_of_a_stage_is_rehearsed_where_it_is_a_file(tmp_path: Path) ->
         file.writeframes((9000 * np.sin(np.arange(16000) / 16)).astype("<i2").tobytes())
     for more, moves in (("", True), ("voice_hz = 16000\n", False)):
         stage = load_stage(str(stage_file(tmp_path, f'voice = "a.wav"\n{more}')), PARAMETERS)
-        rows, _ = dry_run(stage, None, 1.0, PARAMETERS)
+        rows = dry_run(stage, None, 1.0, PARAMETERS).rows
         jaw = next(row for row in rows if row["channel"] == "jawOpen")["sent (deg)"]
         assert (float(jaw.split()[-1]) > 5) == moves
 

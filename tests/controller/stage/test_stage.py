@@ -115,7 +115,7 @@ def test_identities_are_those_of_the_head() -> None:
     check_identity(head, {"broad": 0.5})
     with pytest.raises(ConfigError, match=r"no identity 'brod'; there are .*broad") as caught:
         check_identity(head, {"broad": 1.0, "brod": 1.0})
-    assert "docs/heads.md" in caught.value.hint
+    assert "omote fit --help" in caught.value.hint
 
 
 def test_a_record_cannot_be_changed() -> None:

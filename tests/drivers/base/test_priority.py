@@ -89,4 +89,4 @@ def test_waits_end_on_time() -> None:
         return before, ctypes.CDLL(None).prctl(get_timer_slack)
 
     before, after = in_thread(slack_ns)  # type: ignore[misc]
-    assert before != 1 and after == 1
+    assert before != 1 and after <= 1, "0 in a thread with real-time priority, which has no slack"

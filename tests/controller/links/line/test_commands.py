@@ -182,7 +182,9 @@ def test_a_script_may_stop_the_servos_and_not_start_them() -> None:
     assert (caught.value.code, caught.value.tag) == (Code.BUSY, 3)
 
 
-@pytest.mark.parametrize("name", sorted({*COMMANDS} - {"HELLO", "VERSION", "PING", "NEUTRAL", "STATUS", "UNSUB"}))
+@pytest.mark.parametrize(
+    "name", sorted({*COMMANDS} - {"HELLO", "VERSION", "PING", "NEUTRAL", "STATUS", "UNSUB", "STOP", "START"})
+)
 def test_commands_that_need_arguments_say_so(name: str) -> None:
     with pytest.raises(LineError, match=f"0 arguments; usage: {name}") as caught:
         GRAMMAR.parse(name.encode())
@@ -192,12 +194,12 @@ def test_commands_that_need_arguments_say_so(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "most"),
     [
-        ("HELLO", 0), ("VERSION", 0), ("EXPR", 3), ("GAZE", 4), ("NEUTRAL", 1), ("LIFE", 1), ("SHOW", 2), ("READ", 2),
+        ("HELLO", 1), ("VERSION", 0), ("EXPR", 3), ("GAZE", 4), ("NEUTRAL", 1), ("LIFE", 1), ("SHOW", 2), ("READ", 2),
         ("INFO", 1), ("STATUS", 0), ("UNSUB", 0), ("LIST", 1),
     ],
 )  # fmt: skip
 def test_commands_refuse_more_arguments_than_they_have(name: str, most: int) -> None:
-    with pytest.raises(LineError, match=f"{most + 1} arguments; usage: {name}"):
+    with pytest.raises(LineError, match=f"{most + 1} arguments?; usage: {name}"):
         GRAMMAR.parse((name + (most + 1) * " x").encode())
 
 
@@ -209,7 +211,7 @@ def test_long_words_are_cut_in_refusals() -> None:
     for line, shown in (("%s", "'%s'"), ("LIFE %s", "'%s' is not a finite number"), ("LIST %s", "unknown list '%s'")):
         with pytest.raises(LineError) as caught:
             GRAMMAR.parse((line % ("Q" * 33)).encode())
-        assert shown % ("Q" * 32) in str(caught.value)
+        assert shown % ("Q" * 32 + "...") in str(caught.value)
 
 
 def test_points_may_be_as_far_as_the_limit() -> None:

@@ -168,7 +168,7 @@ def test_every_count_begins_at_nothing_and_bytes_are_counted_both_ways(port: Hos
     link = LineLink(port.path, 115200, state)
     assert link.report() == {
         "port": port.path, "connected": False, "accepted": 0, "refused": {}, "bytes_in": 0, "bytes_out": 0,
-        "streamed": 0, "dropped": 0, "reconnects": 0, "faults": 0, "last_fault": "",
+        "unanswered": 0, "streamed": 0, "dropped": 0, "reconnects": 0, "faults": 0, "last_fault": "",
     }  # fmt: skip
     with link:
         peer = Peer(port)
@@ -220,8 +220,14 @@ def test_faults_that_repeat_leave_the_processor_to_others(
 ) -> None:
     link, waits = LineLink(port.path, 115200, state), list[float]()
     monkeypatch.setattr(link._stopping, "wait", waits.append)
-    link._log_fault(ValueError("mine"))
-    assert link.faults == 1 and len(waits) == 1 and 0.0 < waits[0] < 0.5
+
+    def serve() -> None:
+        link._stopping.set()  # this was the last time
+        raise ValueError("mine")
+
+    monkeypatch.setattr(link, "_serve", serve)
+    link._run()
+    assert link.report()["faults"] == 1 and len(waits) == 1 and 0.0 < waits[0] < 0.5
 
 
 def test_replies_beyond_the_buffer_are_dropped_whole_and_counted(port: HostPort, link: LineLink) -> None:
