@@ -49,6 +49,8 @@ FAULTS = (
 """Every fault of ``drivers.sim.wire.faults``, so that each pair of them comes."""
 RETRY_S = 1.0
 """Time in which a bus drives again after its port is back."""
+PATIENCE_S = 60.0
+"""Time in which all servos are driven again after a repair; the soak ends with an error otherwise."""
 
 
 @dataclass
@@ -148,7 +150,11 @@ class Head:
                 self._well_s[IDS.index(servo.id)] = self.clock() + SETTLE_S
         self.clock.sleep(0.3)
         self._written_s = self.clock()
+        give_up_s = self.clock() + PATIENCE_S
         while not self._recovered():
+            if self.clock() > give_up_s:
+                off = [i for i, driven in zip(IDS, self.bus.driven, strict=True) if not driven]
+                raise RuntimeError(f"{self.name}: servos {off} were not driven again {PATIENCE_S:g} s after a repair")
             self._cycle()
 
     def _recovered(self) -> bool:
@@ -262,6 +268,7 @@ def soak(
                 break
         head.finish()
         spent, turn = spent + head.clock(), turn + 1
+        print(f"{spent:.0f} simulated seconds, {len(result.pairs)} pairs", file=sys.stderr)  # noqa: T201  progress
         if spent >= seconds and len(result.pairs) >= result.wanted:
             return result
     raise AssertionError("there is a family")

@@ -163,10 +163,12 @@ class WireBus(Bus):
             self._start(partly)
 
     def _start(self, partly: bool = False) -> None:
+        ran_before = self._running
         with self._losing():
             self._begin_driving(self._bring_back() if partly else self._bring_up())
             if not self._presence.driven.any():
-                self._running = False
+                # the next reconnect() starts them again, and stop() switches off what may still be on
+                self._running, self._unconfirmed = ran_before, True
                 raise merge_errors(self._reasons)
 
     def _begin_driving(self, here_rad: Floats) -> None:

@@ -36,8 +36,8 @@ class Foreign:
         context.closers.callback(self.end)
 
     def _run(self) -> None:
-        self._go.wait(60.0)
-        raise self.trouble
+        if self._go.wait(60.0):
+            raise self.trouble
 
     def raise_in_thread(self, error: Exception) -> None:
         self.trouble = error

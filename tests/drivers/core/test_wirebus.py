@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, NoReply, PortLost, PortMissing, ServoRefused
+from drivers.base.errors import BusError, DriverError, NoReply, PortLost, PortMissing, ServoRefused
 from drivers.sim.serving.virtual import VirtualBus
 
 SERVOS = tuple(ServoSpec(i, f"s{i}", "rc-180", -0.5, 0.5, 2.0, 50.0) for i in (1, 4))
+
+
+CHAIN = tuple(ServoSpec(i, f"s{i}", "xl330-m288", -0.5, 0.5, 2.0, 50.0) for i in (1, 4))
 
 
 @pytest.fixture
@@ -182,3 +185,40 @@ def test_the_report_is_a_copy_in_depth(board: VirtualBus) -> None:
     with board.bus() as bus:
         bus.report().count("no_reply", 1)
         assert bus.report().errors == {} and bus.report().errors_by_servo == {}
+
+
+def test_a_bus_whose_servos_all_fail_when_the_port_is_back_is_started_again_by_the_next_try() -> None:
+    wire = VirtualBus(CHAIN, "dynamixel")
+    bus = wire.bus()
+    with bus:
+        bus.start()
+        wire.fault("unplug:for=1s")
+        with pytest.raises(PortLost):
+            bus.read()
+        wire.clock.sleep(1.1)
+        wire.fault("silent:*")
+        for _ in range(2):
+            with pytest.raises(DriverError):
+                bus.reconnect()
+            assert bus.running and not bus.is_open
+        wire.clear()
+        bus.reconnect()
+        assert bus.driven.all()
+        bus.write([0.0] * len(CHAIN))
+
+
+def test_servos_that_may_be_on_after_a_start_that_failed_are_switched_off() -> None:
+    wire = VirtualBus(CHAIN, "dynamixel")
+    bus = wire.bus()
+    with bus:
+        bus.start()
+        bus.stop()
+        wire.fault("mute:*")
+        with pytest.raises(DriverError):
+            bus.start(partly=True)
+        assert not bus.running
+        for servo in wire.chain.servos:
+            servo.plant.powered = True
+        wire.clear()
+        bus.stop()
+        assert not any(servo.torque for servo in wire.chain.servos)
