@@ -1,7 +1,8 @@
 """Which servos of a bus are driven: goals go only to those whose positions are known.
 
 A servo that was away may stand anywhere, and the goals that it missed may be far from there. So it is sent nothing
-while it is away, and its goals begin at its measured position when it is back.
+while it is away, and its goals begin at its measured position when it is back. It is back when two of its positions in
+a row agree: one wrong reply in 256 has a right checksum in Protocol 1.0, whose checksum has 8 bits.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ AWAY_S = 0.1
 """Age of its position from which a servo is away that does not report where it is."""
 AWAY_TURNS = 2
 """Turns of reading that it must have missed as well, so that a pause of the caller makes no servo absent."""
+AGREE_RAD = 0.3
+"""How far two positions of a servo that comes back may lie apart."""
 
 
 class Presence:
@@ -31,6 +34,7 @@ class Presence:
         """Begin with the servos that were ``started`` (n,); the others are left out."""
         self.left_out: Flags = ~started
         self._missed = np.zeros(len(started), np.int64)  # reads in a row without the servo's position
+        self._seen_rad = np.full(len(started), np.nan)  # last position of a servo that is away
         self._drive(started)
 
     def join(self, index: int) -> None:
@@ -46,7 +50,9 @@ class Presence:
         self._missed = np.where(state.fresh, 0, self._missed + 1)
         unknown = (self._missed > AWAY_TURNS * turn) & (state.age_s > AWAY_S)
         away = ~state.fresh & (state.silent | unknown)
-        back = state.fresh & ~self.driven & ~self.left_out
+        here = state.fresh & ~self.driven & ~self.left_out
+        back = here & (np.abs(state.position_rad - self._seen_rad) <= AGREE_RAD)
+        self._seen_rad = np.where(back | away, np.nan, np.where(here, state.position_rad, self._seen_rad))
         if away.any() or back.any():
             self._drive(self.driven & ~away | back)
         self._complete = bool(self.driven.all()) and not self._missed.any()

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from drivers.base.bus import BusState, make_state
-from drivers.core.presence import AWAY_S, AWAY_TURNS, Presence
+from drivers.core.presence import AGREE_RAD, AWAY_S, AWAY_TURNS, Presence
 
 
-def state(fresh: list[int], silent: tuple[int, ...] = (0, 0, 0), age_s: float = 10.0) -> BusState:
-    here, none = np.zeros(3), np.zeros(3, np.uint8)
+def state(fresh: list[int], silent: tuple[int, ...] = (0, 0, 0), age_s: float = 10.0, at_rad: float = 0.0) -> BusState:
+    here, none = np.full(3, at_rad), np.zeros(3, np.uint8)
     ages = np.where(fresh, 0.0, age_s)
     slow = (none, here, here, none, np.ones(3, bool))
     return make_state(0.0, np.array([here, here, here, ages]), np.array(fresh, bool), np.array(silent, bool), slow)
 
 
-def test_a_silent_servo_is_away_at_once_and_back_with_its_next_position() -> None:
+def test_a_silent_servo_is_away_at_once_and_back_with_its_second_position() -> None:
     presence = Presence(3)
     before = presence.driven
     assert presence.note(state([1, 1, 1]), 1) == [] and presence.driven is before
@@ -23,8 +23,19 @@ def test_a_silent_servo_is_away_at_once_and_back_with_its_next_position() -> Non
     assert presence.driven.tolist() == [True, False, True] and not presence.driven.flags.writeable
     assert presence.note(state([1, 0, 1]), 1) == [], "it answers, but not with its position"
     assert presence.driven.tolist() == [True, False, True]
+    assert presence.note(state([1, 1, 1]), 1) == [], "one position may be a wrong one"
     assert presence.note(state([1, 1, 1]), 1) == [1]
     assert presence.driven.all() and presence.note(state([1, 1, 1]), 1) == []
+
+
+def test_positions_that_do_not_agree_bring_no_servo_back() -> None:
+    presence = Presence(3)
+    presence.note(state([1, 0, 1], (0, 1, 0)), 1)
+    for at_rad in (0.0, 2 * AGREE_RAD, 0.0):
+        assert presence.note(state([1, 1, 1], at_rad=at_rad), 1) == []
+    presence.note(state([1, 0, 1], (0, 1, 0)), 1)
+    assert presence.note(state([1, 1, 1]), 1) == [], "the positions of before it went do not count"
+    assert presence.note(state([1, 1, 1], at_rad=0.9 * AGREE_RAD), 1) == [1]
 
 
 def test_a_servo_is_away_that_was_asked_often_enough_for_long_enough() -> None:
