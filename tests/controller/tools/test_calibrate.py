@@ -336,8 +336,9 @@ def test_keys_of_a_terminal_are_told_apart() -> None:
     assert split_keys("\x1b") == [] and split_keys("") == []
 
 
+@pytest.mark.parametrize("place", ["full disk", "read-only folder"])
 def test_what_was_captured_stays_where_it_cannot_be_saved_until_it_can(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, place: str
 ) -> None:
     angles = iter([-10.0, 3.0, 20.0])
     read, save, refusals = Servos.read, module.save_calibration, iter([True])
@@ -347,9 +348,11 @@ def test_what_was_captured_stays_where_it_cannot_be_saved_until_it_can(
         return read(servos)
 
     def save_later(path: Path, *rest: Any) -> None:
-        """First with a disk on which no byte fits."""
-        before = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (0 if next(refusals, False) else before[0], before[1]))
+        """First on a disk where no byte fits, or in a folder of the kernel's in which not even root may write."""
+        first, before = next(refusals, False), resource.getrlimit(resource.RLIMIT_FSIZE)
+        if first and place == "read-only folder":
+            return save(Path("/proc/self/c.toml"), *rest)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0 if first else before[0], before[1]))
         try:
             save(path, *rest)
         finally:

@@ -45,6 +45,12 @@ def test_a_mesh_comes_back(tmp_path, sparse):
     np.testing.assert_allclose(np.sort(got.uv, axis=0), np.sort(want.uv, axis=0), atol=1e-6)
 
 
+def test_twenty_thousand_nodes_are_too_many(tmp_path):
+    builder = glb(slit_sheet())
+    builder.document["nodes"] = [{"children": [i + 1]} for i in range(20_000)] + [{"mesh": 0}]
+    assert "20001; 10000 are the most" in refused(write(tmp_path, builder))
+
+
 def test_vertices_doubled_along_a_seam_are_one_again(tmp_path):
     mesh = slit_sheet()
     right = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0
