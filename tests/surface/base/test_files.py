@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +69,19 @@ def test_a_byte_order_mark_is_no_text(tmp_path: Path) -> None:
 def test_nesting_is_a_fault_of_the_file(parse: object, text: str) -> None:
     with pytest.raises(ValueError):
         parse(text)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("wrap", [lambda inner: {"a": inner}, lambda inner: [inner], lambda inner: {"a": [0, inner]}])
+def test_nesting_is_counted_through_tables_and_lists(wrap: Callable[[object], object]) -> None:
+    value: object = 1
+    depth = 1 if wrap(0) != {"a": [0, 0]} else 2
+    for _ in range(files.MOST_DEPTH // depth - 1):
+        value = wrap(value)
+    assert files.parse_json(json.dumps(value)) == value
+    for _ in range(2):
+        value = wrap(value)
+    with pytest.raises(ValueError, match="nested"):
+        files.parse_json(json.dumps(value))
 
 
 def archive(path: Path, **members: bytes) -> Path:

@@ -54,6 +54,14 @@ def test_two_balls_are_eyes_and_what_lies_in_them_goes_with_them():
     assert [p.name for p, _ in plan.parts] == ["face"] and "3 pieces are eyeballs" in plan.notes[0]
 
 
+def test_the_middle_of_a_mesh_beside_the_origin_is_its_own() -> None:
+    mesh = ball([40.0, 5.0, -3.0], 10.0)
+    assert generic._middle_x(mesh) == pytest.approx(40.0, abs=1e-6)
+    assert generic._middle_x(replace(mesh, vertices=mesh.vertices - [100.0, 0.0, 0.0])) == pytest.approx(
+        -60.0, abs=1e-6
+    )
+
+
 @pytest.mark.parametrize("other", [ball((33, 40, 20), 6.0), ball((20, -60, 20), 12), ball((-33, 60, 20), 12)])
 def test_balls_that_do_not_mirror_each_other_are_none(other):
     plan = make_plan(joined([("face", slit_sheet()), ("a", ball((33, 40, 20), 12)), ("b", other)]))
