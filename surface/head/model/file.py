@@ -64,6 +64,9 @@ class _Section:
     def sections(self, key: str) -> list[_Section]:
         """The tables of a list of them."""
         tables = self._value(key, list)
+        for i, table in enumerate(tables):
+            if not isinstance(table, dict):
+                raise self.error(f"{key}[{i}]", f"{table!r} is no table")
         return [_Section(self.path, t, f"{self.where}{key}[{i}].") for i, t in enumerate(tables)]
 
     def _value(self, key: str, kind: type | tuple[type, ...]) -> Any:

@@ -1,9 +1,11 @@
 """Head files: a round trip, and every kind of damage named by file and key."""
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
 from small_head import small_head
 
 from surface.base.errors import HeadFileError
@@ -182,6 +184,13 @@ def test_a_contact_of_what_is_not_there(folder, part, follower, eye, match):
     wrong = Contact("lips", part, (follower,), eye, 5.0, 0.5, np.zeros((2, 3, 3, 2)))
     save_data(folder, small_head(contacts=[wrong]))
     broken(folder, match)
+
+
+@pytest.mark.parametrize("key", ["seams", "parts", "rules"])
+def test_an_entry_that_is_no_table(folder, key):
+    table = tomllib.loads((folder / "head.toml").read_text())
+    (folder / "head.toml").write_text(tomli_w.dumps(table | {key: [0.1]}))
+    broken(folder, rf"{key}\[0\]: 0\.1 is no table")
 
 
 def test_a_full_disk_leaves_the_old_head(folder, full_disk):
