@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import pytest
@@ -13,13 +12,8 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="fi
 
 
 @pytest.fixture
-def program(root: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("process_kill", root / "benchmarks" / "process_kill.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules["process_kill"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def program(benchmark: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark("process_kill")
 
 
 def test_servos_are_safe_and_nothing_is_left_after_a_kill_and_on_a_full_disk(program: ModuleType) -> None:

@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 from controller.base.clock import Clock
 
-_SHORTEST = 2
-"""The part of a period, one over this, that lies at least between two ticks."""
+_MOST_TICKS = 2
+"""Ticks in the length of a period, at most: so much of it, one over this, lies between two ticks at least."""
 _LONGEST_DEBT_S = 0.1
 """For how long a bus that had to go on by itself waits at most, until the control loop has caught up."""
 _FOLLOW = 8
@@ -50,7 +50,7 @@ class HurriedClock(Clock):
     def _due_ns(self) -> int:
         if not self._hurried.is_set():
             return self._deadline_ns
-        return min(self._deadline_ns, self._tick_ns + self.period_ns // _SHORTEST)
+        return min(self._deadline_ns, self._tick_ns + self.period_ns // _MOST_TICKS)
 
 
 class FedClock(Clock):
@@ -88,7 +88,7 @@ class FedClock(Clock):
         return now
 
     def _due_ns(self) -> int:
-        earliest = self._tick_ns + self.period_ns // _SHORTEST
+        earliest = self._tick_ns + self.period_ns // _MOST_TICKS
         if self._urgent:
             return min(self._deadline_ns, earliest)
         # without a near feed wait for the next one, which will be nearer to the deadline than the last

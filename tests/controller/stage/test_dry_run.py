@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
-import sys
 import wave
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -148,14 +147,9 @@ def test_buses_of_two_robots_have_different_names(tmp_path: Path, root: Path) ->
 
 
 @pytest.fixture(scope="module")
-def ticks(root: Path) -> ModuleType:
+def ticks(benchmark: Callable[[str], ModuleType]) -> ModuleType:
     """benchmarks/control_tick.py: the chain with 8 layers and what attacks it; a million ticks with --soak."""
-    spec = importlib.util.spec_from_file_location("control_tick", root / "benchmarks/control_tick.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["control_tick"] = module
-    spec.loader.exec_module(module)
-    return module
+    return benchmark("control_tick")
 
 
 def test_no_hostile_layer_breaks_a_limit_at_the_bus(ticks: ModuleType) -> None:

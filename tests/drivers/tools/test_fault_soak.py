@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
-import sys
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import pytest
@@ -14,13 +12,8 @@ from drivers.sim.wire.faults import KINDS
 
 
 @pytest.fixture
-def program(root: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("fault_soak", root / "benchmarks" / "fault_soak.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules["fault_soak"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def program(benchmark: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark("fault_soak")
 
 
 @pytest.mark.parametrize("family", ["dynamixel", "feetech", "both protocols"])

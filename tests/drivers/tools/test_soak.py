@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import pytest
 
 
 @pytest.fixture
-def program(root: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("soak", root / "benchmarks" / "soak.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules["soak"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def program(benchmark: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark("soak")
 
 
 @pytest.mark.parametrize("seed", [1, 7])
