@@ -28,6 +28,7 @@ from controller.vocabulary.facs import Facs
 from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
 from drivers.base.permission import ports_forbidden
+from surface.base.errors import SurfaceFileError
 from surface.base.files import read_text
 from surface.readers import is_plain, read_surface, summary
 
@@ -64,8 +65,11 @@ def _describe(path: Path) -> Iterator[str]:
     elif suffix == ".json" and _is_group(path):
         yield _check_group(path)
     elif suffix in SURFACE_SUFFIXES or (suffix == ".json" and is_plain(path)):  # .json is speech, too
-        for item in read_surface(path):
+        left_out: list[SurfaceFileError] = []
+        for item in read_surface(path, left_out.append):
             yield f"surface {summary(item)}"
+        for error in left_out:
+            yield f"  left out: {error}"
     elif path.suffix == SUFFIX:  # replayed as fast as possible; every tick has to give the recorded values
         times = [now_ns for now_ns, _ in replay(path, PARAMETERS)]
         seconds = (times[-1] - times[0]) * 1e-9 if times else 0.0

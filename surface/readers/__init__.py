@@ -15,22 +15,27 @@ suffix content                                     module
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from . import gismo, plain, rhino, tsm
-from .common import Location, NamedSurface, summary
+from .common import LeaveOut, Location, NamedSurface, summary
 from .plain import is_plain, write_surfaces
 
 __all__ = ["SUFFIXES", "NamedSurface", "is_plain", "read_surface", "summary", "write_surfaces"]
 
-_READERS = {".json": plain.read, ".3dm": rhino.read, ".xml": gismo.read, ".tsm": tsm.read}
+_READERS: dict[str, Callable[[Path], list[NamedSurface]]] = {
+    ".json": plain.read, ".3dm": rhino.read, ".xml": gismo.read, ".tsm": tsm.read,
+}  # fmt: skip
 SUFFIXES = tuple(_READERS)
 
 
-def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
+def read_surface(path: str | os.PathLike[str], leave_out: LeaveOut | None = None) -> list[NamedSurface]:
     """All surfaces of a file, at least one.
 
     path : its suffix chooses the format: one of :data:`SUFFIXES`
+    leave_out : is called with the error of each object or face of a .3dm file that cannot be read, and the rest is
+        returned; without it the first such error is raised
 
     Raises SurfaceFileError: naming file and line or element: another suffix, a damaged file, or one that no DCP surface
     can be exactly. SurfaceError: for .3dm where rhino3dm is not installed.
@@ -40,7 +45,7 @@ def read_surface(path: str | os.PathLike[str]) -> list[NamedSurface]:
     if suffix not in _READERS:
         hint = f"use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         raise Location(file).error(f"no surface file: its name ends in {suffix or 'nothing'}", hint=hint)
-    surfaces = _READERS[suffix](file)
+    surfaces = rhino.read(file, leave_out) if suffix == ".3dm" else _READERS[suffix](file)
     if not surfaces:
         raise Location(file).error("holds no surface", hint="export at least one surface into it")
     return surfaces

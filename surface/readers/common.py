@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,9 @@ from surface.base.errors import SurfaceFileError
 from surface.base.files import DATA_LIMIT, TEXT_LIMIT, decode, read_file, reading
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
+
+#: Takes the error of a part of a file that is left out.
+LeaveOut = Callable[[SurfaceFileError], None]
 
 
 @dataclass(frozen=True)

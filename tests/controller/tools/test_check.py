@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -196,3 +197,22 @@ def test_identities_that_do_not_fit_the_head_are_found(tmp_path: Path) -> None:
     save_identities(tmp_path / "small", [stranger])
     with pytest.raises(HeadFileError, match="another fit"):
         check_anything(str(tmp_path / "small"))
+
+
+def test_a_bad_object_of_a_surface_file_is_left_out_by_name(tmp_path: Path) -> None:
+    rhino: Any = pytest.importorskip("rhino3dm", reason="writing .3dm files needs rhino3dm: pip install rhino3dm")
+    file = rhino.File3dm()
+    for weight in (1.0, -1.0):
+        form = rhino.NurbsSurface.Create(3, True, 2, 2, 2, 2)
+        form.KnotsU.CreateUniformKnots(1.0)
+        form.KnotsV.CreateUniformKnots(1.0)
+        for i in range(2):
+            for j in range(2):
+                form.Points[(i, j)] = rhino.Point4d(i * weight, j * weight, 0.0, weight)
+        file.Objects.Add(form, rhino.ObjectAttributes())
+    assert file.Write(str(tmp_path / "a.3dm"), 7)
+    good, bad = check_anything(str(tmp_path / "a.3dm"))
+    assert good.startswith("surface object 0: 4 control points")
+    assert good.endswith(": good")
+    assert bad.startswith("  left out: ")
+    assert "object 1 (" in bad

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import sys
-from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from surface import DCPSurface, SurfaceError, SurfaceFileError
+from surface import SurfaceError, SurfaceFileError
 from surface.readers import NamedSurface, read_surface
 from surface.readers import rhino as reader
 from surface.readers.common import Location
-from surface.readers.rhino import invert, polyline
-from tests.surface import shapes
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +114,59 @@ def test_a_periodic_surface_is_closed(tmp_path: Path, rhino: Any) -> None:
     check(item, form)
 
 
+@pytest.mark.parametrize(("rational", "order"), [(False, 3), (True, 4), (True, 5), (False, 7)])
+def test_an_uneven_closed_surface_comes_back_exactly(tmp_path: Path, rhino: Any, rational: bool, order: int) -> None:
+    """The knots that openNURBS leaves out follow from those a turn further on, however uneven they are."""
+    degree, rng = order - 1, np.random.default_rng(order)
+    spans = rng.uniform(0.2, 1.8, 8)
+    knots = np.concatenate([[0.0], np.cumsum(np.tile(spans, 3))])[8 - degree + 1 :][: 8 + 2 * degree - 1]
+    form = rhino.NurbsSurface.Create(3, rational, order, 2, 8 + degree, 2)
+    for k, knot in enumerate(knots):
+        form.KnotsU[k] = float(knot)
+    form.KnotsV.CreateUniformKnots(1.0)
+    ring = [rng.normal(size=3) + np.array([3 * np.cos(i), 3 * np.sin(i), 0]) for i in range(8)]
+    weights = rng.uniform(0.5, 2, 8) if rational else np.ones(8)
+    for i in range(8 + degree):
+        for j in range(2):
+            w, (x, y, z) = weights[i % 8], ring[i % 8]
+            form.Points[(i, j)] = rhino.Point4d(x * w, y * w, (z + j) * w, w)
+    (item,) = saved(tmp_path, rhino, form)
+    assert form.IsPeriodic(0)
+    assert item.surface.closed[0] is not None
+    check(item, form)
+
+
+def test_a_bad_object_is_left_out_by_name_and_the_others_are_read(tmp_path: Path, rhino: Any) -> None:
+    bad = net(rhino)
+    bad.Points[(1, 1)] = rhino.Point4d(0, 0, 0, -1.0)
+    with pytest.raises(SurfaceFileError, match=r"object 1 \("):
+        saved(tmp_path, rhino, net(rhino), bad, net(rhino, False))
+    left_out: list[SurfaceFileError] = []
+    items = read_surface(tmp_path / "a.3dm", left_out.append)
+    assert [item.name for item in items] == ["object 0", "object 2"]
+    assert len(left_out) == 1
+    assert "object 1 (" in str(left_out[0])
+
+
+def test_a_bad_face_is_left_out_and_the_other_faces_are_read(
+    tmp_path: Path, rhino: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = rhino.Brep.CreateFromBoundingBox(rhino.BoundingBox(rhino.Point3d(0, 0, 0), rhino.Point3d(1, 2, 3)))
+    saved(tmp_path, rhino, box, name="box")
+    whole = reader._face
+
+    def face(here: Location, *parts: Any) -> Any:
+        if here.where.endswith("face 4"):
+            raise here.error("is torn")
+        return whole(here, *parts)
+
+    monkeypatch.setattr(reader, "_face", face)
+    left_out: list[SurfaceFileError] = []
+    items = read_surface(tmp_path / "a.3dm", left_out.append)
+    assert [item.name for item in items] == [f"box face {k}" for k in (0, 1, 2, 3, 5)]
+    assert [str(error).split(", ")[-1] for error in left_out] == ["face 4: is torn"]
+
+
 def test_an_extrusion_is_its_faces(tmp_path: Path, rhino: Any) -> None:
     cylinder = rhino.Cylinder(rhino.Circle(rhino.Point3d(0, 0, 0), 1.5), 4.0)
     items = saved(tmp_path, rhino, rhino.Extrusion.CreateCylinderExtrusion(cylinder, True, True))
@@ -165,110 +214,6 @@ def test_without_rhino3dm_it_says_what_to_install(tmp_path: Path, monkeypatch: p
     with pytest.raises(SurfaceError, match=r"a\.3dm.*rhino3dm") as caught:
         read_surface(tmp_path / "a.3dm")
     assert caught.value.hint == "pip install 'omote[cad]'"
-
-
-@cache
-def cylinder() -> DCPSurface:
-    """Radius 2, height 3, clamped at its seam at u = 0 and 4."""
-    angle = np.arange(9) * np.pi / 4
-    far = np.where(np.arange(9) % 2, 2 * 2**0.5, 2.0)
-    ring = np.stack([far * np.cos(angle), far * np.sin(angle)], axis=1)
-    net = np.stack([np.column_stack([ring, np.full(9, z)]) for z in (0.0, 3.0)], axis=1)
-    weights = np.repeat(np.where(np.arange(9) % 2, 0.5**0.5, 1.0)[:, None], 2, axis=1)
-    return DCPSurface.from_nurbs(2, 1, [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4], [0, 0, 1, 1], net, weights)
-
-
-def test_points_of_a_sheet_find_their_parameters() -> None:
-    surface = shapes.hills(12)
-    uv = np.random.default_rng(1).uniform(0, 1, (300, 2))
-    found, distance = invert(surface, surface.evaluate(uv))
-    assert np.abs(found - uv).max() < 1e-9
-    assert distance.max() < 1e-9
-
-
-def test_points_near_a_seam_are_found_on_both_sides_of_it() -> None:
-    surface = cylinder()
-    u = np.concatenate([np.linspace(1e-3, 0.2, 60), np.linspace(3.8, 3.999, 60)])
-    uv = np.stack([u, np.linspace(0.1, 0.9, 120)], axis=1)
-    found, distance = invert(surface, surface.evaluate(uv))
-    assert np.abs(found - uv).max() < 1e-9
-    assert distance.max() < 1e-9
-
-
-def test_chords_of_a_curve_stray_less_than_asked() -> None:
-    def point(t: float) -> np.ndarray:
-        return np.array([np.cos(t), np.sin(t), t])
-
-    line = polyline(point, 0.0, 6.0, 1e-3)
-    assert np.array_equal(line[[0, -1]], [point(0.0), point(6.0)])
-    radii = np.linalg.norm((line[1:, :2] + line[:-1, :2]) / 2, axis=1)
-    assert 1 - 1e-3 < radii.min() < 1 - 1e-5
-
-
-def edge(start: float, end: float, at: Any) -> Any:
-    """An edge as openNURBS has it: ``at(t)`` gives u and v on the cylinder."""
-
-    def point(t: float) -> Any:
-        x, y, z = cylinder().evaluate([at(t)])[0]
-        return SimpleNamespace(X=x, Y=y, Z=z)
-
-    return SimpleNamespace(Domain=SimpleNamespace(T0=start, T1=end), PointAt=point)
-
-
-def face(monkeypatch: pytest.MonkeyPatch, centre: float) -> Any:
-    """The cylinder with a round hole in (u, v) about ``centre``."""
-    from surface.readers import rhino
-
-    monkeypatch.setattr(rhino, "_nurbs", lambda place, shape: (cylinder(), None))
-    low, high = edge(0, 4, lambda t: (t, 0.0)), edge(0, 4, lambda t: (t, 1.0))
-    seam = edge(0, 1, lambda t: (0.0, t))
-    hole = edge(0, 2 * np.pi, lambda t: ((centre + 0.3 * np.cos(t)) % 4, 0.5 + 0.2 * np.sin(t)))
-    outer = [(0, False), (2, False), (1, True), (2, True)]
-    loops = [[SimpleNamespace(EdgeIndex=i, IsReversed=back) for i, back in trims] for trims in (outer, [(3, False)])]
-    made = [SimpleNamespace(TrimCount=len(trims), Trims=trims) for trims in loops]
-    shape = SimpleNamespace(Loops=made, UnderlyingSurface=lambda: None)
-    return rhino._face(
-        Location(Path("a.3dm"), "object 0, face 0"), SimpleNamespace(Edges=[low, high, seam, hole]), shape
-    )
-
-
-def test_a_hole_in_a_closed_face_is_a_hole(monkeypatch: pytest.MonkeyPatch) -> None:
-    _, domain = face(monkeypatch, 1.7)
-    assert len(domain.loops) == 2
-    assert domain.area == pytest.approx(4 - np.pi * 0.3 * 0.2, rel=1e-3)
-    assert domain.inside([[1.7, 0.5], [1.7, 0.8], [3.0, 0.5]]).tolist() == [False, True, True]
-
-
-def test_a_straight_curve_has_eight_equal_chords_from_end_to_end() -> None:
-    points = polyline(lambda t: np.array([t, 2.0, -t]), 3.0, 7.0, 1e-6)
-    np.testing.assert_allclose(points, [[t, 2.0, -t] for t in np.linspace(3, 7, 9)])
-
-
-def test_chords_are_halved_until_they_stray_less_and_not_further() -> None:
-    """The sagitta of a chord that spans an angle is 1 - cos of half of it; of 8 chords of a half circle, 0.0192."""
-
-    def arc(t: float) -> Any:
-        return np.array([np.cos(t), np.sin(t), 0.0])
-
-    for error, chords in ((0.02, 8), (0.019, 16), (0.0049, 16), (0.0048, 32)):
-        points = polyline(arc, 0.0, np.pi, error)
-        np.testing.assert_allclose(points, [arc(t) for t in np.linspace(0, np.pi, chords + 1)], atol=1e-12)
-
-
-def test_parameters_are_looked_for_from_every_quarter_of_the_rectangle(monkeypatch: pytest.MonkeyPatch) -> None:
-    surface = shapes.hills(8)
-    grids: list[np.ndarray] = []
-    evaluate = DCPSurface.evaluate
-    monkeypatch.setattr(DCPSurface, "evaluate", lambda self, uv: grids.append(np.asarray(uv)) or evaluate(self, uv))
-    invert(surface, surface.points[:1])
-    starts = [grid for grid in grids if len(grid) > 1]
-    boxes = [(*grid.min(axis=0).tolist(), *grid.max(axis=0).tolist()) for grid in starts]
-    assert boxes == [(0, 0, 0.5, 0.5), (0, 0.5, 0.5, 1), (0.5, 0, 1, 0.5), (0.5, 0.5, 1, 1)]
-
-
-def test_a_hole_across_the_seam_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(SurfaceFileError, match=r"face 0, loop 1: crosses the seam"):
-        face(monkeypatch, 0.0)
 
 
 def test_what_keeps_opennurbs_busy_is_refused_within_a_limit(
