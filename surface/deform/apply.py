@@ -22,6 +22,7 @@ NAMES = (
     "point_start", "point_count", "point_cell", "point_row",
     "points", "origin", "inv_w", "dw", "numerators", "differences", "vertices", "normals",
     "ranges", "hits", "affected", "recomputed", "moved_ids", "delta", "local", "scratch",
+    "pull", "span", "drift", "extent",
 )  # fmt: skip
 """The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`.
 

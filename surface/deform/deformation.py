@@ -1,8 +1,10 @@
 """Meshes that follow their control points: the differential update, Eq. (2), touches the cells of a change only.
 
-Numerators and denominators are kept. Drift is bounded in two ways. A cell takes at most ``LIMIT`` differences before
-it is computed again from the float64 control points; and its numerators are those of positions relative to its own
-origin, so that a rounding error is 6e-8 of the cell's size, not of the head's.
+Numerators and denominators are kept. Drift is bounded in three ways. The numerators of a cell are those of positions
+relative to its own origin, so that a rounding error is 6e-8 of the cell's size, not of the head's. A cell takes at most
+``LIMIT`` differences before it is computed again from the float64 control points; and it is computed again before its
+rounding errors can add up to more than 8e-7 of the surface's size, however far its points have been (see
+:mod:`.updates`).
 """
 
 from __future__ import annotations
@@ -168,10 +170,18 @@ class Deformation(Generic[Table]):
             self._count = found
         elif found == -1:
             self.refresh()
+        elif found == -2:
+            self._recentre()
         else:
             check_ids(which, n * copies)
             bad = found + REFUSED
             raise ValueError(f"{name}[{bad}]: must be finite, got {target[bad].tolist()}")
+
+    def _recentre(self) -> None:
+        """Compute everything again, from origins in the middle of the cells as they are now."""
+        self.refresh()
+        self._arrays["origin"][:] = _middles(self.vertices, self.mesh.cell_start)
+        self.refresh()
 
     def _bind(self) -> None:
         """Make room for the longest list, and take the addresses of all arrays, which other knots may have replaced."""
@@ -225,20 +235,28 @@ def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[
     differences : (c,) int64, how many each cell has taken since it was computed again; -1 without numerators
     vertices, normals : (3 m,) float32, current
     ranges : (c, 2) int64, the vertex ranges that the last update touched
-        The others are scratch of :mod:`.updates`.
+    extent : (2,) float64, the surface's size, and how far points have moved since it was measured
+        The others belong to :mod:`.updates`.
     """
     m, cells, n = len(mesh.vertices), len(mesh.cell_start) - 1, len(points)
-    origin = np.zeros((cells, 3))
-    if m:
-        origin[:] = np.add.reduceat(mesh.vertices, mesh.cell_start[:-1]) / np.diff(mesh.cell_start)[:, None]
     single, cell = partial(np.zeros, dtype=np.float32), partial(np.zeros, cells)
     return {
-        "origin": origin, "inv_w": single(8 * tiles), "dw": single(16 * tiles * normals), "points": points.copy(),
-        "numerators": single((72 if normals else 24) * tiles), "differences": np.full(cells, NOT_STORED),
+        "origin": _middles(mesh.vertices, mesh.cell_start), "points": points.copy(), "inv_w": single(8 * tiles),
+        "dw": single(16 * tiles * normals), "numerators": single((72 if normals else 24) * tiles),
+        "differences": np.full(cells, NOT_STORED),
         "vertices": single(3 * m), "normals": single(3 * m * normals), "ranges": np.zeros((max(cells, 1), 2), np.int64),
         "hits": cell(dtype=np.int64), "affected": cell(dtype=np.int32), "recomputed": cell(dtype=np.int32),
         "moved_ids": np.zeros(n, np.int64), "delta": np.zeros((n, 3)), "scratch": single(24),
+        "pull": cell(), "span": cell(), "drift": cell(), "extent": np.array([float(np.ptp(points, axis=0).max()), 0.0]),
     }  # fmt: skip
+
+
+def _middles(vertices: np.ndarray, cell_start: Ints) -> Floats:
+    """(c, 3) the middle of each cell's vertices (m, 3)."""
+    if not len(vertices):
+        return np.zeros((len(cell_start) - 1, 3))
+    middles: Floats = np.add.reduceat(vertices, cell_start[:-1], dtype=np.float64) / np.diff(cell_start)[:, None]
+    return middles
 
 
 def _rows(rows: ArrayLike, name: str) -> Floats:

@@ -1,6 +1,11 @@
 """Compiled kernels that move control points and bring the cells they affect up to date, Eq. (2).
 
 ``arrays`` is the tuple of :data:`surface.deform.apply.NAMES`.
+
+Each difference rounds a numerator, by at most ``ROUNDING`` of its size. So every cell keeps a bound on its numerators
+per weight (``span``: what they were made of, and all moves since) and on the sum of these errors (``drift``), and is
+computed again before the drift exceeds ``MOST_DRIFT`` of the surface's size. That size is measured again when points
+have moved so far in all that it may have changed; where it is less than half, everything is computed again.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="call-arg, var-annotated, has-type"
@@ -16,6 +21,8 @@ from .apply import compute_cells, finish_cell, gather, join_ranges, store_numera
 NOT_STORED = -1  # in ``differences``: the cell's numerators are not stored
 STORE = -2  # in ``differences``: compute and store them now
 VALID = 1 << 62  # what :func:`first_invalid` returns where nothing is wrong
+ROUNDING = 6e-8  # half a unit in the last place of float32
+MOST_DRIFT = 8e-7  # of the surface's size
 REFUSED = 1 << 61  # subtracted from results of :func:`move_points` that mean a bad argument
 
 
@@ -46,34 +53,46 @@ def add_row(first_tile, end_tile, place, step, dx, dy, dz, value, slope, numerat
 
 
 @kernel
-def find_affected(ids, count, point_start, point_count, point_cell, hits, affected):
-    """List the cells that the first ``count`` of ``ids`` reach, rising, and count by how many; returns their number."""
+def find_affected(ids, delta, count, point_start, point_count, point_cell, hits, pull, affected):
+    """List the cells that the first ``count`` of ``ids`` reach, rising; returns their number.
+
+    ``hits`` counts by how many each is reached, and ``pull`` adds up how far these move.
+    """
     total = 0
     for q in range(count):
         i = ids[q]
+        far = max(abs(delta[q, 0]), abs(delta[q, 1]), abs(delta[q, 2]))
         for e in range(point_start[i], point_start[i] + point_count[i]):
             c = point_cell[e]
             if hits[c] == 0:
                 affected[total] = c
                 total += 1
+                pull[c] = 0.0
             hits[c] += 1
+            pull[c] += far
     affected[:total].sort()
     return total
 
 
 @kernel
-def choose_recomputed(total, affected, hits, differences, rows, limit, bias, recomputed):
+def choose_recomputed(
+    total, affected, hits, pull, differences, span, drift, rows, limit, bias, most_drift, recomputed
+):  # fmt: skip
     """Decide for each affected cell how it is updated; returns how many are computed again from all their points.
 
     Those are listed in ``recomputed``. Differences cost ``bias`` rows each, computing again costs all rows. A cell
-    is also computed again where its numerators are not stored, or would take more than ``limit`` differences.
+    is also computed again where its numerators are not stored, would take more than ``limit`` differences, or would
+    drift by more than ``most_drift``.
     """
     count = 0
     for q in range(total):
         c = affected[q]
         few = bias * hits[c] < rows[c]
-        if differences[c] >= 0 and differences[c] + hits[c] <= limit and few:
+        reach = span[c] + pull[c]
+        error = drift[c] + ROUNDING * hits[c] * reach
+        if differences[c] >= 0 and differences[c] + hits[c] <= limit and few and error <= most_drift:
             differences[c] += hits[c]
+            span[c], drift[c] = reach, error
         elif few:
             differences[c] = STORE  # few points, perhaps again next time: compute all and store the numerators
         else:
@@ -84,15 +103,56 @@ def choose_recomputed(total, affected, hits, differences, rows, limit, bias, rec
     return count
 
 
+@inlined
+def largest(local, rows):
+    """The greatest coordinate of the first ``rows`` of ``local``, without sign."""
+    most = 0.0
+    for k in range(rows):
+        most = max(most, abs(local[k, 0]), abs(local[k, 1]), abs(local[k, 2]))
+    return most
+
+
+@kernel
+def measured_extent(points):
+    """The longest side of the box around ``points (n, 3)``."""
+    most = 0.0
+    for k in range(3):
+        low, high = points[0, k], points[0, k]
+        for i in range(points.shape[0]):
+            low, high = min(low, points[i, k]), max(high, points[i, k])
+        most = max(most, high - low)
+    return most
+
+
+@kernel
+def has_shrunk(points, delta, count, extent):
+    """Whether the surface is less than half as large as when it was last measured.
+
+    ``extent`` : the size that was measured, and how far points have moved since, the furthest of each call added up.
+    The size cannot have changed by more than twice that.
+    """
+    far = 0.0
+    for q in range(count):
+        far = max(far, abs(delta[q, 0]), abs(delta[q, 1]), abs(delta[q, 2]))
+    extent[1] += far
+    if 4.0 * extent[1] <= extent[0]:
+        return False
+    before = extent[0]
+    extent[0], extent[1] = measured_extent(points), 0.0
+    return 2.0 * extent[0] < before
+
+
 @kernel
 def update_cells(arrays, count, limit, bias, sign):
     """Bring all cells that the first ``count`` moved points reach up to date; returns how many there are."""
     cell_start, tile_start, rows, room, at, ids_at, ids, value, slope = arrays[:9]
     point_start, point_count, point_cell, point_row = arrays[9:13]
     points, origin, inv_w, dw, numerators, differences, vertices, normals = arrays[13:21]
-    _, hits, affected, recomputed, moved_ids, delta, local, scratch = arrays[21:]
-    total = find_affected(moved_ids, count, point_start, point_count, point_cell, hits, affected)
-    again = choose_recomputed(total, affected, hits, differences, rows, limit, bias, recomputed)
+    _, hits, affected, recomputed, moved_ids, delta, local, scratch, pull, span, drift, extent = arrays[21:]
+    total = find_affected(moved_ids, delta, count, point_start, point_count, point_cell, hits, pull, affected)
+    again = choose_recomputed(
+        total, affected, hits, pull, differences, span, drift, rows, limit, bias, MOST_DRIFT * extent[0], recomputed
+    )  # fmt: skip
     for q in range(count):
         i = moved_ids[q]
         dx, dy, dz = np.float32(delta[q, 0]), np.float32(delta[q, 1]), np.float32(delta[q, 2])
@@ -113,6 +173,7 @@ def update_cells(arrays, count, limit, bias, sign):
                 tile_start[c], tile_start[c + 1], rows[c], room[c], at[c], value, slope, local, numerators
             )  # fmt: skip
             differences[c] = 0
+            span[c], drift[c] = largest(local, rows[c]), 0.0
         ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
         first, last = cell_start[c], cell_start[c + 1]
         finish_cell(
@@ -162,15 +223,17 @@ def move_points(arrays, ids, rows, relative, most, limit, bias, gap, sign):
     """Move points and bring the mesh up to date: the whole of an update in one call.
 
     ``rows (k, 3)`` are new positions, or moves if ``relative``. Returns the number of vertex ranges in ``ranges``; -1
-    if more than ``most`` points moved and everything is to be computed again; or what :func:`first_invalid` found,
-    less REFUSED, and then nothing has been changed.
+    if more than ``most`` points moved, -2 if the surface shrank to less than half, and then everything is to be
+    computed again; or what :func:`first_invalid` found, less REFUSED, and then nothing has been changed.
     """
     cell_start, points = arrays[0], arrays[13]
-    found, _, affected, _, moved_ids, delta, _, _ = arrays[21:]
+    found, _, affected, _, moved_ids, delta, _, _, _, _, _, extent = arrays[21:]
     bad = first_invalid(ids, rows, points.shape[0])
     if bad != VALID:
         return bad - REFUSED
     count = store_positions(ids, rows, relative, points, moved_ids, delta)
+    if has_shrunk(points, delta, count, extent):
+        return -2
     if count > most:
         return -1
     total = update_cells(arrays, count, limit, bias, sign)

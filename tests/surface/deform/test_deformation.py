@@ -91,6 +91,49 @@ def test_many_small_moves_do_not_drift(sheet: tuple[DCPSurface, Mesh]) -> None:
     check(deformation)
 
 
+@pytest.mark.parametrize("far", [1e3, 1.2e5, 1e9, 1e30])
+@pytest.mark.parametrize("absolute", [False, True])
+def test_a_point_far_away_and_back_leaves_nothing(sheet: tuple[DCPSurface, Mesh], far: float, absolute: bool) -> None:
+    surface, mesh = sheet
+    deformation = surface.deformation(mesh)
+    deformation.move([200], [[0.0, 0.0, 0.1]])  # its cells keep their numerators
+    home = deformation.points[200].copy()
+    for _ in range(3):
+        deformation.move([200], [[far * SIZE, 0.0, -far * SIZE]])
+        assert np.abs(deformation.vertices - fresh(deformation)[0]).max() < 1e-6 * far * SIZE
+        if absolute:
+            deformation.set_positions([200], [home])
+        else:
+            deformation.move([200], [[-far * SIZE, 0.0, far * SIZE]])
+            deformation.move([200], [home - deformation.points[200]])
+    check(deformation)
+
+
+def test_points_that_wander_by_large_steps_never_drift(sheet: tuple[DCPSurface, Mesh]) -> None:
+    """One after the other, always in the same few cells and the same way: rounding errors add up the worst."""
+    surface, mesh = sheet
+    deformation = surface.deformation(mesh)
+    for k in range(400):
+        deformation.move([200 + k % 3], [[0.37 * SIZE, 0.11 * SIZE, 0.05 * SIZE * (-1) ** k]])
+        if k % 20 == 19:
+            size = np.ptp(deformation.points, axis=0).max()
+            assert np.abs(deformation.vertices - fresh(deformation)[0]).max() < 1e-6 * size
+            assert np.isfinite(deformation.normals).all()
+    for k in range(400):
+        deformation.move([200 + k % 3], [[-0.37 * SIZE, -0.11 * SIZE, 0.05 * SIZE * (-1) ** k]])
+    check(deformation)
+
+
+def test_a_surface_that_shrinks_point_by_point_stays_exact_for_its_new_size(sheet: tuple[DCPSurface, Mesh]) -> None:
+    surface, mesh = sheet
+    deformation = surface.deformation(mesh)
+    target = 1e-3 * surface.points
+    for i in range(surface.n):
+        deformation.set_positions([i], [target[i]])
+    error = np.abs(deformation.vertices - fresh(deformation)[0]).max()
+    assert error < 1e-6 * 1e-3 * SIZE
+
+
 def test_moving_everything_and_back(sheet: tuple[DCPSurface, Mesh]) -> None:
     surface, mesh = sheet
     deformation = surface.deformation(mesh)

@@ -29,6 +29,7 @@ def test_a_cell_takes_at_most_the_limit_of_differences_and_is_then_computed_agai
     counts = deformation._arrays["differences"]
     assert (counts == updates.NOT_STORED).all()
     assert LIMIT == 256
+    deformation._arrays["extent"][0] = 1e6  # so large that the errors of 256 differences do not count
     for k in range(2 * LIMIT + 5):
         deformation.move([100], [[0.0, 0.0, 0.001]])
         assert (counts[cells] == k % 257).all(), k
@@ -81,19 +82,51 @@ def test_differences_are_taken_where_they_cost_less_than_all_rows(few: bool, mon
 def test_cells_choose_by_limit_bias_and_what_is_stored() -> None:
     affected, hits = np.arange(6, dtype=np.int32), np.array([1, 1, 1, 2, 1, 1])
     counts, rows = np.array([9, 10, -1, 9, 3, -1]), np.array([7, 7, 7, 13, 6, 6])
-    recomputed = np.zeros(6, dtype=np.int32)
-    assert updates.choose_recomputed(6, affected, hits, counts, rows, 10, 6.0, recomputed) == 2
+    recomputed, none = np.zeros(6, dtype=np.int32), np.zeros(6)
+    chosen = updates.choose_recomputed(
+        6, affected, hits, none, counts, none.copy(), none.copy(), rows, 10, 6.0, 1.0, recomputed
+    )  # fmt: skip
+    assert chosen == 2
     assert counts.tolist() == [10, updates.STORE, updates.STORE, updates.STORE, -1, -1]
     assert recomputed[:2].tolist() == [4, 5]
     assert (hits == 0).all()
 
 
-def test_affected_cells_rise_and_count_the_points_that_reach_them() -> None:
+def test_cells_are_computed_again_before_they_drift_too_far() -> None:
+    """Each difference rounds by 6e-8 of all that the numerators are made of: the span, and the move itself."""
+    affected, hits, rows = np.arange(3, dtype=np.int32), np.array([1, 2, 1]), np.full(3, 50)
+    counts, pull = np.array([4, 4, 4]), np.array([2.0, 2.0, 2.0])
+    span, drift = np.array([8.0, 8.0, 8.0]), np.array([4e-7, 0.0, 5e-7])
+    updates.choose_recomputed(
+        3, affected, hits, pull, counts, span, drift, rows, 100, 6.0, 1.0001e-6, np.zeros(3, dtype=np.int32)
+    )  # fmt: skip
+    assert counts.tolist() == [5, updates.STORE, updates.STORE]
+    assert span.tolist() == [10.0, 8.0, 8.0]
+    np.testing.assert_allclose(drift, [1e-6, 0.0, 5e-7])
+
+
+def test_affected_cells_rise_and_count_the_points_that_reach_them_and_how_far_these_move() -> None:
     start, count = np.array([0, 2, 3]), np.array([2, 1, 2])
     cells, hits, affected = np.array([4, 1, 0, 4, 2], dtype=np.int32), np.zeros(5, np.int64), np.zeros(5, np.int32)
-    assert updates.find_affected(np.array([0, 2, 1]), 2, start, count, cells, hits, affected) == 3
+    delta, pull = np.array([[1.0, -3.0, 2.0], [0.5, 0.25, -0.25]]), np.full(5, 9.0)
+    found = updates.find_affected(np.array([0, 2, 1]), delta, 2, start, count, cells, hits, pull, affected)
+    assert found == 3
     assert affected[:3].tolist() == [1, 2, 4]
     assert hits.tolist() == [0, 1, 1, 0, 2]
+    assert pull.tolist() == [9.0, 3.0, 0.5, 9.0, 3.5]
+
+
+def test_the_surface_is_measured_again_when_it_may_have_shrunk_to_half() -> None:
+    points, extent = np.array([[0.0, 0, 0], [8, 1, 1]]), np.array([8.0, 0.0])
+    step = np.array([[0.0, -1.5, 0.0]])
+    points[1, 0] = 3.0
+    assert not updates.has_shrunk(points, step, 1, extent)
+    assert extent.tolist() == [8.0, 1.5]
+    assert updates.has_shrunk(points, step, 1, extent)
+    assert extent.tolist() == [3.0, 0.0]
+    points[1, 0] = 2.0
+    assert not updates.has_shrunk(points, step, 1, extent)
+    assert extent.tolist() == [2.0, 0.0]
 
 
 def test_only_points_that_really_move_are_stored() -> None:
