@@ -24,7 +24,7 @@ from surface.readers.meshdata import read_bytes
 MAGIC, JSON_CHUNK, BIN_CHUNK = b"glTF", 0x4E4F534A, 0x004E4942
 TYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit"}
+UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit", "EXT_texture_webp"}
 MOST_ELEMENTS = 4_000_000  # of one accessor
 MOST_ITEMS = 10_000  # nodes, accessors and so on
 
@@ -198,12 +198,25 @@ class Gltf:
                 raise self.error("buffers", f"hold more than {DATA_LIMIT >> 20} MB", "export the head alone")
         return self._buffers[index]
 
+    def view_bytes(self, index: Any, where: str) -> bytes:
+        """The bytes of a buffer view."""
+        view, name = self.item("bufferViews", index, where), f"bufferViews[{index}]"
+        start, size = self._length(view, "byteOffset", name, 0), self._length(view, "byteLength", name)
+        data = self._buffer(view.get("buffer"), name)
+        if start + size > len(data):
+            raise self.error(name, f"ends at byte {start + size}, but the buffer has {len(data)}: it is cut short")
+        return data[start : start + size]
+
     def _load(self, uri: Any, where: str, index: int) -> bytes:
         """The bytes of a buffer: the binary chunk, a data URI, or a file in the folder of this one."""
         if uri is None:
             if index != 0 or self._chunk is None:
                 raise self.error(where, "has neither a uri nor a binary chunk")
             return self._chunk
+        return self.uri_bytes(uri, where)
+
+    def uri_bytes(self, uri: Any, where: str) -> bytes:
+        """The bytes behind a data URI, or of a file in the folder of this one."""
         if not isinstance(uri, str):
             raise self.error(f"{where}.uri", "is no text")
         if uri.startswith("data:"):

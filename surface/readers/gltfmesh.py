@@ -15,7 +15,8 @@ import numpy as np
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.readers.gltf import Gltf
-from surface.readers.meshdata import MeshData, check_size
+from surface.readers.gltfmaterials import read_materials
+from surface.readers.meshdata import Material, MeshData, check_size
 
 WELD = 1e-6  # of the mesh's size: vertices nearer than this are welded
 TRIANGLES, STRIP, FAN = 4, 5, 6  # modes of a primitive
@@ -30,6 +31,7 @@ class _Primitive:
     triangles: Ints
     uv: Floats | None
     deltas: dict[str, Floats]
+    material: int | None = None
 
 
 def read_gltf(path: Path) -> MeshData:
@@ -54,7 +56,7 @@ def _read(file: Gltf) -> MeshData:
             check_size(str(file.path), total, len({n for p in found for n in p.deltas}))
     if not found:
         raise file.error("scene", "holds no triangles", "export the head's mesh, not only its skeleton")
-    return _weld(_join(found))
+    return _weld(_join(found, read_materials(file)))
 
 
 def _world_matrices(file: Gltf) -> dict[int, Floats]:
@@ -149,7 +151,9 @@ def _primitive(
     material = table.get("material")
     if isinstance(material, int) and len(file.items("materials")) > material >= 0:
         name = f"{name}/{file.item('materials', material, where).get('name', material)}"
-    return _Primitive(name, _apply(linear, vertices) + matrix[..., :3, 3], triangles, uv, deltas)
+    else:
+        material = None
+    return _Primitive(name, _apply(linear, vertices) + matrix[..., :3, 3], triangles, uv, deltas, material)
 
 
 def _apply(matrices: Floats, rows: Floats) -> Floats:
@@ -228,7 +232,7 @@ def _triangles(file: Gltf, table: dict[str, Any], count: int, where: str) -> Int
     return np.column_stack([index[k], index[k + 1 + k % 2], index[k + 2 - k % 2]])
 
 
-def _join(found: list[_Primitive]) -> MeshData:
+def _join(found: list[_Primitive], materials: list[Material]) -> MeshData:
     """All primitives as one mesh, nothing welded."""
     names = tuple(dict.fromkeys(n for p in found for n in p.deltas))
     starts = np.cumsum([0, *(len(p.vertices) for p in found)]).tolist()
@@ -241,9 +245,10 @@ def _join(found: list[_Primitive]) -> MeshData:
     piece = np.repeat(np.arange(len(found)), [len(p.triangles) for p in found])
     has_uv = np.array([p.uv is not None for p in found])[piece]
     uv = np.concatenate([np.zeros((len(p.vertices), 2)) if p.uv is None else p.uv for p in found])
+    colours = tuple(None if p.material is None else materials[p.material] for p in found)
     return MeshData(
         np.concatenate([p.vertices for p in found]), faces, uv, np.where(has_uv[:, None], faces, -1), names, deltas,
-        piece, tuple(p.name for p in found),
+        piece, tuple(p.name for p in found), colours,
     )  # fmt: skip
 
 
