@@ -77,20 +77,26 @@ def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
 
     Names are not believed where shapes move the piece as they move the face, or where nothing would be left.
     """
-    kept = np.ones(len(mesh.faces), bool)
-    notes = []
-    most = np.abs(mesh.deltas).max(initial=0.0)
+    kept, notes, out = np.ones(len(mesh.faces), bool), [], []
     for k, name in enumerate(mesh.pieces):
         kind, own = kind_of(name), mesh.piece == k
         if kind.rule != "out" or not own.any():
             continue
-        used = np.unique(mesh.faces[own])
-        if most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= MOVED * most:
+        if _moves(mesh, own):
             notes.append(f"{name!r}: named as {kind.name}, but shapes move it: kept as skin")
         else:
             kept &= ~own
-            notes.append(f"{name!r}: left out: {kind.name}")
-    return (kept, notes) if kept.any() else (np.ones(len(mesh.faces), bool), [])
+            out.append(f"{name!r} ({kind.name})")
+    if not kept.any():
+        return np.ones(len(mesh.faces), bool), []
+    return kept, notes + ([f"left out: {', '.join(out)}"] if out else [])
+
+
+def _moves(mesh: FitMesh, own: Bools) -> bool:
+    """Whether shapes move some faces (f,) nearly as far as they move anything."""
+    used = np.unique(mesh.faces[own])
+    most = np.abs(mesh.deltas).max(initial=0.0)
+    return bool(most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= MOVED * most)
 
 
 @cache

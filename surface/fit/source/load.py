@@ -69,7 +69,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     shapes = dict(zip(arkit.names, arkit.deltas, strict=True))
     frame = find_frame(mesh.vertices, shapes, unit=options.unit, up=options.up, forward=options.forward)
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
-    return Loaded(mesh, named, (*frame.notes, *notes, *name_notes(mesh.names, named)))
+    return Loaded(mesh, named, (*frame.notes, *notes, *name_notes(mesh.names, named, other)))
 
 
 def _read(path: Path, shapes: Path | None) -> MeshData:

@@ -94,7 +94,7 @@ def map_names(
     stand_ins = _stand_ins(every, read.presets)
     every |= stand_ins
     sources = {shape: made for shape, made in every.items() if made}
-    used = {k for made in sources.values() for s in made for k in (s.index, s.less)}
+    used = {s.index for made in sources.values() for s in made}
     rest = [i for i in range(len(names)) if i not in used and i not in empty]
     spare = [i for i in rest if read.meant.get(i) in {s.removesuffix("Left").removesuffix("Right") for s in sources}]
     unread = [i for i in rest if i not in read.moods and i not in spare and not is_junk(names[i])]
