@@ -28,7 +28,9 @@ from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold
-from surface.fit.source.names import sources_of, to_arkit
+from surface.fit.source.names import sources_of
+from surface.fit.source.repair import repaired
+from surface.fit.source.shapes import to_arkit
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
 from surface.head.model.file import check_writable, save_data
@@ -47,7 +49,7 @@ def fit_head(
 ) -> FitReport:  # fmt: skip
     """Fit a head to a mesh and write it.
 
-    mesh_path : .glb or .gltf with morph targets, .obj with a folder of shapes, or .npz.
+    mesh_path : .glb, .gltf or .vrm with morph targets, .obj with a folder of shapes, or .npz.
     out_dir : folder that gets head.toml and head.npz.
     progress : called with the part being fitted and the fraction done, 0..1.
     options : how to interpret the mesh. report_dir : folder that gets the report (see
@@ -74,6 +76,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         mesh = prepare(loaded.mesh, recipe)
         plan = recipe_plan(mesh, recipe)
     else:
+        loaded = _repaired(loaded)
         check_manifold(loaded.mesh, where)
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
@@ -92,6 +95,12 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     report = FitReport(name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes], scale)
     return FitResult(head, report, fitted_parts)
+
+
+def _repaired(loaded: Loaded) -> Loaded:
+    """The mesh as a manifold, and notes of what that took."""
+    mesh, notes = repaired(loaded.mesh)
+    return replace(loaded, mesh=mesh, notes=(*loaded.notes, *notes))
 
 
 def _fit_parts(

@@ -15,7 +15,9 @@ import numpy as np
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.readers.gltf import Gltf
-from surface.readers.meshdata import MeshData, check_size
+from surface.readers.gltfmaterials import read_materials
+from surface.readers.gltftargets import read_expressions, target_names
+from surface.readers.meshdata import Material, MeshData, check_size
 
 WELD = 1e-6  # of the mesh's size: vertices nearer than this are welded
 TRIANGLES, STRIP, FAN = 4, 5, 6  # modes of a primitive
@@ -30,6 +32,7 @@ class _Primitive:
     triangles: Ints
     uv: Floats | None
     deltas: dict[str, Floats]
+    material: int | None = None
 
 
 def read_gltf(path: Path) -> MeshData:
@@ -54,7 +57,7 @@ def _read(file: Gltf) -> MeshData:
             check_size(str(file.path), total, len({n for p in found for n in p.deltas}))
     if not found:
         raise file.error("scene", "holds no triangles", "export the head's mesh, not only its skeleton")
-    return _weld(_join(found))
+    return replace(_weld(_join(found, read_materials(file))), expressions=read_expressions(file))
 
 
 def _world_matrices(file: Gltf) -> dict[int, Floats]:
@@ -121,9 +124,8 @@ def _primitives(file: Gltf, index: int, world: dict[int, Floats]) -> list[_Primi
         if not isinstance(table, dict):
             raise file.error(at, "is no object")
         if table.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
-            out.append(
-                _primitive(file, table, at, name, _target_names(mesh) or _target_names(table), world[index], joints)
-            )
+            names = target_names(file, node["mesh"], len(file.value(table, "targets", list, at, [])))
+            out.append(_primitive(file, table, at, name, names, world[index], joints))
     return out
 
 
@@ -149,7 +151,9 @@ def _primitive(
     material = table.get("material")
     if isinstance(material, int) and len(file.items("materials")) > material >= 0:
         name = f"{name}/{file.item('materials', material, where).get('name', material)}"
-    return _Primitive(name, _apply(linear, vertices) + matrix[..., :3, 3], triangles, uv, deltas)
+    else:
+        material = None
+    return _Primitive(name, _apply(linear, vertices) + matrix[..., :3, 3], triangles, uv, deltas, material)
 
 
 def _apply(matrices: Floats, rows: Floats) -> Floats:
@@ -192,7 +196,7 @@ def _targets(file: Gltf, table: dict[str, Any], names: list[str], count: int, wh
     """Displacements (count, 3) of the morph targets by name."""
     out = {}
     for k, target in enumerate(file.value(table, "targets", list, where, [])):
-        name = names[k] if k < len(names) else f"target{k}"
+        name = names[k]
         at = f"{where}.targets[{k}] ({name})"
         if not isinstance(target, dict):
             raise file.error(at, "is no object")
@@ -203,12 +207,6 @@ def _targets(file: Gltf, table: dict[str, Any], names: list[str], count: int, wh
             if len(out[name]) != count:
                 raise file.error(at, f"has {len(out[name])} displacements for {count} vertices")
     return out
-
-
-def _target_names(table: dict[str, Any]) -> list[str]:
-    extras = table.get("extras")
-    names = extras.get("targetNames") if isinstance(extras, dict) else None
-    return [str(n) for n in names] if isinstance(names, list) else []
 
 
 def _triangles(file: Gltf, table: dict[str, Any], count: int, where: str) -> Ints:
@@ -228,7 +226,7 @@ def _triangles(file: Gltf, table: dict[str, Any], count: int, where: str) -> Int
     return np.column_stack([index[k], index[k + 1 + k % 2], index[k + 2 - k % 2]])
 
 
-def _join(found: list[_Primitive]) -> MeshData:
+def _join(found: list[_Primitive], materials: list[Material]) -> MeshData:
     """All primitives as one mesh, nothing welded."""
     names = tuple(dict.fromkeys(n for p in found for n in p.deltas))
     starts = np.cumsum([0, *(len(p.vertices) for p in found)]).tolist()
@@ -241,9 +239,10 @@ def _join(found: list[_Primitive]) -> MeshData:
     piece = np.repeat(np.arange(len(found)), [len(p.triangles) for p in found])
     has_uv = np.array([p.uv is not None for p in found])[piece]
     uv = np.concatenate([np.zeros((len(p.vertices), 2)) if p.uv is None else p.uv for p in found])
+    colours = tuple(None if p.material is None else materials[p.material] for p in found)
     return MeshData(
         np.concatenate([p.vertices for p in found]), faces, uv, np.where(has_uv[:, None], faces, -1), names, deltas,
-        piece, tuple(p.name for p in found),
+        piece, tuple(p.name for p in found), colours,
     )  # fmt: skip
 
 

@@ -6,12 +6,50 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT, read_file, reading
 
 MOST_VERTICES = 400_000
 MOST_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a file says of the colour of its faces; textures stay as they are encoded.
+
+    name : of the material in the file; may be "".
+    colour : linear RGB and opacity, by which the texture's colour is multiplied.
+    texture : a whole PNG, JPEG or WebP file of sRGB colours; None without one. mime : its kind, for example
+        ``image/png``; "" where the file does not say.
+    alpha : ``OPAQUE``, ``MASK`` (nothing below ``cutoff`` is drawn) or ``BLEND``.
+    image_of_uv : (2, 3) from (u, v, 1) of the mesh, v up, to x to the right and y down in pictures of size 1; pictures
+        repeat beyond that. See :meth:`in_picture`.
+    """
+
+    name: str = ""
+    colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    texture: bytes | None = None
+    mime: str = ""
+    alpha: str = "OPAQUE"
+    cutoff: float = 0.5
+    image_of_uv: tuple[tuple[float, float, float], tuple[float, float, float]] = ((1.0, 0.0, 0.0), (0.0, -1.0, 1.0))
+
+    def in_picture(self, uv: Floats) -> Floats:
+        """Places (t, 2) of texture coordinates (t, 2) in the texture: 0..1 to the right, 0..1 down."""
+        matrix = np.array(self.image_of_uv)
+        out: Floats = uv @ matrix[:, :2].T + matrix[:, 2]
+        return out
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A named expression that a file makes of its shapes: ``binds`` are names of shapes, and how much of each."""
+
+    name: str
+    binds: tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
@@ -23,6 +61,8 @@ class MeshData:
     uv : (t, 2) float64, v up; face_uv : (f, 4) int64 into ``uv``; all -1 where a face has no texture coordinates.
     names : k shape names; deltas : (k, n, 3) float64.
     piece : (f,) int64 into ``pieces``, the names of the objects or materials that faces belong to.
+    materials : one for each of ``pieces``, None where the file gives it none; empty where the format has none.
+    expressions : what the file makes of its shapes.
     """
 
     vertices: Floats
@@ -33,6 +73,8 @@ class MeshData:
     deltas: Floats
     piece: Ints
     pieces: tuple[str, ...]
+    materials: tuple[Material | None, ...] = ()
+    expressions: tuple[Expression, ...] = ()
 
 
 def check_size(where: str, vertices: int, shapes: int) -> None:

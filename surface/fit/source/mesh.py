@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
+from surface.readers.meshdata import Material
 
 LARGE, SMALL = 1e7, 1e-7  # in any unit: no vertex of a head lies further out, no head is smaller
 
@@ -24,6 +25,7 @@ class FitMesh:
     uv : (t, 2) float64; face_uv : (f, 4) int64 into ``uv``, -1 as in ``faces``.
     names : k shape names; deltas : (k, n, 3) float64, millimetres.
     piece : (f,) int64 into ``pieces``, names of the objects that faces belong to; empty where there are none.
+    materials : what the file says of the colours of each of ``pieces``; empty where it says nothing of any.
     """
 
     vertices: Floats
@@ -34,10 +36,15 @@ class FitMesh:
     deltas: Floats
     piece: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     pieces: tuple[str, ...] = ()
+    materials: tuple[Material | None, ...] = ()
 
     def piece_of(self, face: int) -> str:
         """Name of the object that a face belongs to."""
         return self.pieces[self.piece[face]] if self.pieces else ""
+
+    def material_of(self, face: int) -> Material | None:
+        """What the file says of the colour of a face; None where it says nothing."""
+        return self.materials[self.piece[face]] if self.materials else None
 
 
 def check_mesh(mesh: FitMesh, where: str) -> None:
