@@ -195,6 +195,9 @@ def export(
     settings: Setting = None,
     expression: Expression = None,
     identity: Identity = None,
+    frame: Annotated[
+        str, typer.Option(help="head: millimetres or metres, y up, z forward; file: as in the mesh it was fitted to.")
+    ] = "head",
 ) -> None:
     """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.
 
@@ -214,6 +217,6 @@ def export(
         added = added_exporters()
         kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
         with EXPORTERS.blaming(kind):
-            written = export_head(loaded, out, pose, added)
+            written = export_head(loaded, out, pose, added, frame)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)

@@ -22,6 +22,7 @@ from surface.fit.points.refine import fit_chart
 from surface.fit.points.report import FitReport, FitResult, FittedPart, PartReport, measure
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
+from surface.fit.source.anatomy import Landmarks
 from surface.fit.source.chart import Chart, make_chart
 from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island, find_islands
@@ -29,6 +30,7 @@ from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold
 from surface.fit.source.names import sources_of, to_arkit
+from surface.fit.source.place import CLOSE_MM, EYES_AT, find_neck, head_size, moved, place
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
 from surface.head.model.file import check_writable, save_data
@@ -71,9 +73,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     """Fit all parts of a mesh in memory; ``where`` names it in messages."""
     recipe = recipe_for(loaded.mesh)
     if recipe is not None:
+        loaded = _at_recipes_place(loaded, recipe)
         mesh = prepare(loaded.mesh, recipe)
         plan = recipe_plan(mesh, recipe)
     else:
+        loaded = place(loaded)
         check_manifold(loaded.mesh, where)
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
@@ -82,8 +86,8 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress)
     charts = {p.name: p.chart for p in fitted_parts}
     head = HeadData(
-        name, _provenance(recipe), _neck(mesh, recipe), rig.eyes, rig.radius, rig.jaw,
-        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
+        name, _provenance(recipe), _neck(mesh, recipe, loaded.marks), rig.eyes, rig.radius, rig.jaw,
+        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh), placement=loaded.placement,
     )  # fmt: skip
     head = finish_head(head, mesh, charts, recipe)
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
@@ -176,11 +180,22 @@ def eyes_of(mesh: FitMesh, recipe: Recipe) -> tuple[Floats, float]:
     return np.stack([centre, centre * [-1.0, 1.0, 1.0]]), balls[1].radius
 
 
-def _neck(mesh: FitMesh, recipe: Recipe) -> Neck:
-    """The recipe's neck, or one in the lower quarter of a head nothing is known of."""
+def _at_recipes_place(loaded: Loaded, recipe: Recipe) -> Loaded:
+    """The mesh moved to where the recipe's own places, of neck and hinge, belong to it."""
+    balls = recipe.eyeballs(loaded.mesh)
+    if balls is None or not recipe.ball_at:
+        return loaded
+    shift = np.array(recipe.ball_at) - balls[0].centre
+    return moved(loaded, shift) if np.abs(shift).max() > CLOSE_MM else loaded
+
+
+def _neck(mesh: FitMesh, recipe: Recipe, marks: Landmarks = Landmarks()) -> Neck:
+    """The recipe's neck, or one below the eyes, or in the lower quarter of a head nothing is known of."""
     if recipe.neck:
         x, y, z = recipe.neck
         return Neck((x, y, z))
+    if marks.eyes is not None:
+        return find_neck(mesh, EYES_AT, head_size(marks))
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     height = float(high[1] - low[1])
     pivot = (0.0, float(low[1]) + 0.3 * height, float(0.5 * (low[2] + high[2])))

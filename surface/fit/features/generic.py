@@ -17,7 +17,7 @@ from surface.fit.points.lid_seating import fit_sphere
 from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
-from surface.fit.source.frame import head_scale
+from surface.fit.source.frame import HEIGHT_MM, head_scale
 from surface.fit.source.islands import Island, find_islands, signed_areas
 from surface.fit.source.layout import lay_out, open_flat_holes, separate
 from surface.fit.source.mesh import FitMesh, components, face_areas, renumbered, triangles
@@ -36,7 +36,7 @@ DEPTH = 8  # of the cells; more where many islands lie side by side, since roots
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
 TOOTH_MM, TEETH = 24.0, 12  # so many pieces no larger than this are teeth
 ROUND = 0.07  # how far a ball may stray from a sphere, in radii
-BALL = (0.02, 0.14)  # radius of an eyeball, in heights of the mesh
+BALL = (0.02, 0.14)  # radius of an eyeball, in heights of the head with its neck
 MOVING = 0.4  # an island moved by at least this share of the shapes that move the most mobile one is the face's
 MOVES_MM = 1.0  # of a head of usual size: what moves less does not count as moved
 
@@ -109,7 +109,7 @@ def _points(mesh: FitMesh, chosen: Bools) -> Floats:
 
 def _find_eyes(mesh: FitMesh, label: Ints, scale: float) -> tuple[tuple[Floats, float], set[int]]:
     """The two largest balls that mirror each other, and every piece inside or on them."""
-    height, middle = float(np.ptp(mesh.vertices[:, 1])), _middle_x(mesh)
+    height, middle = HEIGHT_MM * scale, _middle_x(mesh)
     balls = {}
     for k in np.unique(label):
         points = _points(mesh, label == k)
