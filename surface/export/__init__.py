@@ -77,8 +77,8 @@ def export_head(
 
     Returns the paths written.
 
-    Raises ExportError: another suffix or frame, nothing known of that file, a pose that a file of this kind cannot hold, or a place that cannot be written
-    to; nothing is left half-written.
+    Raises ExportError: another suffix or frame, a frame of a file that nothing is known of, a pose that a file of this
+    kind cannot hold, or a place that cannot be written to; nothing is left half-written.
     """
     path, known = Path(path), exporters(extra)
     if frame not in FRAMES:

@@ -189,9 +189,11 @@ def _sphere(points: Floats) -> tuple[Floats, float] | None:
     origin = points.mean(axis=0)
     centre, radius = _least_squares(points - origin)
     off = np.abs(np.linalg.norm(points - origin - centre, axis=1) - radius)
-    near = off <= np.median(off) * CORNEA  # without the cornea, which stands out of the ball
-    if near.sum() >= LEAST_BALL:
-        centre, radius = _least_squares((points - origin)[near])
+    for _ in range(4):  # without the cornea, which stands out of the ball
+        near = np.abs(np.linalg.norm(points - origin - centre, axis=1) - radius)
+        kept = near <= CORNEA * np.median(near)
+        if kept.sum() >= LEAST_BALL and not kept.all():
+            centre, radius = _least_squares((points - origin)[kept])
     good = radius > 0 and float(np.sqrt((off**2).mean())) < ROUND * radius and extent.min() > COVER * radius
     return (origin + centre, radius) if good else None
 
