@@ -107,7 +107,9 @@ def fit(
     name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
     shapes: Annotated[Path | None, typer.Option(help="Folder with one .obj a shape, for an .obj mesh.")] = None,
     names: Annotated[Path | None, typer.Option(help="TOML table of shape names: [names] theirs = ARKit's.")] = None,
-    unit: Annotated[str | None, typer.Option(help="mm, cm, m or in; default: guessed from the head's size.")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="mm, cm, dm, m, in or ft; default: as the format says, else by the eyes.")
+    ] = None,
     up: Annotated[str | None, typer.Option(help="Axis that points up: x, y, z, -x, -y or -z.")] = None,
     forward: Annotated[str | None, typer.Option(help="Axis that the face looks along.")] = None,
     without: Annotated[

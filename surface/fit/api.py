@@ -10,6 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.progress import Progress, no_progress, part_of
+from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
@@ -94,7 +95,8 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
-    report = FitReport(name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes], scale)
+    notes = [*loaded.notes, *plan.notes, *findings(head, loaded.marks)]
+    report = FitReport(name, reports, moving, missing, loaded.named.left_out, notes, scale)
     return FitResult(head, report, fitted_parts)
 
 

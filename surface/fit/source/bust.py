@@ -60,7 +60,7 @@ def _kept_faces(mesh: FitMesh, gone: Bools) -> Bools:
 
 
 def _notes(mesh: FitMesh, gone: Bools, below: float) -> list[str]:
-    names = [n for n, out in zip(mesh.pieces, gone, strict=True) if out]
+    names = list(dict.fromkeys(n for n, out in zip(mesh.pieces, gone, strict=True) if out))
     left = f"; left out with it: {', '.join(repr(n) for n in names)}" if names else ""
     return [f"a body, {below:.0f} mm below the eyes: the head is cut from it below the neck{left}"]
 
