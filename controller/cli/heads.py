@@ -107,7 +107,9 @@ def fit(
     name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
     shapes: Annotated[Path | None, typer.Option(help="Folder with one .obj a shape, for an .obj mesh.")] = None,
     names: Annotated[Path | None, typer.Option(help="TOML table of shape names: [names] theirs = ARKit's.")] = None,
-    unit: Annotated[str | None, typer.Option(help="mm, cm, m or in; default: guessed from the head's size.")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="mm, cm, dm, m, in or ft; default: as the format says, else by the eyes.")
+    ] = None,
     up: Annotated[str | None, typer.Option(help="Axis that points up: x, y, z, -x, -y or -z.")] = None,
     forward: Annotated[str | None, typer.Option(help="Axis that the face looks along.")] = None,
     without: Annotated[
@@ -195,6 +197,9 @@ def export(
     settings: Setting = None,
     expression: Expression = None,
     identity: Identity = None,
+    frame: Annotated[
+        str, typer.Option(help="head: millimetres or metres, y up, z forward; file: as in the mesh it was fitted to.")
+    ] = "head",
 ) -> None:
     """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.
 
@@ -214,6 +219,6 @@ def export(
         added = added_exporters()
         kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
         with EXPORTERS.blaming(kind):
-            written = export_head(loaded, out, pose, added)
+            written = export_head(loaded, out, pose, added, frame)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)

@@ -171,11 +171,12 @@ class HeadlessFace:
         recorder: Recorder | None = None,
     ) -> None:
         from surface.view.pictures.offscreen import Offscreen  # start-up: the body gets its orders first
+        from surface.view.scene.framing import framed
 
         self._screen: Offscreen = Offscreen(
             head, settings.size, quality=settings.quality, theme=settings.make_theme(), evaluator=settings.evaluator
         )
-        self._camera, self._settings = settings.make_camera(), settings
+        self._camera, self._settings = framed(settings.make_camera(), head), settings
         self._values, self._recorder = values, recorder
         self._log = FrameLog()
         self._screen.go_live()

@@ -21,6 +21,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.view.pictures.offscreen import Offscreen
 from surface.view.pictures.sheet import contact_sheet, write_png
+from surface.view.scene.framing import framed
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,7 @@ def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
     head, look = still.load_head(), still.look
     with Offscreen(head, still.size, quality=look.quality, theme=look.make_theme(), evaluator=look.evaluator) as screen:
-        picture = screen.render(for_head(still.values, head.parameters), look.make_camera())
+        picture = screen.render(for_head(still.values, head.parameters), framed(look.make_camera(), head))
     write_png(picture, out)
 
 
@@ -164,6 +165,7 @@ def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | N
     head, look = still.load_head(), still.look
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]
     page = contact_sheet(
-        head, entries, views=[look.make_camera()], quality=look.quality, theme=look.make_theme(), progress=progress
-    )
+        head, entries, views=[framed(look.make_camera(), head)], quality=look.quality, theme=look.make_theme(),
+        progress=progress,
+    )  # fmt: skip
     write_png(page, out)

@@ -23,6 +23,7 @@ from controller.stage.stage import FaceSettings
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.view.scene.camera import Camera
+from surface.view.scene.framing import framed, framing_of
 from surface.view.scene.viewpoint import Viewpoint
 from surface.view.window import run_window
 
@@ -57,7 +58,7 @@ class WindowFace:
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
-        viewpoint = Viewpoint(self._settings.make_camera())
+        viewpoint = Viewpoint(framed(self._settings.make_camera(), self._head), framing_of(self._head))
         began = time.monotonic_ns()
 
         def source() -> NDArray[np.float64]:

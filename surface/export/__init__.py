@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from surface.base.errors import ExportError
-from surface.export.exporter import API, Exporter
+from surface.export.exporter import API, Exporter, Write
+from surface.export.frames import FRAMES
 from surface.head import Head
 
 __all__ = ["API", "SUFFIXES", "Exporter", "export_head", "exporters"]
@@ -63,24 +64,29 @@ def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
 
 
 def export_head(
-    head: Head, path: str | Path, pose: Mapping[str, float] | None = None, extra: Iterable[Exporter] = ()
-) -> list[Path]:
+    head: Head, path: str | Path, pose: Mapping[str, float] | None = None, extra: Iterable[Exporter] = (),
+    frame: str = "head",
+) -> list[Path]:  # fmt: skip
     """Write a head to a file for other programs; the suffix chooses the exporter (see :func:`exporters`).
 
     pose : values by parameter. A .glb opens in this pose and keeps its shapes; an .obj is written in it, without
         shapes.
     extra : exporters from other packages.
+    frame : "head" for head space (mm or m, y up, z forward), "file" for axes, origin and unit of the file that the head
+        was fitted to.
 
     Returns the paths written.
 
-    Raises ExportError: another suffix, a pose that a file of this kind cannot hold, or a place that cannot be written
-    to; nothing is left half-written.
+    Raises ExportError: another suffix or frame, a frame of a file that nothing is known of, a pose that a file of this
+    kind cannot hold, or a place that cannot be written to; nothing is left half-written.
     """
     path, known = Path(path), exporters(extra)
+    if frame not in FRAMES:
+        raise ExportError(f"frame {frame!r}: is neither {' nor '.join(FRAMES)}", hint="leave it out for head space")
     for one in known:
         if path.suffix.lower() in one.suffixes:
             try:
-                return one.write(head, path, pose or {})
+                return _writer(one, frame)(head, path, pose or {})
             except OSError as e:
                 hint = "choose a folder that can be written to"
                 raise ExportError(f"{path}: cannot be written ({e})", hint=hint) from e
@@ -89,3 +95,13 @@ def export_head(
     raise ExportError(
         f"{path}: is neither {', '.join(most)} nor {last}{why}", hint="for example: omote export head.glb"
     )
+
+
+def _writer(exporter: Exporter, frame: str) -> Write:
+    """What writes in a frame."""
+    if frame == "head":
+        return exporter.write
+    if exporter.write_in_file is None:
+        why = f"{exporter.kind!r} writes {', '.join(exporter.suffixes)} in head space only"
+        raise ExportError(why, hint="leave out --frame, or write a .glb or an .obj")
+    return exporter.write_in_file

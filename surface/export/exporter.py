@@ -18,6 +18,8 @@ class Exporter:
     """One file format.
 
     api : version of the interface it uses; see :data:`API`
+    write_in_file : as ``write``, but in axes, origin and unit of the file that the head was fitted to
+        (``head.data.placement``); None for a format that is always written in head space
     kind : a short name, as "glb"; the module's own for the exporters of this folder
     title : short description of the file's content
     suffixes : of such files, in lower case, as (".glb",)
@@ -32,3 +34,4 @@ class Exporter:
     suffixes: tuple[str, ...]
     write: Write
     install: str = ""
+    write_in_file: Write | None = None

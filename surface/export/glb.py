@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from surface.base import files
 from surface.base.arrays import Array, Floats32
 from surface.base.errors import ExportError
 from surface.export.exporter import Exporter
+from surface.export.frames import in_file, placement_of
 from surface.export.shapes import ExportPart, export_parts
 from surface.head import Head
 from surface.head.model.parameters import ANGLES
@@ -30,10 +32,28 @@ SPARSE = 0.5  # targets that move less than this share of a part's vertices are 
 
 def write_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """See :func:`surface.export.export_head`."""
+    _refuse_angles(pose)
+    _replace(path, Document(head, export_parts(head), pose).bytes())
+    return [path]
+
+
+def write_glb_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
+    """As :func:`write_glb`, in axes, origin and unit of the file that the head was fitted to."""
+    _refuse_angles(pose)
+    placement = placement_of(head)
+    parts = in_file(export_parts(head), placement, 1.0 / float(METRES))
+    _replace(path, Document(head, parts, pose, {"frame": "file"}).bytes())
+    return [path]
+
+
+def _refuse_angles(pose: Mapping[str, float]) -> None:
     angles = [n for n, v in pose.items() if n in ANGLES and v]
     if angles:
         raise ExportError(f"{angles[0]}: angles are no morph targets", hint="export an .obj in this pose")
-    content = Document(head, export_parts(head), pose).bytes()
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all."""
     new = path.with_name(path.name + ".new")
     try:
         new.write_bytes(content)
@@ -41,7 +61,6 @@ def write_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     finally:
         if path.parent.is_dir():
             new.unlink(missing_ok=True)
-    return [path]
 
 
 EXPORTER = Exporter(
@@ -50,6 +69,7 @@ EXPORTER = Exporter(
     title="all parts, materials, and one morph target a shape",
     suffixes=(".glb",),
     write=write_glb,
+    write_in_file=write_glb_in_file,
 )
 
 
@@ -76,7 +96,8 @@ def png_bytes(picture: NDArray[np.uint8]) -> bytes:
 class Document:
     """A head as a glTF document and its binary chunk, in metres."""
 
-    def __init__(self, head: Head, parts: list[ExportPart], pose: Mapping[str, float]) -> None:
+    def __init__(self, head: Head, parts: list[ExportPart], pose: Mapping[str, float],
+                 extras: Mapping[str, str] = MappingProxyType({})) -> None:  # fmt: skip
         self._data = bytearray()
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
@@ -90,7 +111,7 @@ class Document:
             if part.pivot.any():
                 nodes[-1]["translation"] = (METRES * part.pivot).tolist()
         self._document = {
-            "asset": _asset(head), "scene": 0, "scenes": [{"name": head.name, "nodes": [0]}], "nodes": nodes,
+            "asset": _asset(head, extras), "scene": 0, "scenes": [{"name": head.name, "nodes": [0]}], "nodes": nodes,
             "meshes": meshes, "materials": list(self._materials.values()), "accessors": self._accessors,
             "bufferViews": self._views,
         }  # fmt: skip
@@ -203,8 +224,8 @@ class Document:
         self._data += b"\0" * (-len(self._data) % 4)
 
 
-def _asset(head: Head) -> dict[str, Any]:
+def _asset(head: Head, extras: Mapping[str, str]) -> dict[str, Any]:
     provenance = {k: str(v) for k, v in head.data.provenance.items()}
     source = "; ".join(v for k, v in provenance.items() if k in ("source_name", "source_licence"))
-    out: dict[str, Any] = {"version": "2.0", "generator": "omote", "extras": provenance}
+    out: dict[str, Any] = {"version": "2.0", "generator": "omote", "extras": {**provenance, **extras}}
     return out | ({"copyright": source} if source else {})

@@ -11,6 +11,7 @@ import numpy as np
 
 from surface.base.arrays import Floats32
 from surface.export.exporter import Exporter
+from surface.export.frames import in_file, placement_of
 from surface.export.glb import materials
 from surface.export.shapes import ExportPart, export_parts
 from surface.head import Head
@@ -18,11 +19,23 @@ from surface.head import Head
 
 def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """See :func:`surface.export.export_head`."""
-    parts = export_parts(head, pose, shapes=not pose)
+    title = f"# {head.name}, written by omote; millimetres, y up, z forward"
+    return _write_parts(export_parts(head, pose, shapes=not pose), path, title)
+
+
+def write_obj_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
+    """As :func:`write_obj`, in axes, origin and unit of the file that the head was fitted to."""
+    placement = placement_of(head)
+    title = f"# {head.name}, written by omote; in the frame of its source"
+    return _write_parts(in_file(export_parts(head, pose, shapes=not pose), placement), path, title)
+
+
+def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
+    """The OBJ with its materials and its folder of shapes, complete or not at all."""
     shapes = dict.fromkeys(name for part in parts for name in part.displacements)
     vertices, normals = (np.concatenate([getattr(p, key) for p in parts]) for key in ("vertices", "normals"))
     textures = [f"vt {u:.6f} {v:.6f}" for part in parts for u, v in part.uv.tolist()]
-    title, faces = f"# {head.name}, written by omote; millimetres, y up, z forward", _faces(parts)
+    faces = _faces(parts)
     folder = path.with_name(f"{path.stem}_shapes")
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as temporary:
         made = [Path(temporary) / target.name for target in (path, path.with_suffix(".mtl"))]
@@ -46,6 +59,7 @@ EXPORTER = Exporter(
     title="the face at rest with its materials, and a folder beside it with one file a shape",
     suffixes=(".obj",),
     write=write_obj,
+    write_in_file=write_obj_in_file,
 )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from surface.base.arrays import Floats, Floats32
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.head import Head
 from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
 
@@ -52,7 +52,11 @@ def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes:
             occlusion = part.attributes.get("occlusion", np.float32(1.0))
             colours = np.clip(colours * np.sqrt(occlusion), 0.0, 1.0).astype(np.float32)
         vertices, normals, uv = part.vertices.copy(), unit(part.normals), _in_unit_square(part.uv)
-        out.append(ExportPart(part.name, part.material, vertices, normals, uv, part.triangles.copy(), pivot, colours))
+        out.append(
+            ExportPart(
+                part.name, part.material, vertices, normals, uv, _manifold(vertices, part.triangles), pivot, colours
+            )
+        )
     for name in _shapes(head) if shapes else ():
         _add_shape(head, name, out)
     head.pose(head.values({}))
@@ -91,6 +95,31 @@ def unit(normals: Floats32) -> Floats32:
     """Rows scaled to length 1; zero rows become +z."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), np.array([0.0, 0.0, 1.0])).astype(np.float32)
+
+
+def _manifold(vertices: Floats32, triangles: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Triangles without the slivers by which more than two meet in an edge: a tessellation has a few at its seams, and
+    other programs refuse them."""
+    kept = np.array(triangles)
+    for _ in range(8):
+        start, end = kept.ravel().astype(np.int64), kept[:, [1, 2, 0]].ravel().astype(np.int64)
+        _, edge, count = np.unique(start * len(vertices) + end, return_inverse=True, return_counts=True)
+        crowded = (count[edge.ravel()] > 1).reshape(-1, 3).any(axis=1)
+        if not crowded.any():
+            break
+        a, b, c = (vertices[kept[:, k]].astype(float) for k in range(3))
+        area = np.where(crowded, np.linalg.norm(np.cross(b - a, c - a), axis=1), np.inf)
+        kept = np.delete(kept, _smallest(kept, area, edge.reshape(-1, 3), count), axis=0)
+    return kept
+
+
+def _smallest(triangles: NDArray[np.int32], area: Floats, edge: Ints, count: Ints) -> Ints:
+    """The smallest triangle at each directed edge that several have."""
+    out = []
+    for k in np.flatnonzero(count > 1):
+        at = np.flatnonzero((edge == k).any(axis=1))
+        out.append(at[np.argmin(area[at])])
+    return np.unique(np.array(out, np.int64))
 
 
 def _in_unit_square(uv: Floats32) -> Floats32:

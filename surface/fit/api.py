@@ -10,6 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.progress import Progress, no_progress, part_of
+from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
@@ -22,6 +23,7 @@ from surface.fit.points.refine import fit_chart
 from surface.fit.points.report import FitReport, FitResult, FittedPart, PartReport, measure
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
+from surface.fit.source.anatomy import Landmarks
 from surface.fit.source.chart import Chart, make_chart
 from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island, find_islands
@@ -29,6 +31,7 @@ from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold
 from surface.fit.source.names import sources_of
+from surface.fit.source.place import CLOSE_MM, EYES_AT, find_neck, head_size, moved, place
 from surface.fit.source.repair import repaired
 from surface.fit.source.shapes import to_arkit
 from surface.fit.source.wrap import wrap_chart
@@ -73,10 +76,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     """Fit all parts of a mesh in memory; ``where`` names it in messages."""
     recipe = recipe_for(loaded.mesh)
     if recipe is not None:
+        loaded = _at_recipes_place(loaded, recipe)
         mesh = prepare(loaded.mesh, recipe)
         plan = recipe_plan(mesh, recipe)
     else:
-        loaded = _repaired(loaded)
+        loaded = _repaired(place(loaded))
         check_manifold(loaded.mesh, where)
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
@@ -85,15 +89,16 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress)
     charts = {p.name: p.chart for p in fitted_parts}
     head = HeadData(
-        name, _provenance(recipe), _neck(mesh, recipe), rig.eyes, rig.radius, rig.jaw,
-        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
+        name, _provenance(recipe), _neck(mesh, recipe, loaded.marks), rig.eyes, rig.radius, rig.jaw,
+        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh), placement=loaded.placement,
     )  # fmt: skip
     head = finish_head(head, mesh, charts, recipe)
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
-    report = FitReport(name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes], scale)
+    notes = [*loaded.notes, *plan.notes, *findings(head, loaded.marks)]
+    report = FitReport(name, reports, moving, missing, loaded.named.left_out, notes, scale)
     return FitResult(head, report, fitted_parts)
 
 
@@ -185,11 +190,22 @@ def eyes_of(mesh: FitMesh, recipe: Recipe) -> tuple[Floats, float]:
     return np.stack([centre, centre * [-1.0, 1.0, 1.0]]), balls[1].radius
 
 
-def _neck(mesh: FitMesh, recipe: Recipe) -> Neck:
-    """The recipe's neck, or one in the lower quarter of a head nothing is known of."""
+def _at_recipes_place(loaded: Loaded, recipe: Recipe) -> Loaded:
+    """The mesh moved to where the recipe's own places, of neck and hinge, belong to it."""
+    balls = recipe.eyeballs(loaded.mesh)
+    if balls is None or not recipe.ball_at:
+        return loaded
+    shift = np.array(recipe.ball_at) - balls[0].centre
+    return moved(loaded, shift) if np.abs(shift).max() > CLOSE_MM else loaded
+
+
+def _neck(mesh: FitMesh, recipe: Recipe, marks: Landmarks = Landmarks()) -> Neck:
+    """The recipe's neck, or one below the eyes, or in the lower quarter of a head nothing is known of."""
     if recipe.neck:
         x, y, z = recipe.neck
         return Neck((x, y, z))
+    if marks.eyes is not None:
+        return find_neck(mesh, EYES_AT, head_size(marks))
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     height = float(high[1] - low[1])
     pivot = (0.0, float(low[1]) + 0.3 * height, float(0.5 * (low[2] + high[2])))

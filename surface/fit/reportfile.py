@@ -156,6 +156,7 @@ def _picture(head: Head, path: Path) -> None:
     from surface.view.pictures.offscreen import Offscreen  # takes a moment to import; most fits draw nothing
     from surface.view.pictures.sheet import compose, write_png
     from surface.view.scene.camera import Camera
+    from surface.view.scene.framing import framed
 
     views = {
         "front": Camera.front(), "three-quarter": Camera.three_quarter(), "profile": Camera.profile(),
@@ -163,5 +164,5 @@ def _picture(head: Head, path: Path) -> None:
     }  # fmt: skip
     rest = head.values({})
     with Offscreen(head, (420, 480), quality="fast") as screen:
-        pictures = [screen.render(rest, camera) for camera in views.values()]
+        pictures = [screen.render(rest, framed(camera, head)) for camera in views.values()]
     write_png(compose(pictures, list(views), columns=4), path)

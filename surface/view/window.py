@@ -17,6 +17,7 @@ from surface.base.extras import importing
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target
 from surface.view.scene.camera import Camera
+from surface.view.scene.framing import framing_of
 from surface.view.scene.parts import ViewHead
 from surface.view.scene.sampling import AdaptiveSampling, is_software
 from surface.view.scene.theme import Theme
@@ -78,7 +79,7 @@ def run_window(
         raise ViewError("there is no display to open a window on (DISPLAY is not set)", hint=HEADLESS_HINT)
     with importing("the window", "imgui_bundle"):
         from imgui_bundle import hello_imgui, imgui  # optional: the extra view
-    viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera)
+    viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera, framing_of(head))
     make = partial(Renderer, head=head, quality=quality, theme=theme, evaluator=evaluator)
     window = _Window(imgui, source, viewpoint, make, quality)
     window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk

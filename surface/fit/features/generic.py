@@ -18,7 +18,7 @@ from surface.fit.points.lid_seating import fit_sphere
 from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
-from surface.fit.source.frame import head_scale
+from surface.fit.source.frame import HEIGHT_MM, head_scale
 from surface.fit.source.islands import Island, find_islands, signed_areas
 from surface.fit.source.kinds import kind_name, material_of
 from surface.fit.source.layout import lay_out, open_flat_holes, separate
@@ -33,7 +33,7 @@ GROWTH = 1.12  # of the face's net between two solves: small, for its points are
 DEPTH = 8  # of the cells; more where many islands lie side by side, since roots are shared by all
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
 ROUND = 0.07  # how far a ball may stray from a sphere, in radii
-BALL = (0.02, 0.14)  # radius of an eyeball, in heights of the mesh
+BALL = (0.02, 0.14)  # radius of an eyeball, in heights of the head with its neck
 MOVING = 0.4  # an island moved by at least this share of the shapes that move the most mobile one is the face's
 LESS = 1e-6  # what is said to be no skin counts as face only where there is nothing else
 MOVES_MM = 1.0  # of a head of usual size: what moves less does not count as moved
@@ -98,7 +98,7 @@ def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats
 
 def _find_eyes(mesh: FitMesh, label: Ints, scale: float) -> tuple[tuple[Floats, float], set[int]]:
     """The two largest balls that mirror each other, and every piece inside or on them."""
-    height, middle = float(np.ptp(mesh.vertices[:, 1])), _middle_x(mesh)
+    height, middle = HEIGHT_MM * scale, _middle_x(mesh)
     balls = {}
     for k in np.unique(label):
         points = points_of(mesh, label == k)

@@ -53,6 +53,7 @@ class Recipe:
     hinge: Sequence[float] = (0.0, 0.0, 0.0)
     jaw_teeth: Sequence[int] = (0, 0)
     ball: Sequence[int] = ()
+    ball_at: Sequence[float] = ()
     ball_inset: float = 0.0
     eye_shift: Sequence[float] = (0.0, 0.0, 0.0)
     eye_radius: float = 0.0

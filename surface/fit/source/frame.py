@@ -1,65 +1,74 @@
-"""Find axes and unit of a mesh file: from options, else from the mesh's own shapes."""
+"""Find axes and unit of a mesh file: from options, from its format, else from eyes, mouth and size of the head."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
+from surface.fit.source.anatomy import Eyes, Landmarks, find_landmarks, middle_of
+from surface.fit.source.conventions import Convention
+from surface.fit.source.orient import SQUARE, Orientation, axis_names, in_front, orient, snapped
+from surface.head.model.placement import Placement
 
-UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-GUESSED = ("mm", "cm", "m")  # by the height; by the eyes inches, too: the height depends on how much neck there is
+UNITS = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
 AXES = {f"{sign}{'xyz'[i]}": (i, -1.0 if sign else 1.0) for i in range(3) for sign in ("", "-")}
-HEAD_HEIGHT_MM = 250.0  # a head with neck; enough to distinguish metres, centimetres and millimetres
+HEAD_HEIGHT_MM = 250.0  # a head with neck; enough to distinguish units by the height
 EYES_MM = 65.4  # between the middles of what blinks, on the head that the bounds were set for
 HEIGHT_MM = 338.0  # of that head
-BEHIND = -0.15  # of the mesh's depth: shapes further behind its middle mean that left and right are swapped
+HUMAN = 1.6  # a head of a guessed unit is at most so much larger or smaller than usual
+DEFINED = 2.5  # and one of a unit that its format defines: figures may be large
 
 
 @dataclass(frozen=True)
 class Frame:
     """Transformation of a file's coordinates to millimetres, y up, z forward, x to the subject's left: rotation
-    ``turn`` (3, 3) and ``scale`` in mm per unit. ``notes`` say what was guessed."""
+    ``turn`` (3, 3) and ``scale`` in mm per unit, whose name is ``unit``, empty for none that is known. ``notes`` say
+    what was guessed; ``marks`` are the landmarks found in the file's coordinates."""
 
     turn: Floats
     scale: float
     notes: tuple[str, ...] = ()
+    unit: str = ""
+    marks: Landmarks = field(default_factory=Landmarks)
+
+    @property
+    def placement(self) -> Placement:
+        """The same without a shift."""
+        return Placement(self.turn, self.scale, np.zeros(3), self.unit)
 
     def points(self, rows: Floats) -> Floats:
-        """Points or displacements (..., 3) in head space."""
-        return self.scale * (rows @ self.turn.T)
+        """Points or displacements (..., 3) in head space, before any shift."""
+        return self.placement.moves(rows)
 
 
 def find_frame(
     vertices: Floats, shapes: dict[str, Floats], *, unit: str | None = None, up: str | None = None,
-    forward: str | None = None,
+    forward: str | None = None, faces: Ints | None = None, convention: Convention = Convention(),
 ) -> Frame:  # fmt: skip
-    """Find axes and unit: as given, else by the shapes, else y up, z forward and a head's usual height.
+    """Find axes and unit: as given, else as the format defines where the head's anatomy does not contradict it, else
+    by eyes, mouth and size of the head.
 
-    shapes : displacements (n, 3) by ARKit's names.
-    unit : one of :data:`UNITS`; up, forward : x, y, z, -x, -y or -z.
+    shapes : displacements (n, 3) by ARKit's names; see :func:`surface.fit.source.anatomy.find_landmarks`.
+    unit : one of :data:`UNITS`; up, forward : x, y, z, -x, -y or -z. convention : what the format defines.
 
     Raises FitError: an unknown word, or up and forward along one axis.
     """
     notes: list[str] = []
-    turn = _turn(vertices, shapes, up, forward, notes)
-    if unit is not None:
-        if unit not in UNITS:
-            raise FitError(f"--unit {unit}: is not one of {', '.join(UNITS)}", hint="--unit cm")
-        return Frame(turn, UNITS[unit], tuple(notes))
-    turned = vertices @ turn.T
-    eyes, height = eye_distance(turned, shapes), float(np.ptp(turned[:, 1]))
-    measure, usual, units = (eyes, EYES_MM, (*GUESSED, "in")) if eyes else (height, HEAD_HEIGHT_MM, GUESSED)
-    guess = min(units, key=lambda u: abs(np.log(max(measure * UNITS[u], 1e-12) / usual)))
-    notes.append(f"unit taken for {guess}: all of it is {UNITS[guess] * height:.0f} mm high (say --unit otherwise)")
-    return Frame(turn, UNITS[guess], tuple(notes))
+    if unit is not None and unit not in UNITS:
+        raise FitError(f"--unit {unit}: is not one of {', '.join(UNITS)}", hint="--unit cm")
+    marks = find_landmarks(vertices, np.zeros((0, 4), np.int64) if faces is None else faces, shapes)
+    turn = _turn(vertices, shapes, marks, up, forward, convention, notes)
+    height = float(np.ptp(vertices @ turn[1]))
+    scale, name = _scale(marks.eyes, height, unit, convention, notes)
+    return Frame(turn, scale, tuple(notes), name, marks)
 
 
 def eye_distance(vertices: Floats, shapes: dict[str, Floats]) -> float:
     """Distance between the centres of both blink shapes; 0 where one is missing."""
-    left, right = (_middle(vertices, shapes.get(n)) for n in ("eyeBlinkLeft", "eyeBlinkRight"))
+    left, right = (middle_of(vertices, shapes.get(n)) for n in ("eyeBlinkLeft", "eyeBlinkRight"))
     return float(np.linalg.norm(left - right)) if left is not None and right is not None else 0.0
 
 
@@ -69,22 +78,91 @@ def head_scale(vertices: Floats, shapes: dict[str, Floats]) -> float:
     return between / EYES_MM if between else float(np.ptp(vertices[:, 1])) / HEIGHT_MM
 
 
-def _turn(vertices: Floats, shapes: dict[str, Floats], up: str | None, forward: str | None, notes: list[str]) -> Floats:
-    guessed_up, guessed_left = _shape_axes(vertices, shapes)
-    y = _axis("--up", up) if up else guessed_up if guessed_up is not None else np.array([0.0, 1.0, 0.0])
-    if forward:
-        z = _axis("--forward", forward)
+def _scale(
+    eyes: Eyes | None, height: float, told: str | None, convention: Convention, notes: list[str]
+) -> tuple[float, str]:  # fmt: skip
+    """mm per unit, and the unit's name; ``height`` is that of the whole mesh, in the file's unit."""
+    measure, usual = (eyes.apart, EYES_MM) if eyes else (height, HEAD_HEIGHT_MM)
+
+    def words(scale: float) -> str:
+        what = "its eyes are {:.3g} mm apart" if eyes else "all of it is {:.3g} mm high"
+        return what.format(scale * measure)
+
+    def off(scale: float) -> float:
+        return float(np.exp(abs(np.log(max(scale * measure, 1e-12) / usual))))
+
+    given = told or convention.unit
+    if given and (told or off(UNITS[given]) <= (DEFINED if eyes else 12.0)):
+        if told and eyes and off(UNITS[given]) > DEFINED:
+            notes.append(f"with --unit {given} {words(UNITS[given])}, a human's {EYES_MM:.0f}")
+        return UNITS[given], given
+    why = f"although {convention.by} defines {convention.unit}, since then {words(UNITS[given])}" if given else ""
+    guess = min(UNITS, key=lambda u: off(UNITS[u]))
+    if off(UNITS[guess]) > HUMAN and eyes:
+        why = f", {why}" if why else ""
+        notes.append(f"no usual unit fits{why}: its eyes are taken to be {EYES_MM:.0f} mm apart (say --unit otherwise)")
+        return usual / measure, ""
+    notes.append(f"unit taken for {guess}{', ' + why if why else ''}: {words(UNITS[guess])} (say --unit otherwise)")
+    return UNITS[guess], guess
+
+
+def _turn(
+    vertices: Floats, shapes: dict[str, Floats], marks: Landmarks, up: str | None, forward: str | None,
+    convention: Convention, notes: list[str],
+) -> Floats:  # fmt: skip
+    """The rotation to head space, (3, 3): as told, as defined, as found, or as is usual, in this order."""
+    found = orient(vertices, marks)
+    usual = _square(convention.up or "y", convention.forward or "z")
+    if up or forward:
+        turn = _told(up, forward, found, usual)
+    elif found is None:
+        turn = _partly(vertices, shapes, marks, usual, sure=bool(convention.by))
     else:
-        usual = np.array([0.0, 0.0, 1.0]) if abs(y[2]) < 0.5 else np.array([0.0, -1.0, 0.0])
-        z = usual if guessed_left is None or abs(guessed_left @ y) > 0.5 else np.cross(guessed_left, y)
-        z = _seen(vertices, shapes, z, notes)
+        turn = found.turn if _differ(found, usual) else usual
+        notes += found.notes
+    _say(turn, convention, found, told=bool(up or forward), notes=notes)
+    return turn
+
+
+def _differ(found: Orientation, usual: Floats) -> bool:
+    """Whether what was found is another rotation than the usual one."""
+    return not found.upright or not np.allclose(found.turn, usual)
+
+
+def _say(turn: Floats, convention: Convention, found: Orientation | None, *, told: bool, notes: list[str]) -> None:
+    """Note a rotation that a user would not expect."""
+    square = bool(np.isclose(np.abs(turn).max(axis=1), 1.0).all())
+    said = convention.by and np.allclose(turn, _square(convention.up, convention.forward))
+    if np.array_equal(turn, np.eye(3)) or said:
+        return
+    but = f", although {convention.by} defines {convention.up} and {convention.forward}" if convention.by else ""
+    why = "" if told or found is None else " by eyes and mouth (say --up and --forward otherwise)"
+    if square:
+        up, forward = axis_names(turn)
+        notes.append(f"turned: up is {up}, forward is {forward} in the file{but}{why}")
+        return
+    angle = np.degrees(np.arccos(np.clip(0.5 * (np.trace(turn) - 1.0), -1.0, 1.0)))
+    notes.append(f"levelled: the head stands askew in the file, by {angle:.0f} degrees{but}{why}")
+
+
+def _told(up: str | None, forward: str | None, found: Orientation | None, usual: Floats) -> Floats:
+    """The rotation with the axes given; the one that is not given is as found, else the usual one."""
+    guess = usual if found is None else snapped(found.turn).turn
+    if not np.isclose(np.abs(guess).max(axis=1), 1.0).all():
+        guess = max(SQUARE, key=lambda t: float((t * guess).sum()))
+    y = _axis("--up", up) if up else guess[1]
+    z = _axis("--forward", forward) if forward else guess[2]
+    if abs(y @ z) > 0.5 and not (up and forward):  # the other one must give way
+        spare = usual[2] if abs(y @ usual[2]) < 0.5 else (np.array([0.0, -1.0, 0.0]) if up else usual[1])
+        y, z = (y, spare) if up else (spare if abs(spare @ z) < 0.5 else np.array([0.0, 0.0, 1.0]), z)
     if abs(y @ z) > 0.5:
         raise FitError("--up and --forward lie along one axis", hint="--up z --forward -y, for example")
-    turn = np.stack([np.cross(y, z), y, z])
-    if not np.array_equal(turn, np.eye(3)):
-        names = [next(n for n, (i, s) in AXES.items() if row[i] * s > 0.5) for row in turn[1:]]
-        notes.append(f"turned: up is {names[0]}, forward is {names[1]} in the file")
-    return turn
+    return np.stack([np.cross(y, z), y, z])
+
+
+def _square(up: str, forward: str) -> Floats:
+    y, z = _axis("up", up), _axis("forward", forward)
+    return np.stack([np.cross(y, z), y, z])
 
 
 def _axis(option: str, name: str) -> Floats:
@@ -95,44 +173,18 @@ def _axis(option: str, name: str) -> Floats:
     return axis
 
 
-def _shape_axes(vertices: Floats, shapes: dict[str, Floats]) -> tuple[Floats | None, Floats | None]:
-    """Up, against the opening jaw; and left, from right shapes to left ones. None where shapes do not determine it."""
-    left = np.zeros(3)
-    for name in shapes:
-        if "Left" in name and name[:3] not in ("jaw", "mou"):
-            a, b = (_middle(vertices, shapes.get(n)) for n in (name, name.replace("Left", "Right")))
-            left += a - b if a is not None and b is not None else 0.0
-    up = -shapes["jawOpen"].sum(axis=0) if "jawOpen" in shapes else np.zeros(3)
-    x = _nearest_axis(left)
-    if x is not None:
-        up = up * (np.abs(x) < 0.5)
-    return _nearest_axis(up), x
-
-
-def _seen(vertices: Floats, shapes: dict[str, Floats], z: Floats, notes: list[str]) -> Floats:
-    """``z``, or its opposite where the face moves far behind the mesh's middle: then sides are named the other way."""
-    middles = [m for move in shapes.values() if (m := _middle(vertices, move)) is not None]
-    if not middles:
-        return z
-    depth = vertices @ z
-    offset = float(np.mean(middles, axis=0) @ z - 0.5 * (depth.min() + depth.max()))
-    if offset >= BEHIND * float(np.ptp(depth)):
-        return z
-    notes.append("left and right shapes seem to be named as the viewer sees them (say --forward to overrule)")
-    return -z
-
-
-def _middle(vertices: Floats, move: Floats | None) -> Floats | None:
-    """Mean of the vertices, weighted by how far a shape moves them; None for one that moves nothing."""
-    if move is None:
-        return None
-    weight = np.linalg.norm(move, axis=1)
-    return weight @ vertices / weight.sum() if weight.sum() > 0 else None
-
-
-def _nearest_axis(direction: Floats) -> Floats | None:
-    if not np.linalg.norm(direction) > 0:
-        return None
-    index = int(np.argmax(np.abs(direction)))
-    axis: Floats = np.sign(direction[index]) * np.eye(3)[index]
-    return axis
+def _partly(vertices: Floats, shapes: dict[str, Floats], marks: Landmarks, usual: Floats, *, sure: bool) -> Floats:
+    """A rotation by 90 degrees that agrees with what little is known, as near to the usual one as possible."""
+    if sure:
+        return usual
+    known: list[Floats] = list(SQUARE)
+    if marks.eyes is not None:
+        axis = marks.eyes.centres[0] - marks.eyes.centres[1]
+        known = [t for t in known if abs(t[0] @ axis) > 0.9 * marks.eyes.apart] or known
+        known = [t for t in known if in_front(vertices, marks.eyes, t[2]) > 0] or known
+    if marks.left is not None:
+        known = [t for t in known if t[0] @ marks.left > 0.7] or known
+    if "jawOpen" in shapes:
+        down = shapes["jawOpen"].sum(axis=0)
+        known = [t for t in known if t[1] @ down < -0.6 * np.linalg.norm(down)] or known
+    return max(known, key=lambda t: float((t * usual).sum()))

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
 
-from surface.base.arrays import Bools
+from surface.base.arrays import Bools, Floats
 from surface.base.errors import FitError
+from surface.fit.source.anatomy import Eyes, Landmarks
+from surface.fit.source.conventions import convention_of
 from surface.fit.source.expressions import with_expressions
-from surface.fit.source.frame import find_frame
+from surface.fit.source.frame import Frame, find_frame
 from surface.fit.source.kinds import unworn
 from surface.fit.source.mesh import FitMesh, check_mesh, renumbered
 from surface.fit.source.namenotes import name_notes
 from surface.fit.source.names import NameMap, map_names, read_names
-from surface.fit.source.shapes import empty_shapes, to_arkit
+from surface.fit.source.orient import shapes_of_sides
+from surface.fit.source.shapes import empty_shapes
+from surface.head.model.placement import Placement
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MeshData
 from surface.readers.npzmesh import read_npz
@@ -43,11 +47,16 @@ class LoadOptions:
 
 @dataclass(frozen=True)
 class Loaded:
-    """A mesh in head space, which of its shapes make ARKit's, and what was guessed."""
+    """A mesh in head space, which of its shapes make ARKit's, and what was guessed.
+
+    placement : from the file's coordinates; marks : landmarks in head space.
+    """
 
     mesh: FitMesh
     named: NameMap
     notes: tuple[str, ...] = ()
+    placement: Placement = field(default_factory=Placement)
+    marks: Landmarks = field(default_factory=Landmarks)
 
 
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
@@ -65,11 +74,33 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     check_mesh(mesh, str(path))
     own = read_names(options.names) if options.names else None
     named = map_names(mesh.names, own, empty=empty_shapes(mesh), other=other)
-    arkit = to_arkit(mesh, named)
-    shapes = dict(zip(arkit.names, arkit.deltas, strict=True))
-    frame = find_frame(mesh.vertices, shapes, unit=options.unit, up=options.up, forward=options.forward)
+    frame = find_frame(
+        mesh.vertices, _shapes(mesh, named), unit=options.unit, up=options.up, forward=options.forward,
+        faces=mesh.faces, convention=convention_of(path),
+    )  # fmt: skip
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
-    return Loaded(mesh, named, (*frame.notes, *notes, *name_notes(mesh.names, named, other)))
+    every = (*frame.notes, *notes, *name_notes(mesh.names, named, other))
+    return Loaded(mesh, named, every, frame.placement, _turned(frame))
+
+
+def _shapes(mesh: FitMesh, named: NameMap) -> dict[str, Floats]:
+    """The mesh's displacements by ARKit's names, before left and right are known."""
+    return shapes_of_sides(
+        {n: [(s.index, s.side) for s in every if not s.region] for n, every in named.sources.items()}, mesh.deltas
+    )
+
+
+def _turned(frame: Frame) -> Landmarks:
+    """The landmarks of a frame in head space; eyes are in order, since left is known now."""
+
+    def at(point: Floats | None) -> Floats | None:
+        return None if point is None else frame.points(point)
+
+    eyes, left = frame.marks.eyes, frame.marks.left
+    if eyes is not None:
+        centres = frame.points(eyes.centres)
+        eyes = Eyes(centres if centres[0, 0] > centres[1, 0] else centres[::-1].copy(), True, eyes.balls, eyes.by)
+    return Landmarks(eyes, at(frame.marks.mouth), at(frame.marks.jaw), None if left is None else frame.turn @ left)
 
 
 def _read(path: Path, shapes: Path | None) -> MeshData:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from surface.base.arrays import Array, Floats, Floats32, Ints
 from surface.head.model.parameters import smoothstep
+from surface.head.model.placement import Placement
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,7 @@ class HeadData:
 
     provenance : free text by key (source, licence, how it was made).
     eyes : centres (2, 3), left then right, mm; eye_radius : mm.
+    placement : from the frame of the mesh it was fitted to; None for a head of which that is not known.
     """
 
     name: str
@@ -142,3 +144,4 @@ class HeadData:
     paint: list[dict[str, Any]]
     contacts: list[Contact] = field(default_factory=list)
     rules: list[Rule] = field(default_factory=list)
+    placement: Placement | None = None

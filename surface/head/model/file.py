@@ -16,6 +16,7 @@ from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.meshes import KEYS
+from surface.head.model.placement import Placement
 
 VERSION = 1
 ANY = -1  # length of an axis that may have any
@@ -127,6 +128,7 @@ def load_data(path: str | Path) -> HeadData:
         contacts=[_contact(c, arrays.read(f"contacts/{i}", (2, ANY, ANY, 2)), names)
                   for i, c in enumerate(top.sections("contacts") if "contacts" in top.table else [])],
         rules=[_rule(r) for r in (top.sections("rules") if "rules" in top.table else [])],
+        placement=_placement(top.section("placement")) if "placement" in top.table else None,
     )  # fmt: skip
 
 
@@ -198,6 +200,16 @@ def _contact(section: _Section, places: Floats, names: list[str]) -> Contact:
 def _rule(section: _Section) -> Rule:
     terms = [term.read(**dict.fromkeys(term.table, ())) for term in section.sections("terms")]
     return Rule(**section.read(group=str, power=()), terms=tuple(terms))
+
+
+def _placement(section: _Section) -> Placement:
+    table = section.read(turn=(3, 3), scale=(), shift=(3,), unit=str)
+    turn = table["turn"]
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) or np.linalg.det(turn) < 0:
+        raise section.error("turn", "is no rotation")
+    if table["scale"] <= 0:
+        raise section.error("scale", f"{table['scale']:g} is not greater than 0")
+    return Placement(**table | {"shift": np.array(table["shift"])})
 
 
 def check_writable(folder: str | Path) -> None:
@@ -273,4 +285,10 @@ def _table(head: HeadData) -> dict[str, Any]:
         "contacts": [{k: v for k, v in vars(c).items() if k != "places"} for c in head.contacts],
         "rules": [vars(r) for r in head.rules],
         "paint": head.paint,
+        **({"placement": _placement_table(head.placement)} if head.placement else {}),
     }  # fmt: skip
+
+
+def _placement_table(placement: Placement) -> dict[str, Any]:
+    turn, shift = (np.round(rows, 9).tolist() for rows in (placement.turn, placement.shift))
+    return {"turn": turn, "scale": placement.scale, "shift": shift, "unit": placement.unit}

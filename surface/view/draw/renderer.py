@@ -16,6 +16,7 @@ from surface.view.draw.evaluator import choose
 from surface.view.draw.programs import set_uniforms
 from surface.view.scene.bounds import Bands, Silhouette, corners
 from surface.view.scene.camera import Camera
+from surface.view.scene.framing import framing_of
 from surface.view.scene.openings import Openings
 from surface.view.scene.parts import PartBuffers, ViewHead, ViewPart
 from surface.view.scene.theme import Colour, Light, Theme, find_theme
@@ -57,6 +58,7 @@ class Renderer:
             raise ValueError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}")
         self.ctx, self.head, self.quality = ctx, head, quality
         self.theme = find_theme(theme)
+        self._middle_z = framing_of(head).point((0.0, 0.0, 0.0))[2]
         self._values = np.zeros(len(head.parameters))
         head.pose(self._values)
         self.evaluator = choose(ctx, head, evaluator)
@@ -184,7 +186,7 @@ class Renderer:
         if self._camera == (camera, aspect):
             return
         self._camera = (camera, aspect)
-        self._into_bust = camera.eye[2] < 0.0 or camera.pitch_deg < _LOW_DEG
+        self._into_bust = camera.eye[2] < self._middle_z or camera.pitch_deg < _LOW_DEG
         shared = {f"{name}_direction": direction for name, direction in lights.items()}
         for program in self._programs.values():
             set_uniforms(program, {**shared, "view_projection": camera.matrix(aspect), "camera": camera.eye})

@@ -12,6 +12,7 @@ from surface.base.extras import importing
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target
 from surface.view.scene.camera import Camera
+from surface.view.scene.framing import framed
 from surface.view.scene.parts import ViewHead
 from surface.view.scene.sampling import AdaptiveSampling, is_software
 from surface.view.scene.theme import Theme
@@ -70,6 +71,7 @@ class Offscreen:
             self.ctx.release()
             raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
         self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme, evaluator=evaluator)
+        self._front = framed(Camera.front(), head)
         self._sampling = AdaptiveSampling(quality, samples, software=is_software(self.ctx))
         self._settings = self._sampling.settings
         self.target = Target(self.ctx, size, *self._settings)
@@ -108,7 +110,7 @@ class Offscreen:
             self.ctx.finish()
         self._apply_sampling()
         self.renderer.update()
-        self.target.paint(self.renderer, camera or Camera.front())
+        self.target.paint(self.renderer, camera or self._front)
         if self._sampling.live:
             self._sampling.add_frame(time.perf_counter() - started)
 

@@ -12,6 +12,7 @@ from surface.base.errors import ViewError
 from surface.view.pictures.imagefile import as_image, replacing
 from surface.view.pictures.offscreen import Offscreen
 from surface.view.scene.camera import Camera
+from surface.view.scene.framing import framed
 from surface.view.scene.parts import ViewHead
 from surface.view.scene.theme import Theme
 
@@ -39,14 +40,14 @@ def contact_sheet(
     """Draw one picture per entry and view and put them on one labelled page.
 
     entries : (label, values (P,)) in `head.parameters` order.
-    views : cameras; the front if None. Each entry's views are side by side, zoomed in since tiles are small.
+    views : cameras; the head's front if None. Each entry's views are side by side, zoomed in since tiles are small.
     tile : (width, height) of one picture, pixels.
     columns : entries across; about square if None.
     progress : called with (done, total) after each entry.
 
     Raises ViewError: no entries, no OpenGL, no Pillow.
     """
-    cameras = [zoom_to_head(camera) for camera in views or (Camera.front(),)]
+    cameras = [zoom_to_head(camera) for camera in views or (framed(Camera.front(), head),)]
     pictures = []
     with Offscreen(head, tile, quality=quality, theme=theme) as screen:
         for index, (_, values) in enumerate(entries):
@@ -60,7 +61,7 @@ def zoom_to_head(camera: Camera) -> Camera:
     """The camera moved nearer, so that the head without its shoulders fills a small picture."""
     x, y, z = camera.target
     side = abs(np.sin(np.radians(camera.yaw_deg)))
-    return camera.aimed((x, y + _LIFT_MM, z)).zoom(_ZOOM - _ZOOM_LESS * side)
+    return camera.aimed((x, y + _LIFT_MM * camera.near / Camera.near, z)).zoom(_ZOOM - _ZOOM_LESS * side)
 
 
 def compose(pictures: Sequence[np.ndarray], labels: Sequence[str], *, columns: int | None = None) -> Image:

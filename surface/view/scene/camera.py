@@ -93,8 +93,9 @@ class Camera:
         )
 
     def zoom(self, factor: float) -> Camera:
-        """The camera with its distance divided by `factor`, kept between 120 and 3000 mm."""
-        distance = float(np.clip(self.distance / factor, 120.0, 3000.0))
+        """The camera with its distance divided by `factor`, kept between 3 times `near` and 3/4 of `far`: between
+        120 and 3000 mm for a head of usual size."""
+        distance = float(np.clip(self.distance / factor, 3.0 * self.near, 0.75 * self.far))
         return replace(self, eye=_triple(np.asarray(self.target) + self._offset * (distance / self.distance)))
 
     def aimed(self, target: tuple[float, float, float]) -> Camera:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface.view.scene.camera import PRESETS, Camera
+from surface.view.scene.framing import Framing
 
 #: Keys, in order, for the presets.
 KEYS = dict(zip("12345", PRESETS, strict=True))
@@ -13,10 +14,14 @@ _ZOOM_PER_NOTCH = 1.12
 
 
 class Viewpoint:
-    """The camera of a window; key 0 resets it to the camera given (the front without one)."""
+    """The camera of a window; key 0 resets it to the camera given (the front without one).
 
-    def __init__(self, camera: Camera | None = None) -> None:
-        self.home = camera or Camera.front()
+    framing : of the head that is looked at, for the presets.
+    """
+
+    def __init__(self, camera: Camera | None = None, framing: Framing = Framing()) -> None:
+        self._framing = framing
+        self.home = camera or framing.camera(Camera.front())
         self.camera = self.home
 
     def turn(self, right: float, down: float) -> None:
@@ -40,7 +45,7 @@ class Viewpoint:
         if key == "0":
             self.camera = self.home
         elif key in KEYS:
-            self.camera = PRESETS[KEYS[key]]()
+            self.camera = self._framing.camera(PRESETS[KEYS[key]]())
         else:
             return False
         return True

@@ -5,7 +5,7 @@ import pytest
 from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
-from surface.fit.source import frame
+from surface.fit.source.anatomy import find_landmarks
 from surface.fit.source.frame import EYES_MM, eye_distance, find_frame, head_scale
 
 TURNS = {  # how the file's axes stand: rows are the file's x, y, z seen from the head
@@ -102,11 +102,11 @@ def test_a_height_near_a_heads_tells_the_unit_and_is_noted(unit):
 @pytest.mark.parametrize("unit", [0.001, 1.0])
 def test_a_shape_without_its_other_side_says_nothing_of_left_and_right(unit):
     vertices, shapes = face()
+    none = np.zeros((0, 4), np.int64)
     lone = dict.fromkeys(("cheekSquintLeft", "noseSneerLeft"), shapes["eyeBlinkLeft"]) | {"jawOpen": shapes["jawOpen"]}
-    up, left = frame._shape_axes(unit * vertices, {n: unit * s for n, s in lone.items()})
-    assert left is None and up.tolist() == [0, 1, 0]
-    up, left = frame._shape_axes(unit * vertices, {n: unit * s for n, s in {**shapes, **lone}.items()})
-    assert left.tolist() == [1, 0, 0] and up.tolist() == [0, 1, 0]
+    assert find_landmarks(unit * vertices, none, lone).left is None
+    both = {n: unit * s for n, s in {**shapes, **lone}.items()}
+    np.testing.assert_allclose(find_landmarks(unit * vertices, none, both).left, [1, 0, 0], atol=0.02)
     turn = TURNS["sideways"]
-    _, left = frame._shape_axes(unit * vertices @ turn.T, {n: unit * s @ turn.T for n, s in {**shapes, **lone}.items()})
-    assert left.tolist() == [0, 1, 0]
+    turned = {n: s @ turn.T for n, s in both.items()}
+    np.testing.assert_allclose(find_landmarks(unit * vertices @ turn.T, none, turned).left, [0, 1, 0], atol=0.02)

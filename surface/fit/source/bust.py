@@ -1,0 +1,174 @@
+"""Cut a head from its body: what is left is a bust, as the shipped head is one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats, Ints
+from surface.fit.source.mesh import FitMesh, face_areas, renumbered, triangles
+
+BODY_BELOW = 300.0  # a mesh that reaches further below the eyes, mm at usual size, has a body; a bust has not
+BASE, DOWN, ASIDE = -131.0, 98.0, 150.0  # the bust's outline: from this height, so far down and so far to the sides
+ROUND = 4.0  # exponent of the outline, a superellipse: 2 would be an ellipse
+MOSTLY = 0.5  # an object with less of its area than this inside the outline belongs to the body
+NEAR = 0.12  # of an edge: a vertex as near to the outline as that is on it; no slivers are cut
+
+
+def cut_bust(mesh: FitMesh, eyes_at: Floats, scale: float) -> tuple[FitMesh, list[str]]:
+    """The mesh without its body, and notes on what was left out; the mesh itself where there is none.
+
+    eyes_at : (3,) middle of the eyes, mm; scale : of the head, relative to the shipped one.
+    """
+    low = float(mesh.vertices[:, 1].min() - eyes_at[1])
+    if low > -BODY_BELOW * scale:
+        return mesh, []
+    outside = outline(mesh.vertices, eyes_at, scale)
+    gone = _body_objects(mesh, outside)
+    notes = _notes(mesh, gone, -low)
+    return _compact(cut(_subset(mesh, _kept_faces(mesh, gone)), outside)), notes
+
+
+def outline(points: Floats, eyes_at: Floats, scale: float) -> Floats:
+    """(n,) mm that points (n, 3) lie outside the bust's outline; negative inside."""
+    off = (points - eyes_at) / scale
+    down = np.maximum(BASE - off[:, 1], 0.0) / DOWN
+    radius = (down**ROUND + (np.abs(off[:, 0]) / ASIDE) ** ROUND) ** (1.0 / ROUND)
+    beyond: Floats = np.where(off[:, 1] < BASE, (radius - 1.0) * DOWN, (np.abs(off[:, 0]) / ASIDE - 1.0) * ASIDE)
+    head: Floats = np.where(off[:, 1] > 0.6 * BASE, -ASIDE, beyond)  # hair and ears may be as wide as they are
+    return scale * head
+
+
+def _body_objects(mesh: FitMesh, outside: Floats) -> Bools:
+    """(objects,) which objects of the file belong to the body: most of their area is outside; never all of them."""
+    if len(mesh.pieces) < 2:
+        return np.zeros(len(mesh.pieces), bool)
+    areas = face_areas(mesh.vertices, mesh.faces)
+    first = mesh.faces[:, 0]
+    inside = np.bincount(mesh.piece, areas * (outside[first] < 0), len(mesh.pieces))
+    whole = np.bincount(mesh.piece, areas, len(mesh.pieces))
+    moving = np.zeros(len(mesh.pieces))  # a body with a face is one object with it
+    most = np.abs(mesh.deltas).max(axis=(0, 2)) if len(mesh.deltas) else np.zeros(len(mesh.vertices))
+    np.maximum.at(moving, mesh.piece, most[first])
+    gone: Bools = (inside < MOSTLY * whole) & (moving < 1.0)
+    return gone if not gone[np.unique(mesh.piece)].all() else np.zeros(len(mesh.pieces), bool)
+
+
+def _kept_faces(mesh: FitMesh, gone: Bools) -> Bools:
+    return ~gone[mesh.piece] if len(mesh.pieces) and len(mesh.piece) else np.ones(len(mesh.faces), bool)
+
+
+def _notes(mesh: FitMesh, gone: Bools, below: float) -> list[str]:
+    names = list(dict.fromkeys(n for n, out in zip(mesh.pieces, gone, strict=True) if out))
+    left = f"; left out with it: {', '.join(repr(n) for n in names)}" if names else ""
+    return [f"a body, {below:.0f} mm below the eyes: the head is cut from it below the neck{left}"]
+
+
+def cut(mesh: FitMesh, outside: Floats) -> FitMesh:
+    """The part of a mesh where a function ``outside`` (n,) of its vertices is negative, cut along its zeros.
+
+    Faces that are cut become triangles; new vertices, their texture coordinates and displacements lie on the edges.
+    """
+    value = _settled(mesh, outside)
+    sides = np.where(mesh.faces >= 0, value[mesh.faces], np.nan)
+    beyond: Bools = np.asarray((sides > 0).any(axis=1))
+    whole, crossed = ~beyond, beyond & np.asarray((sides < 0).any(axis=1))
+    return _joined(mesh, whole, _clipped(mesh, crossed, value)) if crossed.any() else _subset(mesh, whole)
+
+
+def _settled(mesh: FitMesh, outside: Floats) -> Floats:
+    """``outside``, 0 where the zero lies so near to a vertex on one of its edges that a sliver would be cut."""
+    value = outside.copy()
+    tri = triangles(mesh.faces)
+    a, b = tri.ravel(), tri[:, [1, 2, 0]].ravel()
+    crossed = outside[a] * outside[b] < 0
+    a, b = a[crossed], b[crossed]
+    share = outside[a] / (outside[a] - outside[b])
+    value[a[share < NEAR]] = 0.0
+    value[b[share > 1.0 - NEAR]] = 0.0
+    return value
+
+
+class _Edges:
+    """New rows on edges: each is made once, so that neighbours share it."""
+
+    def __init__(self, start: int) -> None:
+        self.start = start
+        self.made: dict[tuple[int, int, int], int] = {}
+        self.rows: list[tuple[int, int, float]] = []
+
+    def at(self, a: int, b: int, share: float, of: int = -1) -> int:
+        """The row at ``share`` of the way from row a to row b; texture coordinates are those ``of`` a new vertex."""
+        key = (min(a, b), max(a, b), of)
+        if key not in self.made:
+            self.made[key] = self.start + len(self.rows)
+            self.rows.append((a, b, share))
+        return self.made[key]
+
+    def mixed(self, rows: Floats) -> Floats:
+        """``rows`` (n, k) with the new ones appended."""
+        if not self.rows:
+            return rows
+        a, b, share = (np.array(x) for x in zip(*self.rows, strict=True))
+        return np.concatenate([rows, rows[a] + share[:, None] * (rows[b] - rows[a])])
+
+
+_Clip = tuple[list[list[int]], list[list[int]], list[int], _Edges, _Edges]
+
+
+def _clipped(mesh: FitMesh, crossed: Bools, value: Floats) -> _Clip:
+    """Triangles of the inner parts of crossed faces: vertices, texture coordinates, objects, and new rows of both."""
+    points, textures = _Edges(len(mesh.vertices)), _Edges(len(mesh.uv))
+    faces: list[list[int]] = []
+    face_uv: list[list[int]] = []
+    piece: list[int] = []
+    for f in np.flatnonzero(crossed):
+        count = 4 if mesh.faces[f, 3] >= 0 else 3
+        corner = list(zip(mesh.faces[f, :count].tolist(), mesh.face_uv[f, :count].tolist(), strict=True))
+        ring = _ring(corner, value, points, textures)
+        for k in range(1, len(ring) - 1):
+            tri = (ring[0], ring[k], ring[k + 1])
+            faces.append([v for v, _ in tri] + [-1])
+            face_uv.append([t for _, t in tri] + [-1])
+            piece.append(int(mesh.piece[f]) if len(mesh.piece) else 0)
+    return faces, face_uv, piece, points, textures
+
+
+def _ring(
+    corner: list[tuple[int, int]], value: Floats, points: _Edges, textures: _Edges
+) -> list[tuple[int, int]]:  # fmt: skip
+    """Corners of the inner part of one face (Sutherland and Hodgman, 1974)."""
+    ring = []
+    for (a, ta), (b, tb) in zip(corner, corner[1:] + corner[:1], strict=True):
+        if value[a] <= 0:
+            ring.append((a, ta))
+        if value[a] * value[b] < 0:
+            share = float(value[a] / (value[a] - value[b]))
+            new = points.at(a, b, share)
+            ring.append((new, textures.at(ta, tb, share, new) if ta >= 0 and tb >= 0 else -1))
+    return ring
+
+
+def _joined(mesh: FitMesh, whole: Bools, clip: _Clip) -> FitMesh:
+    faces, face_uv, piece, points, textures = clip
+    new, new_uv = (np.array(x, np.int64).reshape(-1, 4) for x in (faces, face_uv))
+    n = len(mesh.vertices) + len(points.rows)
+    flat = mesh.deltas.transpose(1, 0, 2).reshape(len(mesh.vertices), -1)
+    deltas = points.mixed(flat).reshape(n, len(mesh.names), 3).transpose(1, 0, 2)
+    return replace(
+        mesh, vertices=points.mixed(mesh.vertices), deltas=deltas, uv=textures.mixed(mesh.uv),
+        faces=np.concatenate([mesh.faces[whole], new]), face_uv=np.concatenate([mesh.face_uv[whole], new_uv]),
+        piece=np.concatenate([mesh.piece[whole], np.array(piece, np.int64)]) if len(mesh.piece) else mesh.piece,
+    )  # fmt: skip
+
+
+def _subset(mesh: FitMesh, kept: Bools) -> FitMesh:
+    piece: Ints = mesh.piece[kept] if len(mesh.piece) else mesh.piece
+    return replace(mesh, faces=mesh.faces[kept], face_uv=mesh.face_uv[kept], piece=piece)
+
+
+def _compact(mesh: FitMesh) -> FitMesh:
+    """The mesh with only the vertices that its faces use."""
+    used, faces = renumbered(mesh.faces)
+    return replace(mesh, vertices=mesh.vertices[used], faces=faces, deltas=mesh.deltas[:, used])

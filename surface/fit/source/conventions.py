@@ -1,0 +1,56 @@
+"""What a file's format says about unit and axes of its coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from surface.base.errors import FitError
+from surface.readers.gltf import Gltf
+
+OMOTE_OBJ = "written by omote; millimetres, y up, z forward"  # in the first line of OBJ files that omote exports
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Unit and axes by definition; ``by`` : of what, in words. Empty: nothing is defined."""
+
+    by: str = ""
+    unit: str = ""
+    up: str = ""
+    forward: str = ""
+
+
+GLTF = Convention("glTF", "m", "y", "z")  # glTF 2.0 specification, section 3.4
+VRM0 = Convention("VRM 0", "m", "y", "-z")  # VRM 0.x: the model looks along -z; VRM 1.0: along +z, as in glTF
+OBJ = Convention("omote's OBJ", "mm", "y", "z")
+
+
+def convention_of(path: Path) -> Convention:
+    """The convention of a mesh file. Raises FitError: a glTF file is damaged."""
+    kind = path.suffix.lower()
+    if kind in (".glb", ".gltf", ".vrm"):
+        return _gltf(path)
+    if kind == ".obj" and path.is_file() and OMOTE_OBJ in _first_line(path):
+        return OBJ
+    return Convention()
+
+
+def _gltf(path: Path) -> Convention:
+    document = Gltf(path).document
+    asset, extensions = document.get("asset"), document.get("extensions")
+    if isinstance(asset, dict) and asset.get("generator") == "omote" and isinstance(asset.get("extras"), dict):
+        frame = asset["extras"].get("frame")
+        if frame == "file":  # exported in the frame of another file, of which glTF's definition may be untrue
+            return Convention()
+    if isinstance(extensions, dict) and "VRM" in extensions:
+        return VRM0
+    return GLTF
+
+
+def _first_line(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return file.readline(400).decode("utf-8", "replace")
+    except OSError as e:
+        raise FitError(f"{path}: cannot be read ({e})") from e

@@ -1,0 +1,124 @@
+"""Where a head's face is and how large it is, so that every camera shows it as it shows the shipped head."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from surface.view.scene.camera import Camera
+from surface.view.scene.parts import ViewHead
+
+#: Of the shipped head, which the presets of :class:`surface.view.scene.camera.Camera` are made for, mm: the middle
+#: between its eyes, its crown above it, its lips below it, half its width at the ears, and of what blinks.
+EYES, CROWN, LIPS, HALF_WIDTH = np.array([0.0, 36.1, 84.2]), 108.7, 68.0, 92.1
+LIDS = np.array([0.0, 36.6, 93.6])
+NEAR_MM, NEAR_SIZE = 12.0, 0.15  # a head that differs from it by less is shown from the same places
+LIPS_SHAPES = ("mouthPucker", "mouthFunnel", "mouthClose", "mouthRollLower", "mouthRollUpper", "jawOpen")
+BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
+SKIN, SAMPLES = "skin", 400  # places of a part that its outline is measured at
+
+
+@dataclass(frozen=True)
+class Framing:
+    """A move and a scale that bring the shipped head's place to a head's: ``at`` (3,) mm is the middle of its eyes,
+    ``size`` its size relative to the shipped head's."""
+
+    at: tuple[float, float, float] = (float(EYES[0]), float(EYES[1]), float(EYES[2]))
+    size: float = 1.0
+
+    def point(self, place: tuple[float, float, float]) -> tuple[float, float, float]:
+        """A place (3,), mm, at the shipped head as one at this head."""
+        if self == Framing():
+            return place  # exactly: the shipped head's pictures depend on it
+        x, y, z = (np.array(self.at) + self.size * (np.array(place) - EYES)).tolist()
+        return x, y, z
+
+    def camera(self, camera: Camera) -> Camera:
+        """A camera made for the shipped head as one that shows this head in the same way."""
+        if self == Framing():
+            return camera
+        eye, target = self.point(camera.eye), self.point(camera.target)
+        return replace(camera, eye=eye, target=target, near=self.size * camera.near, far=self.size * camera.far)
+
+
+def framing_of(head: ViewHead) -> Framing:
+    """The framing of a head, from its eyes, lips and outline at rest; the shipped head's where it hardly differs, and
+    for one of which nothing is known."""
+    data = getattr(head, "data", None)
+    if data is None:
+        return Framing()
+    skin = _skin_points(head)
+    if not len(skin):
+        return Framing()
+    at, known = _eyes(data, skin)
+    size = _size(data, skin, at) if known else _height(skin)
+    near = np.abs(at - EYES).max() < NEAR_MM and abs(np.log(size)) < np.log1p(NEAR_SIZE)
+    return Framing() if near else Framing((float(at[0]), float(at[1]), float(at[2])), size)
+
+
+def framed(camera: Camera, head: ViewHead) -> Camera:
+    """A camera made for the shipped head, as a preset is, moved to a head's own face."""
+    return framing_of(head).camera(camera)
+
+
+def _skin_points(head: Any) -> np.ndarray:
+    """(n, 3) places all over the skin at rest, whatever the pose is; of all parts where none is skin."""
+    parts = [p for p in head.parts if p.material == SKIN] or list(head.parts)
+    found = [p.surface.evaluate(np.asarray(p.uv[:: -(-len(p.uv) // SAMPLES)], float)) for p in parts if len(p.uv)]
+    return np.concatenate(found) if found else np.zeros((0, 3))
+
+
+def _eyes(data: Any, skin: np.ndarray) -> tuple[np.ndarray, bool]:
+    """The middle of the eyes (3,): of the eyeballs, else behind what blinks, else below the crown; and whether the
+    eyes tell it."""
+    if data.eye_radius > 0:
+        return np.asarray(data.eyes, float).mean(axis=0), True
+    lids = [m for name in BLINKS if (m := _moved(data, (name,))) is not None]
+    if len(lids) == len(BLINKS):
+        apart = float(np.linalg.norm(lids[0] - lids[1])) / 63.0
+        return np.mean(lids, axis=0) + apart * (EYES - LIDS), True
+    low, high = skin.min(axis=0), skin.max(axis=0)
+    size = _height(skin)
+    return np.array([0.5 * (low[0] + high[0]), high[1] - size * CROWN, high[2] - size * 46.0]), False
+
+
+def _height(skin: np.ndarray) -> float:
+    """Size of a head without known eyes, by its own height and width: the shipped bust is 338 mm high."""
+    wide, high = (float(np.ptp(skin[:, k])) for k in (0, 1))
+    return max(min(high / 338.0, wide / (2.0 * HALF_WIDTH)), 1e-3)
+
+
+def _size(data: Any, skin: np.ndarray, at: np.ndarray) -> float:
+    """Size of a head relative to the shipped one, so that crown, ears and lips are in the picture as there."""
+    lips = _moved(data, LIPS_SHAPES)
+    face = (at[1] - lips[1]) / LIPS if lips is not None else 0.0
+    if data.eye_radius > 0:
+        face = max(face, 0.5 * float(np.linalg.norm(data.eyes[0] - data.eyes[1])) / 31.8)
+    crown = (float(skin[:, 1].max()) - at[1]) / CROWN
+    level = skin[np.abs(skin[:, 1] - at[1]) < max(face, 0.2 * crown, 1e-3) * LIPS]
+    wide = float(np.abs(level[:, 0] - at[0]).max()) / HALF_WIDTH if len(level) else 0.0
+    outline = max(crown, wide)
+    return float(max(min(max(outline, 0.7 * face), 2.5 * face) if face > 0 else outline, 1e-3))
+
+
+def _moved(data: Any, names: tuple[str, ...]) -> np.ndarray | None:
+    """(3,) middle of the skin that the first of the groups ``names`` a head has moves; None if it has none."""
+    for name in names:
+        found = [(p.points[g.ids], np.linalg.norm(g.moves, axis=1)) for p in data.parts if p.material == SKIN
+                 for g in p.groups if g.name == name]  # fmt: skip
+        points, weight = (np.concatenate([x[k] for x in found] or [np.zeros(0)]) for k in (0, 1))
+        if weight.sum() > 0:
+            return _weighted_median(points, weight)
+    return None
+
+
+def _weighted_median(points: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(3,) of points (n, 3): a few control points may lie far off and move far."""
+    out = np.zeros(3)
+    for k in range(3):
+        order = np.argsort(points[:, k])
+        share = np.cumsum(weight[order])
+        out[k] = points[order[np.searchsorted(share, 0.5 * share[-1])], k]
+    return out

@@ -1,0 +1,35 @@
+"""What a fit says it found and did not find."""
+
+from dataclasses import replace
+
+import numpy as np
+from small_head import all_points, part, small_head
+
+from surface.fit.features.findings import findings
+from surface.fit.source.anatomy import Eyes, Landmarks
+from surface.head.model.placement import Placement
+
+EYES = Landmarks(Eyes(np.array([[30.0, 30, 0], [-30, 30, 0]]), True, True, "two balls"))
+BLINKS = [all_points("eyeBlinkLeft", (0, -4, 0)), all_points("eyeBlinkRight", (0, -4, 0))]
+
+
+def test_everything_there_is_named():
+    parts = [part("a", -40, groups=[*BLINKS, all_points("jawOpen", (0, -9, 0))])]
+    parts += [replace(part(m, 50), material=m) for m in ("teeth", "tongue", "brow", "lash")]
+    turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    placed = Placement(turn, 10.0, np.array([0.2, -1600.0, 4.0]), "cm")
+    lines = findings(small_head(parts=parts, seams=[], paint=[], placement=placed), EYES)
+    assert lines == [
+        "placed: the file's unit is cm, up is z, forward is -y; moved by 0, -1600, 4 mm",
+        "found: eyes 60 mm apart, of 24 mm, lids that close, a jaw that opens, teeth, tongue, brows or hair, lashes",
+    ]
+
+
+def test_what_is_missing_says_what_to_do():
+    head = small_head(eye_radius=0.0, placement=Placement(scale=190.5))
+    lines = "\n".join(findings(head, Landmarks()))
+    assert "the file's unit is 190.5 mm, up is y, forward is z; it stands where it belongs" in lines
+    assert "the head's place is not known" in lines and "no eyes:" in lines and "as a piece of its own" in lines
+    assert "no lids: no shape closes eyeBlinkLeft or eyeBlinkRight" in lines and "--names" in lines
+    assert "not in the mesh, and not drawn: teeth, tongue, brows or hair, lashes" in lines
+    assert "nothing tells where" not in "\n".join(findings(head, EYES))

@@ -1,0 +1,89 @@
+"""A head is cut from its body."""
+
+import numpy as np
+from traps import good_head, on_body, transformed
+
+from surface.fit.source.bust import cut, cut_bust, outline
+from surface.fit.source.mesh import FitMesh, check_manifold, check_mesh, triangles
+from surface.fit.source.place import EYES_AT
+
+HEAD = good_head()
+
+
+def body() -> FitMesh:
+    """The head on its body with the eyes in their place."""
+    whole = on_body(HEAD)
+    return transformed(whole, np.eye(3), 1.0, tuple(HEAD.vertices[0] - whole.vertices[0]))
+
+
+def quad(mirrored: bool = False) -> FitMesh:
+    """Two quads side by side, x 0..2, whose texture coordinates may lie on each other."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0]])
+    faces = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    deltas = np.zeros((1, 6, 3))
+    deltas[0, :, 2] = points[:, 1]
+    uv = np.abs(points[:, :2] - [1, 0]) if mirrored else points[:, :2] / 2
+    return FitMesh(points, faces, uv, faces.copy(), ("s",), deltas, np.array([0, 1]), ("a", "b"))
+
+
+def area(mesh: FitMesh) -> float:
+    t = mesh.vertices[triangles(mesh.faces)]
+    return float(0.5 * np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum())
+
+
+def test_a_cut_keeps_exactly_the_inner_part_with_texture_and_shapes():
+    for mirrored in (False, True):
+        mesh = quad(mirrored)
+        got = cut(mesh, mesh.vertices[:, 1] - 0.25)
+        check_mesh(got, "cut")
+        check_manifold(got, "cut")
+        used = np.unique(got.faces[got.faces >= 0])
+        assert np.isclose(area(got), 0.5) and got.vertices[used, 1].max() == 0.25
+        np.testing.assert_allclose(got.deltas[0, used, 2], got.vertices[used, 1])
+        for f, t in zip(got.faces[:, :3], got.face_uv[:, :3], strict=True):
+            x, y, _ = got.vertices[f].T
+            wanted = np.column_stack([np.abs(x - 1), y]) if mirrored else np.column_stack([x, y]) / 2
+            np.testing.assert_allclose(got.uv[t], wanted)
+        assert sorted(set(got.piece.tolist())) == [0, 1]
+
+
+def test_a_cut_near_a_vertex_makes_no_sliver():
+    mesh = quad()
+    got = cut(mesh, mesh.vertices[:, 1] - 0.95)  # nearer to the upper vertices than a cut is worth
+    np.testing.assert_array_equal(got.faces, mesh.faces)
+    slanted = mesh.vertices[:, 0] + 0.2 * mesh.vertices[:, 1] - 1.02
+    assert np.isclose(area(cut(mesh, slanted)), 0.92, atol=0.1)
+
+
+def test_a_body_is_left_out_and_the_head_stays_as_it_is():
+    mesh, notes = cut_bust(body(), EYES_AT, 1.0)
+    check_mesh(mesh, "bust")
+    check_manifold(mesh, "bust")
+    (note,) = notes
+    assert "a body" in note and all(f"'{n}'" in note for n in ("Trousers", "Boots", "Arm1", "Arm-1"))
+    assert "'Head'" not in note and "EyeL" not in note
+    kept = mesh.vertices[:, 1] > -80
+    before = HEAD.vertices[HEAD.vertices[:, 1] > -80]
+    assert kept.sum() == len(before) and np.abs(mesh.deltas).max() > 13
+    assert outline(mesh.vertices, EYES_AT, 1.0).max() < 2.0  # a vertex near the outline may stay outside
+
+
+def test_a_bust_is_no_body():
+    mesh, notes = cut_bust(HEAD, EYES_AT, 1.0)
+    assert mesh is HEAD and notes == []
+
+
+def test_one_object_with_a_face_and_a_body_is_cut_not_dropped():
+    whole = body()
+    one = FitMesh(whole.vertices, whole.faces, whole.uv, whole.face_uv, whole.names, whole.deltas,
+                  np.zeros(len(whole.faces), np.int64), ("Everything",))  # fmt: skip
+    mesh, notes = cut_bust(one, EYES_AT, 1.0)
+    assert "left out" not in notes[0] and mesh.vertices[:, 1].min() > -194
+    assert len(mesh.faces) > len(HEAD.faces) * 0.9
+
+
+def test_the_outline_is_a_bust():
+    at = EYES_AT + np.array([[0, 0, 0], [300, 0, 0], [0, -228, 0], [0, -231, 0], [149, -131, 0], [151, -131, 0]], float)
+    assert (outline(at, EYES_AT, 1.0) > 0).tolist() == [False, False, False, True, False, True]
+    large = EYES_AT + 2.0 * (at - EYES_AT)
+    np.testing.assert_allclose(outline(large, EYES_AT, 2.0), 2.0 * outline(at, EYES_AT, 1.0))
