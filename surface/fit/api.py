@@ -29,7 +29,8 @@ from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold
-from surface.fit.source.names import sources_of, to_arkit
+from surface.fit.source.names import sources_of
+from surface.fit.source.shapes import to_arkit
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
 from surface.head.model.file import check_writable, save_data
@@ -48,7 +49,7 @@ def fit_head(
 ) -> FitReport:  # fmt: skip
     """Fit a head to a mesh and write it.
 
-    mesh_path : .glb or .gltf with morph targets, .obj with a folder of shapes, or .npz.
+    mesh_path : .glb, .gltf or .vrm with morph targets, .obj with a folder of shapes, or .npz.
     out_dir : folder that gets head.toml and head.npz.
     progress : called with the part being fitted and the fraction done, 0..1.
     options : how to interpret the mesh. report_dir : folder that gets the report (see

@@ -16,6 +16,7 @@ from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.readers.gltf import Gltf
 from surface.readers.gltfmaterials import read_materials
+from surface.readers.gltftargets import read_expressions, target_names
 from surface.readers.meshdata import Material, MeshData, check_size
 
 WELD = 1e-6  # of the mesh's size: vertices nearer than this are welded
@@ -56,7 +57,7 @@ def _read(file: Gltf) -> MeshData:
             check_size(str(file.path), total, len({n for p in found for n in p.deltas}))
     if not found:
         raise file.error("scene", "holds no triangles", "export the head's mesh, not only its skeleton")
-    return _weld(_join(found, read_materials(file)))
+    return replace(_weld(_join(found, read_materials(file))), expressions=read_expressions(file))
 
 
 def _world_matrices(file: Gltf) -> dict[int, Floats]:
@@ -123,9 +124,8 @@ def _primitives(file: Gltf, index: int, world: dict[int, Floats]) -> list[_Primi
         if not isinstance(table, dict):
             raise file.error(at, "is no object")
         if table.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
-            out.append(
-                _primitive(file, table, at, name, _target_names(mesh) or _target_names(table), world[index], joints)
-            )
+            names = target_names(file, node["mesh"], len(file.value(table, "targets", list, at, [])))
+            out.append(_primitive(file, table, at, name, names, world[index], joints))
     return out
 
 
@@ -196,7 +196,7 @@ def _targets(file: Gltf, table: dict[str, Any], names: list[str], count: int, wh
     """Displacements (count, 3) of the morph targets by name."""
     out = {}
     for k, target in enumerate(file.value(table, "targets", list, where, [])):
-        name = names[k] if k < len(names) else f"target{k}"
+        name = names[k]
         at = f"{where}.targets[{k}] ({name})"
         if not isinstance(target, dict):
             raise file.error(at, "is no object")
@@ -207,12 +207,6 @@ def _targets(file: Gltf, table: dict[str, Any], names: list[str], count: int, wh
             if len(out[name]) != count:
                 raise file.error(at, f"has {len(out[name])} displacements for {count} vertices")
     return out
-
-
-def _target_names(table: dict[str, Any]) -> list[str]:
-    extras = table.get("extras")
-    names = extras.get("targetNames") if isinstance(extras, dict) else None
-    return [str(n) for n in names] if isinstance(names, list) else []
 
 
 def _triangles(file: Gltf, table: dict[str, Any], count: int, where: str) -> Ints:

@@ -45,6 +45,14 @@ class Material:
 
 
 @dataclass(frozen=True)
+class Expression:
+    """A named expression that a file makes of its shapes: ``binds`` are names of shapes, and how much of each."""
+
+    name: str
+    binds: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
 class MeshData:
     """A mesh in the unit and axes of its file.
 
@@ -54,6 +62,7 @@ class MeshData:
     names : k shape names; deltas : (k, n, 3) float64.
     piece : (f,) int64 into ``pieces``, the names of the objects or materials that faces belong to.
     materials : one for each of ``pieces``, None where the file gives it none; empty where the format has none.
+    expressions : what the file makes of its shapes.
     """
 
     vertices: Floats
@@ -65,6 +74,7 @@ class MeshData:
     piece: Ints
     pieces: tuple[str, ...]
     materials: tuple[Material | None, ...] = ()
+    expressions: tuple[Expression, ...] = ()
 
 
 def check_size(where: str, vertices: int, shapes: int) -> None:

@@ -9,15 +9,19 @@ import numpy as np
 
 from surface.base.arrays import Bools
 from surface.base.errors import FitError
+from surface.fit.source.expressions import with_expressions
 from surface.fit.source.frame import find_frame
+from surface.fit.source.kinds import unworn
 from surface.fit.source.mesh import FitMesh, check_mesh, renumbered
-from surface.fit.source.names import NameMap, map_names, read_names, to_arkit
+from surface.fit.source.namenotes import name_notes
+from surface.fit.source.names import NameMap, map_names, read_names
+from surface.fit.source.shapes import empty_shapes, to_arkit
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MeshData
 from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj
 
-SUFFIXES = (".glb", ".gltf", ".obj", ".npz")
+SUFFIXES = (".glb", ".gltf", ".vrm", ".obj", ".npz")
 
 
 @dataclass(frozen=True)
@@ -54,15 +58,18 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     """
     path = Path(path)
     raw = _read(path, options.shapes)
-    mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(raw)})
+    mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)})
     mesh = _without(mesh, options.without, str(path))
+    kept, notes = unworn(mesh)
+    mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
     check_mesh(mesh, str(path))
-    named = map_names(mesh.names, read_names(options.names) if options.names else None)
+    own = read_names(options.names) if options.names else None
+    named = map_names(mesh.names, own, empty=empty_shapes(mesh), other=other)
     arkit = to_arkit(mesh, named)
     shapes = dict(zip(arkit.names, arkit.deltas, strict=True))
     frame = find_frame(mesh.vertices, shapes, unit=options.unit, up=options.up, forward=options.forward)
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
-    return Loaded(mesh, named, frame.notes)
+    return Loaded(mesh, named, (*frame.notes, *notes, *name_notes(mesh.names, named)))
 
 
 def _read(path: Path, shapes: Path | None) -> MeshData:
@@ -71,7 +78,7 @@ def _read(path: Path, shapes: Path | None) -> MeshData:
         raise FitError(f"--shapes {shapes}: belongs to an .obj mesh, {path} has its own shapes", hint="leave it out")
     if kind == ".obj" or path.is_dir():
         return read_obj(path, shapes)
-    if kind in (".glb", ".gltf"):
+    if kind in (".glb", ".gltf", ".vrm"):
         return read_gltf(path)
     if kind == ".npz":
         return read_npz(path)

@@ -1,38 +1,42 @@
 """Map shape names of other heads to ARKit's 52.
 
-The table is ``names.toml`` beside this module; a user's own table comes before it::
+Names are read by :mod:`surface.fit.source.wordings`; a user's own table comes before it::
 
     [names]
     "MyHead_grin_links" = "mouthSmileLeft"
+
+Where a mesh has no shape for a parameter, a vowel, a viseme or a mood of the whole face may stand in for it: the table
+is at the end of ``presets.toml``.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cache
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-
-import numpy as np
 
 from surface.base import files
 from surface.base.errors import FitError
-from surface.fit.source.mesh import FitMesh
+from surface.fit.source.wordings import is_junk, names_table, presets_table, read_name, read_preset, sums
 from surface.head.model.parameters import SHAPES
 
-SIDES = {"l": "Left", "left": "Left", "lft": "Left", "r": "Right", "right": "Right", "rgt": "Right"}
-WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 EXAMPLE = 'a table looks like: [names] "My_Smile_L" = "mouthSmileLeft"'
-MIDDLE = 0.06  # half the band about the middle in which a shape for both sides fades from one to the other, in widths
+_Found = dict[str, dict[str, int]]
 
 
 @dataclass(frozen=True)
 class Source:
-    """One shape of the mesh that adds to a parameter; ``side`` cuts it: "" for all of it."""
+    """One shape of the mesh that adds to a parameter.
+
+    side : which half of it: "Left", "Right", or "" for all of it.
+    region : where: "mouth", "eyes", "brows", or "" for everywhere.
+    less : a shape whose share in this one is taken away; -1 for none.
+    """
 
     index: int
     side: str = ""
+    region: str = ""
+    less: int = -1
 
 
 @dataclass(frozen=True)
@@ -40,39 +44,96 @@ class NameMap:
     """Which shapes of a mesh make which of ARKit's 52.
 
     sources : parameter -> the shapes that add up to it, in the order of ARKit's list.
-    missing : parameters that no shape makes; left_out : shapes of the mesh that make none.
+    missing : parameters that no shape makes; left_out : shapes of the mesh that are not understood.
+    empty : shapes that move nothing; they count as missing.
+    stand_ins : parameters made from a vowel, a viseme or a mood.
+    presets : such shapes that are understood but not needed, since their parameters have shapes of their own.
+    spare : shapes that mean what another shape already does.
+    mouth, eyes : shapes that tell where those are; -1 where there are none.
     """
 
     sources: dict[str, list[Source]]
     missing: tuple[str, ...]
     left_out: tuple[str, ...]
+    empty: tuple[str, ...] = ()
+    stand_ins: tuple[str, ...] = ()
+    presets: tuple[str, ...] = ()
+    spare: tuple[str, ...] = ()
+    mouth: tuple[int, ...] = ()
+    eyes: tuple[int, ...] = ()
+
+
+@dataclass
+class _Read:
+    """What the names say: parameters by key and side, presets by key, and names of neither."""
+
+    exact: dict[str, int]
+    found: _Found = field(default_factory=dict)
+    presets: dict[str, int] = field(default_factory=dict)
+    meant: dict[int, str] = field(default_factory=dict)
+    moods: set[int] = field(default_factory=set)
 
 
 def sources_of(names: tuple[str, ...]) -> dict[str, list[int]]:
     """For each of ARKit's 52 that the mesh has as a whole: indices of the mesh's shapes that add up to it."""
     found = map_names(names).sources
-    return {n: [s.index for s in every] for n, every in found.items() if not any(s.side for s in every)}
+    return {n: [s.index for s in every] for n, every in found.items() if all(s == Source(s.index) for s in every)}
 
 
-def map_names(names: tuple[str, ...], own: Mapping[str, str] | None = None) -> NameMap:
-    """Find ARKit's 52 among shape names; ``own`` maps further names and comes first."""
-    own, start = own or {}, len(_common(names))
-    exact = {n: i for i, n in enumerate(names) if n in SHAPES and n not in own}
-    exact |= {own[n]: i for i, n in enumerate(names) if n in own}
-    found: dict[str, dict[str, int]] = {}
-    read = [(i, _read(n[start:]) or _read(n)) for i, n in enumerate(names) if n not in own]
-    understood = [(i, r) for i, r in read if r is not None]
-    for i, (key, side, _) in sorted(understood, key=lambda x: not x[1][2]):  # ARKit's own words before other ways
-        found.setdefault(key, {}).setdefault(side, i)
-    every = {s: [Source(exact[s])] if s in exact else _made(s, found) for s in SHAPES}
+def map_names(
+    names: tuple[str, ...], own: Mapping[str, str] | None = None, *, empty: Collection[int] = (),
+    other: Mapping[int, Iterable[str]] | None = None,
+) -> NameMap:  # fmt: skip
+    """Find ARKit's 52 among shape names.
+
+    own : maps further names and comes first. empty : shapes that move nothing. other : further names of shapes, that
+        count where their own are not understood.
+    """
+    read = _read_all(names, own or {}, empty, other or {})
+    every = {s: [Source(read.exact[s])] if s in read.exact else _made(s, read.found) for s in SHAPES}
+    stand_ins = _stand_ins(every, read.presets)
+    every |= stand_ins
     sources = {shape: made for shape, made in every.items() if made}
-    used = {s.index for made in sources.values() for s in made}
-    missing = tuple(s for s in SHAPES if s not in sources)
-    return NameMap(sources, missing, tuple(n for i, n in enumerate(names) if i not in used))
+    used = {k for made in sources.values() for s in made for k in (s.index, s.less)}
+    rest = [i for i in range(len(names)) if i not in used and i not in empty]
+    spare = [i for i in rest if read.meant.get(i) in {s.removesuffix("Left").removesuffix("Right") for s in sources}]
+    unread = [i for i in rest if i not in read.moods and i not in spare and not is_junk(names[i])]
+
+    def named(indices: Iterable[int]) -> tuple[str, ...]:
+        return tuple(names[i] for i in indices)
+
+    return NameMap(
+        sources, tuple(s for s in SHAPES if s not in sources), named(unread), named(sorted(empty)), tuple(stand_ins),
+        named(i for i in rest if i in read.moods), named(spare), *_anchors(sources),
+    )  # fmt: skip
 
 
-def _made(shape: str, found: dict[str, dict[str, int]]) -> list[Source]:
-    """Sources of a parameter: one shape, two halves, or a half of a shape for both sides."""
+def _read_all(
+    names: tuple[str, ...], own: Mapping[str, str], empty: Collection[int], other: Mapping[int, Iterable[str]]
+) -> _Read:
+    """Every name that is not empty; ARKit's own words come before other ways to say it, presets in the file's order."""
+    start = len(_common(names))
+    exact = {n: i for i, n in enumerate(names) if n in SHAPES and n not in own and i not in empty}
+    exact |= {own[n]: i for i, n in enumerate(names) if n in own and i not in empty}
+    out = _Read(exact)
+    rest = [i for i, n in enumerate(names) if n not in own and i not in empty]
+    meanings = []
+    for i in rest:
+        ways = [names[i][start:], names[i], *other.get(i, ())]
+        meaning = next((m for way in ways if (m := read_name(way))), None)
+        if meaning is not None:
+            meanings.append((i, meaning))
+        elif (preset := next((p for way in ways if (p := read_preset(way))), None)) is not None:
+            out.presets.setdefault(preset, i)
+            out.moods.add(i)
+    for i, meaning in sorted(meanings, key=lambda x: not x[1].plain):
+        out.found.setdefault(meaning.key, {}).setdefault(meaning.side, i)
+        out.meant[i] = meaning.key.partition("/")[0]
+    return out
+
+
+def _made(shape: str, found: _Found) -> list[Source]:
+    """Sources of a parameter: one shape, two halves, a half of a shape for both sides, or several that add up."""
     side = next((s for s in ("Left", "Right") if shape.endswith(s)), "")
     key = shape.removesuffix(side)
     by_side = found.get(key, {})
@@ -80,35 +141,48 @@ def _made(shape: str, found: dict[str, dict[str, int]]) -> list[Source]:
         return [Source(by_side[side])]
     if not side and len(by_side) == 2:
         return [Source(by_side["Left"]), Source(by_side["Right"])]
-    if side and set(by_side) == {""} and key in _table()["sided"]:
+    if side and set(by_side) == {""} and key in names_table()["sided"]:
         return [Source(by_side[""], side)]
+    for group in sums().get(shape, []):
+        parts = [_whole(found.get(part, {})) for part in group]
+        if all(parts):
+            return [s for part in parts for s in part]
     return []
 
 
-@cache
-def _table() -> dict[str, dict[str, list[str]]]:
-    return files.read_toml(Path(__file__).with_name("names.toml"))
+def _whole(by_side: dict[str, int]) -> list[Source]:
+    """A shape for both sides, or its two halves; nothing where one is missing."""
+    if "" in by_side:
+        return [Source(by_side[""])]
+    return [Source(i) for i in by_side.values()] if len(by_side) == 2 else []
 
 
-@cache
-def _keys() -> dict[str, str]:
-    """Every way to say it, without spaces and sides -> key of the table."""
-    every = [(key, way) for group in _table().values() for key, ways in group.items() for way in (key.lower(), *ways)]
-    return {way.replace(" ", ""): key for key, way in every}
+def _stand_ins(every: Mapping[str, list[Source]], presets: Mapping[str, int]) -> dict[str, list[Source]]:
+    """Sources of parameters without shapes, by the first row of the table that the mesh has a preset for."""
+    out: dict[str, list[Source]] = {}
+    for row in presets_table()["stand_in"]:
+        index, less = presets.get(row["from"]), presets.get(row.get("less", ""), -1)
+        if index is None:
+            continue
+        for shape, side in _sides_of(row["parameter"]):
+            if not every[shape] and shape not in out:
+                out[shape] = [Source(index, side, row.get("region", ""), less)]
+    return out
 
 
-def _read(name: str) -> tuple[str, str, bool] | None:
-    """Key of the table and side that a name means, and whether it is ARKit's own word.
+def _sides_of(key: str) -> list[tuple[str, str]]:
+    """The parameters that a key stands for, each with the side that it is cut to."""
+    if key in names_table()["sided"]:
+        return [(f"{key}{side}", side) for side in ("Left", "Right")]
+    side = next((s for s in ("Left", "Right") if key.endswith(s)), "")
+    return [(key, side)]
 
-    Everything before the last dot or colon is ignored.
-    """
-    words = [w.lower() for w in WORDS.findall(re.split(r"[.:|](?=[^.:|]{3})", name)[-1])]
-    sides = [SIDES[w] for w in words if w in SIDES]
-    base = "".join(w for w in words if w not in SIDES)
-    key = _keys().get(base)
-    if key is None or len(set(sides)) > 1 or len(sides) > 1:
-        return None
-    return key, sides[0] if sides else "", base == key.lower()
+
+def _anchors(sources: Mapping[str, list[Source]]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Shapes that move the mouth, and shapes that move the lids."""
+    mouth = sources.get("jawOpen") or sources.get("mouthFunnel") or sources.get("mouthPucker") or []
+    eyes = {s.index for n in ("eyeBlinkLeft", "eyeBlinkRight") for s in sources.get(n, [])}
+    return tuple(s.index for s in mouth), tuple(sorted(eyes))
 
 
 def _common(names: tuple[str, ...]) -> str:
@@ -131,16 +205,3 @@ def read_names(path: Path) -> dict[str, str]:
         if not isinstance(shape, str) or shape not in SHAPES:
             raise FitError(f"{path}: names.{name}: {shape!r} is not one of ARKit's 52", hint="for example jawOpen")
     return table
-
-
-def to_arkit(mesh: FitMesh, mapped: NameMap) -> FitMesh:
-    """The mesh with only ARKit's shapes: halves added up, shapes for both sides cut in two down the middle."""
-    x = mesh.vertices[:, 0]
-    t = np.clip((x - 0.5 * (x.min() + x.max())) / (MIDDLE * max(x.max() - x.min(), 1e-9)), -1.0, 1.0)
-    left = 0.5 + 0.25 * t * (3.0 - t * t)
-    share = {"": np.ones(len(mesh.vertices)), "Left": left, "Right": 1.0 - left}
-    deltas = np.zeros((len(mapped.sources), len(mesh.vertices), 3))
-    for row, every in zip(deltas, mapped.sources.values(), strict=True):
-        for source in every:
-            row += share[source.side][:, None] * mesh.deltas[source.index]
-    return replace(mesh, names=tuple(mapped.sources), deltas=deltas)

@@ -1,0 +1,131 @@
+"""What the pieces of a mesh are, by the names of objects and materials: skin, eye, hair, teeth, clothes and so on.
+
+The table is ``kinds.toml`` beside this module. A name of a piece is ``object/material``, or one of both.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from surface.base import files
+from surface.base.arrays import Bools
+from surface.fit.source.mesh import FitMesh
+
+WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|[^\W\d_a-zA-Z]+")
+LONGEST = 4  # words of one entry of the table
+INSIDE = 5  # letters of an entry that counts as the beginning or the end of a longer word, too
+ENDINGS = ("lash", "lashes", "brow", "brows", "hair")  # shorter ones that end longer words
+SKIN, PROP = "skin", "prop"
+MOVED = (
+    0.5  # a piece that is moved by at least this share of the largest movement belongs to the face, whatever its name
+)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One row of the table.
+
+    name : "skin", "iris", "hair" and so on. rule : "skin", "part", "eye" or "out", as the table explains.
+    material : by which a head draws it; "skin" for what is drawn as no part of its own.
+    """
+
+    name: str
+    rule: str
+    material: str
+
+
+@cache
+def kinds() -> dict[str, Kind]:
+    """All kinds by name."""
+    return {name: Kind(name, row["rule"], row.get("material", SKIN)) for name, row in _table().items()}
+
+
+def kind_of(name: str) -> Kind:
+    """The kind that a piece's name tells; skin where no word in it is known.
+
+    The material decides where it is anything but skin, then the object. What lies on a person, such as clothes, is
+    skin nevertheless where its material says so in words.
+    """
+    whole, _, material = name.rpartition("/")
+    inner, outer = _said(material), _said(whole)
+    every = kinds()
+    if inner is not None and inner != SKIN:
+        return every[inner]
+    if outer is None or (inner == SKIN and every[outer].rule == "out"):
+        return every[SKIN]
+    return every[outer]
+
+
+def material_of(name: str) -> str:
+    """The material by which a head draws a piece of that name."""
+    return kind_of(name).material
+
+
+def is_known(name: str) -> bool:
+    """Whether any word in a piece's name is in the table."""
+    return any(_said(part) is not None for part in name.split("/"))
+
+
+def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
+    """Which faces (f,) are a person's own, not clothes, hats, glasses or the like; and what the others are, in words.
+
+    Names are not believed where shapes move the piece as they move the face, or where nothing would be left.
+    """
+    kept = np.ones(len(mesh.faces), bool)
+    notes = []
+    most = np.abs(mesh.deltas).max(initial=0.0)
+    for k, name in enumerate(mesh.pieces):
+        kind, own = kind_of(name), mesh.piece == k
+        if kind.rule != "out" or not own.any():
+            continue
+        used = np.unique(mesh.faces[own])
+        if most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= MOVED * most:
+            notes.append(f"{name!r}: named as {kind.name}, but shapes move it: kept as skin")
+        else:
+            kept &= ~own
+            notes.append(f"{name!r}: left out: {kind.name}")
+    return (kept, notes) if kept.any() else (np.ones(len(mesh.faces), bool), [])
+
+
+@cache
+def _table() -> dict[str, Any]:
+    return files.read_toml(Path(__file__).with_name("kinds.toml"))
+
+
+@cache
+def _entries() -> dict[str, str]:
+    """Every entry, written together -> its kind."""
+    return {word.replace(" ", ""): name for name, row in _table().items() for word in row["words"]}
+
+
+@cache
+def _said(name: str) -> str | None:
+    """The kind that words in one name tell: by the longest of them, of two the last; skin only where there is no other,
+    and scaffolding wherever it is named."""
+    words = [w.lower() for w in WORDS.findall(name)]
+    spans = [(i, j) for i in range(len(words)) for j in range(i + 1, min(i + LONGEST, len(words)) + 1)]
+    found = [(i, j, kind) for i, j in spans if (kind := _entry("".join(words[i:j]), j - i > 1)) is not None]
+    outer = [(i, j, k) for i, j, k in found if not any(a <= i and j <= b and b - a > j - i for a, b, _ in found)]
+    told = [(k == PROP, k != SKIN, sum(map(len, words[i:j])), i, k) for i, j, k in outer]
+    return max(told)[-1] if told else None
+
+
+def _entry(word: str, several: bool) -> str | None:
+    """The kind of an entry that this is; of one word also an entry that it begins or ends with, the longest."""
+    if word in _entries() or several:
+        return _entries().get(word)
+    parts = [e for e in _entries() if _inside(e, word)]
+    return _entries()[max(parts, key=len)] if parts else None
+
+
+def _inside(entry: str, word: str) -> bool:
+    if not entry.isascii():
+        return entry in word
+    long = len(entry) >= INSIDE and (word.startswith(entry) or word.endswith(entry))
+    return long or (entry in ENDINGS and word.endswith(entry))
