@@ -1,47 +1,32 @@
-"""What names of nodes, objects and materials say of eyes; the words are in ``eyewords.toml``."""
+"""What names of nodes, objects and materials say of eyes; the words are those of :mod:`surface.fit.source.kinds`."""
 
 from __future__ import annotations
 
 import re
-from functools import cache
-from pathlib import Path
 
-from surface.base import files
+from surface.fit.source.kinds import is_known, kind_of
 
-WORDS = Path(__file__).with_name("eyewords.toml")
-EYE = re.compile(r"Eye|EYE|(?:^|[^a-zA-Z]|left|right|face|(?:^|[^a-zA-Z])[lr])eye")
-
-
-@cache
-def _words() -> dict[str, tuple[str, ...]]:
-    return {key: tuple(words) for key, words in files.read_toml(WORDS).items()}
+JOINED = re.compile(r"(?:left|right|(?:^|[^a-z])[lr])eyes?(?![a-z])", re.IGNORECASE)  # one word for both
+COVERS = ("eye_cover", "highlight", "iris")
+SKIN_BESIDE = ("lid", "socket", "eyebag", "eye bag", "eye_bag")
 
 
 def is_eye(name: str) -> bool:
-    """Does a piece of this name belong to an eye? Of ``object/material`` the last that speaks of eyes decides:
-    ``Face/EyeWhite`` and ``Eyes/Atlas`` do, ``EyeLeft/Lash`` does not."""
-    for part in reversed(re.split(r"[/|:]", name)):
-        if _has(part, "other"):
-            return False
-        if EYE.search(part) or _has(part, "eye"):
-            return True
-    return False
+    """Does a piece of this name, ``object/material``, belong to an eye?"""
+    return kind_of(name).rule == "eye" or (not is_known(name) and JOINED.search(name) is not None)
 
 
 def is_cover(name: str) -> bool:
     """Is it a part of an eye that does not say how large the eyeball is, as a cornea or a highlight?"""
-    return _has(name, "cover")
+    return kind_of(name).name in COVERS
 
 
 def is_iris(name: str) -> bool:
     """Is it an iris without its white?"""
-    return _has(name, "iris")
+    return kind_of(name).name == "iris"
 
 
 def is_beside(name: str) -> bool:
     """Does it name something near an eye that is no part of it, as a lid or a lash?"""
-    return _has(name, "other")
-
-
-def _has(name: str, key: str) -> bool:
-    return any(word in name.lower() for word in _words()[key])
+    kind = kind_of(name)
+    return kind.rule == "part" or (kind.rule == "skin" and any(w in name.lower() for w in SKIN_BESIDE))
