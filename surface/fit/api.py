@@ -10,6 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.progress import Progress, no_progress, part_of
+from surface.fit.features.eye_colours import paint_layers
 from surface.fit.features.eye_lids import fit_lids, gazes_of
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
@@ -79,15 +80,17 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         check_manifold(loaded.mesh, where)
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
-        mesh, moved = fit_lids(mesh, plan.found, gazes_of(mesh)) if plan.found else (mesh, [])
-        plan.notes.extend(moved)
+        mesh, lid_notes = fit_lids(mesh, plan.found, gazes_of(mesh)) if plan.found else (mesh, [])
+        plan.notes.extend(lid_notes)
     sources = sources_of(mesh.names)
     rig = HeadRig(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress)
     charts = {p.name: p.chart for p in fitted_parts}
+    paint = make_paint(recipe.paint, charts, mesh)
+    paint += paint_layers(mesh, plan.found, parts) if plan.found else []
     head = HeadData(
         name, _provenance(recipe), _neck(mesh, recipe), rig.eyes, rig.radius, rig.jaw,
-        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh),
+        parts, find_seams(charts), paint,
     )  # fmt: skip
     head = finish_head(head, mesh, charts, recipe)
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])

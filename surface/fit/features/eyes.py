@@ -37,6 +37,7 @@ class Eyes:
 
     centres : (2, 3) about which they turn, left first, mm; radius : mm, 0 without eyes.
     faces : (f,) bool, faces of the mesh that are eyes and no skin.
+    drawn : (f,) bool, those of ``faces`` that are no sockets. skin : (f,) bool, faces of the face.
     iris : radius of the iris, mm; 0 where no piece tells.
     openings : between the lids, left first; empty where they are not holes of the skin.
     notes : what was found, in words.
@@ -45,6 +46,8 @@ class Eyes:
     centres: Floats
     radius: float
     faces: Bools
+    drawn: Bools
+    skin: Bools
     iris: float = 0.0
     openings: list[Opening] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -67,8 +70,8 @@ def find_eyes(mesh: FitMesh, skin_of: Callable[[Bools], Bools], kept: Bools) -> 
         gone = _mask(mesh, sides)
         skin = skin_of(gone) if sides else skin
     if not skin.any():
-        return Eyes(np.zeros((2, 3)), 0.0, gone, notes=[MISSING])
-    found = _placed(mesh, sides, what, gone, find_openings(mesh, skin, middle, near))
+        return Eyes(np.zeros((2, 3)), 0.0, gone, gone, skin, notes=[MISSING])
+    found = replace(_placed(mesh, sides, what, gone, find_openings(mesh, skin, middle, near)), skin=skin)
     return _without_sockets(mesh, found, skin, middle, near)
 
 
@@ -84,7 +87,7 @@ def _without_sockets(mesh: FitMesh, eyes: Eyes, skin: Bools, middle: float, near
     if not openings:
         return eyes
     notes = [*eyes.notes, f"{count} faces of sockets behind the eyes are left out"]
-    return replace(eyes, faces=behind, openings=openings, notes=notes)
+    return replace(eyes, faces=behind, skin=skin & ~behind, openings=openings, notes=notes)
 
 
 def _piece_sides(mesh: FitMesh, middle: float, near: Floats | None, kept: Bools) -> tuple[list[Side], str, Bools]:
@@ -119,11 +122,11 @@ def _placed(mesh: FitMesh, sides: list[Side], what: str, gone: Bools, openings: 
     elif sides:
         balls, how = _behind_flat(sides), "eyeballs behind them"
     else:
-        return Eyes(np.zeros((2, 3)), 0.0, gone, notes=[MISSING])
+        return Eyes(np.zeros((2, 3)), 0.0, gone, gone, gone, notes=[MISSING])
     radius = float(np.mean([b.radius for b in balls]))
     notes = [f"{int(gone.sum())} faces are eyes ({what}), replaced by {how}"] if sides else [ADDED]
     iris = max((s.iris for s in sides), default=0.0)
-    return Eyes(np.stack([b.centre for b in balls]), radius, gone, iris, openings, notes)
+    return Eyes(np.stack([b.centre for b in balls]), radius, gone, gone, gone, iris, openings, notes)
 
 
 def _turned(mesh: FitMesh, side: Side, index: int) -> Ball:
