@@ -10,6 +10,8 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.progress import Progress, no_progress, part_of
+from surface.fit.features.eye_colours import paint_layers
+from surface.fit.features.eye_lids import fit_lids, gazes_of
 from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
@@ -40,7 +42,7 @@ from surface.head.model.file import check_writable, save_data
 from surface.head.model.meshes import pack, tessellate
 from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.part import make_surface
-from surface.head.posing.rig import SkinRig, optical_axis
+from surface.head.posing.rig import SkinRig
 
 # pose that decides how finely a part is cut into triangles
 SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
@@ -84,13 +86,17 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         check_manifold(loaded.mesh, where)
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
+        mesh, lid_notes = fit_lids(mesh, plan.found, gazes_of(mesh)) if plan.found else (mesh, [])
+        plan.notes.extend(lid_notes)
     sources = sources_of(mesh.names)
     rig = HeadRig(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress)
     charts = {p.name: p.chart for p in fitted_parts}
+    paint = make_paint(recipe.paint, charts, mesh)
+    paint += paint_layers(mesh, plan.found, parts) if plan.found else []
     head = HeadData(
         name, _provenance(recipe), _neck(mesh, recipe, loaded.marks), rig.eyes, rig.radius, rig.jaw,
-        parts, find_seams(charts), make_paint(recipe.paint, charts, mesh), placement=loaded.placement,
+        parts, find_seams(charts), paint, placement=loaded.placement,
     )  # fmt: skip
     head = finish_head(head, mesh, charts, recipe)
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
@@ -147,16 +153,7 @@ def prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
     if recipe.frown:
         mesh = draw_brows(mesh, **recipe.frown)
     balls = recipe.eyeballs(mesh)
-    return mesh if balls is None else seat_lids(mesh, *balls, recipe.seated, _gazes(mesh))
-
-
-def _gazes(mesh: FitMesh) -> Floats:
-    """(k, 2, 3) directions in which the left and the right eye look in every shape of a mesh."""
-    out = np.tile([0.0, 0.0, 1.0], (len(mesh.names), 2, 1))
-    for name, indices in sources_of(mesh.names).items():
-        pose = read_pose(np.array([float(n == name) for n in NAMES]))
-        out[indices] = [optical_axis(gaze) for gaze in pose.gaze]
-    return out
+    return mesh if balls is None else seat_lids(mesh, *balls, recipe.seated, gazes_of(mesh))
 
 
 def recipe_plan(mesh: FitMesh, recipe: Recipe) -> Plan:

@@ -1,39 +1,37 @@
 """Split a mesh that has no recipe into parts: eyeballs, face, back of the head, what is inside the mouth.
 
-Pieces are connected by vertices. Two balls that mirror each other are eyes; the largest of the others is skin; the rest
-is identified by the names of its objects and materials.
+Pieces are connected by vertices. Eyes are found by :mod:`surface.fit.features.eyes`; the largest of the others is skin;
+the rest is identified by the names of its objects and materials.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
-from surface.fit.features.others import by_object, is_skin, points_of, why_out
+from surface.fit.features.eyes import Eyes, find_eyes, middle_x
+from surface.fit.features.others import by_object, is_skin, why_out
 from surface.fit.features.rigging import rigid_fit
-from surface.fit.points.lid_seating import fit_sphere
 from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
-from surface.fit.source.frame import HEIGHT_MM, head_scale
+from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island, find_islands, signed_areas
 from surface.fit.source.kinds import kind_name, material_of
 from surface.fit.source.layout import lay_out, open_flat_holes, separate
-from surface.fit.source.mesh import FitMesh, components, face_areas, renumbered, triangles
+from surface.fit.source.mesh import FitMesh, components, face_areas, triangles
 from surface.mesh.tessellate import MOST_ROOTS
 
-KEPT = ("skin", "socket", "lid")  # in the name of a piece that is no part of an eyeball, however near it is
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.9  # in spacings of the mesh; its triangles may be of any size, and the largest around a place count
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
 DEPTH = 8  # of the cells; more where many islands lie side by side, since roots are shared by all
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
-ROUND = 0.07  # how far a ball may stray from a sphere, in radii
-BALL = (0.02, 0.14)  # radius of an eyeball, in heights of the head with its neck
 MOVING = 0.4  # an island moved by at least this share of the shapes that move the most mobile one is the face's
 LESS = 1e-6  # what is said to be no skin counts as face only where there is nothing else
 MOVES_MM = 1.0  # of a head of usual size: what moves less does not count as moved
@@ -46,7 +44,7 @@ class Plan:
     parts : recipes and islands, ready to become charts.
     eyes : centres (2, 3), left first, and radius; radius 0 without eyes.
     hinge : about which the jaw turns; jaw : vertices that turn with it as a whole.
-    notes : what was left out or guessed, in words.
+    notes : what was left out or guessed, in words. found : the eyes as they were found, to fit lids to them.
     """
 
     parts: list[tuple[PartRecipe, list[Island]]]
@@ -54,6 +52,7 @@ class Plan:
     hinge: Floats
     jaw: Ints
     notes: list[str] = field(default_factory=list)
+    found: Eyes | None = None
 
 
 def make_plan(mesh: FitMesh) -> Plan:
@@ -63,19 +62,35 @@ def make_plan(mesh: FitMesh) -> Plan:
     """
     shapes = dict(zip(mesh.names, mesh.deltas, strict=True))
     scale = head_scale(mesh.vertices, shapes)
-    label, sizes = _pieces(mesh)
-    eyes, gone = _find_eyes(mesh, label, scale)
-    rest = [k for k in np.argsort(-_presence(mesh, label, sizes, scale)) if k not in gone and sizes[k] > 0]
+    eyes = find_eyes(
+        mesh, partial(_largest, mesh, scale), np.array([material_of(n) != "skin" for n in mesh.pieces], bool)
+    )
+    label, sizes = _pieces(mesh, eyes.faces)
+    rest = [int(k) for k in np.argsort(-_presence(mesh, label, sizes, scale)) if sizes[k] > 0]
     if not rest:
         raise FitError("the mesh has no skin: all of it is eyeballs or has no area", hint="export the face, too")
-    notes = [f"{len(gone)} pieces are eyeballs, replaced by exact ones"] if gone else []
+    notes = list(eyes.notes)
     parts = _skin(mesh, label == rest[0], scale)
     parts += _others(mesh, label, rest[1:], float(sizes[rest[0]]), scale, notes)
-    return Plan(parts, eyes, *_hinge(mesh, shapes, scale), notes)
+    return Plan(parts, (eyes.centres, eyes.radius), *_hinge(mesh, shapes, scale), notes, eyes)
 
 
-def _pieces(mesh: FitMesh) -> tuple[Ints, Floats]:
-    """(f,) which connected piece of one material a face belongs to, and each one's area."""
+def _largest(mesh: FitMesh, scale: float, gone: Bools) -> Bools:
+    """(f,) which faces are skin once those that are ``gone`` are left out: the most present piece."""
+    label, sizes = _pieces(mesh, gone)
+    skin: Bools = (label == np.argmax(_presence(mesh, label, sizes, scale))) & ~gone
+    return skin
+
+
+def _pieces(mesh: FitMesh, gone: Bools | None = None) -> tuple[Ints, Floats]:
+    """(f,) which connected piece of one material a face belongs to, and each one's area; faces that are ``gone (f,)``
+    belong to the last, whose area is 0."""
+    if gone is not None and gone.any():
+        rest = replace(mesh, faces=mesh.faces[~gone], piece=mesh.piece[~gone] if len(mesh.piece) else mesh.piece)
+        own, sizes = _pieces(rest)
+        label = np.full(len(gone), len(sizes))
+        label[~gone] = own
+        return label, np.append(sizes, 0.0)
     kinds = np.array([kind_name(name) for name in mesh.pieces] or ["skin"])
     known, kind_of = np.unique(kinds, return_inverse=True)
     kind = kind_of.ravel()[mesh.piece] if len(mesh.piece) else np.zeros(len(mesh.faces), np.int64)
@@ -94,49 +109,6 @@ def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats
     for delta in mesh.deltas:
         moving[np.unique(piece[np.abs(delta).max(axis=1) > MOVES_MM * scale])] += 1
     return sizes * (1.0 + moving) * np.where(is_skin(mesh, label, len(sizes)), 1.0, LESS)
-
-
-def _find_eyes(mesh: FitMesh, label: Ints, scale: float) -> tuple[tuple[Floats, float], set[int]]:
-    """The two largest balls that mirror each other, and every piece inside or on them."""
-    height, middle = HEIGHT_MM * scale, _middle_x(mesh)
-    balls = {}
-    for k in np.unique(label):
-        points = points_of(mesh, label == k)
-        if len(points) >= 12 and (ball := _ball(points, height)):
-            balls[int(k)] = ball
-    best: tuple[float, int, int] | None = None
-    for i, (p, r) in balls.items():
-        for j, (q, s) in balls.items():
-            mirrored = abs(p[0] + q[0] - 2 * middle) < 0.5 * r and np.linalg.norm((p - q)[1:]) < 0.5 * r
-            if p[0] - middle > r > q[0] - middle and mirrored and abs(r - s) < 0.1 * r and r > (best or (0.0,))[0]:
-                best = r, i, j
-    if best is None:
-        return (np.zeros((2, 3)), 0.0), set()
-    eyes = np.stack([balls[best[1]][0], balls[best[2]][0]])
-    return (eyes, best[0]), _within(mesh, label, eyes, best[0])
-
-
-def _middle_x(mesh: FitMesh) -> float:
-    return float(0.5 * (mesh.vertices[:, 0].min() + mesh.vertices[:, 0].max()))
-
-
-def _ball(points: Floats, height: float) -> tuple[Floats, float] | None:
-    """Centre and radius of points that lie on a ball, at least its front half; None for anything else."""
-    extent = np.ptp(points, axis=0)
-    if extent.max() > 2.6 * extent[:2].min() or extent.max() > 3 * BALL[1] * height or extent.min() <= 0:
-        return None
-    centre, radius = fit_sphere(points)
-    off = np.abs(np.linalg.norm(points - centre, axis=1) - radius)
-    fits = BALL[0] * height < radius < BALL[1] * height and float(np.sqrt((off**2).mean())) < ROUND * radius
-    return (centre, radius) if fits and extent[:2].min() > 1.5 * radius else None
-
-
-def _within(mesh: FitMesh, label: Ints, eyes: Floats, radius: float) -> set[int]:
-    """Pieces that lie in a ball a little larger than the eye, unless they are said to be skin or hair: cornea, iris."""
-    near = (np.linalg.norm(mesh.vertices[:, None] - eyes, axis=2) < 1.3 * radius).any(axis=1)
-    inside = {int(k) for k in np.unique(label) if near[renumbered(mesh.faces[label == k])[0]].all()}
-    names = {k: mesh.piece_of(int(np.argmax(label == k))).lower() for k in inside}
-    return {k for k in inside if material_of(names[k]) == "skin" and not any(w in names[k] for w in KEPT)}
 
 
 def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, list[Island]]]:
@@ -215,4 +187,4 @@ def _hinge(mesh: FitMesh, shapes: dict[str, Floats], scale: float) -> tuple[Floa
     if not np.radians(4.0) < angle < np.radians(50.0):
         return none
     y, z = np.linalg.solve(np.eye(2) - turn[1:, 1:], shift[1:] + turn[1:, 0] * rest[:, 0].mean())
-    return np.array([_middle_x(mesh), y, z]), chin
+    return np.array([middle_x(mesh), y, z]), chin

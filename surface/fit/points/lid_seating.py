@@ -24,10 +24,18 @@ HELD = 0.93  # of the radius: further out a sphere's front is too steep to seat 
 
 @dataclass(frozen=True)
 class Eyeball:
-    """A sphere: centre (3,) of the left eye (x > 0; the right one is its mirror image), radius, mm."""
+    """A sphere: centre (3,) of the left eye (x > 0), radius, mm; centre of the right eye, where it is not the left
+    one's mirror image."""
 
     centre: tuple[float, float, float]
     radius: float
+    right: tuple[float, float, float] | None = None
+
+    @property
+    def centres(self) -> Floats:
+        """(2, 3) of both, left first."""
+        x, y, z = self.centre
+        return np.array([self.centre, self.right or (-x, y, z)])
 
 
 def fit_sphere(points: Floats) -> tuple[Floats, float]:
@@ -66,15 +74,21 @@ def _mirror(points: Floats) -> Floats:
 
 def _from_eye(points: Floats, ball: Eyeball) -> tuple[Floats, Floats]:
     """Offsets (m, 3) of points from the eye on their side, and that eye's centre (m, 3)."""
-    centre = np.array(ball.centre) * _mirror(points)
+    centre = ball.centres[_side(points, ball)]
     return points - centre, centre
+
+
+def _side(points: Floats, ball: Eyeball) -> Ints:
+    """(m,) 0 for points on the left eye's side, 1 on the right one's."""
+    side: Ints = (points[:, 0] < ball.centres[:, 0].mean()).astype(np.int64)
+    return side
 
 
 def _above(points: Floats, ball: Eyeball, gaze: Floats) -> Floats:
     """(m,) height of points above the eyeball on their side, which looks along ``gaze (2, 3)``."""
     offset, _ = _from_eye(points, ball)
     length = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
-    own = gaze[(points[:, 0] < 0).astype(int)]
+    own = gaze[_side(points, ball)]
     height: Floats = length - ball.radius * surface_height(offset / length[:, None], own)
     return height
 
@@ -90,7 +104,10 @@ def _lay(points: Floats, ball: Eyeball, gaze: Floats, least: Floats, most: Float
 
 
 def _warp(points: Floats, old: Eyeball, new: Eyeball) -> Floats:
-    """Shift along z by the distance between the two spheres' fronts, fading with the distance from the old one."""
+    """Shift along z by the distance between the two spheres' fronts, fading with the distance from the old one; both
+    mirror each other at x = 0 unless they are one."""
+    if old == new:
+        return points
     local = points * _mirror(points)
     across_old, across_new = (np.linalg.norm(local[:, :2] - ball.centre[:2], axis=1) for ball in (old, new))
     front_old = old.centre[2] + _bulge(across_old, old.radius)

@@ -22,9 +22,7 @@ LONGEST = 4  # words of one entry of the table
 INSIDE = 5  # letters of an entry that counts as the beginning or the end of a longer word, too
 ENDINGS = ("lash", "lashes", "brow", "brows", "hair")  # shorter ones that end longer words
 SKIN, PROP = "skin", "prop"
-MOVED = (
-    0.5  # a piece that is moved by at least this share of the largest movement belongs to the face, whatever its name
-)
+MOVED = 0.5  # of the largest movement: a piece that moves so far belongs to the face, whatever its name
 
 
 @dataclass(frozen=True)
@@ -70,6 +68,11 @@ def material_of(name: str) -> str:
 def kind_name(name: str) -> str:
     """Name of the kind that a piece's name tells."""
     return kind_of(name).name
+
+
+def is_known(name: str) -> bool:
+    """Whether any word in a piece's name is in the table."""
+    return any(_said(part) is not None for part in name.split("/"))
 
 
 def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:

@@ -26,6 +26,9 @@ BASE: dict[str, tuple[float, ...]] = {
     "occlusion": (1.0,),
     "occlusion_floor": (0.0,),  # baked shade leaves at least this much light
     "gloss": (0.3,),
+    "iris": (0.080, 0.125, 0.150),  # colours of an eyeball, and the iris's radius in eyeball radii: all over it
+    "sclera": (0.68, 0.63, 0.59),
+    "iris_radius": (0.49,),
 }
 
 

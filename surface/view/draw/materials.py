@@ -28,6 +28,8 @@ _INSIDE = "0.25"
 #: A baked sky without occlusion.
 _OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
 _LOWER_LASHES = 0.42
+#: Radius of an iris, in eyeball radii, and of its pupil, in radii of the iris.
+_IRIS, _PUPIL = 0.49, 0.185 / 0.49
 #: Materials of parts that the skin surrounds in every pose.
 INSIDE = ("eye", "teeth", "gums", "mouth")
 
@@ -136,12 +138,15 @@ def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[
 
 
 def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
+    painted = openings.painted(part)
+    colours = painted if theme.use_painted else {}
+    radius = float(painted.get("iris_radius", (_IRIS,))[0])
     return {
-        "iris_colour": theme.iris,
-        "sclera_colour": theme.sclera,
+        "iris_colour": tuple(colours.get("iris", theme.iris)),
+        "sclera_colour": tuple(colours.get("sclera", theme.sclera)),
         "glow": theme.glow,
-        "iris_radius": 0.49,
-        "pupil_radius": 0.185,
+        "iris_radius": radius,
+        "pupil_radius": _PUPIL * radius,
         **openings.eye(part),
     }
 

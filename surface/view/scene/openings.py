@@ -7,8 +7,8 @@ lights teeth and tongue by the light that enters between the lips. So blinks and
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,8 @@ _COLUMN_MM = 1.6
 _INNER = ("teeth", "tongue", "gums", "mouth")
 #: Vertices of an eyeball that its rotation is computed from.
 _SAMPLES = 48
+#: Attributes that are painted all over an eyeball.
+_PAINTED = ("iris", "sclera", "iris_radius")
 #: How far, in eyeball radii, a lid loop's mean may lie from the eyeball's centre.
 _LID_REACH = 2.0
 #: How far, millimetres, the lips' mean may lie from the front of the teeth.
@@ -62,12 +64,14 @@ class EyeFrame:
     ids : (k,) vertices used.
     solve : (4, k) maps their positions to rotation times radius and centre (least squares).
     lids : the skin's opening over it, or None.
+    painted : what is painted on the eyeball, (k,) by attribute: "iris" and "sclera", colours, and "iris_radius".
     """
 
     local: np.ndarray
     ids: np.ndarray
     solve: np.ndarray
     lids: Aperture | None
+    painted: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 class Openings:
@@ -108,7 +112,8 @@ class Openings:
         if self._skin is not None:
             loop = nearest_loop(loops, self._skin.vertices, centre, _LID_REACH * radius)
             lids = None if loop is None else _lids(loop, np.asarray(self._skin.vertices, float), centre)
-        return EyeFrame(local, ids, solve, lids)
+        painted = {k: np.asarray(part.attributes[k])[0] for k in _PAINTED if k in part.attributes}
+        return EyeFrame(local, ids, solve, lids, painted)
 
     def _find_lips(self, parts: Sequence[ViewPart], loops: list[np.ndarray]) -> Aperture | None:
         """The skin's opening nearest to the front of the mouth's inner parts."""
@@ -124,6 +129,10 @@ class Openings:
     def local(self, part: ViewPart) -> np.ndarray:
         """Directions of an eye part's vertices in the eye's own frame, (m, 3) float32."""
         return self._eyes[part.name].local
+
+    def painted(self, part: ViewPart) -> Mapping[str, np.ndarray]:
+        """What is painted on an eye part, (k,) by attribute: one value for all of it."""
+        return self._eyes[part.name].painted
 
     def eye(self, part: ViewPart) -> dict[str, object]:
         """Uniforms of an eye now: its rotation and its lid margins."""

@@ -7,8 +7,9 @@ import pytest
 from slit_sheet import slit_sheet, write_npz
 
 from surface.base.errors import FitError
-from surface.fit import api, fit_head
+from surface.fit import fit_head
 from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
+from surface.fit.features.eye_lids import gazes_of
 from surface.fit.points.recipe import PartRecipe, Recipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.mesh import FitMesh
@@ -155,11 +156,11 @@ def test_parts_of_a_recipe_get_their_islands_and_those_without_are_left_out():
 
 def test_eyes_look_where_their_shapes_say_and_else_ahead():
     mesh = replace(whole_sheet(), names=("jawOpen", "eyeLookDownLeft", "eyeLookOutRight"), deltas=np.zeros((3, 25, 3)))
-    jaw, down, out = api._gazes(mesh)
+    jaw, down, out = gazes_of(mesh)
     np.testing.assert_array_equal(jaw, [[0, 0, 1], [0, 0, 1]])
     assert down[1].tolist() == [0, 0, 1] and out[0].tolist() == [0, 0, 1]
     assert down[0][1] < -0.2 and down[0][0] == pytest.approx(0.0, abs=1e-9)
     assert out[1][0] < -0.2 and out[1][1] == pytest.approx(0.0, abs=1e-9)  # the right eye looks to the subject's right
     np.testing.assert_allclose(np.linalg.norm([jaw, down, out], axis=2), 1.0)
     named = replace(mesh, names=("jawOpen", "eyeLookUp_L", "nothing"))
-    assert api._gazes(named)[1][0][1] > 0.2 and api._gazes(named)[2].tolist() == [[0, 0, 1], [0, 0, 1]]
+    assert gazes_of(named)[1][0][1] > 0.2 and gazes_of(named)[2].tolist() == [[0, 0, 1], [0, 0, 1]]

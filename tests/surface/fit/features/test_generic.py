@@ -10,6 +10,7 @@ from slit_sheet import SIZE_MM, slit_sheet
 
 from surface.base.errors import FitError
 from surface.fit.features import generic
+from surface.fit.features.eyes import middle_x
 from surface.fit.features.generic import MOST_ISLANDS, POINTS, make_plan
 from surface.fit.source.mesh import FitMesh, face_areas
 
@@ -51,21 +52,13 @@ def test_two_balls_are_eyes_and_what_lies_in_them_goes_with_them():
     centres, radius = plan.eyes
     np.testing.assert_allclose(centres, [[33, 40, 20], [-33, 40, 20]], atol=1e-6)
     assert radius == pytest.approx(12.0)
-    assert [p.name for p, _ in plan.parts] == ["face"] and "3 pieces are eyeballs" in plan.notes[0]
+    assert [p.name for p, _ in plan.parts] == ["face"] and "462 faces are eyes" in plan.notes[0]
 
 
 def test_the_middle_of_a_mesh_beside_the_origin_is_its_own() -> None:
     mesh = ball([40.0, 5.0, -3.0], 10.0)
-    assert generic._middle_x(mesh) == pytest.approx(40.0, abs=1e-6)
-    assert generic._middle_x(replace(mesh, vertices=mesh.vertices - [100.0, 0.0, 0.0])) == pytest.approx(
-        -60.0, abs=1e-6
-    )
-
-
-@pytest.mark.parametrize("other", [ball((33, 40, 20), 6.0), ball((20, -60, 20), 12), ball((-33, 60, 20), 12)])
-def test_balls_that_do_not_mirror_each_other_are_none(other):
-    plan = make_plan(joined([("face", slit_sheet()), ("a", ball((33, 40, 20), 12)), ("b", other)]))
-    assert plan.eyes[1] == 0 and len(plan.parts) > 1
+    assert middle_x(mesh) == pytest.approx(40.0, abs=1e-6)
+    assert middle_x(replace(mesh, vertices=mesh.vertices - [100.0, 0.0, 0.0])) == pytest.approx(-60.0, abs=1e-6)
 
 
 def test_names_tell_materials_and_a_crowd_of_pieces_is_left_out():
@@ -157,66 +150,6 @@ def test_a_piece_is_as_present_as_its_area_times_the_shapes_that_move_it() -> No
     assert found.tolist() == [2.0, 16.0, 4.5]
     odd = moving(squares((0, 0, 1, 0), (5, 0, 2, 0)), [0.0, 9.0])
     assert generic._presence(odd, np.array([0, 1]), np.array([1.0, 1.0]), 1.0).tolist() == [1.0, 2.0]
-
-
-@pytest.mark.parametrize(
-    ("other", "radius"),
-    [
-        (((-33, 40, 20), 12), 12.0),
-        (((-38, 40, 20), 12), 12.0),  # half a radius beside the mirrored place, nearly
-        (((-40, 40, 20), 12), 0.0),
-        (((-33, 45, 20), 12), 12.0),
-        (((-33, 47, 20), 12), 0.0),
-        (((-33, 40, 25), 12), 12.0),
-        (((-33, 40, 27), 12), 0.0),
-        (((-33, 40, 20), 11), 12.0),  # the larger one's radius, to a tenth
-        (((-33, 40, 20), 10.5), 0.0),
-    ],
-)
-def test_eyes_mirror_each_other_to_half_a_radius_and_have_nearly_one_size(other, radius) -> None:
-    mesh = joined([("face", slit_sheet()), ("a", ball((33, 40, 20), 12)), ("b", ball(*other))])
-    assert make_plan(mesh).eyes[1] == pytest.approx(radius)
-
-
-def test_the_largest_of_several_pairs_of_balls_are_the_eyes() -> None:
-    places = (33, 40, 12), (60, 0, 14), (20, -50, 9)
-    pairs = [(("a", ball((x, y, 20), r)), ("b", ball((-x, y, 20), r))) for x, y, r in places]
-    for order in (pairs, pairs[::-1]):
-        plan = make_plan(joined([("face", slit_sheet()), *(piece for pair in order for piece in pair)]))
-        assert plan.eyes[1] == pytest.approx(14.0)
-        np.testing.assert_allclose(plan.eyes[0], [[60, 0, 20], [-60, 0, 20]], atol=1e-6)
-
-
-def test_what_is_a_ball() -> None:
-    """Of heads 200 high, balls have radii from 4 to 28, and at least their front half is there."""
-    whole = ball((10, 20, 30), 10).vertices
-    assert generic._ball(whole, 200.0)[1] == pytest.approx(10.0)
-    np.testing.assert_allclose(generic._ball(whole, 200.0)[0], [10, 20, 30], atol=1e-6)
-    for radius, found in ((3.9, False), (4.1, True), (27.9, True), (28.1, False)):
-        assert (generic._ball(ball((0, 0, 0), radius).vertices, 200.0) is not None) == found
-    for depth, found in ((-1.0, True), (0.1, True), (0.8, False)):  # of the radius, where the back is cut off
-        cut = whole[whole[:, 2] > 30 + 10 * depth]
-        assert (generic._ball(cut, 200.0) is not None) == found, depth
-    assert generic._ball(whole * [1.0, 1.0, 0.0], 200.0) is None  # flat
-    assert generic._ball(whole * [1.0, 1.0, 1.35], 200.0) is None  # an egg
-    assert generic._ball(whole * [1.0, 1.0, 1.1], 200.0) is not None  # nearly round
-    assert generic._ball(whole * [1.0, 3.0, 1.0], 200.0) is None
-
-
-@pytest.mark.parametrize(
-    ("name", "size", "gone"),
-    [("Lens", 1.1, True), ("Lens", 1.35, False), ("Cornea", 0.5, True), ("Eyelid", 0.5, False), ("Lash", 0.5, False),
-     ("EyeSocket", 0.5, False), ("Brow", 0.5, False)],
-)  # fmt: skip
-def test_what_lies_within_a_ball_goes_with_it_unless_its_name_is_of_skin_or_hair(name, size, gone) -> None:
-    eye, other = ball((33, 40, 20), 12), ball((-33, 40, 20), 12)
-    inside = ball((33, 40, 20), 12 * size)
-    inside = replace(inside, vertices=(inside.vertices - [33, 40, 20]) * [1, 1, 0.5] + [33, 40, 20])  # no ball
-    mesh = joined([("face", slit_sheet()), ("a", eye), ("b", other), (name, inside)])
-    plan = make_plan(mesh)
-    assert plan.eyes[1] == pytest.approx(12.0)
-    assert (plan.notes[0] == "3 pieces are eyeballs, replaced by exact ones") == gone
-    assert (len(plan.parts) == 1) == gone
 
 
 def test_the_back_is_what_less_than_four_tenths_as_many_shapes_move() -> None:

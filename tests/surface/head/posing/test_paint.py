@@ -45,7 +45,7 @@ def test_layers_lie_on_each_other_and_other_parts_get_none():
     two = [white, layer(kind="all", attribute="albedo", value=[0, 0, 1], amount=0.5)]
     np.testing.assert_allclose(paint_part(two, "face", UV, "")["albedo"], np.tile([0.5, 0.5, 1], (len(UV), 1)))
     assert paint_part(two, "back", UV, "") == {}
-    assert set(BASE) == {"albedo", "occlusion", "occlusion_floor", "gloss"}
+    assert set(BASE) == {"albedo", "occlusion", "occlusion_floor", "gloss", "iris", "sclera", "iris_radius"}
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,94 @@
+"""Shut the lids of a mesh whose blink leaves a gap: its displacements are lengthened along the eyeball."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from surface.base.arrays import Floats, Ints
+from surface.fit.features.eye_openings import Opening
+from surface.fit.source.mesh import FitMesh
+from surface.fit.source.names import sources_of
+from surface.head.model.parameters import smoothstep
+
+OVERLAP_MM = 0.6  # further than to where they meet: contacts keep lids from passing through each other
+UPPER = 0.85  # share of the way that the upper lid goes
+BLINKS = 0.6  # of the opening's height: a shape that leaves more open is no whole blink and stays as it is
+REACH = 0.7  # rad round the eyeball from a lid's edge: where the change has faded out
+CORNER = 0.06  # of the opening's width: in its corners lids meet at rest
+COLUMNS = 33
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """Both lids' edges as angles round the eyeball (COLUMNS,), over evenly spaced x (COLUMNS,)."""
+
+    x: Floats
+    upper: Floats
+    lower: Floats
+
+    @property
+    def gap(self) -> Floats:
+        gap: Floats = self.upper - self.lower
+        return gap
+
+
+def shut_blinks(mesh: FitMesh, openings: list[Opening], eyes: Floats, radius: float) -> tuple[FitMesh, list[str]]:
+    """The mesh with blinks that shut the eyes, and what was changed, in words."""
+    deltas, notes, sources = mesh.deltas.copy(), list[str](), sources_of(mesh.names)
+    for opening, eye in zip(openings, eyes, strict=True):
+        indices = sources.get(f"eyeBlink{opening.side}", [])
+        if not indices:
+            continue
+        rest = mesh.vertices - eye
+        move = deltas[indices].sum(axis=0)
+        open_rest, open_shut = (_edges(at, opening.edge, rest) for at in (rest, rest + move))
+        left = float(open_shut.gap.max()) * radius
+        if left < -OVERLAP_MM or left > BLINKS * float(open_rest.gap.max()) * radius:
+            continue
+        deltas[indices[0]] += _lengthened(rest, move, open_rest, open_shut, radius)
+        if left > 0.5:
+            notes.append(f"eyeBlink{opening.side} left {left:.1f} mm open: its displacements were lengthened")
+    return replace(mesh, deltas=deltas), notes
+
+
+def _angle(local: Floats) -> Floats:
+    """(n,) angle of points round the eye's x axis, 0 ahead, + up."""
+    return np.arctan2(local[:, 1], local[:, 2])
+
+
+def _edges(local: Floats, edge: Ints, rest: Floats) -> _Edges:
+    """The edges of both lids where ``local (n, 3)`` are; upper and lower are told apart at rest, by the line between
+    the corners."""
+    at_rest = rest[edge]
+    first, last = at_rest[np.argmin(at_rest[:, 0])], at_rest[np.argmax(at_rest[:, 0])]
+    line = np.interp(at_rest[:, 0], [first[0], last[0]], [first[1], last[1]])
+    above = at_rest[:, 1] >= line
+    corners = np.array([np.argmin(at_rest[:, 0]), np.argmax(at_rest[:, 0])])
+    x = np.linspace(local[edge[corners[0]], 0], local[edge[corners[1]], 0], COLUMNS)
+    sides = []
+    for own in (above, ~above):
+        ids = edge[np.union1d(np.flatnonzero(own), corners)]
+        ids = ids[np.argsort(local[ids, 0])]
+        sides.append(np.interp(x, local[ids, 0], _angle(local[ids])))
+    return _Edges(x, *sides)
+
+
+def _lengthened(rest: Floats, move: Floats, before: _Edges, after: _Edges, radius: float) -> Floats:
+    """(n, 3) what to add to a blink's displacements, so that both edges meet and overlap a little."""
+    local = rest + move
+    along = (local[:, 0] - after.x[0]) / (after.x[-1] - after.x[0])
+    inner = smoothstep(np.minimum(along, 1.0 - along), 0.0, CORNER)
+    need = np.maximum(after.gap + OVERLAP_MM / radius, 0.0)
+    own, angle = np.interp(local[:, 0], after.x, need) * inner, _angle(rest)
+    upper, lower = (np.interp(rest[:, 0], before.x, side) for side in (before.upper, before.lower))
+    is_upper = angle >= 0.5 * (upper + lower)
+    off = np.where(is_upper, angle - upper, lower - angle)
+    fade = (
+        (1.0 - smoothstep(off, 0.0, REACH)) * (local[:, 2] > 0.3 * radius) * (np.linalg.norm(rest, axis=1) < 2 * radius)
+    )
+    turn = own * fade * np.where(is_upper, -UPPER, 1.0 - UPPER)
+    c, s = np.cos(turn), np.sin(turn)
+    y, z = c * local[:, 1] + s * local[:, 2], c * local[:, 2] - s * local[:, 1]
+    return np.column_stack([np.zeros(len(rest)), y - local[:, 1], z - local[:, 2]])
