@@ -152,6 +152,8 @@ BAD = {
     r"ids\[0\]: -1 is not": lambda d: d.set_positions([-1], np.zeros((1, 3))),
     "ids: needs a flat sequence of integers": lambda d: d.move([0.5], np.zeros((1, 3))),
     r"delta: shape \(2, 3\), expected \(1, 3\)": lambda d: d.move([1], np.zeros((2, 3))),
+    r"delta: shape \(1, 4\), expected \(1, 3\)": lambda d: d.move([1], np.zeros((1, 4))),
+    r"xyz: shape \(2,\), expected \(2, 3\)": lambda d: d.set_positions([1, 2], np.zeros(2)),
     r"delta\[1\]: shape \(1,\), expected \(3,\)": lambda d: d.move([1, 2], [[0, 0, 0], [0]]),
     r"delta\[0\]: must be numbers": lambda d: d.move([1], [["up", 0, 0]]),
     r"ids: needs a flat sequence of integers, got \[\[1": lambda d: d.move([[1], [1, 2]], np.zeros((2, 3))),
@@ -242,3 +244,16 @@ def test_the_mesh_of_as_many_copies_as_the_surface_has() -> None:
     mesh = ring.tessellate(chord_error=1.0)
     assert mesh.list_ids.max() >= ring.n  # copies
     assert ring.deformation(mesh, normals=False).nbytes > 0
+
+
+@pytest.mark.parametrize("closed", [(True, False), (False, True), (True, True)])
+def test_a_surface_that_is_closed_follows_on_both_sides_of_its_line(closed: tuple[bool, bool]) -> None:
+    ring, ends = shapes.torus(), ((0.0, 1.0), (0.0, 1.0))
+    sides = {f"closed_{name}": end for name, end, on in zip("uv", ends, closed, strict=True) if on}
+    surface = DCPSurface(ring.points, ring.weights, ring.knots_u, ring.knots_v, **sides)
+    domain = Domain(tuple(x for on in closed for x in ((0.0, 1.0) if on else (0.3, 0.7))))  # type: ignore[arg-type]
+    deformation = surface.deformation(surface.tessellate(chord_error=1.0, domain=domain))
+    rng, first = np.random.default_rng(1), np.arange(surface.n)
+    deformation.move(first[:20], rng.normal(size=(20, 3)))
+    deformation.set_positions(first[::3], surface.points[::3] + rng.normal(size=(len(first[::3]), 3)))
+    check(deformation)
