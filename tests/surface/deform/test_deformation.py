@@ -204,6 +204,11 @@ def test_two_threads_give_the_same(sheet: tuple[DCPSurface, Mesh], monkeypatch: 
 def test_a_mesh_of_a_larger_surface_is_refused(sheet: tuple[DCPSurface, Mesh]) -> None:
     with pytest.raises(ValueError, match="mesh: was made from another surface: this one has 16 points"):
         shapes.hills(4).deformation(sheet[1])
+    whole = sheet[0]
+    one_less = DCPSurface(whole.points[:-1], whole.weights[:-1], whole.knots_u[:-1], whole.knots_v[:-1])
+    assert sheet[1].list_ids.max() == whole.n - 1 == one_less.n
+    with pytest.raises(ValueError, match="this one has 575 points"):
+        one_less.deformation(sheet[1])
 
 
 def test_published_arrays_are_read_only(sheet: tuple[DCPSurface, Mesh]) -> None:
