@@ -222,9 +222,13 @@ def test_more_ids_than_points_the_last_position_counts_and_moves_add_up(sheet: t
     surface, mesh = sheet
     deformation = surface.deformation(mesh)
     ids = np.append(np.arange(surface.n), [5, 5])
-    places = np.vstack([surface.points, np.full((2, 3), [[1.0], [2.0]])])
+    places = np.vstack([surface.points + 0.5, np.full((2, 3), [[1.0], [2.0]])])
     deformation.set_positions(ids, places)
     assert deformation.points[5].tolist() == [2, 2, 2]
+    others = np.arange(surface.n) != 5
+    assert np.array_equal(deformation.points[others], (surface.points + 0.5)[others])
+    deformation.set_positions(ids[:-2], surface.points)
+    deformation.set_positions([5], [[2.0, 2.0, 2.0]])
     deformation.move(ids, np.ones((len(ids), 3)))
     assert deformation.points[5].tolist() == [5, 5, 5]
     assert np.allclose(deformation.points[6], surface.points[6] + 1)

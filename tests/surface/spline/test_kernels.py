@@ -222,7 +222,9 @@ def test_up_to_256_bins_are_searched_for_a_run() -> None:
     none.flags.writeable = False  # as those of a surface
     for wide, high, expected in ((16, 16, 0), (16, 17, -1), (17, 16, -1), (1, 20, 0), (20, 1, 0), (20, 13, -1)):
         uv = np.array([[5.5, 10.25], [4.5 + wide, 10.25 + (high - 1) / 2]])
-        assert kernels.points_near(uv, none, none, grid, shape, start, np.zeros(0, np.int32), out) == expected
+        for aside in ([0, 0], [20 - wide, 0], [0, (20 - high) / 2]):
+            found = kernels.points_near(uv + aside, none, none, grid, shape, start, np.zeros(0, np.int32), out)
+            assert found == expected, aside
     assert RUN == 256
 
 

@@ -187,3 +187,14 @@ def test_the_tongue_is_held_at_its_root_and_let_go_over_twenty_millimetres():
     np.testing.assert_allclose(out.moves, held[:, None] * [0, 0, 30.0], atol=1e-4)
     np.testing.assert_allclose(droop.moves, held[:, None] * [0, -4.0, 0], atol=1e-4)
     assert out.ids.tolist() == droop.ids.tolist() == list(range(6))
+
+
+def test_displacements_are_rounded_to_a_tenth_of_a_micrometre():
+    """So that they take little room in a head's file."""
+    moves = RNG.normal(size=(1, 40, 3)) * 5
+    made, _ = make_groups(POINTS, moves, {"cheekPuff": [0]}, JAW)
+    np.testing.assert_allclose(made[0].moves, moves[0], atol=0.6e-4)
+    section = np.array([[3.0, -44.0, 44.0], [1.0, -38.0, 71.0], [2.0, -41.0, 93.0]])
+    for group in (*made, *tongue_groups(section, PATH, JAW)):
+        steps = 1e4 * group.moves.astype(float)
+        assert np.abs(steps - np.rint(steps)).max() < 0.06 and (np.rint(steps) % 10).any()
