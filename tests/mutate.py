@@ -104,7 +104,7 @@ def _arguments() -> argparse.Namespace:
 def sample(room: str, count: int, seed: int) -> list[Mutant]:
     """`count` mutants of `room`, no two at the same place, and none that is listed as equivalent."""
     lines = EQUIVALENT.read_text().splitlines() if EQUIVALENT.is_file() else []
-    equivalent = {line.partition("  #")[0] for line in lines}
+    equivalent = {line.rpartition("  #")[0] for line in lines}  # the last one: the line of code may have a comment
     places = [place for module in modules_in(room) for place in _places(module)]
     draw, chosen = random.Random(seed), list[Mutant]()
     draw.shuffle(places)

@@ -59,6 +59,57 @@ def test_other_encodings_are_named(tmp_path: Path, data: bytes, told: str) -> No
         files.read_text(tmp_path / "a")
 
 
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        ("\ufeffé".encode("utf-16-be"), "UTF-16"),
+        (b"\xe9" + b"\0" * 20, "Latin-1"),
+        (b"\xe9" + b"\0" * 21, "UTF-16"),
+        (b"\xe9" * 179 + b"\0" * 30, "UTF-16"),  # 21 zeros among the first 200 bytes
+        (b"\xe9" * 180 + b"\0" * 30, "Latin-1"),
+        (b"\nb\xff\n", "line 2"),
+    ],
+)
+def test_many_zeros_near_the_start_mean_two_bytes_a_letter(data: bytes, told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        files.decode(data)
+
+
+def sparse(path: Path, size: int) -> Path:
+    path.touch()
+    os.truncate(path, size)
+    return path
+
+
+def test_limits_are_one_megabyte_of_settings_sixty_four_of_text_and_a_gigabyte_of_data(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="not valid TOML"):
+        files.read_toml(sparse(tmp_path / "a.toml", 1 << 20))
+    with pytest.raises(OSError, match=r"is larger than 1 MB \(1 MB\)"):
+        files.read_toml(sparse(tmp_path / "a.toml", (1 << 20) + 1))
+    assert len(files.read_text(sparse(tmp_path / "a.txt", 64 << 20))) == 64 << 20
+    for read in (files.read_text, files.read_json):
+        with pytest.raises(OSError, match=r"is larger than 64 MB \(70 MB\)"):
+            read(sparse(tmp_path / "a.txt", 70 << 20))  # type: ignore[operator]
+    files.open_file(sparse(tmp_path / "a.bin", 1 << 30)).close()
+    for read in (files.open_file, files.read_file, files.read_npz):
+        with pytest.raises(OSError, match=r"is larger than 1024 MB \(1024 MB\)"):
+            read(sparse(tmp_path / "a.bin", (1 << 30) + 1))  # type: ignore[operator]
+
+
+@pytest.mark.skipif(not Path("/proc/version").exists(), reason="needs /proc")
+def test_a_file_that_does_not_say_its_size_is_read_whole() -> None:
+    assert files.read_file("/proc/version", 4096) == Path("/proc/version").read_bytes()
+
+
+def test_what_is_no_array_in_an_archive_is_named(tmp_path: Path) -> None:
+    path = archive(tmp_path / "a.npz", one=npy(np.arange(3)))
+    with zipfile.ZipFile(path, "a") as file:
+        for name in ("first.txt", "other.txt", "third.txt"):
+            file.writestr(name, "no array")
+    with pytest.raises(ValueError, match=r"^first\.txt is no array"):
+        files.read_npz(path)
+
+
 def test_a_byte_order_mark_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"\xef\xbb\xbf[a]\nb = 1")
     assert files.parse_toml(files.read_text(tmp_path / "a")) == {"a": {"b": 1}}
@@ -106,7 +157,7 @@ def test_arrays_come_back_as_they_were(tmp_path: Path) -> None:
 def test_an_archive_that_unpacks_to_more_than_the_limit_is_refused_before_it_is(tmp_path: Path) -> None:
     path = archive(tmp_path / "a.npz", bomb=npy(np.zeros(4_000_000)))
     assert path.stat().st_size < 100_000
-    with pytest.raises(ValueError, match="unpacks to 30 MB"):
+    with pytest.raises(ValueError, match="unpacks to 30 MB, more than 10 MB"):
         files.read_npz(path, 10 << 20)
 
 

@@ -195,6 +195,8 @@ BAD = {
     r"ids\[0\]: -1 is not": lambda d: d.set_positions([-1], np.zeros((1, 3))),
     "ids: needs a flat sequence of integers": lambda d: d.move([0.5], np.zeros((1, 3))),
     r"delta: shape \(2, 3\), expected \(1, 3\)": lambda d: d.move([1], np.zeros((2, 3))),
+    r"delta: shape \(1, 4\), expected \(1, 3\)": lambda d: d.move([1], np.zeros((1, 4))),
+    r"xyz: shape \(2,\), expected \(2, 3\)": lambda d: d.set_positions([1, 2], np.zeros(2)),
     r"delta\[1\]: shape \(1,\), expected \(3,\)": lambda d: d.move([1, 2], [[0, 0, 0], [0]]),
     r"delta\[0\]: must be numbers": lambda d: d.move([1], [["up", 0, 0]]),
     r"ids: needs a flat sequence of integers, got \[\[1": lambda d: d.move([[1], [1, 2]], np.zeros((2, 3))),
@@ -245,6 +247,11 @@ def test_two_threads_give_the_same(sheet: tuple[DCPSurface, Mesh], monkeypatch: 
 def test_a_mesh_of_a_larger_surface_is_refused(sheet: tuple[DCPSurface, Mesh]) -> None:
     with pytest.raises(ValueError, match="mesh: was made from another surface: this one has 16 points"):
         shapes.hills(4).deformation(sheet[1])
+    whole = sheet[0]
+    one_less = DCPSurface(whole.points[:-1], whole.weights[:-1], whole.knots_u[:-1], whole.knots_v[:-1])
+    assert sheet[1].list_ids.max() == whole.n - 1 == one_less.n
+    with pytest.raises(ValueError, match="this one has 575 points"):
+        one_less.deformation(sheet[1])
 
 
 def test_published_arrays_are_read_only(sheet: tuple[DCPSurface, Mesh]) -> None:
@@ -258,9 +265,13 @@ def test_more_ids_than_points_the_last_position_counts_and_moves_add_up(sheet: t
     surface, mesh = sheet
     deformation = surface.deformation(mesh)
     ids = np.append(np.arange(surface.n), [5, 5])
-    places = np.vstack([surface.points, np.full((2, 3), [[1.0], [2.0]])])
+    places = np.vstack([surface.points + 0.5, np.full((2, 3), [[1.0], [2.0]])])
     deformation.set_positions(ids, places)
     assert deformation.points[5].tolist() == [2, 2, 2]
+    others = np.arange(surface.n) != 5
+    assert np.array_equal(deformation.points[others], (surface.points + 0.5)[others])
+    deformation.set_positions(ids[:-2], surface.points)
+    deformation.set_positions([5], [[2.0, 2.0, 2.0]])
     deformation.move(ids, np.ones((len(ids), 3)))
     assert deformation.points[5].tolist() == [5, 5, 5]
     assert np.allclose(deformation.points[6], surface.points[6] + 1)
@@ -285,3 +296,16 @@ def test_the_mesh_of_as_many_copies_as_the_surface_has() -> None:
     mesh = ring.tessellate(chord_error=1.0)
     assert mesh.list_ids.max() >= ring.n  # copies
     assert ring.deformation(mesh, normals=False).nbytes > 0
+
+
+@pytest.mark.parametrize("closed", [(True, False), (False, True), (True, True)])
+def test_a_surface_that_is_closed_follows_on_both_sides_of_its_line(closed: tuple[bool, bool]) -> None:
+    ring, ends = shapes.torus(), ((0.0, 1.0), (0.0, 1.0))
+    sides = {f"closed_{name}": end for name, end, on in zip("uv", ends, closed, strict=True) if on}
+    surface = DCPSurface(ring.points, ring.weights, ring.knots_u, ring.knots_v, **sides)
+    domain = Domain(tuple(x for on in closed for x in ((0.0, 1.0) if on else (0.3, 0.7))))  # type: ignore[arg-type]
+    deformation = surface.deformation(surface.tessellate(chord_error=1.0, domain=domain))
+    rng, first = np.random.default_rng(1), np.arange(surface.n)
+    deformation.move(first[:20], rng.normal(size=(20, 3)))
+    deformation.set_positions(first[::3], surface.points[::3] + rng.normal(size=(len(first[::3]), 3)))
+    check(deformation)

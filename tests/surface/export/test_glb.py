@@ -3,15 +3,18 @@
 import io
 import json
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from shapes import hills
 from small_head import all_points, part, small_head
 
 from surface.export import export_head
 from surface.export.glb import materials, png_bytes
 from surface.export.shapes import export_parts
 from surface.head import Head
+from surface.head.model.data import Group
 
 
 class Decoded:
@@ -81,6 +84,27 @@ def test_targets_are_sparse_where_less_than_half_moves(tmp_path):
             assert ("sparse" in entry) == (share < 0.5) and ("bufferView" in entry) == (share >= 0.5)
             assert {"min", "max"} <= set(entry)
             assert "min" not in file.document["accessors"][target["NORMAL"]]
+
+
+@pytest.mark.parametrize(("first", "sparse"), [(15, True), (60, False)])
+def test_a_small_share_of_the_vertices_is_stored_as_such(tmp_path, first, sparse):
+    """A fine sheet of which the points before ``first`` of 100 move."""
+    surface = hills(10, 60.0)
+    ku, kv = surface.padded
+    ids = np.arange(first, dtype=np.int32)
+    moved = [Group("mouthPucker", ids, np.tile(np.float32([0, 0, 5]), (len(ids), 1)))]
+    fields = {"points": surface.points.copy(), "weights": surface.weights.copy(), "knots_u": ku, "knots_v": kv}
+    fields |= {"degrees": np.stack(surface.degrees, axis=1), "jaw": np.zeros(100), "lids": np.zeros(100)}
+    head = Head(small_head(parts=[replace(part("a", -40, groups=moved), **fields)], seams=[], paint=[]))
+    file, (wanted,) = exported(tmp_path, head), export_parts(head)
+    (target,) = file.document["meshes"][0]["primitives"][0]["targets"]
+    share = wanted.displacements["mouthPucker"].any(axis=1).mean()
+    assert 0.1 < share < 0.9 and (share < 0.5) == sparse
+    entry = file.document["accessors"][target["POSITION"]]
+    assert ("sparse" in entry) == sparse and entry["count"] == len(wanted.vertices)
+    np.testing.assert_allclose(
+        file.accessor(target["POSITION"]), 0.001 * wanted.displacements["mouthPucker"], atol=1e-8
+    )
 
 
 def test_a_normal_that_never_changes_is_a_whole_accessor_of_zeros(tmp_path):

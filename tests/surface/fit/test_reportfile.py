@@ -2,21 +2,180 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from slit_sheet import slit_sheet
+from small_head import small_head
 
-from surface.base.errors import FitError
+from surface.base.errors import FitError, ViewError
 from surface.fit import reportfile
 from surface.fit.api import fit_mesh
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds
-from surface.fit.reportfile import EXCLUDED, _colours, write_report
+from surface.fit.reportfile import EXCLUDED, SCALE, _colours, as_markdown, as_table, write_report
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
 from surface.fit.source.load import Loaded
 from surface.fit.source.names import map_names
+from surface.head import Head
+
+NETS = [UniformNet(100, 0.5), UniformNet(110, 0.9), UniformNet(250, 0.45)]
+
+
+def report_of(name: str = "Ada", **other: Any) -> FitReport:
+    """A face with two shapes, and lashes without any."""
+    shapes = {"jawOpen": Errors(0.1, 0.2, 0.35), "cheekPuff": Errors(0.3, 0.4, 0.55)}
+    face = PartReport("face", 120, 300, 7, Errors(0.5, 0.75, 1.25), shapes)
+    lashes = PartReport("lashes", 9, 20, 0, Errors(0.01, 0.02, 0.03), {})
+    fields = {"missing": ("tongueOut", "mouthRight"), "left_out": ("odd", "strange"), "scale": 0.5, **other}
+    return FitReport(name, [face, lashes], list(shapes), **fields)
+
+
+def test_every_figure_of_the_report_is_in_its_table() -> None:
+    table = json.loads(json.dumps(as_table(report_of(), NETS)))
+    wanted = {"head": "Ada", "scale": 0.5, "control_points": 129, "parameters": ["jawOpen", "cheekPuff"]}
+    wanted |= {"missing": ["tongueOut", "mouthRight"], "left_out": ["odd", "strange"], "notes": []}
+    assert {key: table[key] for key in wanted} == wanted
+    face, lashes = table["parts"]
+    assert (face["name"], face["control_points"], face["samples"], face["excluded_samples"]) == ("face", 120, 300, 7)
+    assert face["neutral_mm"] == {"rms": 0.5, "p99": 0.75, "max": 1.25}
+    assert face["mean_shape_rms_mm"] == pytest.approx(0.2)
+    assert face["shapes_mm"]["cheekPuff"] == {"rms": 0.3, "p99": 0.4, "max": 0.55}
+    assert lashes["shapes_mm"] == {} and lashes["mean_shape_rms_mm"] == 0.0
+    assert (table["nurbs"]["control_points"], table["nurbs"]["rms_mm"]) == (100, 0.5)
+    assert table["nurbs"]["uniform_nets"] == [{"points": 110, "rms": 0.9}, {"points": 250, "rms": 0.45}]
+
+
+def test_every_figure_of_the_report_can_be_read() -> None:
+    lines = as_markdown(report_of(notes=["eyes guessed"]), NETS, ["a.png", "b.png"]).splitlines()
+    assert lines[0] == "# Ada: 129 control points, 2 shapes"
+    for line in (
+        "- eyes guessed", "- no shape for: tongueOut, mouthRight", "- left out, not ARKit's: odd, strange",
+        "| face | 120 | 300 | 7 | 0.500 | 0.750 | 1.250 | 0.200 |",
+        "| lashes | 9 | 20 | 0 | 0.010 | 0.020 | 0.030 | 0.000 |", "![error](a.png)", "![error](b.png)",
+        "| this head's | 100 | 0.500 |", "| uniform | 250 | 0.450 |", "## Shapes of face",
+        "| jawOpen | 0.100 | 0.200 | 0.350 |", "| cheekPuff | 0.300 | 0.400 | 0.550 |",
+    ):  # fmt: skip
+        assert lines.count(line) == 1, line
+    assert sum("violet" in line for line in lines) == 1 and not any("OpenGL" in line for line in lines)
+    assert "## Shapes of lashes" not in lines
+    plain = as_markdown(report_of(missing=(), left_out=()), NETS, [])
+    assert "no shape for" not in plain and "left out" not in plain
+    assert "No OpenGL" in plain and "violet" not in plain
+
+
+def test_a_report_replaces_an_older_one_and_folders_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reportfile, "_nets", lambda result: NETS)
+    monkeypatch.setattr(reportfile, "_draw", lambda result, folder: [])
+    folder = tmp_path / "some" / "where"
+    for name in ("Ada", "Bob"):
+        write_report(SimpleNamespace(report=report_of(name)), folder, lambda part, done: None)  # type: ignore[arg-type]
+        assert json.loads((folder / "report.json").read_text())["head"] == name
+        assert (folder / "report.md").read_text().startswith(f"# {name}: ")
+        assert sorted(p.name for p in folder.parent.rglob("*")) == ["report.json", "report.md", "where"]
+
+
+def test_uniform_nets_stand_beside_the_first_tile_without_its_folds(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, float]] = []
+    monkeypatch.setattr(reportfile, "uniform_nets", lambda *given: asked.append(given[2:]) or NETS[1:])
+    uv = np.array([[0.1, 0], [0.5, 0], [0.95, 0], [0.7, 0], [1.9, 0], [2.5, 0]])  # the last two: another tile
+    chart = SimpleNamespace(uv=uv, folded=np.array([False, False, False, True, False, False]))
+    net = SimpleNamespace(centres=np.array([[0.1, 0], [0.3, 0], [0.9, 0], [1.9, 0], [2.5, 0]]))
+    fitted = SimpleNamespace(net=net, error=np.array([1.0, 2.0, 4.0, 9.0, 7.0, 7.0]))
+    nets = reportfile._nets(SimpleNamespace(parts=[SimpleNamespace(chart=chart, fitted=fitted, targets=None)]))
+    assert nets == [UniformNet(3, pytest.approx(np.sqrt(7.0))), *NETS[1:]]
+    assert asked == [(3, pytest.approx(np.sqrt(7.0)))]
+
+
+def fitted_part(uv: np.ndarray, folded: np.ndarray, name: str = "a", **errors: np.ndarray) -> Any:
+    chart = SimpleNamespace(uv=uv, folded=folded)
+    return SimpleNamespace(name=name, chart=chart, fitted=SimpleNamespace(**errors))
+
+
+def test_colours_are_those_of_the_legend() -> None:
+    uv = np.random.default_rng(3).random((40, 2))
+    part, errors = fitted_part(uv, np.zeros(40, bool)), (0.0, 0.25, 0.5, 0.75, 1.0, 3.0, 0.125)
+    got = [_colours(uv[:5], part, np.full(40, e)) for e in errors]
+    for colours, wanted in zip(got, [*SCALE, SCALE[4], SCALE[:2].mean(axis=0)], strict=True):
+        np.testing.assert_allclose(colours, np.tile(wanted, (5, 1)), atol=1e-6)
+        assert colours.dtype == np.float32
+    every = np.vstack([SCALE, EXCLUDED])
+    assert (every >= 0.0).all() and (every <= 1.0).all()
+    blue, green, yellow, orange, red, violet = every
+    assert blue.argmax() == 2 and green.argmax() == 1 and yellow.argmin() == 2 and orange.argmax() == red.argmax() == 0
+    assert violet.argmin() == 1 and yellow[1] > 0.5 > orange[1] > red[1]
+
+
+def test_a_colour_is_the_mean_of_the_four_nearest_samples() -> None:
+    uv = np.column_stack([np.arange(6.0), np.zeros(6)])
+    error = np.array([0.0, 0.0, 0.0, 1.0, 9.0, 9.0])
+    part = fitted_part(uv, np.array([True, True, True, False, True, True]))
+    place = np.array([[-1.0, 0.0]])
+    assert _colours(place, part, error)[0] == pytest.approx(EXCLUDED, abs=1e-6)
+    part.chart.folded[0] = False  # half of them lie inside a fold
+    assert _colours(place, part, error)[0] == pytest.approx(SCALE[1], abs=1e-6)
+    alone = fitted_part(uv[:1], np.array([False]))
+    assert _colours(uv[:2], alone, np.array([0.5])) == pytest.approx(np.tile(SCALE[2], (2, 1)), abs=1e-6)
+
+
+def test_pictures_show_the_error_at_rest_and_of_the_worst_shape(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    uv, drawn = np.random.default_rng(1).random((30, 2)), {}
+
+    def keep(head: Head, path: Path) -> None:
+        drawn[path.name] = {part.name: part.attributes["albedo"].copy() for part in head.parts}
+        assert all(set(part.attributes) <= {"albedo", "eye_local"} for part in head.parts)
+
+    monkeypatch.setattr(reportfile, "_picture", keep)
+    worst = np.stack([np.full(30, 0.25), np.full(30, 1.0)])
+    parts = [
+        fitted_part(uv, np.zeros(30, bool), "a", error=np.full(30, 0.5), shape_error=worst),
+        fitted_part(uv, np.zeros(30, bool), "b", error=np.full(30, 0.75), shape_error=np.zeros((0, 30))),
+    ]
+    result: Any = SimpleNamespace(head=small_head(), parts=parts)
+    assert reportfile._draw(result, tmp_path) == ["error_neutral.png", "error_shapes.png"] == list(drawn)
+    for name, (a, b) in {"error_neutral.png": (2, 3), "error_shapes.png": (4, 0)}.items():
+        for part, wanted in {"a": SCALE[a], "b": SCALE[b], "tooth": [0.35] * 3}.items():
+            albedo = drawn[name][part]
+            assert albedo == pytest.approx(np.broadcast_to(wanted, albedo.shape), abs=1e-6), (name, part)
+
+    def refuse(head: Head, path: Path) -> None:
+        raise ViewError("no OpenGL", hint="")
+
+    monkeypatch.setattr(reportfile, "_picture", refuse)
+    assert reportfile._draw(result, tmp_path) == []
+
+
+def test_a_picture_has_four_views_side_by_side(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    image = pytest.importorskip("PIL.Image", reason="needs Pillow (extra view)")
+    cameras = []
+
+    class Screen:
+        def __init__(self, head: Any, size: tuple[int, int], **other: Any) -> None:
+            self.size = size
+
+        def __enter__(self) -> "Screen":
+            return self
+
+        def __exit__(self, *error: object) -> None: ...
+
+        def render(self, values: np.ndarray, camera: Any) -> np.ndarray:
+            cameras.append(camera)
+            return np.zeros((*self.size[::-1], 3), np.uint8)
+
+    monkeypatch.setattr("surface.view.pictures.offscreen.Offscreen", Screen)
+    reportfile._picture(Head(small_head()), tmp_path / "it.png")
+    assert len({camera.yaw_deg for camera in cameras[:3]}) == 3
+    assert cameras[3].pitch_deg == pytest.approx(cameras[0].pitch_deg - 55.0)
+    assert cameras[3].yaw_deg == pytest.approx(cameras[0].yaw_deg)
+    with image.open(tmp_path / "it.png") as sheet:
+        width, height = sheet.size
+    assert 4 * 420 <= width < 4 * 440 and 480 <= height < 540
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 import shapes
@@ -88,3 +90,76 @@ def test_directions_need_a_product_of_a_millionth_of_a_millionth_of_the_lengths(
         assert (out[:2] == 9.0).all()
         wanted = sign * np.sign(angles[2:, None]) * np.roll([0.0, 0, 1], axis)
         np.testing.assert_allclose(out[2:], wanted, atol=1e-12)
+
+
+def cheapest_cells(code: np.ndarray, depth: int, uv: np.ndarray, supports: np.ndarray) -> list[int]:
+    """First vertices of cells: a branch is cut into its quarters where these cost less, by the docstring's rule."""
+
+    def cost(low: int, high: int) -> float:
+        (u0, v0), (u1, v1) = uv[low:high].min(axis=0), uv[low:high].max(axis=0)
+        a, b, c, d = supports.T
+        points = ((a <= u1) & (b >= u0) & (c <= v1) & (d >= v0)).sum()
+        return float(points * (8 * np.ceil((high - low) / 8) + 10))
+
+    def edges(low: int, high: int, level: int) -> list[tuple[int, int]]:
+        first = np.unique(code[low:high] >> (2 * level), return_index=True)[1]
+        return list(zip(low + first, [*(low + first[1:]), high], strict=True))
+
+    def cut(low: int, high: int, level: int) -> list[int]:
+        if level == 0 or high - low <= 8:
+            return [low]
+        quarters = edges(low, high, level - 1)
+        forced = high - low > 4096 or len(quarters) == 1
+        if not forced and sum(cost(a, b) for a, b in quarters) >= cost(low, high):
+            return [low]
+        return [cell for a, b in quarters for cell in cut(a, b, level - 1)]
+
+    return [cell for a, b in edges(0, len(code), depth) for cell in cut(a, b, depth)] + [len(code)]
+
+
+@pytest.mark.parametrize(
+    ("count", "control", "depth", "spread"),
+    [(700, 300, 4, (1, 1)), (700, 300, 4, (0.1, 0.1)), (300, 60, 5, (1, 0.03)), (300, 60, 5, (0.02, 1)),
+     (90, 400, 3, (1, 1)), (300, 8, 5, (1, 0.03)), (300, 8, 5, (0.02, 1)), (6000, 8, 5, (1, 1))],
+)  # fmt: skip
+def test_a_branch_is_cut_where_its_quarters_cost_less(
+    count: int, control: int, depth: int, spread: tuple[float, float]
+) -> None:
+    """Vertices of two roots side by side, all over them, or most in one corner or along one side."""
+    surface, rng = shapes.scattered(control, 3), np.random.default_rng(count)
+    at = rng.random((count, 2))
+    at[: -count // 9] *= spread
+    whole = np.clip((at * [2, 1] * 2**depth).astype(np.int64), 0, [2 * 2**depth - 1, 2**depth - 1])
+    root, inner = whole[:, 0] >> depth, whole & [2**depth - 1, 2**depth - 1]
+    code = (root << (2 * depth)) | blocks.morton(inner[:, 0].copy(), inner[:, 1].copy())
+    order = np.argsort(code, kind="stable")
+    code, uv = code[order], np.ascontiguousarray(at[order])
+    found = blocks.group(code, depth, uv, surface)
+    assert 3 < len(found) < count
+    assert found.tolist() == cheapest_cells(code, depth, uv, surface.supports)
+
+
+def test_a_vertex_belongs_to_the_first_of_the_leaves_around_it() -> None:
+    triangles = np.array([[0, 1, 2], [2, 1, 3], [3, 4, 2]])
+    code = np.full(5, 99)
+    blocks.least_codes(triangles, np.array([1, 0, 2]), np.array([7, 5, 3]), code)
+    assert code.tolist() == [5, 5, 3, 3, 3]
+
+
+def test_morton_codes_have_room_for_twenty_four_bits() -> None:
+    top = np.array([2**23, 0, 2**24 - 1])
+    assert blocks.morton(top, top[::-1].copy()).tolist() == [
+        2**46 + sum(2 ** (2 * k + 1) for k in range(24)), 0, sum(4**k for k in range(24)) + 2**47,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_lists_are_those_points_whose_support_meets_the_cells_rectangle(seed: int) -> None:
+    surface = shapes.scattered(60, seed)
+    rng, s = np.random.default_rng(seed), surface.supports
+    uv, start = rng.random((40, 2)), np.array([0, 3, 4, 20, 40])
+    list_start, ids = blocks.point_lists(start, uv, surface)
+    for cell, (low, high) in enumerate(itertools.pairwise(start)):
+        (u0, v0), (u1, v1) = uv[low:high].min(axis=0), uv[low:high].max(axis=0)
+        meets = (s[:, 0] <= u1) & (s[:, 1] >= u0) & (s[:, 2] <= v1) & (s[:, 3] >= v0)
+        assert ids[list_start[cell] : list_start[cell + 1]].tolist() == np.flatnonzero(meets).tolist()

@@ -222,7 +222,9 @@ def test_up_to_256_bins_are_searched_for_a_run() -> None:
     none.flags.writeable = False  # as those of a surface
     for wide, high, expected in ((16, 16, 0), (16, 17, -1), (17, 16, -1), (1, 20, 0), (20, 1, 0), (20, 13, -1)):
         uv = np.array([[5.5, 10.25], [4.5 + wide, 10.25 + (high - 1) / 2]])
-        assert kernels.points_near(uv, none, none, grid, shape, start, np.zeros(0, np.int32), out) == expected
+        for aside in ([0, 0], [20 - wide, 0], [0, (20 - high) / 2]):
+            found = kernels.points_near(uv + aside, none, none, grid, shape, start, np.zeros(0, np.int32), out)
+            assert found == expected, aside
     assert RUN == 256
 
 
@@ -261,3 +263,19 @@ def test_a_blending_function_counts_where_its_value_or_slope_is_not_zero() -> No
     assert kernels.along(knots, 1, 1, values, 2, False, work, out)
     np.testing.assert_allclose(out, [[0.5, 0], [0.5, 0], [0, 0], [0, 0], [0, 0]])
     assert not kernels.along(knots, 1, 1, values, 0, True, work, out)
+
+
+@pytest.mark.parametrize("slopes", [False, True])
+def test_sums_of_a_run_are_those_of_its_samples(slopes: bool) -> None:
+    """A run that sums nothing would only be slow: its samples are then summed one by one."""
+    surface, rng = shapes.scattered(60, 2), np.random.default_rng(2)
+    u, v = np.meshgrid(rng.random(5), rng.random(6))
+    uv, side = np.column_stack([u.ravel(), v.ravel()]), rng.integers(0, 4, 30)
+    ids, work = np.arange(surface.n, dtype=np.int32), np.zeros(12)
+    run, one = np.full((32, 12), 7.0), np.zeros(12)
+    kernels.sum_run(*surface.arrays(), ids, uv, side, slopes, work, run)
+    for s in range(30):
+        kernels.sum_one(*surface.arrays(), ids, *uv[s], side[s], slopes, work, one)
+        assert np.array_equal(run[s], one) and one[3] > 0.0
+        assert one[4:].any() == slopes
+    assert (run[30:] == 7.0).all()

@@ -81,3 +81,13 @@ def test_a_net_is_the_rational_sum_of_the_textbook(p: int, q: int, seed: int) ->
         along_v = np.array([cox_de_boor(kv, q, j, v) for j in range(nv)])
         share = np.outer(along_u, along_v) * weights
         assert np.allclose(point, np.einsum("ij,ijc->c", share, net) / share.sum(), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("axis", "row", "told"), [
+    ("u", [0, 0, 0.5, 0.2, 1], r"knots_u\[3\]: 0.2 after 0.5"), ("v", [0, 0, 0.5, 1, np.nan], r"knots_v\[4\]"),
+    ("v", [1, 0, 0.5, 1, 1], r"knots_v\[1\]: 0.0 after 1.0"),
+])  # fmt: skip
+def test_a_knot_that_falls_is_named_with_the_one_before(axis: str, row: list[float], told: str) -> None:
+    knots = {"u": [0.0, 0, 0.5, 1, 1], "v": [0.0, 0, 0.5, 1, 1], axis: row}
+    with pytest.raises(ValueError, match=told):
+        nurbs_arrays(1, 1, knots["u"], knots["v"], np.zeros((3, 3, 3)))

@@ -18,6 +18,7 @@ from surface.fit.features.finish import (
 )
 from surface.fit.points.recipe import Recipe
 from surface.head import Head
+from surface.head.model.data import PartData
 from surface.head.model.file import load_data
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import SHAPES
@@ -139,3 +140,54 @@ def test_samples_of_an_opening_go_outwards_at_constant_x_by_their_length_on_the_
     for side, sign in ((0, 1.0), (1, -1.0)):
         along = sign * (at[side, :, :, 1] / 0.8 - 45.0)
         np.testing.assert_allclose(along, half[:, None] + wanted, atol=0.15)
+
+
+def plane_with_holes(slit: tuple[float, float, float]) -> PartData:
+    """A plane, 200 by 200 mm, with a hole that has no slit, and one of 60 by 20 mm around (0, -10, 0) that has."""
+    net = np.array([[[x, y, 0.0] for y in (-100.0, 100.0)] for x in (-100.0, 100.0)])
+    surface = DCPSurface.from_nurbs(1, 1, [0, 0, 1, 1], [0, 0, 1, 1], net)
+    ku, kv = surface.padded
+    outline, hole = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), almond()
+    return PartData(
+        "face", "skin", "skin", surface.points.copy(), surface.weights.copy(), ku.copy(), kv.copy(),
+        np.stack(surface.degrees, axis=1), [outline, hole * 0.1 + [0.8, 0.8], hole], np.array([slit]), (0, 0.1, 4), [],
+        jaw=np.zeros(4), lids=np.zeros(4),
+    )  # fmt: skip
+
+
+SLIT = (0.45, 0.35, 0.65)
+NAMES = ("face", "sockets", "cavity", "lashes", "teeth")
+
+
+@pytest.mark.parametrize("radius", [0.5, 12.0])
+@pytest.mark.parametrize(("away", "lids"), [(1.49, True), (1.51, False)])
+def test_lids_are_an_opening_before_an_eyeball_and_lips_any_other(radius: float, away: float, lids: bool):
+    eyes = np.array([[500.0, 0, 0], [0.0, -10.0, -away * radius]])
+    (contact,) = find_contacts(plane_with_holes(SLIT), eyes, radius, NAMES)
+    assert (contact.name, contact.eye) == (("right_lids", 1) if lids else ("lips", -1))
+    assert contact.part == "face" and contact.followers == (("lashes", "sockets") if lids else ("cavity",))
+    assert (contact.reach_mm, contact.share) == ((0.5 * radius, 0.8) if lids else (12.0, 0.5))
+    depth = 0.58 * radius if lids else 15.0
+    y = 200.0 * contact.places[0, COLUMNS // 2, :, 1]
+    np.testing.assert_allclose(np.ptp(y[:ROWS]), depth, rtol=0.03)
+    np.testing.assert_allclose(np.ptp(y), depth + contact.reach_mm, rtol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "found"),
+    [(0.35, 0.65, 1), (0.4, 0.6, 1), (0.35 - 1e-10, 0.65 + 1e-10, 1), (0.3499, 0.6, 0), (0.4, 0.6501, 0)],
+)
+def test_an_opening_is_a_hole_that_holds_a_slit_from_end_to_end(start: float, end: float, found: int):
+    face = plane_with_holes((0.45, start, end))
+    assert len(find_contacts(face, np.zeros((2, 3)), 0.0, ("face",))) == found
+
+
+def test_corrections_take_back_only_what_is_named_and_more_than_a_thousandth():
+    groups = [all_points("mouthLeft", (1.0, 0, 0)), all_points("cheekPuff", (0, 3.0, 0))]
+    groups[0].moves[5:, 0] = 0.0019
+    groups[0].moves[7:, 0] = 0.0021
+    head = small_head(parts=[part("a", -40, groups=groups)], seams=[])
+    table = [{"shapes": ["mouthLeft", "jawOpen"], "subtract": {"mouthLeft": 0.5}}]
+    group = add_correctives(head, table).parts[0].groups[-1]
+    assert group.name == "mouthLeft*jawOpen" and group.ids.tolist() == [*range(5), *range(7, 25)]
+    np.testing.assert_allclose(group.moves[[0, -1]], [[-0.5, 0, 0], [-0.00105, 0, 0]], atol=1e-8)

@@ -122,3 +122,79 @@ def test_lids_let_go_of_the_eyeball_between_three_and_eight_millimetres_and_behi
         assert abs(share(*place) - expected) < 1e-9, place
     other = lid_share(np.array([[30.0, 0, 17.5]]), eyes[::-1], 12.0)
     np.testing.assert_allclose(other, [-0.5])
+
+
+NONE = np.zeros((0, 4), np.int64)
+
+
+def mesh_of(points: np.ndarray, *moves: np.ndarray) -> FitMesh:
+    names = tuple(f"shape {k}" for k in range(len(moves)))
+    return FitMesh(points, NONE, np.zeros((0, 2)), NONE, names, np.array(moves))
+
+
+def test_without_opening_or_teeth_a_jaw_does_not_move():
+    mesh, hinge, still = mesh_of(POINTS, 0 * POINTS), np.array([0.5, 6.0, 12.0]), Jaw((0.5, 6.0, 12.0), 0.0, (0, 0, 0))
+    assert find_jaw(mesh, {"jawLeft": [0]}, np.arange(40), hinge) == still
+    assert find_jaw(mesh, {"jawOpen": [0]}, np.arange(0), hinge) == still
+
+
+def test_the_jaw_is_the_sum_of_its_sources_glides_straight_and_tilts_by_maps_of_its_teeth():
+    turn, shift = jaw_path(JAW, 1.0)
+    half = 0.5 * (POINTS @ turn.T + shift + [0.7, 0, 0] - POINTS)
+    ahead = POINTS @ np.diag([0.0, 0.01, 0.02]) + [0, 0, 6.0]
+    none = np.full((10, 3), 99.0)  # of what is no tooth
+    mesh = mesh_of(np.vstack([none, POINTS]), *(np.vstack([none, m]) for m in (half, ahead, half)))
+    found = find_jaw(mesh, {"jawOpen": [0, 2], "jawForward": [1]}, np.arange(10, 50), np.array(JAW.centre))
+    assert found.angle_rad == pytest.approx(JAW.angle_rad)
+    np.testing.assert_allclose(found.glide, [0.0, *JAW.glide[1:]], atol=1e-9)
+    assert set(found.tilts) == {"jawForward"}
+    np.testing.assert_allclose(found.tilts["jawForward"], [[0, 0, 0, 0], [0, 0.01, 0, 0], [0, 0, 0.02, 6.0]], atol=1e-9)
+
+
+def test_a_mirrored_cloud_is_turned_and_not_mirrored():
+    turn, _ = rigid_fit(POINTS, POINTS * [-1.0, 1.0, 1.0])
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+
+
+def test_shares_lie_between_none_and_whole_and_hardly_moved_points_have_none():
+    turn, shift = jaw_path(JAW, 1.0)
+    whole = POINTS @ turn.T + shift - POINTS
+    np.testing.assert_array_equal(jaw_share(POINTS, 3.0 * whole, JAW), np.ones(40))
+    np.testing.assert_array_equal(jaw_share(POINTS, -whole, JAW), np.zeros(40))
+    along = whole / np.linalg.norm(whole, axis=1, keepdims=True)
+    assert not jaw_share(POINTS, 0.049 * along, JAW).any()
+    np.testing.assert_allclose(jaw_share(POINTS, 0.051 * along, JAW), 0.051 / np.linalg.norm(whole, axis=1), rtol=1e-9)
+
+
+def test_groups_leave_out_what_hardly_moves():
+    moves = np.zeros((3, 40, 3))
+    moves[0, [3, 5, 9], 1] = 0.251, 0.0041, 0.0039
+    moves[1, :, 2] = 0.249
+    moves[2, 3, 1] = 0.00008
+    (only,), share = make_groups(POINTS, moves, {"cheekPuff": [0, 2], "mouthPucker": [1]}, JAW)
+    assert only.name == "cheekPuff" and only.ids.tolist() == [3, 5] and only.ids.dtype == np.int32
+    np.testing.assert_allclose(only.moves, [[0, 0.2511, 0], [0, 0.0041, 0]], atol=1e-7)
+    assert not share.any()
+
+
+def test_the_tongue_is_held_at_its_root_and_let_go_over_twenty_millimetres():
+    still = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
+    path = np.array([[z, -41.0, -41.0, z + 30.0, 1.0, 1.0, 4.0] for z in (30.0, 60.0, 98.0)])
+    points = np.array([[3.0, -38.0, z] for z in (20.0, 30.0, 35.0, 40.0, 50.0, 90.0)])
+    out, droop = tongue_groups(points, path, still)
+    held = np.array([0.0, 0.0, 0.25, 0.5, 1.0, 1.0])
+    np.testing.assert_allclose(out.moves, held[:, None] * [0, 0, 30.0], atol=1e-4)
+    np.testing.assert_allclose(droop.moves, held[:, None] * [0, -4.0, 0], atol=1e-4)
+    assert out.ids.tolist() == droop.ids.tolist() == list(range(6))
+
+
+def test_displacements_are_rounded_to_a_tenth_of_a_micrometre():
+    """So that they take little room in a head's file."""
+    moves = RNG.normal(size=(1, 40, 3)) * 5
+    made, _ = make_groups(POINTS, moves, {"cheekPuff": [0]}, JAW)
+    np.testing.assert_allclose(made[0].moves, moves[0], atol=0.6e-4)
+    section = np.array([[3.0, -44.0, 44.0], [1.0, -38.0, 71.0], [2.0, -41.0, 93.0]])
+    for group in (*made, *tongue_groups(section, PATH, JAW)):
+        steps = 1e4 * group.moves.astype(float)
+        assert np.abs(steps - np.rint(steps)).max() < 0.06 and (np.rint(steps) % 10).any()

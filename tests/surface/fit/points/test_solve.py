@@ -66,3 +66,42 @@ def test_slopes_are_matched_besides_positions(net):
         d = step * np.eye(2)[axis]
         slope = (basis(net, at + d) - basis(net, at - d)) @ x / (2 * step) * span[0, axis]
         np.testing.assert_allclose(slope, target, rtol=0.02)
+
+
+@pytest.mark.parametrize("sloped", [False, True])
+def test_the_solution_is_that_of_the_functional(net, sloped):
+    """Dense algebra over the documented sum, with derivatives by central differences."""
+    rng, fair = np.random.default_rng(5), 0.3
+    uv = np.vstack([UV, rng.random((2000, 2)) * 0.98 + 0.01])
+    weight, targets = rng.uniform(0.5, 3.0, len(uv)), rng.normal(size=(len(uv), 2))
+    b, f = basis(net, uv), fairness(net).toarray()
+    dense = b.toarray()
+    strength = weight.sum() / len(net)
+    normal = dense.T @ (weight[:, None] * dense) + fair * strength * f.T @ f
+    right = dense.T @ (weight[:, None] * targets)
+    slopes = None
+    if sloped:
+        at, none = rng.random((30, 2)) * 0.9 + 0.05, csr_matrix((30, 1))
+        span, heavy = rng.uniform(0.05, 0.2, (30, 2)), rng.uniform(50.0, 200.0, 30)
+        wanted = rng.normal(size=(2, 30, 2))
+        slopes = Slopes(at, span, none, none, heavy), *wanted
+        for axis in range(2):
+            d = 1e-5 * np.eye(2)[axis]
+            rows = ((basis(net, at + d) - basis(net, at - d)) / 2e-5).toarray() * span[:, axis, None]
+            normal += rows.T @ (heavy[:, None] * rows)
+            right += rows.T @ (heavy[:, None] * wanted[axis])
+    x = solve(net, b, weight, targets, fair, slopes)
+    np.testing.assert_allclose(x, np.linalg.solve(normal, right), atol=2e-4)
+
+
+def test_a_net_with_more_points_than_samples_reach_is_solved(net):
+    few = basis(net, UV[:3])
+    x = solve(net, few, np.ones(3), np.full((3, 1), 2.0), 0.0)
+    assert np.isfinite(x).all()
+    np.testing.assert_allclose(few @ x, 2.0, rtol=1e-3)
+
+
+def test_the_unit_of_weights_says_nothing(net):
+    b, targets = basis(net, UV), np.random.default_rng(1).normal(size=(len(UV), 2))
+    one, other = (solve(net, b, np.full(len(UV), unit), targets, 1e-3) for unit in (1.0, 1e-8))
+    np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-6)

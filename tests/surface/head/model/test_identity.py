@@ -92,3 +92,11 @@ def test_damage_is_named(folder):
         path.write_bytes(whole[: int(size)])
         with pytest.raises(HeadFileError, match=r"identities\.npz"):
             load_identities(folder)
+
+
+def test_a_group_holds_only_the_points_that_a_blend_moves():
+    cancelled = Group("mouthPucker", np.array([11, 13, 20], np.int32), np.array([[0, 0, -6], [0, 0, -5], [1, 0, 0.0]]))
+    blended = with_identities(small_head(), {"wide": wide(changes={"a": [cancelled]})}, {"wide": 1.0}, "here")
+    (group,) = blended.parts[0].groups
+    assert group.name == "mouthPucker" and group.ids.tolist() == [12, 13, 20]
+    np.testing.assert_allclose(group.moves, [[0, 0, 6], [0, 0, 1], [1, 0, 0]])

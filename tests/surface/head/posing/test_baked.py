@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +25,7 @@ from surface.head.posing.baked import (
     checksum,
     read_decimated,
     read_shade,
+    tessellation_key,
     write_decimated,
     write_shade,
 )
@@ -177,3 +182,72 @@ def test_the_checksum_sees_order_and_places_but_no_last_bits() -> None:
     assert check != checksum(triangles[::-1], uv)
     assert check != checksum(triangles, uv[::-1])
     assert check != checksum(triangles, uv + 1 / 256)
+
+
+def test_the_checksum_is_that_of_the_files_that_heads_have() -> None:
+    """Steps of 1/16384, rounded up from two thirds: another rule would refuse every file written before."""
+    uv = np.array([[0.0, 0.5], [1.0, 0.25], [8191.7 / 16384, 8191.6 / 16384], [0.75, 4096.6 / 16384]])
+    places = struct.pack("<8i", 0, 8192, 16384, 4096, 8192, 8191, 12288, 4096)
+    triangles = struct.pack("<6i", 0, 1, 2, 2, 1, 3)
+    assert checksum(np.array([[0, 1, 2], [2, 1, 3]]), uv) == zlib.crc32(triangles + places)
+
+
+def test_the_key_of_a_mesh_is_that_of_the_files_that_heads_have() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(12):
+        triangles = rng.integers(0, 9, (4, 3))
+        part: Any = SimpleNamespace(vertices=np.zeros((9, 3)), triangles=triangles)
+        check = zlib.crc32(struct.pack("<12i", *triangles.ravel()))
+        assert tessellation_key(part).tolist() == [9, 4, check % 2**31]
+
+
+def test_shares_beyond_their_range_are_kept_within_it(tmp_path: Path) -> None:
+    write_shade(tmp_path, {"face": np.array([[-0.3], [0.0], [0.5], [1.0], [1.7]])})
+    assert read_shade(tmp_path)["face"] == pytest.approx(np.array([[0], [0], [128 / 255], [1], [1]]), abs=1e-6)
+
+
+def test_only_what_belongs_to_a_changed_part_is_left_out(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    meshes = [SimpleNamespace(triangles=rng.integers(0, 9, (5, 3)), uv=rng.random((9, 2))) for _ in range(3)]
+    parts: list[Any] = [
+        SimpleNamespace(name=name, mesh=mesh, stored=False) for name, mesh in zip(("a", "ab", "c"), meshes, strict=True)
+    ]
+    names = ("a", "a/thin", "ab", "ab/thin", "c", "c/visible")
+    write_shade(tmp_path, {name: np.ones((9, 1)) for name in names}, parts)
+    assert set(read_shade(tmp_path, parts)) == set(names)
+    parts[0].mesh = meshes[1]
+    assert set(read_shade(tmp_path, parts)) == {"ab", "ab/thin", "c", "c/visible"}
+    parts[0].stored = True
+    with pytest.raises(HeadFileError, match="of part 'a'"):
+        read_shade(tmp_path, parts)
+
+
+def test_sky_and_thin_flesh_are_taken_where_they_fit() -> None:
+    part = skin()
+    count = len(part.rest)
+    sky, thin = np.random.default_rng(0).random((count, 4)), np.ones((count - 1, 1))
+    apply_shade([part], {"face/visible": sky, "face/thin": thin, "other/thin": np.ones((count, 1))})
+    assert part.attributes["visible"] is sky and set(part.attributes) == {"visible"}
+
+
+GOOD = np.array([[0, 1, 2], [2, 1, 3]], np.int32)
+
+
+@pytest.mark.parametrize(
+    ("triangles", "taken"),
+    [(GOOD, True), (GOOD + 1, False), (GOOD - 1, False), (GOOD[:0], False), (GOOD[0], False), (GOOD[:, :2], False),
+     (GOOD[None], False), (GOOD[:1], True)],
+)  # fmt: skip
+def test_triangles_are_taken_that_can_be_drawn(triangles: np.ndarray, taken: bool) -> None:
+    part: Any = SimpleNamespace(name="a", vertices=np.zeros((4, 3)), triangles=GOOD, decimated={})
+    apply_decimated([part], {"a": tessellation_key(part), "a/full": triangles, "a/other": GOOD})
+    assert set(part.decimated) == ({"full"} if taken else set())
+
+
+@pytest.mark.parametrize(("highest", "kind"), [(65535, np.uint16), (65536, np.uint32)])
+def test_indices_are_stored_as_narrowly_as_they_can_be(tmp_path: Path, highest: int, kind: type) -> None:
+    triangles = np.array([[0, 1, highest]], np.int32)
+    path = write_decimated(tmp_path, [], {"a/full": triangles})
+    with np.load(path) as stored:
+        assert stored["a/full"].dtype == kind
+    assert read_decimated(tmp_path)["a/full"].tolist() == triangles.tolist()

@@ -47,6 +47,15 @@ def test_heights_are_those_above_ball_and_cornea(look):
     assert (eye_height(way, axis) > 1.05).any()
 
 
+def test_heights_at_an_eyes_side_are_those_of_its_axis_there():
+    """A sample that stands exactly beside the centre, and one that rounding puts a little further."""
+    axis, found = np.array([0.9, 0.0, np.sqrt(1 - 0.81)]), np.empty(3)
+    find_heights(np.array([[13.0, 0.0, 13.0], [13.0 + 1e-12, 5.0, 13.0], [-13.0, 0.0, 13.0]]), RADIUS, axis, found)
+    wanted = 13.0 - RADIUS * eye_height(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), axis)
+    np.testing.assert_allclose(found, wanted[[0, 0, 1]], atol=2e-3)
+    assert wanted[0] < wanted[1] == pytest.approx(13.0 - RADIUS)
+
+
 @pytest.mark.parametrize("look", LOOKS)
 def test_lids_are_seated_on_the_surface_that_is_measured(look):
     axis, way = optical_axis(np.array(look)), directions(300)

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shapes import hills
 from small_head import all_points, small_head
 from small_head import part as patch
 
 from surface.head import Head
 from surface.head.model.data import Seam
-from surface.head.posing.decimated_head import DecimatedHead
+from surface.head.posing.decimated_head import DecimatedHead, submesh
 
 VALUES = ({}, {"mouthPucker": 0.7, "headYaw": 0.3}, {"jawOpen": 0.4, "headYaw": 0.3}, {"jawOpen": 0.4})
 
@@ -85,3 +86,39 @@ def test_points_at_rest_that_are_changed_are_seen(head: Head, decimated: Decimat
         rig.rest[:] = before
         rig.invalidate()
         head.pose(head.values({}))
+
+
+def test_its_rotation_is_the_heads(head: Head, decimated: DecimatedHead) -> None:
+    for given in ({"headYaw": 0.4, "headPitch": -0.2}, {}):
+        head.pose(head.values(given))
+        decimated.pose(head.values(given))
+        assert decimated.turn == pytest.approx(head.parts[0].turn, abs=1e-12)
+        assert (np.abs(decimated.turn - np.eye(3)).max() > 0.05) == bool(given)
+
+
+def test_a_part_without_triangles_of_a_level_keeps_all(head: Head) -> None:
+    decimated = DecimatedHead(head, head.parts, "full", {})
+    for own in decimated.parts:
+        assert np.array_equal(own.kept, np.arange(len(own.part.vertices)))
+        assert np.array_equal(own.triangles, own.part.triangles)
+        assert own.changed == [(0, len(own.kept))]
+    assert [own.first for own in decimated.parts[1:]] == [own.last for own in decimated.parts[:-1]]
+    assert len(decimated.vertices) == sum(len(part.vertices) for part in head.parts)
+    assert_alike(decimated)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+def test_some_vertices_of_a_mesh_keep_their_places_and_the_points_that_reach_them(flip: bool) -> None:
+    mesh = hills(16).tessellate(chord_error=0.3, flip=flip)
+    cells = len(mesh.cell_start) - 1
+    ids = np.flatnonzero((mesh.cell % 3 == 1) & (np.arange(len(mesh.uv)) % 2 == 0))
+    some = submesh(mesh, ids)
+    assert cells > 6 and len(some.triangles) == 0 and some.flip == flip
+    for name in ("vertices", "normals", "uv", "side"):
+        assert np.array_equal(getattr(some, name), getattr(mesh, name)[ids]), name
+    assert some.cell_start.tolist() == [0, *np.cumsum(np.unique(mesh.cell[ids], return_counts=True)[1]).tolist()]
+    for vertex, original in enumerate(ids):
+        own = some.points_of(int(some.cell[vertex]))
+        assert np.array_equal(own, mesh.points_of(int(mesh.cell[original])))
+        first, last = some.cell_start[some.cell[vertex] :][:2]
+        assert first <= vertex < last

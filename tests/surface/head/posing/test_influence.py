@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shapes import hills
+from small_head import part as patch
 from small_head import small_head
 
-from surface.head import Head
+from surface.head import Head, Neck
 from surface.head.posing.influence import Influence
 
 
@@ -42,15 +44,48 @@ def test_weights_of_a_position_add_up_and_of_a_derivative_cancel() -> None:
 
 
 def test_a_vertex_of_a_seam_takes_the_share_of_those_it_lies_between() -> None:
-    head = Head(small_head())
+    data = small_head(neck=Neck((0.0, -50.0, 0.0), 0.0, -18.0, 10.0))
+    finer = replace(data.parts[1], budget=(0, 0.003, 6))
+    head = Head(replace(data, parts=[data.parts[0], finer, data.parts[2]]))
     sums = Influence(head)
     stitch = head.zippers[0]
     own = sums.share[sums.part_start[1] + stitch.ids]
     first = sums.share[: sums.part_start[1]]
+    assert first == pytest.approx(head.part("a").share, abs=1e-6) and 0.1 < first.mean() < 0.9
     low, high = first[stitch.low], first[stitch.high]
-    assert len(own) > 5
-    assert (own >= np.minimum(low, high) - 1e-6).all()
-    assert (own <= np.maximum(low, high) + 1e-6).all()
+    assert len(own) > 5 and ((stitch.share > 0.1) & (stitch.share < 0.9)).any()
+    assert own == pytest.approx(low + stitch.share * (high - low), abs=1e-6)
+
+
+def test_sums_of_a_part_with_several_cells_and_uneven_weights() -> None:
+    surface = hills(20, 60.0)
+    weights = np.random.default_rng(4).uniform(0.4, 2.0, surface.n)
+    ku, kv = surface.padded
+    degrees = np.stack(surface.degrees, axis=1)
+    fields = {"jaw": np.zeros(surface.n), "lids": np.zeros(surface.n), "knots_u": ku, "knots_v": kv}
+    one = replace(patch("a", -40), points=surface.points.copy(), weights=weights, degrees=degrees, **fields)
+    data = small_head(parts=[one], seams=[], paint=[])
+    head = Head(data)
+    assert len(head.parts[0].mesh.cell_start) > 5
+    at, normals = summed(head, Influence(head), head.values({}))
+    points, su, sv = head.parts[0].surface.derivatives(head.parts[0].mesh.uv)
+    wanted = np.cross(su, sv)
+    assert at == pytest.approx(points, abs=1e-4)
+    assert (normals * wanted).sum(axis=1) == pytest.approx(np.linalg.norm(wanted, axis=1), rel=1e-4)
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2])
+def test_rigid_parts_keep_their_normals_whatever_side_they_face(turn: int) -> None:
+    tooth = patch("tooth", 0, "jaw")
+    data = small_head(parts=[replace(tooth, points=np.roll(tooth.points, turn, axis=1))], seams=[], paint=[])
+    head = Head(data)
+    facing = np.abs(head.parts[0].normals).mean(axis=0)
+    assert facing.argmax() == (2 + turn) % 3 and facing.max() > 0.8
+    values = head.values({"jawOpen": 0.6, "jawForward": 0.5})
+    at, normals = summed(head, Influence(head), values)
+    head.pose(values)
+    assert at == pytest.approx(head.parts[0].vertices, abs=1e-4)
+    assert (normals * head.parts[0].normals).sum(axis=1).min() > 0.9999
 
 
 def test_sums_of_every_vertex_run_over_the_points_of_its_part() -> None:

@@ -86,3 +86,33 @@ def test_added_vertices_are_copies_behind_the_parts_own(head):
         np.testing.assert_array_equal(array[count:], array[[3, 1]])
     assert {k: len(a) for k, a in part.attributes.items()} == {"albedo": count + 2}
     assert len(part.triangles) == triangles + 1 and part.triangles[-1].tolist() == [0, 1, count]
+
+
+def test_a_part_that_was_never_posed_stands_at_rest(head):
+    for posed in (head.part("tooth"), head.part("a")):
+        data = next(p for p in head.data.parts if p.name == posed.name)
+        part = type(posed)(data, head.data, posed.mesh, posed.surface, {})
+        np.testing.assert_array_equal(part.control_points, part.surface.points)
+        np.testing.assert_array_equal(part.turn, np.eye(3))
+        np.testing.assert_allclose(part.vertices, posed.mesh.vertices, atol=1e-5)
+        assert part.changed == [(0, len(part.vertices))] and part.stored is False
+        assert part.share.shape == (len(part.vertices),)
+    assert (head.part("tooth").share == 1.0).all()
+
+
+def test_a_part_that_is_touched_has_changed_in_whole(head):
+    part = head.part("b")
+    part.changed = []
+    part.touch()
+    assert part.changed == [(0, len(part.vertices))]
+
+
+def test_points_are_placed_without_moving_the_part(head):
+    values = head.values({"jawForward": 0.5, "mouthPucker": 1.0, "headYaw": 1.0})
+    before = {p.name: p.vertices.copy() for p in head.parts}
+    placed = dict(zip((p.name for p in head.parts), head.place_points(values)[0], strict=True))
+    for p in head.parts:
+        np.testing.assert_array_equal(p.vertices, before[p.name])
+    np.testing.assert_allclose(placed["tooth"], [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 4]], atol=1e-12)
+    moved = placed["a"] - head.part("a").surface.points
+    assert np.flatnonzero(moved.any(axis=1)).tolist() == [11, 12, 13] and moved[12, 2] == pytest.approx(6.0)

@@ -152,3 +152,56 @@ def test_vertices_between_two_of_the_first_part_are_put_on_its_edge() -> None:
     stitch.close()
     np.testing.assert_allclose(second.vertices[:3, :2], [[0, 0], [0.125, 0.5], [0.5, 2.0]], atol=1e-6)
     np.testing.assert_allclose(second.vertices[4, :2], [0.0, 1.2])
+
+
+LINE = np.array([[0.0, v] for v in np.linspace(0, 1, 5)])
+
+
+def test_what_lies_beyond_either_end_of_the_first_border_is_left_where_it_is() -> None:
+    first = Patch([(0.0, 0.2), (0.0, 0.5), (0.0, 0.8), (-1.0, 0.5)], [[3, 0, 1], [3, 1, 2]])
+    heights = [0.0, 0.1, 0.2, 0.6, 0.8, 0.9, 1.0]
+    corner = len(heights)
+    second = Patch([*((0.0, v) for v in heights), (1.0, 0.5)], [[k, corner, k + 1] for k in range(corner - 1)])
+    stitch = SeamStitch(Seam("a", "b", LINE, LINE), first, second)
+    assert stitch.ids[:3].tolist() == [2, 3, 4] and len(stitch.ids) == 4  # and a sliver's, at the first's 0.5
+    first.vertices[:, 0] += 0.3
+    stitch.close()
+    assert second.vertices[:corner, 0] == pytest.approx([0, 0, 0.3, 0.3, 0.3, 0, 0], abs=1e-6)
+
+
+def test_no_sliver_bridges_a_gap_in_the_second_border() -> None:
+    first = Patch([*((0.0, v) for v in (0.0, 0.5, 1.0)), (-1.0, 0.5)], [[3, 0, 1], [3, 1, 2]])
+    places = [(0.0, 0.0), (0.0, 0.3), (1.0, 0.1), (0.0, 0.7), (0.0, 1.0), (1.0, 0.9)]
+    second = Patch(places, [[0, 2, 1], [3, 5, 4]])
+    stitch = SeamStitch(Seam("a", "b", LINE, LINE), first, second)
+    assert len(second.triangles) == 2 and len(second.vertices) == 6
+    assert stitch.ids.tolist() == [0, 1, 3, 4]
+    assert stitch.share == pytest.approx([0.0, 0.6, 0.4, 1.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(("off", "on"), [(0.0019, True), (0.0021, False)])
+def test_vertices_up_to_two_thousandths_off_the_line_are_on_it(off: float, on: bool) -> None:
+    first = Patch([(0.0, 0.0), (0.0, 1.0), (-1.0, 0.5)], [[2, 0, 1]])
+    second = Patch([(0.0, 0.0), (off, 0.5), (0.0, 1.0), (1.0, 0.5)], [[0, 3, 1], [1, 3, 2]])
+    stitch = SeamStitch(Seam("a", "b", LINE, LINE), first, second)
+    assert (1 in stitch.ids) == on
+
+
+def test_a_border_with_one_vertex_on_the_line_is_no_seam() -> None:
+    first = Patch([(0.0, 0.5), (-1.0, 0.0), (-1.0, 1.0)], [[0, 2, 1]])
+    second = Patch([(0.0, 0.0), (0.0, 0.5), (0.0, 1.0), (1.0, 0.5)], [[0, 3, 1], [1, 3, 2]])
+    assert len(SeamStitch(Seam("a", "b", LINE, LINE), first, second).ids) == 0
+    second.triangles = np.zeros((0, 3), int)
+    second.borders = border_edges(second.triangles)
+    first = Patch([(0.0, 0.0), (0.0, 1.0), (-1.0, 0.5)], [[2, 0, 1]])
+    stitch = SeamStitch(Seam("a", "b", LINE, LINE), first, second)
+    assert [len(a) for a in (stitch.ids, stitch.low, stitch.high, stitch.share)] == [0] * 4
+
+
+def test_vertices_nearer_than_a_ten_thousandth_of_a_step_are_one() -> None:
+    """In points of the line, which has one every 0.25: 0.0001 of it is 0.000025 in v."""
+    first = Patch([*((0.0, v) for v in (0.0, 0.500015, 0.75003, 1.0)), (-1.0, 0.5)], [[4, k, k + 1] for k in range(3)])
+    second = Patch([(0.0, 0.0), (0.0, 0.5), (0.0, 0.75), (0.0, 1.0), (1.0, 0.5)], [[k, 4, k + 1] for k in range(3)])
+    stitch = SeamStitch(Seam("a", "b", LINE, LINE), first, second)
+    assert len(second.vertices) == 6 and len(stitch.ids) == 5  # only for the one 0.00003 beside the second's
+    assert stitch.low[4] == stitch.high[4] == 2 and stitch.share[4] == 0.0

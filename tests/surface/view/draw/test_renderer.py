@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ball_head import RADII, BallHead, BallPart, ball, values
+from ball_head import RADII, BallHead, BallPart, ball, grid, values
 
 from surface.base.errors import ViewError
 from surface.head import Head
@@ -315,3 +315,19 @@ def test_lights_follow_half_of_the_cameras_turn_and_none_of_the_pose(screen: Off
     screen.render(values(), Camera.around(30.0))
     wanted = light_direction(screen.renderer.theme.key, 15.0)
     assert np.array(program["key_at_rest"].value) == pytest.approx(wanted, abs=1e-5)
+
+
+@pytest.mark.parametrize("quality", ["full", "fast"])
+@pytest.mark.parametrize(("material", "seen"), [("mouth", True), ("teeth", False), ("skin", False)])
+def test_backs_are_drawn_of_two_sided_materials_only(gl: None, quality: str, material: str, seen: bool) -> None:
+    """A sheet before the face that looks away from the camera."""
+    uv, triangles = grid(5, 5)
+    points = np.column_stack([60.0 * (uv - 0.5), np.full(len(uv), 130.0)])
+    back = BallPart("sheet", material, triangles[:, ::-1].copy(), points, np.tile([0.0, 0.0, -1.0], (len(uv), 1)))
+    drawn = []
+    for more in ((), (back,)):
+        head = BallHead()
+        head.parts = (*head.parts, *more)
+        with Offscreen(head, SIZE, quality=quality) as screen:
+            drawn.append(screen.render(values()).astype(int))
+    assert (np.abs(middle(drawn[1], 0.5, 0.5) - middle(drawn[0], 0.5, 0.5)).max() > 20.0) == seen

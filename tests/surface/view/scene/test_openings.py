@@ -261,3 +261,15 @@ def test_all_vertices_that_are_read_are_named(head: BallHead) -> None:
     named = {name: set(ids.tolist()) for name, ids in openings.read_vertices().items()}
     assert all(ids <= named[name] for name, ids in asked.items())
     assert set(named) == {"face", *EYES} and all(len(named[name]) == 48 for name in EYES)
+
+
+@pytest.mark.parametrize("size", [0.1, 1e-9])
+def test_lips_pressed_together_still_let_in_a_little_light(head: BallHead, size: float) -> None:
+    shrink = [1.0]
+    openings = Openings(head.parts, lambda part, ids: part.vertices[ids] * np.float32(shrink[0]))
+    shrink[0] = size
+    openings.refresh()
+    mouth = openings.mouth()
+    assert all(np.isfinite(value).all() for value in mouth.values())
+    if size > 0.01:
+        assert np.linalg.norm(mouth["opening_area"]) == pytest.approx(20.0, rel=1e-4)
