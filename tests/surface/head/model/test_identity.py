@@ -92,3 +92,21 @@ def test_damage_is_named(folder):
         path.write_bytes(whole[: int(size)])
         with pytest.raises(HeadFileError, match=r"identities\.npz"):
             load_identities(folder)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("omote/format", np.zeros(0, np.int64), "holds an array of another shape or kind"),
+        ("fit", np.array(["x", "y"]), "holds an array of another shape or kind"),
+        ("eyes", None, "has no array 'eyes'"),
+        ("jaw", np.full((2, 3), np.nan), "or is not finite"),
+    ],
+)
+def test_wrong_arrays_are_told_in_words_about_the_file(folder, key, value, message):
+    """numpy's own say "index 0 is out of bounds for axis 0 with size 0"."""
+    with np.load(folder / "identities.npz") as stored:
+        arrays = {name: stored[name] for name in stored.files if name != key}
+    np.savez(folder / "identities.npz", **arrays | ({} if value is None else {key: value}))
+    with pytest.raises(HeadFileError, match=message):
+        load_identities(folder)
