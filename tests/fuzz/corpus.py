@@ -277,8 +277,9 @@ def _meshes(folder: Path) -> list[Kind]:
         Kind("names", "names.toml", [b'[names]\nmouthWide = "jawOpen"\n"Head.Smile_L" = "mouthSmileLeft"\n'],
              reports(read_names), {"mesh.glb": small.bytes()},
              ("fit", "{folder}/mesh.glb", "--names", "{}", "-o", "{out}"), FIT_S),
-        Kind("modes", "modes.npz", [_modes(grid)], reports(lambda path: read_modes(path, grid, path)),
-             {"mesh.npz": (folder / "mesh.npz").read_bytes()}),  # no command comes so far with a mesh without a recipe
+        Kind("modes", "modes.npz", [_modes(grid)],  # no command comes so far with a mesh without a recipe
+             reports(lambda path: read_modes(path, grid, path.with_name("mesh.npz"))),
+             {"mesh.npz": (folder / "mesh.npz").read_bytes()}),
     ]  # fmt: skip
 
 

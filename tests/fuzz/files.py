@@ -26,7 +26,7 @@ from pathlib import Path
 
 from tests.fuzz.corpus import Kind, kinds
 from tests.fuzz.mutators import mutate
-from tests.fuzz.outcome import Outcome
+from tests.fuzz.outcome import PROCESSOR_S, Outcome
 from tests.fuzz.processes import Job, Worker, attempt
 from tests.fuzz.reading import quickened
 
@@ -81,11 +81,14 @@ class Fuzzer:
     """Reads damaged files with several processes and counts what comes of them.
 
     seed : of all damages. keep : folder for files with a fault. commands : whole commands, a process for each.
+    most_s : processor time allowed, but for commands that allow more.
     """
 
-    def __init__(self, seed: int, keep: Path | None = None, *, commands: bool = False) -> None:
+    def __init__(
+        self, seed: int, keep: Path | None = None, *, commands: bool = False, most_s: float = PROCESSOR_S
+    ) -> None:
         self.tallies: dict[str, Tally] = {}
-        self._seed, self._keep, self._commands = seed, keep, commands
+        self._seed, self._keep, self._commands, self._most_s = seed, keep, commands, most_s
         self._running: dict[Worker, Turn] = {}
         self._folder = tempfile.TemporaryDirectory(prefix="fuzz-", dir=_memory())
         self._began_s = self._shown_s = time.monotonic()
@@ -124,7 +127,7 @@ class Fuzzer:
                 self._note(turn.kind, number, self._alone(turn.kind, number))
                 self._show(last=False)
         else:
-            self._running[Worker.start(jobs)] = turn
+            self._running[Worker.start(jobs, self._most_s)] = turn
 
     def _alone(self, kind: Kind, number: int) -> Outcome:
         """Read a file in a process of its own: by the whole command, or as the workers do."""
@@ -133,7 +136,7 @@ class Fuzzer:
             path.write_bytes(damaged(kind, self._seed, number))
             if self._commands:
                 return attempt(lambda: kind.command(path), kind.most_s)
-            return attempt(lambda: kind.read(path), Outcome.most_s)
+            return attempt(lambda: kind.read(path), self._most_s)
 
     def _listen(self) -> Iterator[Turn]:
         """Take what the workers send; gives what those left undone that ended early."""

@@ -117,7 +117,7 @@ def inside_archive(data: bytes, draw: random.Random) -> bytes:
 
 def mutate(data: bytes, draw: random.Random) -> bytes:
     """One to three damages, one after the other: to what the file says, or to its bytes."""
-    if draw.random() < 0.5:
+    if draw.random() < 0.65:
         sound = (damage_arrays if data.startswith(b"PK") else damage_tree)(data, draw)
         if sound is not None:
             return sound

@@ -42,13 +42,13 @@ class Worker:
     done: int = 0
 
     @classmethod
-    def start(cls, jobs: Callable[[], Iterator[Job]]) -> Worker:
-        """Fork a process that does `jobs`, which it draws one at a time."""
+    def start(cls, jobs: Callable[[], Iterator[Job]], most_s: float) -> Worker:
+        """Fork a process that does `jobs`, which it draws one at a time, each in so much processor time."""
         ours, theirs = get_context("fork").Pipe(duplex=False)
         pid = os.fork()
         if pid == 0:
             ours.close()
-            _do_all(jobs, theirs)
+            _do_all(jobs, theirs, most_s)
         theirs.close()
         return cls(ours, pid, time.monotonic())
 
@@ -111,14 +111,14 @@ def _do_alone(job: Job, output: IO[bytes], most_s: float) -> None:
         os._exit(code)
 
 
-def _do_all(jobs: Callable[[], Iterator[Job]], connection: Connection) -> None:
+def _do_all(jobs: Callable[[], Iterator[Job]], connection: Connection, most_s: float) -> None:
     """What the process of a worker does; it never returns."""
     try:
         gc.freeze()  # what was imported stays; searching it again and again would copy its pages
         with tempfile.TemporaryFile() as output:
             _limit(output)
             for job in jobs():
-                connection.send(_measured(job, output))
+                connection.send(_measured(job, output, most_s))
     except BaseException:  # noqa: BLE001  the parent judges by the code
         os._exit(98)
     os._exit(0)
@@ -141,19 +141,19 @@ def _allow_processor(most_s: float) -> None:
     )
 
 
-def _measured(job: Job, output: IO[bytes]) -> Outcome:
+def _measured(job: Job, output: IO[bytes], most_s: float) -> Outcome:
     """Do one job in a worker."""
     os.ftruncate(output.fileno(), 0)
     os.lseek(output.fileno(), 0, os.SEEK_SET)
     Path("/proc/self/clear_refs").write_text("5")  # the largest memory so far is that of now
     base_mb = int(STATM.read_text().split()[1]) * PAGE_MB
     before_s = time_used()
-    _allow_processor(2.0)
+    _allow_processor(most_s)
     code = _code_of(job)
     spent_s = time_used() - before_s
     own_kb = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
     largest_mb = max(int(own_kb.split()[1]), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024
-    return Outcome(code, spent_s, largest_mb - base_mb, _text_of(output))
+    return Outcome(code, spent_s, largest_mb - base_mb, _text_of(output), most_s)
 
 
 def time_used() -> float:
