@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import random
@@ -12,12 +13,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.fuzz.corpus import Kind
 from tests.fuzz.files import Fuzzer, Turn, turns_of
 from tests.fuzz.mutators import mutate
-from tests.fuzz.structures import change_tree
+from tests.fuzz.structures import change_tree, damage_arrays
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_S = 1.0
@@ -128,3 +130,10 @@ def test_structures_stay_sound_and_the_same_seed_gives_the_same_damage() -> None
     assert sound > 100
     tree = json.loads(data)
     assert change_tree(tree, random.Random(1)) != tree == json.loads(data)
+
+
+def test_arrays_of_every_shape_can_be_damaged() -> None:
+    stored = io.BytesIO()
+    np.savez(stored, none=np.zeros(0), one=np.array(7), many=np.ones((3, 4)), names=np.array(["a", "bc"]))
+    changed = [damage_arrays(stored.getvalue(), random.Random(k)) for k in range(500)]
+    assert None not in changed and len(set(changed)) > 100

@@ -114,6 +114,13 @@ class Fuzzer:
         """How many files had a fault."""
         return sum(len(tally.faults) for tally in self.tallies.values())
 
+    def print_table(self) -> None:
+        """A line for each kind, and its first faults with the seed and the number of the file."""
+        for name, tally in sorted(self.tallies.items()):
+            print(f"{name:14} {tally}")
+            for number, fault, text in tally.faults[:MOST_SHOWN]:
+                print(f"    {self._seed}/{number}: {fault}: {text}")
+
     def _begin(self, turn: Turn) -> None:
         def jobs() -> Iterator[Job]:
             with tempfile.TemporaryDirectory(dir=self._folder.name) as folder:
@@ -238,10 +245,8 @@ def main() -> int:
         fuzzer.run(turns_of(every, given.count), given.jobs, time.monotonic() + 60.0 * given.minutes)
     except KeyboardInterrupt:
         print("interrupted: what was read so far", file=sys.stderr)
-    for name, tally in sorted(fuzzer.tallies.items()):
-        print(f"{name:14} {tally}")
-        for number, fault, text in tally.faults[:MOST_SHOWN]:
-            print(f"    {given.seed}/{number}: {fault}: {text}")
+    finally:
+        fuzzer.print_table()
     return int(fuzzer.faults > 0)
 
 

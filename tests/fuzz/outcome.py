@@ -13,6 +13,7 @@ INTERNALS = re.compile(  # Python's own words, which say nothing to who wrote th
     r"NoneType|object has no attribute|not subscriptable|unhashable|<class |out of (range|bounds) for axis|"
     r"(list|tuple) index out of range|unsupported operand|codec can't|object is not|positional argument"
 )
+MESSAGE = re.compile(r"^error:", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,8 @@ class Outcome:
             return f"exit code {self.code}"
         if "Traceback" in self.output:
             return "a traceback"
-        if self.code == 1 and self.output.count("error:") != 1:
-            return f"{self.output.count('error:')} messages"
+        if self.code == 1 and (count := len(MESSAGE.findall(self.output))) != 1:
+            return f"{count} messages"
         if self.processor_s > self.most_s:
             return f"{self.processor_s:.1f} s of processor time"
         if self.memory_mb > MEMORY_MB:

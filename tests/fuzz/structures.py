@@ -146,7 +146,7 @@ def damage_array(array: Array, draw: random.Random) -> Array:
             order = np.random.default_rng(draw.randrange(2**32)).permutation(len(flat))
             flat = flat[order]
         case _:
-            return draw.choice((np.zeros(0), np.zeros((3, 0)), np.array("x"), np.array(1e308), array.T, array[::-1]))
+            return draw.choice((np.zeros(0), np.zeros((3, 0)), np.array("x"), np.array(1e308), array.T, np.flip(array)))
     return flat.reshape(array.shape)
 
 
