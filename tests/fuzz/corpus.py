@@ -23,6 +23,7 @@ from surface.fit.source.names import read_names
 from surface.head import Head, save_data
 from surface.head.model.data import Contact, Rule
 from surface.head.model.identity import Identity, fingerprint, save_identities
+from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.posing.baked import write_decimated, write_shade
 from surface.readers.common import NamedSurface
 from surface.readers.plain import write_surfaces
@@ -307,7 +308,8 @@ def _save_head(folder: Path) -> None:
     places = np.stack([np.stack([u, 0.5 + v], axis=-1), np.stack([u, 0.5 - v], axis=-1)])
     rule = Rule("frown", ({"mouthPucker": 0.5, "jawOpen": 0.5},), 2.0)
     data = small_head(contacts=[Contact("lips", "a", ("b",), -1, 60.0, 0.5, places)], rules=[rule])
-    save_data(folder, data)
+    parts = [replace(p, mesh=pack(tessellate(p, make_surface(p), data.seams), p.budget)) for p in data.parts]
+    save_data(folder, replace(data, parts=parts))
     head = Head.load(folder)
     wide = Identity("wide", {"a": all_points("wide", (1, 0, 0))}, {}, np.zeros((2, 3)), np.zeros(3), fingerprint(data))
     save_identities(folder, [wide])

@@ -101,6 +101,7 @@ def test_damage_is_named(folder):
         ("fit", np.array(["x", "y"]), "holds an array of another shape or kind"),
         ("eyes", None, "has no array 'eyes'"),
         ("jaw", np.full((2, 3), np.nan), "or is not finite"),
+        ("0/ids/a", np.arange(25) + 2**31, "an array of control points holds something else"),
     ],
 )
 def test_wrong_arrays_are_told_in_words_about_the_file(folder, key, value, message):
