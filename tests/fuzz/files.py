@@ -19,7 +19,7 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Iterator
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import nullcontext, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -96,7 +96,7 @@ class Fuzzer:
     def run(self, turns: Iterator[Turn], jobs: int, end_s: float) -> None:
         """Take all turns, or as many as begin before a time."""
         todo: deque[Turn] = deque()
-        with self._folder, quickened():
+        with self._folder, nullcontext() if self._commands else quickened():
             while True:
                 while len(self._running) < jobs and time.monotonic() < end_s:
                     turn = todo.popleft() if todo else next(turns, None)
