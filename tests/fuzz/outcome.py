@@ -11,7 +11,8 @@ MEMORY_MB = 500
 MOST_TEXT = 40_000  # characters of a message: fifty faults of a file with long names
 INTERNALS = re.compile(  # Python's own words, which say nothing to who wrote the file
     r"NoneType|object has no attribute|not subscriptable|unhashable|<class |out of (range|bounds) for axis|"
-    r"(list|tuple) index out of range|unsupported operand|codec can't|object is not|positional argument"
+    r"(list|tuple) index out of range|unsupported operand|codec can't|object is not|positional argument|"
+    r"constrained-|function-(before|after|wrap|plain)"
 )
 MESSAGE = re.compile(r"^error:", re.MULTILINE)
 
