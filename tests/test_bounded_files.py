@@ -5,8 +5,6 @@ from __future__ import annotations
 import ast
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -145,12 +143,3 @@ def test_only_the_first_faults_of_a_file_are_listed(tmp_path: Path) -> None:
     with pytest.raises(OMOTE_ERRORS, match=r"1000 faults[\s\S]*and 950 more") as raised:
         check_anything(str(path))
     assert len(str(raised.value).splitlines()) == 52
-
-
-def test_damaged_files_of_some_kinds_are_each_one_message() -> None:
-    """The short form of ``make fuzz``."""
-    kinds = ["stage", "wav", "head.npz"]
-    command = [sys.executable, "-m", "tests.fuzz.files", "--count", "10", "--jobs", "1", "--only", *kinds]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count(" 10 files") == len(kinds)

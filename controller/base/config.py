@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -17,6 +18,7 @@ from surface.base import files
 Model = TypeVar("Model", bound=BaseModel)
 
 _MOST_FAULTS = 50  # listed of a file
+_KIND = re.compile(r"(constrained|function)-|(tuple|list|dict)\[")  # pydantic's names of kinds: no keys of the file
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite number; neither ``true`` nor ``"1"`` is one."""
@@ -58,7 +60,7 @@ def check(table: dict[str, Any], model: type[Model], path: Path,
     try:
         read = model.model_validate(table)
     except ValidationError as error:
-        faults = [describe(fault, model) for fault in error.errors()]
+        faults = describe_all(error.errors(), model)
         rest = PartialConfig(table, model, error)
         if cross_check is not None and rest.read is not None:
             faults += rest.relocate(cross_check(rest.read))
@@ -77,6 +79,24 @@ def config_error(path: Path, faults: list[str]) -> ConfigError:
     newer = any(NEWER in fault for fault in faults)
     hint = "pip install --upgrade omote" if newer else f"correct the file, then: omote check {path}"
     return ConfigError(f"{path}: {count}\n{listing}", hint=hint)
+
+
+def describe_all(faults: Iterable[Any], model: type[BaseModel]) -> list[str]:
+    """Faults as :func:`describe`; those of a value that may be of several kinds become one."""
+    found: dict[str, list[str]] = {}
+    single: list[str] = []
+    for fault in faults:
+        place = tuple(part for part in fault["loc"] if not _KIND.match(str(part)))
+        text = describe({**fault, "loc": place}, model)
+        where, _, reason = text.partition(": ")
+        if place == fault["loc"]:
+            single.append(text)
+        elif where not in found:
+            found[where] = [reason]
+            single.append(where)
+        elif reason not in found[where]:
+            found[where].append(reason)
+    return [f"{text}: {', or '.join(found[text])}" if text in found else text for text in single]
 
 
 def describe(fault: Any, model: type[BaseModel]) -> str:

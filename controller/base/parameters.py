@@ -66,14 +66,17 @@ class Parameters:
     def __len__(self) -> int:
         return len(self.names)
 
+    def find(self, name: str) -> int | None:
+        """Position of ``name``, any known spelling; None for what is no parameter."""
+        found = self._lookup.get(name)  # the canonical spelling needs no folding
+        return self._lookup.get(fold(name)) if found is None else found
+
     def index(self, name: str) -> int:
         """Position of ``name``, any known spelling.
 
         Raises ParameterError: no such parameter; the message suggests the nearest names.
         """
-        found = self._lookup.get(name)  # the canonical spelling needs no folding
-        if found is None:
-            found = self._lookup.get(fold(name))
+        found = self.find(name)
         if found is None:
             raise ParameterError(
                 f"unknown parameter {name!r}{did_you_mean(name, self.names)}",

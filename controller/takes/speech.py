@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -125,10 +126,25 @@ def _tsv_rows(path: Path, text: str) -> tuple[list[tuple[str, float, str]], floa
 
 def _json_rows(path: Path, text: str) -> tuple[list[tuple[str, float, str]], float]:
     try:
-        cues = files.parse_json(text)["mouthCues"]
-        rows = [(f"mouthCues[{i}]", float(cue["start"]), str(cue["value"])) for i, cue in enumerate(cues)]
-        return rows, float(cues[-1]["end"]) if cues else 0.0
-    except (LookupError, TypeError, ValueError, OverflowError) as error:
-        raise TakeError(
-            f"{path}: not the output of rhubarb -f json: {error}", hint="rhubarb -f json voice.wav"
-        ) from error
+        table = files.parse_json(text)
+        cues = table.get("mouthCues") if isinstance(table, dict) else None
+        if not isinstance(cues, list):
+            raise ValueError("there is no list mouthCues")
+        every = [_json_cue(f"mouthCues[{i}]", cue) for i, cue in enumerate(cues)]
+    except ValueError as error:
+        why = f"{path}: not the output of rhubarb -f json: {error}"
+        raise TakeError(why, hint="rhubarb -f json voice.wav") from error
+    return [(where, start_s, name) for where, start_s, _, name in every], every[-1][2] if every else 0.0
+
+
+def _json_cue(where: str, cue: Any) -> tuple[str, float, float, str]:
+    """Place, start (s), end (s) and name of a cue. Raises ValueError, which names the key."""
+    if not isinstance(cue, dict):
+        raise ValueError(f"{where} must be a table")
+    for key in ("start", "end"):
+        value = cue.get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1e12:
+            raise ValueError(f"{where}.{key} must be a time in seconds")
+    if not isinstance(cue.get("value"), str):
+        raise ValueError(f"{where}.value must be a name")
+    return where, float(cue["start"]), float(cue["end"]), cue["value"]

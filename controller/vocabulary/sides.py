@@ -6,21 +6,16 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, did_you_mean
 
 
 def sides(parameters: Parameters, name: str) -> list[int]:
     """Positions that ``name`` means: itself, or its left and right; empty when unknown."""
-    found = []
-    for spelling in (name, f"{name}Left", f"{name}Right"):
-        try:
-            found.append(parameters.index(spelling))
-        except ParameterError:
-            continue
-        if spelling == name:
-            break
-    return found
+    itself = parameters.find(name)
+    if itself is not None:
+        return [itself]
+    each = (parameters.find(f"{name}{side}") for side in ("Left", "Right"))
+    return [position for position in each if position is not None]
 
 
 def unknown_names(parameters: Parameters, where: str, names: Iterable[str]) -> list[str]:

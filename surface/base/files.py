@@ -194,7 +194,9 @@ def read_npz(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> dict[str,
                 raise ValueError("holds Python objects, which omote does not load") from error
             if isinstance(error, OSError) and error.strerror:
                 raise  # the disk's fault, not the content's
-            raise ValueError(f"not a sound archive of arrays: {error}") from error
+            foreign_words = isinstance(error, UnicodeError | TypeError | LookupError)  # the interpreter's own
+            why = "it is damaged" if foreign_words else str(error)
+            raise ValueError(f"not a sound archive of arrays: {why}") from error
     if foreign := [name for name, array in found.items() if not isinstance(array, np.ndarray)]:
         raise ValueError(f"{foreign[0]} is no array")  # numpy gives the bytes of a member that it does not know
     return found

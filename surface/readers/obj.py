@@ -12,6 +12,7 @@ from surface.readers.meshdata import MeshData, check_size, read_bytes
 
 Corner = tuple[int, int]
 Lines = list[tuple[int, bytes]]
+MOST_INDEX = 2**31 - 1
 NEUTRAL = ("neutral", "basis", "base", "rest")
 
 
@@ -130,6 +131,8 @@ class _Parser:
             raise self._error(number, f"{text[:20].decode('utf-8', 'replace')!r} is no corner of a face") from e
         v = vertex - 1 if vertex > 0 else len(self.vertices) + vertex
         t = texture - 1 if texture >= 0 else len(self._textures) + texture
+        if max(v, t) > MOST_INDEX:
+            raise self._error(number, f"corner {text[:40].decode('utf-8', 'replace')} points beyond the last vertex")
         if vertex == 0 or v < 0 or t < -1:
             raise self._error(number, f"corner {text.decode('utf-8', 'replace')} points before the first vertex")
         return v, t

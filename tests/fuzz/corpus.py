@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import struct
-import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -13,24 +14,79 @@ from pathlib import Path
 import numpy as np
 
 from controller.base.parameters import PARAMETERS
-from controller.cli.app import main, report_error
 from controller.layers.commands import CommandState
 from controller.takes.recording import recorded
-from surface.base.errors import SurfaceError
-from surface.fit.source.load import load_mesh
+from surface.fit.identities import read_modes
+from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh
+from surface.fit.source.names import read_names
 from surface.head import Head, save_data
 from surface.head.model.data import Contact, Rule
 from surface.head.model.identity import Identity, fingerprint, save_identities
+from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.posing.baked import write_decimated, write_shade
 from surface.readers.common import NamedSurface
 from surface.readers.plain import write_surfaces
-from tests.surface.meshfiles import glb, write_obj
+from tests.fuzz.outcome import PROCESSOR_S
+from tests.fuzz.reading import check, reports, run_command
+from tests.surface.meshfiles import GlbBuilder, glb, write_obj
 from tests.surface.readers.test_gismo import geometry, hierarchy, tensor
 from tests.surface.readers.test_tsm import Writer, cells
 from tests.surface.small_head import all_points, sheet, small_head
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
+ROBOTS = ("head-text", "eyes-maestro", "head-arduino", "head-dynamixel1", "head-feetech", "head-ssc32")
+CALIBRATED = "head24.mine.calibration.toml"
+EXPRESSIONS = b"""[grin]
+kind = "gesture"
+aliases = ["wide_smile", "beam"]
+source = "AU 6+12"
+onset_s = 0.45
+offset_s = 0.6
+blink = "blend"
+gaze = "keep"
+weights = { mouthSmile = 0.85, cheekSquint = 0.75, jawOpen = 0.06 }
+[sulk]
+kind = "user"
+weights = { browDown = 0.5, mouthFrownLeft = 0.3 }
+[mixed]
+kind = "user"
+onset_s = 0.2
+of = { grin = 0.4, sulk = 0.6 }
+"""
+CALIBRATION = b"""format = 1
+name = "mine"
+robot = "head24"
+[channels.jaw]
+min_deg = -8.5
+neutral_deg = 0.0
+max_deg = 24.25
+[channels.neckYaw]
+min_deg = -40
+neutral_deg = 1.5
+max_deg = 41
+"""
+WIDE_STAGE = b"""name = "wide"
+head = "ict"
+robots = ["head24", "eyes-maestro"]
+liveliness = 0.5
+show = "tour"
+[face]
+size = [640, 480]
+fps = 30
+quality = "full"
+theme = "mask"
+background = ["#102030", "#405060"]
+[[links]]
+kind = "line"
+port = "simulated"
+checksum = "latched"
+script = "tour"
+[[links]]
+kind = "line"
+port = "/dev/ttyUSB9"
+baud = 1000000
+"""
 
 
 @dataclass(frozen=True)
@@ -41,33 +97,41 @@ class Kind:
     ----------
     name : of the kind. file : path in a folder under which it is read.
     seeds : good files. read : reads one and returns omote's exit code. beside : files that belong to it.
+    words : of the command that reads it, ``{}`` its path; ``omote check`` without.
+    most_s : processor time of that command; more where it goes on to fit.
     """
 
     name: str
     file: str
     seeds: list[bytes]
-    read: Callable[[Path], int]
+    read: Callable[[Path], int] = check
     beside: dict[str, bytes] = field(default_factory=dict)
+    words: tuple[str, ...] = ()
+    most_s: float = PROCESSOR_S
+
+    def lay_out(self, folder: Path) -> Path:
+        """Write what belongs to it into a folder; returns the path where it is read itself."""
+        path = folder / self.file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for name, data in self.beside.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+        return path
+
+    def command(self, path: Path) -> int:
+        """Run the command that reads it."""
+        if not self.words:
+            return check(path)
+        with tempfile.TemporaryDirectory(prefix="fuzz-") as out:
+            given = {"{}": str(path), "{folder}": str(path.parent), "{out}": f"{out}/head"}
+            words = self.words
+            for name, text in given.items():
+                words = tuple(word.replace(name, text) for word in words)
+            return run_command(words)
 
 
-def check(path: Path) -> int:
-    """``omote check`` of a file; of its folder where it belongs to a head."""
-    sys.argv = ["omote", "check", str(path.parent if path.parent.name == "head" else path)]
-    try:
-        main()
-    except SystemExit as ended:
-        return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
-    return 0
-
-
-def mesh(path: Path) -> int:
-    """What ``omote fit`` reads before it fits."""
-    try:
-        load_mesh(path)
-    except SurfaceError as error:
-        report_error(error)
-        return 1
-    return 0
+FIT = ("fit", "{}", "-o", "{out}")
+FIT_S = 60.0
 
 
 def kinds() -> list[Kind]:
@@ -84,18 +148,17 @@ def kinds() -> list[Kind]:
 
 def _configs() -> list[Kind]:
     named = {
-        "stage": ["stages/demo.toml", "stages/everything.toml", "stages/play.toml"],
-        "robot": ["robots/head24.toml", "robots/head-text.toml", "robots/eyes-maestro.toml"],
-        "script": ["scripts/everything.toml"],
-        **{
-            name: [f"vocabularies/{name}.toml"]
-            for name in ("arkit", "expressions", "facs", "affect", "visemes", "layers")
-        },
+        "stage": ["stages/demo.toml", "stages/everything.toml", "stages/play.toml", "stages/serial.toml"],
+        "robot": ["robots/head24.toml", *(f"robots/{name}.toml" for name in ROBOTS)],
+        "script": ["scripts/everything.toml", "scripts/tour.toml"],
+        **{name: [f"vocabularies/{name}.toml"] for name in ("arkit", "facs", "affect", "visemes", "layers")},
         "life": ["life/natural.toml"],
     }
+    found = [Kind(name, f"{name}.toml", [(CONFIGS / f).read_bytes() for f in files]) for name, files in named.items()]
     return [
-        Kind(name, f"{name}.toml", [(CONFIGS / f).read_bytes() for f in files], check) for name, files in named.items()
-    ]
+        *found, Kind("stage-wide", "stage.toml", [WIDE_STAGE]), Kind("expressions", "own.toml", [EXPRESSIONS]),
+        Kind("calibration", CALIBRATED, [CALIBRATION]),
+    ]  # fmt: skip
 
 
 def wav(samples: np.ndarray, rate: int = 16000) -> bytes:
@@ -118,17 +181,15 @@ def _takes(folder: Path) -> list[Kind]:
     header = (
         "Timecode,BlendShapeCount," + ",".join(n[0].upper() + n[1:] for n in names[:52]) + ",HeadYaw,HeadPitch,HeadRoll"
     )
-    rows = [f"00:00:{k // 60:02}:{k % 60:02}.000,61," + ",".join(["0.25"] * 55) for k in range(90)]
+    rows = [f"00:00:{k // 60:02}:{k % 60:02}.000,61," + ",".join(["0.25"] * 55) for k in range(20)]
     cues = [{"start": 0.0, "end": 0.3, "value": "A"}, {"start": 0.3, "end": 0.9, "value": "D"}]
     return [
-        Kind("csv", "take.csv", ["\n".join([header, *rows]).encode()], check),
-        Kind("tsv", "speech.tsv", [b"0.00\tX\n0.10\tD\n0.40\tB\n0.90\tX\n", b"0.0\taa\n0.5\tPP\n1.0\tsil\n"], check),
-        Kind(
-            "rhubarb", "speech.json", [json.dumps({"metadata": {"duration": 0.9}, "mouthCues": cues}).encode()], check
-        ),
-        Kind("wav", "voice.wav", [wav(8000 * np.sin(np.arange(8000) / 9.0))], check),
-        Kind("recording", "run.rec", [_recording(folder / "run.rec")], check),
-        Kind("group", "group.json", [_group()], check),
+        Kind("csv", "take.csv", ["\n".join([header, *rows]).encode()]),
+        Kind("tsv", "speech.tsv", [b"0.00\tX\n0.10\tD\n0.40\tB\n0.90\tX\n", b"0.0\taa\n0.5\tPP\n1.0\tsil\n"]),
+        Kind("rhubarb", "speech.json", [json.dumps({"metadata": {"duration": 0.9}, "mouthCues": cues}).encode()]),
+        Kind("wav", "voice.wav", [wav(8000 * np.sin(np.arange(3000) / 9.0))]),
+        Kind("recording", "run.rec", [_recording(folder / "run.rec")]),
+        Kind("group", "group.json", [_group()]),
     ]
 
 
@@ -155,23 +216,40 @@ def _surfaces(folder: Path) -> list[Kind]:
         geometry("THBSpline2", hierarchy("THBSpline", [(1, 0, 0, 4, 4)]), rng.normal(size=(48, 3))).encode(),
     ]
     kinds = [
-        Kind("surface", "surface.json", [(folder / "plain.json").read_bytes()], check),
-        Kind("gismo", "surface.xml", xml, check),
-        Kind("tsm", "surface.tsm", [Writer(cells([0, 1, 2, 3], [0, 1, 2])).text().encode()], check),
+        Kind("surface", "surface.json", [(folder / "plain.json").read_bytes()]),
+        Kind("gismo", "surface.xml", xml),
+        Kind("tsm", "surface.tsm", [Writer(cells([0, 1, 2, 3], [0, 1, 2])).text().encode()]),
     ]
+    return [*kinds, *_rhino(folder / "ball.3dm")]
+
+
+def _rhino(path: Path) -> list[Kind]:
+    """A ball, a box, a cylinder and a trimmed disc; nothing without rhino3dm."""
     try:
-        import rhino3dm
+        import rhino3dm as rhino
     except ImportError:
-        return kinds
-    file = rhino3dm.File3dm()
-    file.Objects.AddSphere(rhino3dm.Sphere(rhino3dm.Point3d(0, 0, 0), 5.0))
-    file.Write(str(folder / "ball.3dm"), 7)
-    return [*kinds, Kind("3dm", "surface.3dm", [(folder / "ball.3dm").read_bytes()], check)]
+        return []
+    middle = rhino.Point3d(0, 0, 0)
+    circle = rhino.Circle(middle, 2.0)
+    box = rhino.BoundingBox(middle, rhino.Point3d(1, 2, 3))
+    shapes = [
+        rhino.Sphere(middle, 5.0).ToBrep(),
+        rhino.Brep.CreateFromBoundingBox(box),
+        rhino.Extrusion.CreateCylinderExtrusion(rhino.Cylinder(circle, 4.0), True, True),
+        rhino.Brep.CreateTrimmedPlane(rhino.Plane(middle, rhino.Vector3d(0, 0, 1)), circle.ToNurbsCurve()),
+    ]
+    seeds = []
+    for shape in shapes:
+        file = rhino.File3dm()
+        file.Objects.Add(shape)
+        file.Write(str(path), 7)
+        seeds.append(path.read_bytes())
+    return [Kind("3dm", "surface.3dm", seeds)]
 
 
 def _grid() -> FitMesh:
     """A sheet of quads with one shape."""
-    side = 9
+    side = 5
     u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, side), np.linspace(0, 1, side)))
     corner = np.arange(side * side).reshape(side, side)
     faces = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 4)
@@ -182,17 +260,46 @@ def _grid() -> FitMesh:
 
 def _meshes(folder: Path) -> list[Kind]:
     grid = _grid()
-    write_obj(folder / "mesh.obj", grid)
+    write_obj(folder / "mesh.obj", grid, folder / "shapes")
     np.savez(
         folder / "mesh.npz", neutral=grid.vertices, faces=grid.faces, uv=grid.uv, face_uv=grid.face_uv,
         names=np.array(grid.names), deltas=grid.deltas,
     )  # fmt: skip
     small = glb(replace(grid))
+    whole, shape = (folder / "mesh.obj").read_bytes(), (folder / "shapes" / "jawOpen.obj").read_bytes()
+    read = reports(load_mesh)
     return [
-        Kind("obj", "mesh.obj", [(folder / "mesh.obj").read_bytes()], mesh),
-        Kind("glb", "mesh.glb", [small.bytes(), glb(grid, sparse=True).bytes()], mesh),
-        Kind("npz", "mesh.npz", [(folder / "mesh.npz").read_bytes()], mesh),
-    ]
+        Kind("obj", "mesh.obj", [whole], read, words=FIT, most_s=FIT_S),
+        Kind("glb", "mesh.glb", [small.bytes(), glb(grid, sparse=True).bytes()], read, words=FIT, most_s=FIT_S),
+        Kind("gltf", "mesh.gltf", [_gltf(small), _gltf(glb(grid, sparse=True))], read, words=FIT, most_s=FIT_S),
+        Kind("npz", "mesh.npz", [(folder / "mesh.npz").read_bytes()], read, words=FIT, most_s=FIT_S),
+        Kind("shape", "shapes/jawOpen.obj", [shape], reports(_with_shapes), {"mesh.obj": whole},
+             ("fit", "{folder}/../mesh.obj", "--shapes", "{folder}", "-o", "{out}"), FIT_S),
+        Kind("names", "names.toml", [b'[names]\nmouthWide = "jawOpen"\n"Head.Smile_L" = "mouthSmileLeft"\n'],
+             reports(read_names), {"mesh.glb": small.bytes()},
+             ("fit", "{folder}/mesh.glb", "--names", "{}", "-o", "{out}"), FIT_S),
+        Kind("modes", "modes.npz", [_modes(grid)],  # no command comes so far with a mesh without a recipe
+             reports(lambda path: read_modes(path, grid, path.with_name("mesh.npz"))),
+             {"mesh.npz": (folder / "mesh.npz").read_bytes()}),
+    ]  # fmt: skip
+
+
+def _with_shapes(path: Path) -> Loaded:
+    return load_mesh(path.parents[1] / "mesh.obj", LoadOptions(shapes=path.parent))
+
+
+def _gltf(builder: GlbBuilder) -> bytes:
+    """A mesh as JSON alone, its buffer in a data URI."""
+    builder.bytes()
+    uri = "data:application/octet-stream;base64," + base64.b64encode(builder.data).decode()
+    return json.dumps(builder.document | {"buffers": [{"byteLength": len(builder.data), "uri": uri}]}).encode()
+
+
+def _modes(mesh: FitMesh) -> bytes:
+    """Two ways in which a mesh may vary; its own vertices besides, as in a mesh's file."""
+    out = io.BytesIO()
+    np.savez(out, deltas=np.stack([mesh.vertices, -mesh.vertices]), neutral=mesh.vertices)
+    return out.getvalue()
 
 
 def _save_head(folder: Path) -> None:
@@ -201,7 +308,8 @@ def _save_head(folder: Path) -> None:
     places = np.stack([np.stack([u, 0.5 + v], axis=-1), np.stack([u, 0.5 - v], axis=-1)])
     rule = Rule("frown", ({"mouthPucker": 0.5, "jawOpen": 0.5},), 2.0)
     data = small_head(contacts=[Contact("lips", "a", ("b",), -1, 60.0, 0.5, places)], rules=[rule])
-    save_data(folder, data)
+    parts = [replace(p, mesh=pack(tessellate(p, make_surface(p), data.seams), p.budget)) for p in data.parts]
+    save_data(folder, replace(data, parts=parts))
     head = Head.load(folder)
     wide = Identity("wide", {"a": all_points("wide", (1, 0, 0))}, {}, np.zeros((2, 3)), np.zeros(3), fingerprint(data))
     save_identities(folder, [wide])
@@ -213,6 +321,6 @@ def _heads(folder: Path) -> list[Kind]:
     _save_head(folder / "head")
     files = {path.name: path.read_bytes() for path in sorted((folder / "head").iterdir())}
     return [
-        Kind(name, f"head/{name}", [data], check, {n: d for n, d in files.items() if n != name})
+        Kind(name, f"head/{name}", [data], beside={f"head/{n}": d for n, d in files.items() if n != name})
         for name, data in files.items()
     ]

@@ -8,6 +8,8 @@ import re
 import zipfile
 from collections.abc import Callable
 
+from tests.fuzz.structures import damage_arrays, damage_tree
+
 Mutator = Callable[[bytes, random.Random], bytes]
 
 NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
@@ -18,24 +20,7 @@ EXTREMES = (
     *(b"99999999999999999999999999", b'""', b"''", b"[]", b"{}", b"null", b"true", b'"\\u0000"', b"1_0", b"0x10"),
 )
 TOKENS = (
-    b"{",
-    b"}",
-    b"[",
-    b"]",
-    b'"',
-    b"'",
-    b",",
-    b":",
-    b"=",
-    b"\n",
-    b"\r",
-    b"\0",
-    b"\t",
-    b"#",
-    b"<",
-    b">",
-    b"&",
-    b"\\",
+    *(b"{", b"}", b"[", b"]", b'"', b"'", b",", b":", b"=", b"\n", b"\r", b"\0", b"\t", b"#", b"<", b">", b"&", b"\\"),
 )
 
 
@@ -131,8 +116,12 @@ def inside_archive(data: bytes, draw: random.Random) -> bytes:
 
 
 def mutate(data: bytes, draw: random.Random) -> bytes:
-    """One to three damages, one after the other."""
-    if data.startswith(b"PK") and draw.random() < 0.8:
+    """One to three damages, one after the other: to what the file says, or to its bytes."""
+    if draw.random() < 0.65:
+        sound = (damage_arrays if data.startswith(b"PK") else damage_tree)(data, draw)
+        if sound is not None:
+            return sound
+    if data.startswith(b"PK") and draw.random() < 0.6:
         return inside_archive(data, draw)
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
         if data:

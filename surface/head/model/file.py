@@ -25,6 +25,9 @@ ARRAYS: dict[str, tuple[int | str, ...]] = {  # key of a part: its array's shape
     "loops": (ANY, 2), "loop_ends": (ANY,), "slits": (ANY, 3), "group_ids": (ANY,), "group_ends": (ANY,),
     "group_moves": (ANY, 3), "jaw": ("n",), "lids": ("n",),
 }  # fmt: skip
+TYPES: dict[str, type[np.number[Any]]] = {  # of the last word of a key; float64 for others
+    "degrees": np.int8, "loop_ends": np.int32, "group_ids": np.int32, "group_ends": np.int32, "group_moves": np.float32,
+}  # fmt: skip
 
 
 HINT = "restore the file or make the head again: omote fit"
@@ -92,9 +95,16 @@ class _Arrays:
     stored: dict[str, Array]
 
     def read(self, key: str, shape: tuple[int, ...]) -> Array:
+        """The array of a key in the type that omote computes with, whatever it was stored in."""
         if key not in self.stored:
             raise _error(self.path, key, "missing")
-        return _checked(self.path, key, self.stored[key], shape)
+        found = _checked(self.path, key, self.stored[key], shape)
+        with np.errstate(invalid="ignore", over="ignore"):
+            array = np.ascontiguousarray(found, TYPES.get(key.rsplit("/", 1)[-1], np.float64))
+        lost = not np.isfinite(array).all() or (array.dtype.kind == "i" and (array != found).any())
+        if lost:
+            raise _error(self.path, key, f"holds numbers that are no {array.dtype}")
+        return array
 
     def split(self, key: str, a: Array, ends: Array) -> list[Array]:
         """Runs of rows that end at ``ends``, an array kept under ``key``."""

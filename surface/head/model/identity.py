@@ -76,7 +76,7 @@ def _moves(z: Mapping[str, Array], ids_prefix: str, moves_prefix: str) -> dict[s
     for key in z:
         if key.startswith(ids_prefix):
             name, ids = key.removeprefix(ids_prefix), z[key]
-            if ids.ndim != 1 or ids.dtype.kind not in "iu" or ids.min(initial=0) < 0:
+            if ids.ndim != 1 or ids.dtype.kind not in "iu" or ids.min(initial=0) < 0 or ids.max(initial=0) >= 2**31:
                 raise ValueError("an array of control points holds something else")
             moves = _finite(z[moves_prefix + name], (len(ids), 3)).astype(np.float32)
             out[name] = ids.astype(np.int32), moves

@@ -81,7 +81,10 @@ def unpack(
     uv, triangles, side, start, list_start, ids, made = (arrays[key] for key in KEYS)
     if made.shape != (5,) or not np.isfinite(made).all() or tuple(made[:3]) != tuple(map(float, budget)):
         return None
-    if not (_kinds_valid(arrays, len(uv)) and _indices_valid(uv, triangles, start, list_start, ids, surface.n)):
+    if not _kinds_valid(arrays, uv.shape[:1]):
+        return None
+    triangles, start, list_start, ids = (a.astype(np.int64) for a in (triangles, start, list_start, ids))
+    if not _indices_valid(uv, triangles, start, list_start, ids, surface.n):
         return None
     uv, triangles, side = uv.astype(float), triangles.astype(np.int32), side.astype(np.int64)
     cell = np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start))
@@ -97,10 +100,10 @@ def unpack(
     )  # fmt: skip
 
 
-def _kinds_valid(arrays: dict[str, Array], vertices: int) -> bool:
+def _kinds_valid(arrays: dict[str, Array], vertices: tuple[int, ...]) -> bool:
     """Are the arrays numbers of the right shapes, and no list empty?"""
     uv, triangles, side, *lists = (arrays[key] for key in KEYS[:-1])
-    shaped = uv.shape == (vertices, 2) and triangles.shape[1:] == (3,) and side.shape == (vertices,)
+    shaped = uv.shape == (*vertices, 2) and triangles.shape[1:] == (3,) and side.shape == vertices
     whole = all(a.dtype.kind in "iu" for a in (triangles, side, *lists)) and uv.dtype.kind == "f"
     return bool(shaped and whole and all(a.ndim == 1 and len(a) for a in lists) and np.isfinite(uv).all())
 

@@ -53,7 +53,15 @@ def read_sidecar(path: Path, make: Callable[[Sidecar], Made], hint: str) -> Made
         checks = {name.removeprefix(CHECK): int(array[0]) for name, array in every.items() if name.startswith(CHECK)}
         return make(Sidecar(path, {k: v for k, v in every.items() if not k.startswith(META)}, checks))
     except DAMAGED as error:
-        raise HeadFileError(f"{path}: {error}", hint=hint) from error
+        raise HeadFileError(f"{path}: {reason(error)}", hint=hint) from error
+
+
+def reason(error: Exception) -> str:
+    """What is wrong with arrays, in words for who has the file; those of the interpreter name nothing in it."""
+    if isinstance(error, KeyError):
+        return f"has no array {error}"
+    own = type(error) is ValueError
+    return str(error) if own else "holds an array of another shape or kind than it was written with"
 
 
 def write_sidecar(path: Path, arrays: Mapping[str, Array], checks: Mapping[str, int] | None = None) -> Path:

@@ -15,7 +15,7 @@ from surface.head.model.identity import load_identities, with_identities
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.parameters import NAMES, SHAPES, read_pose, rotation
 from surface.head.model.rules import Drivers
-from surface.head.model.sidecar import DAMAGED
+from surface.head.model.sidecar import DAMAGED, reason
 from surface.head.posing.baked import apply_decimated, apply_shade, read_decimated, read_shade
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
@@ -68,7 +68,7 @@ class Head:
             apply_decimated(head.parts, read_decimated(path, head.parts))
         except DAMAGED as error:
             hint = "take it from a copy, or make the head again: omote fit"
-            raise HeadFileError(f"{path}: its files are damaged: {error}", hint=hint) from error
+            raise HeadFileError(f"{path}: its files are damaged: {reason(error)}", hint=hint) from error
         return head
 
     @property

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32
+from surface.base.checks import numbers, require
 from surface.base.errors import HeadFileError
 from surface.head.model.parameters import smoothstep
 from surface.head.posing.kernels import nearest_on_line
@@ -32,47 +33,85 @@ BASE: dict[str, tuple[float, ...]] = {
 }
 
 
+KINDS = ("all", "band", "region", "spots")
+HINT = "compare it with the other layers of paint"
+
+
 def paint_part(layers: list[dict[str, Any]], part: str, uv: Floats, where: str) -> dict[str, Floats32]:
     """Attributes (m, k) of one part at its vertices ``uv (m, 2)``.
 
-    Raises HeadFileError: a layer lacks a key or has a wrong one; names ``where`` and the layer.
+    Raises HeadFileError: a layer lacks a key or has a wrong one; names ``where``, the layer and the key.
     """
     out: dict[str, Floats] = {}
     for i, layer in enumerate(layers):
-        if layer.get("part") != part:
-            continue
         try:
-            _lay_on(out, layer, uv)
-        except (KeyError, ValueError, TypeError, IndexError) as e:
-            raise HeadFileError(
-                f"{where}: paint[{i}]: {type(e).__name__}: {e}", hint="compare with the other layers"
-            ) from e
+            if not isinstance(layer, dict):
+                raise ValueError("must be a table")
+            if layer.get("part") == part:
+                _lay_on(out, layer, uv)
+        except ValueError as error:
+            raise HeadFileError(f"{where}: paint[{i}]: {error}", hint=HINT) from error
     return {k: v.astype(np.float32) for k, v in out.items()}
 
 
 def _lay_on(out: dict[str, Floats], layer: dict[str, Any], uv: Floats) -> None:
-    name, value = layer["attribute"], np.atleast_1d(np.asarray(layer["value"], float))
+    name = _word(layer, "attribute", tuple(BASE))
+    base = np.asarray(BASE[name])
+    value = np.atleast_1d(_numbers(layer, "value"))
+    if value.shape not in ((1,), base.shape):
+        raise ValueError(f"value: must have {len(base)} numbers, not shape {value.shape}")
     if name not in out:
-        out[name] = np.tile(np.asarray(BASE[name]), (len(uv), 1))
-    strength = float(layer.get("amount", 1.0)) * _field(layer, uv)[:, None]
+        out[name] = np.tile(base, (len(uv), 1))
+    strength = _number(layer, "amount", 1.0) * _field(layer, uv)[:, None]
     out[name] += strength * (value - out[name])
 
 
+def _word(layer: dict[str, Any], key: str, known: tuple[str, ...]) -> str:
+    value = layer.get(key)
+    if not isinstance(value, str) or value not in known:
+        why = "missing" if value is None else f"{value!r:.60} is not one of {', '.join(known)}"
+        raise ValueError(f"{key}: {why}")
+    return value
+
+
+def _numbers(layer: dict[str, Any], key: str) -> Floats:
+    if key not in layer:
+        raise ValueError(f"{key}: missing")
+    found = numbers(layer[key], key)
+    require(np.atleast_1d(np.isfinite(found)), np.atleast_1d(found), key)
+    return found
+
+
+def _number(layer: dict[str, Any], key: str, default: float | None = None) -> float:
+    found = _numbers(layer if default is None else {key: default} | layer, key)
+    if found.ndim:
+        raise ValueError(f"{key}: must be one number")
+    return float(found)
+
+
 def _field(layer: dict[str, Any], uv: Floats) -> Floats:
-    kind = layer["kind"]
+    """(m,) how strongly a layer shows at each vertex."""
+    kind = _word(layer, "kind", KINDS)
     if kind == "all":
         return np.ones(len(uv))
-    lines = [np.asarray(line, float).reshape(-1, 2) for line in layer["lines"]]
-    width, feather = float(layer.get("width", 0.0)), float(layer["feather"])
-    if kind not in ("band", "region", "spots"):
-        raise ValueError(f"kind {kind!r} is not one of all, band, region, spots")
-    if not lines:
-        raise ValueError("lines is empty")
+    width, feather = _number(layer, "width", 0.0), _number(layer, "feather")
     uv, least = np.ascontiguousarray(uv), np.full(len(uv), np.inf)
     distance, along = np.empty(len(uv)), np.empty(len(uv))
-    for line in lines:
+    for line in _lines(layer):
         nearest_on_line(uv, line, kind == "region", distance, along)
         np.minimum(least, distance, out=least)
         if kind == "region":
             least[inside(np.hstack([line, np.roll(line, -1, axis=0)]), uv)] = 0.0
     return 1.0 - smoothstep((least - width) / max(feather, 1e-9))
+
+
+def _lines(layer: dict[str, Any]) -> list[Floats]:
+    """Each (k, 2), k >= 1."""
+    lines = layer.get("lines")
+    if not isinstance(lines, list) or not lines:
+        raise ValueError("lines: must be a list with at least one line of points (u, v)")
+    found = [_numbers({f"lines[{i}]": line}, f"lines[{i}]") for i, line in enumerate(lines)]
+    for i, line in enumerate(found):
+        if line.ndim != 2 or line.shape[1] != 2 or not len(line):
+            raise ValueError(f"lines[{i}]: must be a list of points (u, v), not of shape {line.shape}")
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 from pydantic import Field, RootModel, ValidationError
@@ -136,3 +137,14 @@ def test_unknown_keys_are_compared_with_those_of_their_own_table(tmp_path: Path)
         with pytest.raises(ConfigError) as caught:
             load(write(tmp_path, text), Box)
         assert str(caught.value).endswith(f"cart.toml: 1 fault\n  {fault}"), text
+
+
+def test_a_value_of_several_kinds_has_one_fault_without_the_names_of_kinds(tmp_path: Path) -> None:
+    class Look(Settings):
+        colour: Share | Annotated[str, Field(min_length=2)] | tuple[Share, Share] = 0.0
+
+    (tmp_path / "a.toml").write_text("colour = [1, 2, 3]\nwidth = 1\n")
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path / "a.toml", Look)
+    kinds = "number, or input should be a valid string, or tuple should have at most 2 items after validation, not 3"
+    assert str(caught.value).splitlines()[1:] == [f"  colour: input should be a valid {kinds}", "  width: unknown key"]

@@ -179,6 +179,13 @@ def test_what_is_no_sound_archive_is_a_fault_of_the_file(tmp_path: Path, data: b
         files.read_npz(archive(tmp_path / "b.npz", a=data))
 
 
+def test_a_damaged_name_in_an_archive_is_told_without_the_words_of_the_interpreter(tmp_path: Path) -> None:
+    path = archive(tmp_path / "a.npz", ä=npy(np.zeros(1)))
+    path.write_bytes(path.read_bytes().replace("ä".encode(), b"\xff\xff", 1))
+    with pytest.raises(ValueError, match="not a sound archive of arrays: it is damaged"):
+        files.read_npz(path)
+
+
 def test_python_objects_are_not_loaded(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="Python objects"):
         files.read_npz(archive(tmp_path / "a.npz", a=npy(np.array([{}], dtype=object))))

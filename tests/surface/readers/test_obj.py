@@ -61,6 +61,8 @@ def test_polygons_become_fans(tmp_path):
         (CUBE_FACE + "f 1/1 2/2\n", "line 9: a face needs three corners"),
         (CUBE_FACE + "f 1/1 x/2 3/3\n", "line 9: 'x/2' is no corner"),
         (CUBE_FACE + "f 0/1 2/2 3/3\n", "line 9: corner 0/1 points before"),
+        (CUBE_FACE + f"f 1/1 2/2 {10**30}/3\n", f"line 9: corner {10**30}/3 points beyond the last"),
+        (CUBE_FACE + f"f 1/1 2/2 3/{10**30}\n", "line 9: corner .* points beyond the last"),
         (CUBE_FACE + "f -9/1 2/2 3/3\n", "line 9: corner -9/1 points before"),
         (CUBE_FACE + "f 1/1 2/2 9/3\n", r"faces\[0\] points at 8, but there are 4"),
         (CUBE_FACE + "f 1/1 2/2 3/9\n", r"face_uv\[0\] points at 8, but there are 4"),

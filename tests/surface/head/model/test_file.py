@@ -151,6 +151,31 @@ def test_nan_in_an_array(folder):
     broken(folder, "b/points: holds something that is not a finite number")
 
 
+@pytest.mark.parametrize("kind", ["<i8", ">f8", "<f2", "<u4", "<f4"])
+def test_arrays_come_in_one_type_whatever_they_were_stored_in(folder, kind):
+    want = load_data(folder).parts[0]
+    points = np.asfortranarray(np.round(want.points), kind)
+    change(folder, a__points=points, a__weights=np.ones(25, kind), a__group_ids=np.array([11, 12, 13], kind))
+    got = load_data(folder).parts[0]
+    assert got.points.dtype == got.weights.dtype == want.points.dtype and got.points.flags.c_contiguous
+    np.testing.assert_array_equal(got.points, points)
+    assert got.groups[0].ids.dtype == want.groups[0].ids.dtype and got.groups[0].ids.tolist() == [11, 12, 13]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "match"),
+    [
+        ("a__group_ids", np.array([11, 12.5, 13]), "a/group_ids: holds numbers that are no int32"),
+        ("a__group_ids", np.array([11, 2**32 + 12, 13]), "a/group_ids: holds numbers that are no int32"),
+        ("a__degrees", np.full((25, 2), 300), "a/degrees: holds numbers that are no int8"),
+        ("a__group_moves", np.full((3, 3), 1e300), "a/group_moves: holds numbers that are no float32"),
+    ],
+)
+def test_numbers_that_the_type_cannot_hold_are_refused(folder, key, value, match):
+    change(folder, **{key: value})
+    broken(folder, match)
+
+
 def test_a_group_that_points_nowhere(folder):
     change(folder, a__group_ids=np.array([11, 12, 25], np.int32))
     broken(folder, r"a/group_ids: points at a control point that is not there")

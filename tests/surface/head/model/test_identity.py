@@ -100,3 +100,22 @@ def test_a_group_holds_only_the_points_that_a_blend_moves():
     (group,) = blended.parts[0].groups
     assert group.name == "mouthPucker" and group.ids.tolist() == [12, 13, 20]
     np.testing.assert_allclose(group.moves, [[0, 0, 6], [0, 0, 1], [1, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("omote/format", np.zeros(0, np.int64), "holds an array of another shape or kind"),
+        ("fit", np.array(["x", "y"]), "holds an array of another shape or kind"),
+        ("eyes", None, "has no array 'eyes'"),
+        ("jaw", np.full((2, 3), np.nan), "or is not finite"),
+        ("0/ids/a", np.arange(25) + 2**31, "an array of control points holds something else"),
+    ],
+)
+def test_wrong_arrays_are_told_in_words_about_the_file(folder, key, value, message):
+    """numpy's own say "index 0 is out of bounds for axis 0 with size 0"."""
+    with np.load(folder / "identities.npz") as stored:
+        arrays = {name: stored[name] for name in stored.files if name != key}
+    np.savez(folder / "identities.npz", **arrays | ({} if value is None else {key: value}))
+    with pytest.raises(HeadFileError, match=message):
+        load_identities(folder)

@@ -52,6 +52,14 @@ def test_a_mesh_that_does_not_fit_is_made_anew(key, value):
     assert unpack({**pack(MESH, BUDGET), key: value}, SURFACE, BUDGET, rough=False) is None
 
 
+@pytest.mark.parametrize("key", ["mesh_cell_start", "mesh_list_start"])
+def test_differences_of_unsigned_starts_do_not_wrap(key):
+    arrays = changed(key, 1, 2**30)
+    assert unpack({**arrays, key: arrays[key].astype(np.uint32)}, SURFACE, BUDGET, rough=True) is None
+    sound = pack(MESH, BUDGET)
+    assert unpack({**sound, key: sound[key].astype(np.uint32)}, SURFACE, BUDGET, rough=True) is not None
+
+
 def test_an_absent_mesh_is_made_anew():
     assert unpack({}, SURFACE, BUDGET, rough=False) is None
 

@@ -49,10 +49,25 @@ def test_layers_lie_on_each_other_and_other_parts_get_none():
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [{"kind": "splash", "lines": [[[0, 0]]]}, {"kind": "band"}, {"kind": "all", "attribute": "shine"},
-     {"kind": "band", "lines": [[["x", 0]]]}],
+    ("wrong", "message"),
+    [
+        ({"kind": "splash", "lines": [[[0, 0]]]}, "kind: 'splash' is not one of all, band, region, spots"),
+        ({"kind": ["all"]}, "kind: "), ({"kind": "band"}, "lines: must be a list"), ({}, "kind: missing"),
+        ({"kind": "all", "attribute": "shine"}, "attribute: 'shine' is not one of albedo"),
+        ({"kind": "all", "attribute": []}, "attribute: "), ({"kind": "all", "value": {}}, "value: must be numbers"),
+        ({"kind": "all", "value": [1, 2, 3]}, "value: must have 1 numbers"),
+        ({"kind": "all", "value": [float("nan")]}, r"value\[0\]: must be finite"),
+        ({"kind": "all", "amount": [1]}, "amount: must be one number"),
+        ({"kind": "band", "lines": [[["x", 0]]]}, r"lines\[0\]"), ({"kind": "band", "lines": [[]]}, r"lines\[0\]"),
+        ({"kind": "band", "lines": [[[0, 0]]], "feather": "x"}, "feather: must be numbers"),
+    ],
 )  # fmt: skip
-def test_a_wrong_layer_is_named(wrong):
-    with pytest.raises(HeadFileError, match=r"head\.toml: paint\[1\]"):
+def test_a_wrong_layer_is_named_with_its_key(wrong, message):
+    with pytest.raises(HeadFileError, match=rf"head\.toml: paint\[1\]: {message}"):
         paint_part([layer(kind="all"), layer(**wrong)], "face", UV, "head.toml")
+
+
+@pytest.mark.parametrize("strange", [0.5, "face", ["face"], None])
+def test_a_layer_that_is_no_table_is_named(strange):
+    with pytest.raises(HeadFileError, match=r"paint\[0\]: must be a table"):
+        paint_part([strange], "face", UV, "head.toml")

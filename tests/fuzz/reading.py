@@ -1,0 +1,69 @@
+"""Reads one file in this process as the command line does, and returns omote's exit code."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from unittest.mock import patch
+
+from typer.main import get_command
+
+from controller.cli import app
+from surface.base.errors import SurfaceError
+from surface.readers import rhino
+
+
+def run_command(words: Sequence[str]) -> int:
+    """Run ``omote`` with words of the command line."""
+    sys.argv = ["omote", *words]
+    try:
+        app.main()
+    except SystemExit as ended:
+        return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+    return 0
+
+
+def check(path: Path) -> int:
+    """``omote check`` of a file; of its folder where it belongs to a head."""
+    return run_command(["check", str(path.parent if path.parent.name == "head" else path)])
+
+
+def reports(read: Callable[[Path], object]) -> Callable[[Path], int]:
+    """What a command reads before it goes on, with the errors that are reported for it."""
+
+    def run(path: Path) -> int:
+        try:
+            read(path)
+        except SurfaceError as error:
+            app.report_error(error)
+            return 1
+        return 0
+
+    return run
+
+
+@contextmanager
+def quickened() -> Iterator[None]:
+    """No work is done again for each file: commands are put together once, and .3dm files tried in a forked process."""
+    command = get_command(app.make_app())
+    with patch.object(app, "make_app", lambda: command), patch.object(rhino, "_is_readable", _tried_in_fork):
+        yield
+
+
+def _tried_in_fork(data: bytes) -> bool:
+    """As the reader's own trial, in a process that need not start the interpreter."""
+    import rhino3dm
+
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            signal.setitimer(signal.ITIMER_PROF, rhino.PATIENCE_S + len(data) / rhino.BYTES_PER_S)
+            code = int(rhino3dm.File3dm.FromByteArray(data) is None)
+        finally:
+            os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
