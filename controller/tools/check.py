@@ -6,8 +6,6 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from controller.base.config import load, read_toml
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS, Parameters
@@ -61,7 +59,7 @@ def _describe(path: Path) -> Iterator[str]:
     """Lines on a file; one that begins with a space continues the line before it."""
     suffix = path.suffix.lower()
     if path.is_dir() or path.name == "head.toml":
-        yield _check_head(path if path.is_dir() else path.parent)
+        yield from _check_head(path if path.is_dir() else path.parent)
     elif suffix == ".json" and _is_group(path):
         yield _check_group(path)
     elif suffix in SURFACE_SUFFIXES or (suffix == ".json" and is_plain(path)):  # .json is speech, too
@@ -81,8 +79,9 @@ def _describe(path: Path) -> Iterator[str]:
         yield from _describe_toml(path)
 
 
-def _check_head(folder: Path) -> str:
-    """Pose every parameter alone at its end: every vertex must be finite."""
+def _check_head(folder: Path) -> Iterator[str]:
+    """Look at the head at rest and with every parameter at its end; every defect is one line of the error."""
+    from surface.check import check_head  # start-up: only heads need it
     from surface.head import Head  # start-up: only heads and groups need it
     from surface.head.model.identity import load_identities, with_identities  # start-up: the same
 
@@ -90,16 +89,15 @@ def _check_head(folder: Path) -> str:
     known = load_identities(folder)
     for name in known:
         with_identities(head.data, known, {name: 1.0}, str(folder))
-    for name in head.parameters:
-        try:
-            head.pose(head.values({name: 1.0}))
-        except (ArithmeticError, LookupError, ValueError) as error:
-            raise ConfigError(f"{folder}: {name} = 1 cannot be posed: {error}", hint="make the head again") from error
-        bad = [part.name for part in head.parts if not np.isfinite(part.vertices).all()]
-        if bad:
-            raise ConfigError(f"{folder}: {name} = 1 throws vertices of {', '.join(bad)} out of space")
+    try:
+        found = check_head(head)
+    except (ArithmeticError, LookupError, ValueError) as error:
+        raise ConfigError(f"{folder}: cannot be posed: {error}", hint="make the head again: omote fit") from error
+    if defects := [f.line(str(folder)) for f in found if not f.warning]:
+        raise ConfigError("\n".join(f"{folder}: {line}" for line in defects))
     vertices = sum(len(part.vertices) for part in head.parts)
-    return f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, {len(head.parameters)} parameters"
+    yield f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, {len(head.parameters)} parameters"
+    yield from (f"  warning: {f.line(str(folder))}" for f in found)
 
 
 def _is_group(path: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from surface.head import Head
 from surface.head.model.file import save_data
 from surface.head.model.identity import Identity, save_identities
 from surface.readers import NamedSurface, write_surfaces
-from tests.surface.small_head import part, small_head
+from tests.surface.small_head import JAW, part, small_head
 
 KNOTS = '<KnotVector degree="1">0 0 1 1</KnotVector>'
 SIDE = f'<Basis type="BSplineBasis">{KNOTS}</Basis>'
@@ -98,9 +99,6 @@ def test_a_recording_without_a_tick_and_a_json_that_is_no_text(tmp_path: Path) -
 
 def test_a_head_whose_vertices_leave_space_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_data(tmp_path, small_head(parts=[part("face", -40)], seams=[], paint=[]))
-    (line,) = check_anything(str(tmp_path))
-    assert line.startswith("head small: 1 parts, ") or ": 1 parts, " in line
-    assert check_anything(str(tmp_path / "head.toml")) == [line]
     pose = Head.pose
 
     def broken(head: Head, values: np.ndarray) -> None:
@@ -111,6 +109,30 @@ def test_a_head_whose_vertices_leave_space_is_refused(tmp_path: Path, monkeypatc
     monkeypatch.setattr(Head, "pose", broken)
     with pytest.raises(ConfigError, match="= 1 throws vertices of face out of space"):
         check_anything(str(tmp_path))
+
+
+def test_the_shipped_head_is_good_and_says_what_it_is() -> None:
+    (line,) = check_anything("ict")
+    assert line.startswith("head ict: 13 parts, ") and line.endswith(" 59 parameters: good")
+
+
+def test_every_defect_of_a_head_is_one_line_with_what_to_type(tmp_path: Path) -> None:
+    head = small_head(parts=[part("face", -40), part("cheek", 10)], seams=[], paint=[])
+    save_data(tmp_path, head)
+    result = CliRunner().invoke(make_app(), ["check", str(tmp_path / "head.toml")])
+    assert isinstance(result.exception, ConfigError)
+    lines = str(result.exception).splitlines()
+    assert len(lines) >= 2 and all(line.startswith(f"{tmp_path}: ") and "; next: " in line for line in lines)
+    assert any("missing eye: no part follows left_eye" in line for line in lines)
+    assert any(f"omote fit MESH -o {tmp_path}" in line for line in lines)
+
+
+def test_what_a_head_lacks_is_a_warning(tmp_path: Path) -> None:
+    patch = part("face", -150.0, jaw=np.zeros(25))
+    wide = replace(patch, points=patch.points * [3.0, 3.0, 1.0] + [390.0, 0.0, 20.0])
+    save_data(tmp_path, small_head(parts=[wide], seams=[], paint=[], eye_radius=0.0, jaw=replace(JAW, angle_rad=0.0)))
+    good, warning = check_anything(str(tmp_path))
+    assert good.endswith(": good") and warning.startswith("  warning: missing eye: the head has no eyes")
 
 
 def test_calibrations_and_expressions_that_are_shipped_are_told_apart(tmp_path: Path) -> None:

@@ -1,0 +1,215 @@
+"""Holes: borders of the surface that nothing is sewn to.
+
+Border edges that run along another border are sewn. What is left makes loops. A sheet of skin has one outer border, its
+longest loop; the eyes and the mouth may be open, for eyeballs and lips fill them; every other loop is a hole. Borders
+that are sewn at rest and come apart in a pose are seams that open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats, Floats32, Ints
+from surface.base.jit import kernel
+from surface.check.findings import AGAIN, Finding
+from surface.check.mouth import Mouth
+from surface.check.places import Places
+from surface.check.subject import Subject, pose_of
+from surface.mesh.mesh import border_edges
+
+SEWN_MM = 0.4  # borders nearer than this are one
+WIDE_MM = 1.2  # least width of a hole: twice its area by its length
+APART_MM = 1.0  # of borders that are sewn at rest: a seam that opens
+SHEETS = ("skin", "mouth", "tongue")  # materials of which sheets are made that have to be closed
+MOUTH_REACH = 0.75  # in widths of the mouth, from its middle
+EYE_REACH = 1.7  # in radii: a loop whose middle is so near to an eye's centre is its opening
+
+
+@kernel
+def _nearest(middles: Any, own: Any, ends: Any, ids: Any, reach: float, distance: Any, other: Any) -> None:
+    """Distance (q,) of the middles of edges between vertices ``own (q, 2)`` from the nearest of edges ``ends (e, 2,
+    3)`` that shares none of its vertices ``ids (e, 2)`` with it, and which one that is; infinite and -1 beyond
+    ``reach``."""
+    for i in range(len(middles)):
+        best, found = reach * reach, -1
+        p0, p1, p2 = middles[i, 0], middles[i, 1], middles[i, 2]
+        for j in range(len(ends)):
+            a = ends[j, 0]
+            if abs(a[0] - p0) > 20.0 * reach or abs(a[1] - p1) > 20.0 * reach:
+                continue
+            if ids[j, 0] == own[i, 0] or ids[j, 0] == own[i, 1] or ids[j, 1] == own[i, 0] or ids[j, 1] == own[i, 1]:
+                continue
+            d0, d1, d2 = ends[j, 1, 0] - a[0], ends[j, 1, 1] - a[1], ends[j, 1, 2] - a[2]
+            length = d0 * d0 + d1 * d1 + d2 * d2
+            t = 0.0
+            if length > 0.0:
+                t = ((p0 - a[0]) * d0 + (p1 - a[1]) * d1 + (p2 - a[2]) * d2) / length
+                t = min(1.0, max(0.0, t))
+            w0, w1, w2 = a[0] + t * d0 - p0, a[1] + t * d1 - p1, a[2] + t * d2 - p2
+            square = w0 * w0 + w1 * w1 + w2 * w2
+            if square < best:
+                best, found = square, j
+        distance[i], other[i] = np.sqrt(best) if found >= 0 else np.inf, found
+
+
+@dataclass(frozen=True)
+class Borders:
+    """Border edges of all sheets.
+
+    part : (e,) number of the part; ends : (e, 2) vertices of it, those in one place as one; ids : (e, 2) the same, in
+        one count over all parts.
+    sewn : (e,); mate : (e,) the edge that each is sewn to, -1 for none.
+    """
+
+    part: Ints
+    ends: Ints
+    ids: Ints
+    sewn: Bools
+    mate: Ints
+
+    def at(self, vertices: list[Floats32]) -> Floats:
+        """(e, 2, 3) in a pose."""
+        out = np.empty((len(self.part), 2, 3))
+        for k in np.unique(self.part):
+            out[self.part == k] = vertices[k][self.ends[self.part == k]]
+        return out
+
+
+def find_borders(subject: Subject) -> Borders:
+    """All border edges, and which of them are sewn at rest."""
+    numbers = [k for k, p in enumerate(subject.parts) if p.material in SHEETS and p.follows == "skin"]
+    starts = np.cumsum([0, *(len(v) for v in subject.rest)])
+    pairs = [(k, border_edges(_welded(subject, k).astype(np.int32))) for k in numbers]
+    part = np.concatenate([np.full(len(e), k) for k, e in pairs] or [np.zeros(0, int)]).astype(np.int64)
+    ends = np.concatenate([e for _, e in pairs] or [np.zeros((0, 2), int)]).astype(np.int64)
+    ids = ends + starts[part][:, None]
+    found = Borders(part, ends, ids, np.zeros(len(part), bool), np.full(len(part), -1))
+    at = found.at(subject.rest)
+    distance, mate = np.full(len(part), np.inf), np.full(len(part), -1, np.int64)
+    _nearest(at.mean(axis=1), ids, at, ids, SEWN_MM * subject.scale, distance, mate)
+    return Borders(part, ends, ids, mate >= 0, mate)
+
+
+def _welded(subject: Subject, number: int) -> Ints:
+    """(t, 3) triangles of a part over vertices of which those in one place are one; slivers of no area are dropped."""
+    at, triangles = subject.rest[number], subject.parts[number].triangles
+    _, first, same = np.unique(np.round(at / (1e-3 * subject.scale)), axis=0, return_index=True, return_inverse=True)
+    corner = first[same.ravel()][triangles]
+    whole = (corner != np.roll(corner, 1, axis=1)).all(axis=1)
+    kept: Ints = corner[whole]
+    return kept
+
+
+def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Borders) -> Iterator[Finding]:
+    """Holes at rest, and seams that open in a pose."""
+    at = borders.at(subject.rest)
+    for loop in _loops(subject, borders):
+        middle, width = _form(at[loop])
+        if width < WIDE_MM * subject.scale or _is_opening(subject, mouth, middle):
+            continue
+        length = float(np.linalg.norm(at[loop, 1] - at[loop, 0], axis=1).sum())
+        part = subject.parts[borders.part[loop[0]]].name
+        text = f"a hole in part {part!r}, {length:.0f} mm round: {places.name(middle)}"
+        yield Finding("hole", text, f"close it in the mesh, then {AGAIN}")
+    yield from _opening_seams(subject, mouth, borders, places)
+
+
+def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, places: Places) -> Iterator[Finding]:
+    """The seam that opens furthest, with the pose in which it does."""
+    worst, where, pose = 0.0, np.zeros(3), ""
+    reach = 4.0 * APART_MM * subject.scale
+    rest = borders.at(subject.rest).mean(axis=1)
+    kept = borders.sewn & ~np.array([_is_opening(subject, mouth, at) for at in rest], bool)
+    sewn = np.flatnonzero(kept)
+    for name in subject.claimed:
+        at = borders.at(subject.posed(pose_of(name)))
+        middle = at.mean(axis=1)
+        way = middle - rest  # what moves as the border does that it is sewn to stays sewn
+        loose = np.linalg.norm(way - way[borders.mate], axis=1)[sewn] > 0.3 * APART_MM * subject.scale
+        asked = sewn[loose]
+        distance, mate = np.full(len(asked), np.inf), np.full(len(asked), -1, np.int64)
+        _nearest(middle[asked], borders.ids[asked], at, borders.ids, reach, distance, mate)
+        apart = np.minimum(distance, reach)
+        if len(apart) and apart.max() > worst:
+            worst, where, pose = float(apart.max()), rest[asked[apart.argmax()]], name
+    if worst > APART_MM * subject.scale:
+        wide = f"{worst:.1f} mm" + (" or more" if worst >= reach else "")
+        text = f"with {pose} = 1 a seam opens by {wide}: {places.name(where)}"
+        yield Finding("hole", text, AGAIN)
+
+
+def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
+    """Edges of every chain that nothing is sewn to, less the outer border of each sheet."""
+    free, at = np.flatnonzero(~borders.sewn), borders.at(subject.rest)
+    chains = _chains(_joined(borders, at, free, SEWN_MM * subject.scale))
+    sheet = _sheets(subject, borders)
+    lengths = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
+    rows = [free[c] for c in chains]
+    outer: dict[int, tuple[float, int]] = {}
+    for k, row in enumerate(rows):
+        key = int(sheet[borders.ids[row[0], 0]])
+        outer[key] = max(outer.get(key, (0.0, -1)), (float(lengths[row].sum()), k))
+    longest = {k for _, k in outer.values()}
+    yield from (row for k, row in enumerate(rows) if k not in longest)
+
+
+def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
+    """(k, 2) ends of some edges, of which those nearer than ``reach`` are one: a seam runs through the border there."""
+    ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
+    known = np.unique(ends, return_inverse=True)[1].reshape(-1)
+    square = (points**2).sum(axis=1)
+    near = np.maximum(square[:, None] + square - 2.0 * points @ points.T, 0.0) < reach**2
+    links = known[np.argwhere(near)]
+    return _components(links, int(known.max(initial=-1)) + 1)[known].reshape(-1, 2)
+
+
+def _chains(ids: Ints) -> list[Ints]:
+    """Rows of edges (e, 2) that hang together."""
+    label = _components(ids, int(ids.max(initial=-1)) + 1)
+    own = label[ids[:, 0]] if len(ids) else np.zeros(0, np.int64)
+    return [np.flatnonzero(own == k) for k in np.unique(own)]
+
+
+def _sheets(subject: Subject, borders: Borders) -> Ints:
+    """(all vertices,) the number of the sheet that each belongs to: what triangles and seams connect."""
+    starts = np.cumsum([0, *(len(v) for v in subject.rest)])
+    links = [_welded(subject, k)[:, [0, 1, 1, 2]].reshape(-1, 2) + starts[k] for k in np.unique(borders.part)]
+    sewn = np.flatnonzero(borders.sewn)
+    links.append(np.column_stack([borders.ids[sewn, 0], borders.ids[borders.mate[sewn], 0]]))
+    return _components(np.concatenate(links), int(starts[-1]))
+
+
+def _components(links: Ints, count: int) -> Ints:
+    """(count,) the least number of the nodes that each is connected with."""
+    label = np.arange(count)
+    while len(links):
+        least = np.minimum(label[links[:, 0]], label[links[:, 1]])
+        fresh = label.copy()
+        for end in (0, 1):
+            np.minimum.at(fresh, links[:, end], least)
+            np.minimum.at(fresh, label[links[:, end]], least)
+        fresh = fresh[fresh]
+        if np.array_equal(fresh, label):
+            break
+        label = fresh
+    return label
+
+
+def _form(ends: Floats) -> tuple[Floats, float]:
+    """Middle (3,) and width of a loop, mm: twice its area by its length, for a slit its height."""
+    middle = ends.reshape(-1, 3).mean(axis=0)
+    area = 0.5 * np.linalg.norm(np.cross(ends[:, 0] - middle, ends[:, 1] - middle).sum(axis=0))
+    return middle, float(4.0 * area / max(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum(), 1e-9))
+
+
+def _is_opening(subject: Subject, mouth: Mouth | None, middle: Floats) -> bool:
+    """Is a loop about this place the rim of an eye, with an eyeball behind it, or of the mouth?"""
+    if subject.eyes is not None:
+        near = np.linalg.norm(subject.eyes - middle, axis=1) < EYE_REACH * subject.head.data.eye_radius
+        if any(near[side] and subject.eye(side) is not None for side in (0, 1)):
+            return True
+    return mouth is not None and bool(np.linalg.norm(mouth.middle - middle) < MOUTH_REACH * mouth.width)

@@ -1,0 +1,63 @@
+"""All checks of a head, in order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from surface.check import borders, motions, spikes, stance
+from surface.check.findings import AGAIN, Finding
+from surface.check.mouth import Mouth, find_mouth, lips_gap
+from surface.check.places import Places
+from surface.check.subject import Subject
+from surface.head import Head
+
+GAPE_MM = 1.2  # most height of the opening between closed lips
+
+
+def check_head(head: Head) -> list[Finding]:
+    """Everything that is wrong with a head; empty for a good one. The head is left at rest.
+
+    Looks at the head at rest and with every parameter at 1, from its geometry alone. Lengths are limited in millimetres
+    of a head of usual size, and grow with the distance between the eyes.
+    """
+    subject = Subject(head)
+    found = list(not_finite(subject)) or list(stance.wrong_unit(subject))
+    if not found:
+        mouth = find_mouth(subject)
+        places, edges = Places(subject, mouth), borders.find_borders(subject)
+        found = [
+            *stance.off_camera(subject, mouth), *stance.missing_eyes(subject), *stance.inside_out(subject),
+            *motions.empty_shapes(subject), *motions.swapped_sides(subject), *motions.blind_lids(subject),
+            *unsealed_lips(subject, mouth), *borders.holes(subject, mouth, places, edges),
+            *spikes.spikes(subject, places, edges),
+        ]  # fmt: skip
+    head.pose(head.values({}))
+    return found
+
+
+def not_finite(subject: Subject) -> Iterator[Finding]:
+    """Poses that throw vertices out of space."""
+    for name in ("", *subject.head.parameters):
+        vertices = subject.at_one(name) if name else subject.rest
+        bad = [p.name for p, v in zip(subject.parts, vertices, strict=True) if not np.isfinite(v).all()]
+        if bad:
+            when = f"{name} = 1" if name else "the neutral face"
+            yield Finding("not finite", f"{when} throws vertices of {', '.join(bad)} out of space", AGAIN)
+            return
+
+
+def unsealed_lips(subject: Subject, mouth: Mouth | None) -> Iterator[Finding]:
+    """Lips that gape at rest, or where mouthClose should close them over an open jaw."""
+    if mouth is None:
+        return
+    at_rest, x = lips_gap(subject, mouth, subject.rest)
+    hint = f"close the lips in the mesh, then {AGAIN}"
+    if at_rest > GAPE_MM * subject.scale:
+        yield Finding("unsealed lips", f"the neutral face has its lips {at_rest:.1f} mm apart at x = {x:.0f} mm", hint)
+    if "mouthClose" in subject.claimed:
+        closed, x = lips_gap(subject, mouth, subject.at_one("mouthClose"))
+        if closed > max(GAPE_MM * subject.scale, at_rest + 0.5 * GAPE_MM * subject.scale):
+            text = f"jawOpen = 1 with mouthClose = 1 leaves the lips {closed:.1f} mm apart at x = {x:.0f} mm"
+            yield Finding("unsealed lips", text, f"make mouthClose bring the lips together over jawOpen, then {AGAIN}")

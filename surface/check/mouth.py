@@ -1,0 +1,115 @@
+"""Where the mouth is, and how far the lips gape, seen from the front.
+
+The line of the lips is where the skin is torn when the jaw opens: above it nothing moves, below it everything does. So
+it is found in any mesh, whether the lips are the rim of a hole or the skin goes on into the mouth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats, Floats32, Ints
+from surface.check.raster import NOTHING, Picture, View, enclosed
+from surface.check.subject import Subject
+
+STEP = 0.5  # mm of a pixel where the lips are looked for, times the head's scale
+FINE = 0.15  # of a pixel where their gap is measured
+TORN = 0.3  # of the largest motion: a step of that height from one pixel to the next is the line of the lips
+LEAST_MM = 3.0  # that the chin must go down
+DEEP_MM, LIPS_MM = 9.0, 15.0  # skin so far behind the lips, and no higher or lower, is the inside of the mouth
+INNER = 0.5  # of the width of the mouth, in which its gap is measured
+
+
+@dataclass(frozen=True)
+class Mouth:
+    """The line of the lips at rest: x (k,) rising, y (k,), z (k,), mm; ``drop`` is how far the lower lip goes down."""
+
+    x: Floats
+    y: Floats
+    z: Floats
+    drop: float
+
+    @property
+    def middle(self) -> Floats:
+        """(3,) its middle."""
+        return np.array([0.5 * (self.x[0] + self.x[-1]), np.median(self.y), self.z.max()])
+
+    @property
+    def width(self) -> float:
+        """From corner to corner, mm."""
+        return float(self.x[-1] - self.x[0])
+
+
+def find_mouth(subject: Subject) -> Mouth | None:
+    """The line of the lips; None where no jaw opens."""
+    if "jawOpen" not in subject.claimed or not len(subject.skin):
+        return None
+    moves = [m[:, 1].astype(np.float64) for m in subject.moves("jawOpen")]
+    drop = -min(float(moves[k].min()) for k in subject.skin)
+    if drop < LEAST_MM * subject.scale:
+        return None
+    picture = _front(subject)
+    down = _values(subject, picture, moves)
+    step = np.where(np.isfinite(down[1:]) & np.isfinite(down[:-1]), down[1:] - down[:-1], 0.0)
+    torn: Bools = step > TORN * np.nanmax(-down)
+    columns = _longest_run(np.asarray(torn.any(axis=0)))
+    if len(columns) < 5:
+        return None
+    rows = np.argmax(step[:, columns], axis=0)
+    y = np.array([picture.at(r, 0)[1] for r in rows]) + 0.5 * picture.view.step
+    x = np.array([picture.at(0, c)[0] for c in columns])
+    return Mouth(x, y, picture.depth[rows, columns], float(np.nanmax(-down)))
+
+
+def _front(subject: Subject) -> Picture:
+    """The skin at rest from the front."""
+    at = np.concatenate([subject.rest[k] for k in subject.skin])
+    view = View((at[:, 0].min(), at[:, 0].max()), (at[:, 1].min(), at[:, 1].max()), STEP * subject.scale)
+    shapes = subject.shapes(subject.rest)
+    return view.draw([s if k in subject.skin else None for k, s in enumerate(shapes)])
+
+
+def _values(subject: Subject, picture: Picture, of: list[Floats]) -> Floats:
+    """(h, w) values at the vertices (m,) of every part, meant over the triangle at each pixel; NaN where none is."""
+    out = np.full(picture.depth.shape, np.nan)
+    for k in np.unique(picture.parts[picture.parts != NOTHING]):
+        here = picture.parts == k
+        out[here] = of[k][subject.parts[k].triangles].mean(axis=1)[picture.rows[here]]
+    return out
+
+
+def _longest_run(hits: Bools, most_gap: int = 2) -> Ints:
+    """Indices of the longest run of hits, with gaps of a few filled."""
+    at = np.flatnonzero(hits)
+    if not len(at):
+        return at
+    runs = np.split(at, np.flatnonzero(np.diff(at) > most_gap) + 1)
+    best = max(runs, key=len)
+    return np.arange(best[0], best[-1] + 1)
+
+
+def lips_gap(subject: Subject, mouth: Mouth, vertices: list[Floats32]) -> tuple[float, float]:
+    """Largest height of the opening between the lips, mm, and the x where it is, in the middle half of the mouth."""
+    scale, half = subject.scale, 0.5 * INNER * mouth.width
+    centre = mouth.middle
+    view = View(
+        (centre[0] - half, centre[0] + half),
+        (centre[1] - mouth.drop - 25.0 * scale, centre[1] + 20.0 * scale),
+        FINE * scale,
+    )
+    picture = view.draw(subject.shapes(vertices))
+    inside = _values(subject, picture, [_inside(v, mouth, scale) for v in subject.rest])
+    solid = np.isin(picture.parts, subject.skin) & (inside < 0.5)
+    height = enclosed(~solid, solid).sum(axis=0) * view.step
+    column = int(height.argmax())
+    return float(height[column]), picture.at(0, column)[0]
+
+
+def _inside(rest: Floats32, mouth: Mouth, scale: float) -> Floats:
+    """(m,) 1 for vertices (m, 3) that at rest lie behind the lips, as the inside of the mouth does; else 0."""
+    away = rest.astype(np.float64) - mouth.middle
+    beside = np.abs(away[:, 0]) < 0.5 * mouth.width
+    behind = away[:, 2] < -DEEP_MM * scale
+    return (beside & behind & (np.abs(away[:, 1]) < LIPS_MM * scale)).astype(np.float64)

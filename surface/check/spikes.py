@@ -1,0 +1,232 @@
+"""Spikes: points that stick out of the surface on all sides, at rest or in a pose.
+
+A vertex sticks out by the least height, along one direction, over everything on a ring round it at some millimetres.
+A ridge, as the rim of an ear or a lid, does not stick out: the ring meets the ridge again on either side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats, Floats32, Ints
+from surface.base.jit import kernel
+from surface.check.borders import Borders
+from surface.check.findings import AGAIN, Finding
+from surface.check.places import Places
+from surface.check.subject import Subject
+from surface.head.model.parameters import SHAPES
+
+RINGS = {6.0: 0.55, 12.0: 0.45}  # radii of the rings, mm at usual size: most height at rest, in radii
+RING = (0.75, 1.3)  # its inner and outer edge, in radii
+OFF_RIM = 0.5  # of the radius: so near to a free border nothing is measured
+MOVED = 0.5  # most height of how far a pose moves a point, in radii; corners of mouth and eyes have up to 0.35
+PAIRED = 0.6  # of that height: what is so steep on the other side is its like
+MIRROR_MM = 10.0  # a horn or a pointed ear has its like on the other side, so near to its mirror image
+NOSE = 0.35  # of the distance between the eyes, about the middle: a nose may be as long as it likes
+SPACING = 0.6  # of the samples, in the ring's radius
+MOST_STEPS = 40  # along an edge: a triangle across half the face is wrong anyway
+
+
+@kernel
+def rings(points: Any, cells: Any, order: Any, start: Any, low: float, high: float, first: Any, out: Any) -> int:
+    """List the points between ``low`` and ``high`` mm from each of the first of points (m, 3), as many as ``first``
+    takes. All are sorted into cubes as wide as ``high``: ``cells (m, 3)``, and those of cube c are ``order`` from
+    ``start[c, 0]`` to ``start[c, 1]``. Fills ``out`` as far as it goes, and returns how many there are."""
+    used = 0
+    nx, ny, nz = start.shape[0], start.shape[1], start.shape[2]
+    for i in range(len(first) - 1):
+        first[i] = used
+        for x in range(max(0, cells[i, 0] - 1), min(nx, cells[i, 0] + 2)):
+            for y in range(max(0, cells[i, 1] - 1), min(ny, cells[i, 1] + 2)):
+                for z in range(max(0, cells[i, 2] - 1), min(nz, cells[i, 2] + 2)):
+                    for k in range(start[x, y, z, 0], start[x, y, z, 1]):
+                        j = order[k]
+                        a, b, c = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+                        square = a * a + b * b + c * c
+                        if low * low <= square <= high * high:
+                            if used < len(out):
+                                out[used] = j
+                            used += 1
+    first[len(first) - 1] = used
+    return used
+
+
+@kernel
+def heights(values: Any, start: Any, ring: Any, out: Any) -> None:
+    """Least height ``out (k,)`` of each of the first k of values (m, 3) over those on its ring, along its mean way from
+    them."""
+    for i in range(len(out)):
+        out[i] = 0.0
+        x, y, z = 0.0, 0.0, 0.0
+        for k in range(start[i], start[i + 1]):
+            x += values[i, 0] - values[ring[k], 0]
+            y += values[i, 1] - values[ring[k], 1]
+            z += values[i, 2] - values[ring[k], 2]
+        length = np.sqrt(x * x + y * y + z * z)
+        if length < 1e-9:
+            continue
+        x, y, z = x / length, y / length, z / length
+        least = np.inf
+        for k in range(start[i], start[i + 1]):
+            j = ring[k]
+            dx, dy, dz = values[i, 0] - values[j, 0], values[i, 1] - values[j, 1], values[i, 2] - values[j, 2]
+            least = min(least, dx * x + dy * y + dz * z)
+        out[i] = max(least, 0.0)
+
+
+@kernel
+def mix(rows: Any, corners: Any, share: Any, values: Any, out: Any) -> None:
+    """Fill ``rows`` of ``out (m, 3)`` with ``share (m, 3)`` of values (v, 3) at ``corners (m, 3)``."""
+    for row in rows:
+        for c in range(3):
+            out[row, c] = 0.0
+            for k in range(3):
+                out[row, c] += share[row, k] * values[corners[row, k], c]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Vertices and further places on large triangles of the skin, close enough for rings.
+
+    part : (m,) number of the part; corners : (m, 3) vertices of it; share : (m, 3) of each; the first ``vertices`` of
+    them are vertices.
+    """
+
+    part: Ints
+    corners: Ints
+    share: Floats
+    vertices: int
+
+    def at(self, vertices: list[Floats32]) -> Floats:
+        """(m, 3) values at the samples from those of vertices (v, 3) of every part."""
+        out = np.empty((len(self.part), 3))
+        for k in np.unique(self.part):
+            mix(np.flatnonzero(self.part == k), self.corners, self.share, vertices[k], out)
+        return out
+
+
+def find_samples(subject: Subject, spacing: float) -> Samples:
+    """Samples of all skin that deforms, no further apart than ``spacing`` mm; vertices come first."""
+    found, more = [], []
+    for k, part in enumerate(subject.parts):
+        if part.material == "skin" and part.follows == "skin":
+            used = np.unique(part.triangles)
+            corners, share = _filled(subject.rest[k].astype(np.float64), part.triangles.astype(np.int64), spacing)
+            whole = np.tile([1.0, 0.0, 0.0], (len(used), 1))
+            found.append((np.full(len(used), k), np.repeat(used[:, None], 3, axis=1), whole))
+            more.append((np.full(len(corners), k), corners, share))
+    none = np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros((0, 3))
+    number, corners, share = (np.concatenate(x) for x in zip(none, *found, *more, strict=True))
+    return Samples(number.astype(np.int64), corners.astype(np.int64), share, sum(len(x[0]) for x in found))
+
+
+def _filled(at: Floats, triangles: Ints, spacing: float) -> tuple[Ints, Floats]:
+    """Corners (m, 3) and shares (m, 3) of places inside triangles with edges longer than ``spacing``."""
+    corner = at[triangles]
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    steps = np.minimum(np.ceil(longest / spacing), MOST_STEPS).astype(int)
+    corners, shares = [np.zeros((0, 3), np.int64)], [np.zeros((0, 3))]
+    for n in np.unique(steps[steps > 1]):
+        i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+        inner = (i + j <= n) & ~((i == n) | (j == n) | (i + j == 0))
+        share = np.stack([n - i - j, i, j], axis=-1)[inner] / n
+        rows = triangles[steps == n]
+        corners.append(np.repeat(rows, len(share), axis=0))
+        shares.append(np.tile(share, (len(rows), 1)))
+    return np.concatenate(corners), np.concatenate(shares)
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Samples round every vertex at rest: those of vertex i are ``ids`` from ``start[i]`` to ``start[i + 1]``."""
+
+    start: Ints
+    ids: Ints
+
+    def heights(self, values: Floats) -> Floats:
+        """(k,) how far each of the first k of values (m, 3) sticks out."""
+        out = np.zeros(len(self.start) - 1)
+        heights(np.ascontiguousarray(values), self.start, self.ids, out)
+        return out
+
+    def high(self, points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
+        """``height (k,)`` of points (m, 3); 0 where it is below ``least`` or a rim, points (r, 3), is nearer than
+        ``off``: the corner of a border sticks out."""
+        rows = np.flatnonzero(height > least)
+        out = np.zeros(len(height))
+        for row in rows:
+            if not (np.linalg.norm(rims - points[row], axis=1) < off).any():
+                out[row] = height[row]
+        return out
+
+
+def find_rings(points: Floats, count: int, radius: float) -> Ring:
+    """The rings of the first ``count`` of points (m, 3)."""
+    low, high = RING[0] * radius, RING[1] * radius
+    cells = np.floor((points - points.min(axis=0)) / high).astype(np.int64)
+    shape = tuple(int(n) for n in cells.max(axis=0) + 1)
+    flat = np.ravel_multi_index(tuple(cells.T), shape)
+    order = np.argsort(flat, kind="stable")
+    edges = np.searchsorted(flat[order], np.arange(int(np.prod(shape)) + 1))
+    start = np.stack([edges[:-1], edges[1:]], axis=1).reshape(*shape, 2)
+    begin, ids = np.zeros(count + 1, np.int64), np.zeros(0, np.int64)
+    used = rings(points, cells, order, start, low, high, begin, ids)
+    ids = np.zeros(used, np.int64)
+    rings(points, cells, order, start, low, high, begin, ids)
+    return Ring(begin, ids)
+
+
+def spikes(subject: Subject, places: Places, borders: Borders) -> Iterator[Finding]:
+    """The steepest spike at rest, and in the pose that has the highest."""
+    rims = borders.at(subject.rest)[~borders.sewn].reshape(-1, 3)
+    found = [_spikes(subject, places, rims, r * subject.scale, steep) for r, steep in RINGS.items()]
+    for kind in zip(*found, strict=True):
+        if steepest := max((x for x in kind if x is not None), default=None):
+            yield Finding("spike", steepest[1], AGAIN)
+
+
+def _spikes(
+    subject: Subject, places: Places, rims: Floats, radius: float, steep: float
+) -> list[tuple[float, str] | None]:
+    """The steepest spike at rest, over ``steep``, and in a pose, over one ring: steepness and text."""
+    samples = find_samples(subject, SPACING * radius)
+    if not samples.vertices:
+        return [None, None]
+    at, off = samples.at(subject.rest), OFF_RIM * radius
+    ring = find_rings(at, samples.vertices, radius)
+    height = ring.high(at, rims, ring.heights(at), PAIRED * steep * radius, off)
+    height[_usual(subject, at[: samples.vertices], height, places)] = 0.0
+    worst, best, name, where = int(height.argmax()), 0.0, "", 0
+    for pose in (n for n in subject.claimed if n in SHAPES):
+        moved = ring.heights(samples.at(subject.moves(pose)))
+        moved = ring.high(at, rims, moved, max(best, MOVED * radius), off)
+        if moved.max() > best:
+            best, name, where = float(moved.max()), pose, int(moved.argmax())
+
+    def told(when: str, row: int, high: float) -> tuple[float, str]:
+        part = subject.parts[samples.part[row]].name
+        return high / radius, f"{when}part {part!r} sticks out by {high:.1f} mm or more: {places.name(at[row])}"
+
+    return [
+        told("", worst, height[worst]) if height[worst] > steep * radius else None,
+        told(f"with {name} = 1 ", where, best) if best > 0.0 else None,
+    ]
+
+
+def _usual(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
+    """(m,) which samples belong to what a head may have: the nose, and what sticks out on both sides alike."""
+    middle, apart = places.centre[0], places.apart
+    out: Bools = np.abs(at[:, 0] - middle) < NOSE * apart
+    out &= (at[:, 2] > places.centre[2]) & (at[:, 1] < places.centre[1] + 0.3 * apart)
+    out &= at[:, 1] > places.centre[1] - 0.9 * places.down * apart
+    steep = np.flatnonzero(height)
+    mirrored = at[steep] * [-1.0, 1.0, 1.0] + [2.0 * middle, 0.0, 0.0]
+    for row, place in zip(steep, mirrored, strict=True):
+        near = np.linalg.norm(at[steep] - place, axis=1) < MIRROR_MM * subject.scale
+        apart_ = np.abs(at[steep, 0] - at[row, 0]) > MIRROR_MM * subject.scale
+        out[row] |= bool((near & apart_).any())
+    return out

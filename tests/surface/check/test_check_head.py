@@ -1,0 +1,117 @@
+"""Ten defects are seeded into the shipped head, and the check names each; heads without any pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from surface.check import Finding, borders, check_head, motions, spikes, stance
+from surface.check.checker import unsealed_lips
+from surface.check.mouth import find_mouth
+from surface.check.places import Places
+from surface.check.subject import Subject
+from surface.head import Head
+from surface.head.model.data import HeadData
+from surface.head.model.file import load_data
+from tests.surface.check import seeded
+
+Seed = Callable[[HeadData], HeadData]
+DEFECTS: dict[str, tuple[Seed, str]] = {
+    "spike": (seeded.spike_at_rest, "left cheek"),
+    "missing eye": (seeded.without_an_eye, "left eye"),
+    "blind lid": (seeded.weak_blink, "eyeBlinkLeft = 1 leaves the eye"),
+    "swapped sides": (seeded.swapped, "eyeBlinkLeft"),
+    "hole": (seeded.hole_of_triangles, "left cheek"),
+    "wrong unit": (lambda h: seeded.scaled(h, 10.0), "636 mm apart"),
+    "off camera": (lambda h: seeded.moved(h, (0.0, 1500.0, 0.0)), "not in the front camera's picture"),
+    "empty shape": (seeded.empty_shape, "browInnerUp = 1 moves nothing"),
+    "inside-out part": (seeded.inside_out_part, "'face': its triangles run inwards"),
+    "unsealed lips": (seeded.weak_mouth_close, "mouthClose = 1"),
+}
+OTHERS: dict[str, tuple[Seed, Callable[[Subject], Iterator[Finding]], str]] = {
+    "spike in a pose": (
+        seeded.spike_in_a_pose,
+        lambda s: spikes.spikes(s, Places(s, None), borders.find_borders(s)),
+        "mouthSmileLeft = 1",
+    ),
+    "no blink": (seeded.no_blink, motions.blind_lids, "no eyeBlinkRight"),
+    "a pair swapped": (
+        lambda h: seeded.swapped(h, "mouthLeft", "mouthRight"),
+        motions.swapped_sides,
+        "mouthLeft, mouthRight",
+    ),
+    "hole of a loop": (
+        seeded.hole_of_a_loop,
+        lambda s: borders.holes(s, None, Places(s, None), borders.find_borders(s)),
+        "forehead",
+    ),
+    "ten times too small": (lambda h: seeded.scaled(h, 0.1), stance.wrong_unit, "6.36 mm apart"),
+    "turned round": (seeded.turned_round, lambda s: stance.off_camera(s, None), "back of the head"),
+    "inward normals": (lambda h: seeded.inward_normals(h, "tongue"), stance.inside_out, "'tongue': its normals"),
+    "inside-out teeth": (lambda h: seeded.inside_out_part(h, "teeth_upper"), stance.inside_out, "'teeth_upper'"),
+    "open lips": (seeded.open_lips, lambda s: unsealed_lips(s, find_mouth(s)), "neutral face"),
+}
+
+
+@pytest.fixture(scope="module")
+def good(root: Path) -> HeadData:
+    return load_data(root / "configs" / "heads" / "ict")
+
+
+def findings(head: HeadData) -> list[Finding]:
+    return check_head(Head(head))
+
+
+def test_the_shipped_head_passes_without_a_warning(good: HeadData) -> None:
+    assert findings(good) == []
+
+
+@pytest.mark.parametrize("kind", DEFECTS)
+def test_a_seeded_defect_is_named(good: HeadData, kind: str) -> None:
+    make, words = DEFECTS[kind]
+    found = findings(make(good))
+    named = [f for f in found if f.kind == kind]
+    assert named, found
+    assert not named[0].warning and words in named[0].text and named[0].hint
+    assert "\n" not in named[0].line("heads/me") and "{" not in named[0].line("heads/me")
+    if kind not in ("swapped sides", "spike"):  # eyes that the other side's blink closes are open, too
+        assert {f.kind for f in found} == {kind}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_forms_of_defects_are_found(good: HeadData, name: str) -> None:
+    make, check, words = OTHERS[name]
+    (found,) = check(Subject(Head(make(good))))
+    assert words in found.text and not found.warning
+
+
+@pytest.mark.parametrize("factor", [0.7, (1.5, 1.3, 1.3)], ids=str)
+def test_heads_of_other_sizes_and_proportions_pass(good: HeadData, factor: float | tuple[float, float, float]) -> None:
+    assert findings(seeded.scaled(good, factor)) == []
+
+
+def test_a_head_without_eyes_or_blinks_is_a_warning(good: HeadData) -> None:
+    none = seeded.without_parts(good, "eye_left", "eye_right", "sockets")
+    found = findings(replace(none, eye_radius=0.0, contacts=[c for c in none.contacts if c.eye < 0]))
+    assert [(f.kind, f.warning) for f in found if f.kind == "missing eye"] == [("missing eye", True)]
+
+
+def test_places_have_names(good: HeadData) -> None:
+    subject = Subject(Head(good))
+    mouth = find_mouth(subject)
+    assert mouth is not None
+    assert mouth.width == pytest.approx(46.0, abs=6.0) and abs(mouth.middle[0]) < 1.0
+    places = Places(subject, mouth)
+    wanted = {
+        "left mouth corner": (26, -34, 104), "right cheek": (-50, -15, 92), "chin": (0, -72, 112), "nose": (0, 2, 128),
+        "forehead": (5, 90, 115), "left ear": (78, 10, 12), "top of the head": (0, 140, 10), "lower lip": (0, -42, 118),
+        "upper lip": (0, -25, 120), "right eye": (-32, 36, 96),
+    }  # fmt: skip
+    assert {n: places.name(np.array(at, float)) for n, at in wanted.items()} == {n: n for n in wanted}
+    assert (
+        places.name(np.zeros(3), "teeth") == "teeth" and places.name(np.array([30.0, 36, 90]), "eye") == "left eyeball"
+    )
