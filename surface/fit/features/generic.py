@@ -18,9 +18,10 @@ from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
 from surface.fit.source.frame import head_scale
-from surface.fit.source.islands import Island, find_islands, signed_areas
-from surface.fit.source.layout import lay_out, open_flat_holes, separate
+from surface.fit.source.islands import Island
+from surface.fit.source.layout import lay_out, open_flat_holes, straighten_holes
 from surface.fit.source.mesh import FitMesh, components, face_areas, renumbered, triangles
+from surface.fit.source.owncharts import usable_islands
 from surface.mesh.tessellate import MOST_ROOTS
 
 WORDS = {  # in the name of an object or material -> material of the part; the first that fits
@@ -31,6 +32,8 @@ KEPT = ("skin", "socket", "lid")  # in the name of a piece that is no part of an
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.9  # in spacings of the mesh; its triangles may be of any size, and the largest around a place count
+ASTRAY_MM = 1.8  # of a head of usual size: where the surface is further off, it is mended
+SPARE = 60  # points of the face that are kept for mending
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
 DEPTH = 8  # of the cells; more where many islands lie side by side, since roots are shared by all
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
@@ -71,7 +74,8 @@ def make_plan(mesh: FitMesh) -> Plan:
     if not rest:
         raise FitError("the mesh has no skin: all of it is eyeballs or has no area", hint="export the face, too")
     notes = [f"{len(gone)} pieces are eyeballs, replaced by exact ones"] if gone else []
-    parts = _skin(mesh, label == rest[0], scale)
+    gone_faces = np.flatnonzero(np.isin(label, list(gone)))
+    parts = _skin(mesh, label == rest[0], scale, gone_faces, notes)
     parts += _others(mesh, label, rest[1:], float(sizes[rest[0]]), scale, notes)
     return Plan(parts, eyes, *_hinge(mesh, shapes, scale), notes)
 
@@ -150,11 +154,13 @@ def _within(mesh: FitMesh, label: Ints, eyes: Floats, radius: float) -> set[int]
     return {k for k in inside if _kind(names[k]) == "skin" and not any(w in names[k] for w in KEPT)}
 
 
-def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, list[Island]]]:
+def _skin(
+    mesh: FitMesh, chosen: Bools, scale: float, eyeballs: Ints, notes: list[str]
+) -> list[tuple[PartRecipe, list[Island]]]:  # fmt: skip
     """The face, and, as a part of their own, islands of the same piece that hardly move."""
-    islands = _separated(mesh, chosen)
+    islands = usable_islands(mesh, np.flatnonzero(chosen), scale, notes, "face", face=True, others=eyeballs)
     if not islands:
-        raise FitError("the skin's texture coordinates have no area", hint="unwrap the mesh first")
+        raise FitError("the skin has no area", hint="export the mesh again")
     most = [np.abs(mesh.deltas[:, i.vertex]).max(axis=(1, 2), initial=0.0) for i in islands]
     moved = np.array([(m > MOVES_MM * scale).sum() for m in most])
     mobile = moved >= MOVING * moved.max(initial=0)
@@ -169,23 +175,17 @@ def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, 
     return out
 
 
-def _separated(mesh: FitMesh, chosen: Bools) -> list[Island]:
-    """Islands of the chosen faces, without overlap; those without area in (u, v) are dropped."""
-    found = [part for island in find_islands(mesh, np.flatnonzero(chosen)) for part in separate(island)]
-    return [i for i in found if np.ptp(i.uv, axis=0).min() > 1e-6 and np.abs(signed_areas(i)).sum() > 1e-12]
-
-
 def _part(
     name: str, material: str, points: int, coarse: float, error: float, scale: float, islands: list[Island],
     mesh: FitMesh,
 ) -> tuple[PartRecipe, list[Island]]:  # fmt: skip
     face = name == "face"
     request = FitRequest(points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, finest=FINEST,
-                growth=GROWTH if face else 1.25)  # fmt: skip
+                growth=GROWTH if face else 1.25, astray_mm=ASTRAY_MM * scale, spare=SPARE if face else 0)  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth
     recipe = PartRecipe(name, material, "skin", [], request, budget, doubt_slivers=True)
-    return recipe, [open_flat_holes(i) for i in lay_out(mesh, islands)]
+    return recipe, [open_flat_holes(straighten_holes(i)) for i in lay_out(mesh, islands)]
 
 
 def _others(
@@ -194,11 +194,16 @@ def _others(
     """All further pieces, one part for each object or material that they belong to."""
     out: list[tuple[PartRecipe, list[Island]]] = []
     for (name, material), own in _by_material(mesh, label, pieces, scale).items():
-        islands = _separated(mesh, np.isin(label, own))
+        made: list[str] = []
+        few = len(own) <= MOST_ISLANDS
+        faces = np.flatnonzero(np.isin(label, own))
+        islands = usable_islands(mesh, faces, scale, made, repr(name)) if few else []
         if not 0 < len(islands) <= MOST_ISLANDS:
-            why = f"{len(islands)} separate pieces are too many to fit" if islands else "no area in (u, v)"
+            count = len(islands) if few else len(own)
+            why = f"{count} separate pieces are too many to fit" if count else "no area"
             notes.append(f"{name!r}: left out: {why}")
             continue
+        notes += made
         share = sum(_area(mesh, i) for i in islands) / max(skin_area, 1e-9)
         points = int(np.clip(1.5 * POINTS * share, min(3 * LEAST * len(islands), POINTS), POINTS))
         title = f"{material if material != 'skin' else 'piece'}_{len(out) + 1}"

@@ -10,7 +10,7 @@ import numpy as np
 from surface.base.arrays import Bools
 from surface.base.errors import FitError
 from surface.fit.source.frame import find_frame
-from surface.fit.source.mesh import FitMesh, check_mesh, renumbered
+from surface.fit.source.mesh import FitMesh, bare_where_damaged, check_mesh, renumbered
 from surface.fit.source.names import NameMap, map_names, read_names, to_arkit
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MeshData
@@ -49,13 +49,14 @@ class Loaded:
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     """Read and check a mesh.
 
-    Raises FitError: the file is missing, damaged or too large, has no texture coordinates, holds NaN, or its arrays do
+    Raises FitError: the file is missing, damaged or too large, holds NaN, or its arrays do
     not fit together; names file and element.
     """
     path = Path(path)
     raw = _read(path, options.shapes)
     mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(raw)})
     mesh = _without(mesh, options.without, str(path))
+    mesh = bare_where_damaged(mesh)
     check_mesh(mesh, str(path))
     named = map_names(mesh.names, read_names(options.names) if options.names else None)
     arkit = to_arkit(mesh, named)
