@@ -1,4 +1,4 @@
-"""Fit a head to a mesh with texture coordinates and expression shapes, from the file to the head's folder."""
+"""Fit a head to a mesh with expression shapes, from the file to the head's folder."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
-from surface.fit.source.mesh import FitMesh, check_manifold
+from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
 from surface.fit.source.place import CLOSE_MM, EYES_AT, find_neck, head_size, moved, place
 from surface.fit.source.repair import repaired
@@ -60,7 +60,7 @@ def fit_head(
     options : how to interpret the mesh. report_dir : folder that gets the report (see
         :func:`surface.fit.reportfile.write_report`).
 
-    Raises FitError: the mesh cannot be read, has no texture coordinates or faces, holds NaN, is no manifold, or does
+    Raises FitError: the mesh cannot be read, has no faces, holds NaN, is no manifold, or does
     not fit together. Nothing is written then. HeadFileError: a folder cannot be written to.
     """
     report = progress or no_progress
@@ -76,7 +76,7 @@ def fit_head(
 
 def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh") -> FitResult:
     """Fit all parts of a mesh in memory; ``where`` names it in messages."""
-    recipe = recipe_for(loaded.mesh)
+    recipe = recipe_for(loaded.mesh) if is_mapped(loaded.mesh) else None
     if recipe is not None:
         loaded = _at_recipes_place(loaded, recipe)
         mesh = prepare(loaded.mesh, recipe)

@@ -1,7 +1,7 @@
 """Reader of meshes in the NPZ layout of ICT-FaceKit (Light)::
 
 neutral (n, 3)   deltas (k, n, 3)   names (k,)   faces (f, 4), the last index of a triangle is -1
-uv (t, 2)        face_uv (f, 4), texture coordinates per face corner
+uv (t, 2)        face_uv (f, 4), texture coordinates per face corner; may be left out
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from surface.base.files import reading
 from surface.readers.meshdata import MeshData, check_size
 
 KEYS = ("neutral", "deltas", "names", "faces", "uv", "face_uv")
+MAPPED = ("uv", "face_uv")
 
 
 def read_npz(path: Path) -> MeshData:
@@ -25,6 +26,8 @@ def read_npz(path: Path) -> MeshData:
     Raises FitError: the file is missing or damaged, lacks a key, or holds an array of another kind or shape.
     """
     raw = _arrays(path)
+    if not any(key in raw for key in MAPPED):
+        raw |= {"uv": np.zeros((0, 2)), "face_uv": np.full(np.shape(raw["faces"]), -1)}
     n, f, k, t = (len(np.atleast_1d(raw[key])) for key in ("neutral", "faces", "names", "uv"))
     shapes = {"neutral": (n, 3), "faces": (f, 4), "uv": (t, 2), "face_uv": (f, 4), "deltas": (k, n, 3), "names": (k,)}
     for key, shape in shapes.items():
@@ -46,7 +49,8 @@ def _arrays(path: Path) -> dict[str, Array]:
         raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
     with reading(path, FitError, hint=f"save {', '.join(KEYS)} with numpy.savez"):
         arrays = read_npz_file(path)
-    missing = [k for k in KEYS if k not in arrays]
+    bare = not any(key in arrays for key in MAPPED)
+    missing = [k for k in KEYS if k not in arrays and not (bare and k in MAPPED)]
     if missing:
         why = f"key {missing[0]!r} is missing (found: {', '.join(arrays)[:200]})"
         raise FitError(f"{path}: {why}", hint=f"the layout needs {', '.join(KEYS)}")

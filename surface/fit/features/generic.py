@@ -20,15 +20,18 @@ from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
 from surface.fit.source.frame import head_scale
-from surface.fit.source.islands import Island, find_islands, signed_areas
+from surface.fit.source.islands import Island
 from surface.fit.source.kinds import kind_name, material_of
-from surface.fit.source.layout import lay_out, open_flat_holes, separate
+from surface.fit.source.layout import lay_out, open_flat_holes, straighten_holes
 from surface.fit.source.mesh import FitMesh, components, face_areas, triangles
+from surface.fit.source.owncharts import usable_islands
 from surface.mesh.tessellate import MOST_ROOTS
 
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.9  # in spacings of the mesh; its triangles may be of any size, and the largest around a place count
+ASTRAY_MM = 1.8  # of a head of usual size: where the surface is further off, it is mended
+SPARE = 60  # points of the face that are kept for mending
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
 DEPTH = 8  # of the cells; more where many islands lie side by side, since roots are shared by all
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
@@ -70,7 +73,7 @@ def make_plan(mesh: FitMesh) -> Plan:
     if not rest:
         raise FitError("the mesh has no skin: all of it is eyeballs or has no area", hint="export the face, too")
     notes = list(eyes.notes)
-    parts = _skin(mesh, label == rest[0], scale)
+    parts = _skin(mesh, label == rest[0], scale, np.flatnonzero(eyes.faces), notes)
     parts += _others(mesh, label, rest[1:], float(sizes[rest[0]]), scale, notes)
     return Plan(parts, (eyes.centres, eyes.radius), *_hinge(mesh, shapes, scale), notes, eyes)
 
@@ -111,11 +114,13 @@ def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats
     return sizes * (1.0 + moving) * np.where(is_skin(mesh, label, len(sizes)), 1.0, LESS)
 
 
-def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, list[Island]]]:
+def _skin(
+    mesh: FitMesh, chosen: Bools, scale: float, eyeballs: Ints, notes: list[str]
+) -> list[tuple[PartRecipe, list[Island]]]:  # fmt: skip
     """The face, and, as a part of their own, islands of the same piece that hardly move."""
-    islands = _separated(mesh, chosen)
+    islands = usable_islands(mesh, np.flatnonzero(chosen), scale, notes, "face", face=True, others=eyeballs)
     if not islands:
-        raise FitError("the skin's texture coordinates have no area", hint="unwrap the mesh first")
+        raise FitError("the skin has no area", hint="export the mesh again")
     most = [np.abs(mesh.deltas[:, i.vertex]).max(axis=(1, 2), initial=0.0) for i in islands]
     moved = np.array([(m > MOVES_MM * scale).sum() for m in most])
     mobile = moved >= MOVING * moved.max(initial=0)
@@ -130,23 +135,17 @@ def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, 
     return out
 
 
-def _separated(mesh: FitMesh, chosen: Bools) -> list[Island]:
-    """Islands of the chosen faces, without overlap; those without area in (u, v) are dropped."""
-    found = [part for island in find_islands(mesh, np.flatnonzero(chosen)) for part in separate(island)]
-    return [i for i in found if np.ptp(i.uv, axis=0).min() > 1e-6 and np.abs(signed_areas(i)).sum() > 1e-12]
-
-
 def _part(
     name: str, material: str, points: int, coarse: float, error: float, scale: float, islands: list[Island],
     mesh: FitMesh,
 ) -> tuple[PartRecipe, list[Island]]:  # fmt: skip
     face = name == "face"
     request = FitRequest(points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, finest=FINEST,
-                growth=GROWTH if face else 1.25)  # fmt: skip
+                growth=GROWTH if face else 1.25, astray_mm=ASTRAY_MM * scale, spare=SPARE if face else 0)  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth
     recipe = PartRecipe(name, material, "skin", [], request, budget, doubt_slivers=True)
-    return recipe, [open_flat_holes(i) for i in lay_out(mesh, islands)]
+    return recipe, [open_flat_holes(straighten_holes(i)) for i in lay_out(mesh, islands)]
 
 
 def _others(
@@ -155,10 +154,14 @@ def _others(
     """All further pieces, one part for each object or material that they belong to."""
     out: list[tuple[PartRecipe, list[Island]]] = []
     for (name, kind), own in by_object(mesh, label, pieces, scale).items():
-        islands = [] if kind.rule == "eye" else _separated(mesh, np.isin(label, own))
-        if why := why_out(name, kind, len(islands), MOST_ISLANDS):
+        made: list[str] = []
+        faces = np.flatnonzero(np.isin(label, own))
+        few = kind.rule != "eye" and len(own) <= MOST_ISLANDS
+        islands = usable_islands(mesh, faces, scale, made, repr(name)) if few else []
+        if why := why_out(name, kind, len(islands) if few else len(own), MOST_ISLANDS):
             notes.append(why)
             continue
+        notes += made
         share = sum(_area(mesh, i) for i in islands) / max(skin_area, 1e-9)
         points = int(np.clip(1.5 * POINTS * share, min(3 * LEAST * len(islands), POINTS), POINTS))
         title = f"{kind.material if kind.material != 'skin' else 'piece'}_{len(out) + 1}"

@@ -1,18 +1,30 @@
-"""Fit a chart: solve for control points, measure neutral and every shape, add points where they are off, repeat."""
+"""Fit a chart: solve for control points, measure neutral and every shape, add points where they are off, repeat.
+
+Then look between the samples. Where the surface strays there, places between the samples become samples, too; the net
+may become finer there; and control points around are held to their neighbours, positions and displacements alike, ever
+more strongly, until nothing strays.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, vstack
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Bools, Floats
+from surface.fit.points.dense import around, bounded, dense_errors, places_of
 from surface.fit.points.net import Net, coarse_places, keys, level_caps, net_at, wanted_places
 from surface.fit.points.solve import basis, solve
-from surface.fit.source.chart import Chart
+from surface.fit.source.chart import Chart, Places
 from surface.fit.source.mesh import FitMesh
+
+HOLDS = (1.0, 30.0, 1e3, 3e4)  # how strongly points around strays are held, one turn after another
+FAR = (
+    1.5  # times the error that mends: where nothing helped, control points beyond the mesh's own range are put into it
+)
 
 
 @dataclass(frozen=True)
@@ -23,6 +35,7 @@ class FitRequest:
     neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
     growth : most factor by which the net grows between two solves.
     finest : least spacing of a net, in spacings of the mesh's vertices.
+    astray_mm : where the surface is further off, also between samples, it is mended; spare : points kept for that.
     """
 
     points: int
@@ -33,6 +46,8 @@ class FitRequest:
     fair: float = 1e-4
     growth: float = 1.25
     finest: float = 1.2
+    astray_mm: float = 2.5
+    spare: int = 0
 
 
 @dataclass(frozen=True)
@@ -54,14 +69,37 @@ def fit_chart(
     mesh: FitMesh, chart: Chart, request: FitRequest, report: Callable[[float], None] = lambda _: None
 ) -> Fitted:
     """Control points for neutral and shapes of one chart; ``report`` is called with the fraction done."""
-    targets = _targets(mesh, chart.mix)
-    slopes = None
+    net = net_at(coarse_places(chart.uv, request.coarse), request.coarse, chart.cuts, chart.uv)
+    first = replace(request, points=request.points - request.spare)
+    fitted = _refined(mesh, chart, net, first, Hold(), report)
+    return fitted if chart.between is None else _mended(mesh, chart, fitted, request, report)
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Where control points are held to their neighbours: those that reach any of places ``uv (d, 2)``, ``factor`` times
+    as strongly as all others."""
+
+    uv: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    factor: float = 1.0
+
+    def fair(self, net: Net, usual: float) -> Floats:
+        """(n,) weight of fairness of every control point."""
+        reached = basis(net, self.uv).getnnz(axis=0) > 0 if len(self.uv) else np.zeros(len(net), bool)
+        return np.where(reached, self.factor, 1.0) * usual
+
+
+def _refined(
+    mesh: FitMesh, chart: Chart, net: Net, request: FitRequest, hold: Hold, report: Callable[[float], None]
+) -> Fitted:  # fmt: skip
+    """Solve, and add points where samples are off, until none is or there are enough points."""
+    targets, slopes = _targets(mesh, chart.mix), None
     if chart.slopes is not None:
         slopes = chart.slopes, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
-    net = net_at(coarse_places(chart.uv, request.coarse), request.coarse, chart.cuts, chart.uv)
     while True:
         b = basis(net, chart.uv)
-        fitted = _measured(net, b, targets, solve(net, b, chart.weight, targets, request.fair, slopes))
+        solved = solve(net, b, chart.weight, targets, hold.fair(net, request.fair), slopes)
+        fitted = _measured(net, b, targets, solved)
         report(min(1.0, len(net) / request.points))
         room = request.points - len(net)
         if room <= 0:
@@ -69,6 +107,56 @@ def fit_chart(
         net, grown = _grow(net, chart, need(chart, fitted, request), request, room)
         if not grown:
             return fitted
+
+
+def _mended(
+    mesh: FitMesh, chart: Chart, fitted: Fitted, request: FitRequest, report: Callable[[float], None]
+) -> Fitted:  # fmt: skip
+    """The fit without spikes between its samples; the errors that come with it are those of the chart's own samples."""
+    within, held = chart, np.zeros((0, 2))
+    places, best = places_of(chart, mesh), fitted
+    for factor in HOLDS:
+        strays = _strays(mesh, chart, fitted, request.astray_mm)
+        if not strays.any():
+            return fitted
+        held = np.concatenate([held, places.uv[strays]])
+        within = _with_samples(within, places.take(around(places, places.mix[np.flatnonzero(strays)])))
+        fitted = _on(mesh, chart, _refined(mesh, within, fitted.net, request, Hold(held, factor), report))
+        best = min(best, fitted, key=lambda f: _most(mesh, chart, f))
+    off = dense_errors(mesh, chart, best.net, best.points, best.moves)
+    far = np.maximum(off.neutral, off.worst) > FAR * request.astray_mm
+    points, moves = bounded(mesh, chart, best.net, best.points, best.moves, far)
+    return _on(mesh, chart, replace(best, points=points, moves=moves))
+
+
+def _most(mesh: FitMesh, chart: Chart, fitted: Fitted) -> float:
+    """The largest error (mm) between the samples of a chart."""
+    return dense_errors(mesh, chart, fitted.net, fitted.points, fitted.moves).most
+
+
+def _strays(mesh: FitMesh, chart: Chart, fitted: Fitted, most_mm: float) -> Bools:
+    """(d,) places between samples where the surface is too far from the mesh, there or at a sample beside."""
+    off = dense_errors(mesh, chart, fitted.net, fitted.points, fitted.moves)
+    worst = fitted.shape_error.max(axis=0) if len(fitted.shape_error) else np.zeros_like(fitted.error)
+    samples = np.maximum(np.where(chart.folded, 0.0, fitted.error), worst) > most_mm
+    here = np.maximum(off.neutral, off.worst) > most_mm
+    return here | around(places_of(chart, mesh), chart.mix[np.flatnonzero(samples)])
+
+
+def _on(mesh: FitMesh, chart: Chart, fitted: Fitted) -> Fitted:
+    """The same control points, with the errors that they have at the chart's own samples."""
+    x = np.concatenate([fitted.points[:, None], fitted.moves.transpose(1, 0, 2)], axis=1).reshape(len(fitted.net), -1)
+    return _measured(fitted.net, basis(fitted.net, chart.uv), _targets(mesh, chart.mix), x)
+
+
+def _with_samples(chart: Chart, places: Places) -> Chart:
+    """The chart with places as further samples, of full weight wherever they lie."""
+    rows = {
+        "uv": places.uv, "weight": np.ones(len(places.uv)), "spacing": places.spacing,
+        "folded": np.zeros(len(places.uv), bool),
+    }  # fmt: skip
+    joined: dict[str, Any] = {k: np.concatenate([getattr(chart, k), v]) for k, v in rows.items()}
+    return replace(chart, mix=vstack([chart.mix, places.mix]).tocsr(), **joined)
 
 
 def _targets(mesh: FitMesh, mix: csr_matrix) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_matrix, identity
+from scipy.sparse import csr_matrix, diags, identity
 
 from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
@@ -60,13 +60,14 @@ def normal_equations(rows: csr_matrix, weight: Floats, targets: Floats) -> tuple
 
 
 def solve(
-    net: Net, samples: csr_matrix, weight: Floats, targets: Floats, fair: float,
+    net: Net, samples: csr_matrix, weight: Floats, targets: Floats, fair: float | Floats,
     slopes: tuple[Slopes, Floats, Floats] | None = None,
 ) -> Floats:  # fmt: skip
     """Control point coordinates (n, c) for all targets (m, c) at once.
 
     Minimises sum weight (B P - target)^2 + slopes + fair (m / n) |F P|^2 with F of :func:`fairness`; one
-    factorisation serves every right-hand side. ``slopes`` come with their targets (f, c) in u and in v.
+    factorisation serves every right-hand side. ``slopes`` come with their targets (f, c) in u and in v. ``fair`` is one
+    number, or one of each control point (n,).
     """
     n = len(net)
     normal, right = normal_equations(samples, weight, targets)
@@ -79,7 +80,7 @@ def solve(
             right += more_right
     strength = weight.sum() / n
     f = fairness(net)
-    normal += (fair * strength * (f.T @ f)).toarray()
+    normal += (strength * (f.T @ diags(np.broadcast_to(fair, n)) @ f)).toarray()
     normal[np.diag_indices(n)] += 1e-7 * strength
     solved: Floats = cho_solve(cho_factor(normal, check_finite=False), right, check_finite=False)
     return solved

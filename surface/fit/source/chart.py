@@ -14,13 +14,16 @@ from scipy.sparse import csr_matrix, identity, vstack
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.islands import Island, boundary_loops
-from surface.fit.source.mesh import FitMesh, directed_edges, face_areas
+from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, triangles
 
 TILE = 2.0  # distance between the tiles of two islands: supports of one cannot reach the next
 NARROW = 0.7  # a hole lower than this part of its width is a slit
 BORDER_WEIGHT = 8.0  # samples on a border hold the surface to its neighbour
 CLUTTER = (4.5, 7.0)  # stretch, in medians, where a fold of the mesh begins and where it is only held loosely
 CLUTTER_WEIGHT = 0.05
+INNER = np.array([4.0, 1.0, 1.0]) / 6.0  # of a triangle's corners: a place that is no sample
+QUARTER = np.array([0.75, 0.25])  # of an edge of the border
+THIRD = 0.4  # of the mesh's spacing: that of such places
 SLOPE_WEIGHT = 2.0  # of a face's slope, relative to a sample's position
 
 
@@ -34,6 +37,22 @@ class Cut:
 
 
 @dataclass(frozen=True)
+class Places:
+    """Places of a chart that are no samples: uv (d, 2), their mix (d, n) of the mesh's vertices, spacing (d, 2) of what
+    lies around them, and folded (d,), as in :class:`Chart`."""
+
+    uv: Floats
+    mix: csr_matrix
+    spacing: Floats
+    folded: Bools
+
+    def take(self, chosen: Bools) -> Places:
+        """Some of them, by a mask (d,)."""
+        rows = np.flatnonzero(chosen)
+        return Places(self.uv[rows], self.mix[rows], self.spacing[rows], self.folded[rows])
+
+
+@dataclass(frozen=True)
 class Chart:
     """Everything the fit needs of one part.
 
@@ -44,6 +63,7 @@ class Chart:
     folded : (m,) bool, samples inside folds (nostrils, ear canals) that are not measured.
     loops : closed polylines (k, 2) in (u, v); loop_vertices : the mesh vertex of each of their points.
     cuts : slits of the chart; slopes : what the surface's derivatives should be, if wanted.
+    between : places all over the chart between its samples, for looking whether the surface strays there.
     """
 
     uv: Floats
@@ -55,6 +75,7 @@ class Chart:
     loop_vertices: list[Ints]
     cuts: list[Cut] = field(default_factory=list)
     slopes: Slopes | None = None
+    between: Places | None = None
 
     def hole_near(self, vertices: Floats, eye: Floats) -> int:
         """Which of the loops has its rim, on a mesh's vertices (n, 3), nearest to an eyeball's centre (3,)."""
@@ -74,7 +95,14 @@ def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True, 
     }
     lists: dict[str, Any] = {k: [x for p in pieces for x in getattr(p, k)] for k in ("loops", "loop_vertices", "cuts")}
     slopes = join_slopes([p.slopes for p in pieces if p.slopes is not None])
-    return Chart(mix=vstack([p.mix for p in pieces]).tocsr(), slopes=slopes, **rows, **lists)
+    between = join_places([p.between for p in pieces if p.between is not None])
+    return Chart(mix=vstack([p.mix for p in pieces]).tocsr(), slopes=slopes, between=between, **rows, **lists)
+
+
+def join_places(parts: list[Places]) -> Places:
+    """The places of several islands as one."""
+    uv, spacing, folded = (np.concatenate([getattr(p, k) for p in parts]) for k in ("uv", "spacing", "folded"))
+    return Places(uv, vstack([p.mix for p in parts]).tocsr(), spacing, folded)
 
 
 def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
@@ -90,7 +118,25 @@ def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
         [island.uv[loop] for loop in around], [island.vertex[loop] for loop in around],
         [c for loop in around[1:] if (c := slit_of(island.uv[loop])) is not None],
         face_slopes(island, n, SLOPE_WEIGHT * _loosened(fold), doubt_slivers=doubt_slivers),
+        _between(island, n, fold),
     )  # fmt: skip
+
+
+def _between(island: Island, vertices: int, fold: Floats) -> Places:
+    """Places inside every triangle, and along the border a quarter of an edge from either end."""
+    tri, loops = triangles(island.faces), boundary_loops(island)
+    rim = np.concatenate([np.zeros((0, 2), np.int64), *(np.column_stack([x, np.roll(x, -1)]) for x in loops)])
+    inside = [_mix(tri, np.roll(INNER, k), len(island.uv)) for k in range(3)]
+    along = [_mix(rim, share, len(island.uv)) for share in (QUARTER, QUARTER[::-1])]
+    rows = vstack([*inside, *along]).tocsr()
+    mix = rows @ identity(vertices, format="csr")[island.vertex]
+    return Places(rows @ island.uv, mix, THIRD * (rows @ _spacing(island)), rows @ fold > 0.5)
+
+
+def _mix(corner: Ints, share: Floats, points: int) -> csr_matrix:
+    """(r, points) one share (k,) of each of the corners (r, k)."""
+    rows = np.repeat(np.arange(len(corner)), corner.shape[1])
+    return csr_matrix((np.tile(share, len(corner)), (rows, corner.ravel())), shape=(len(corner), points))
 
 
 def _loosened(fold: Floats) -> Floats:

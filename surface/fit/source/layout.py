@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.source.chart import NARROW, TILE
+from surface.fit.source.chart import NARROW, TILE, slit_of
 from surface.fit.source.islands import Island, boundary_loops, signed_areas
 from surface.fit.source.mesh import FitMesh, components, directed_edges
 from surface.head.model.parameters import smoothstep
@@ -21,6 +21,8 @@ LARGE = 0.03  # of an island's area: what runs the other way round in (u, v) and
 TILT = 0.35  # rad; holes that are tilted more than this are no slits along u
 FLAT = 0.05  # sine of a slope below which a surface has no up
 SMALLEST = 0.12  # tiles are as large as their islands, but never smaller than this
+COLUMNS = 33  # places along a hole at which its middle is looked up
+INSIDE = 0.7  # of half its height: further from the middle a slit is too near to the rim
 OPEN = 0.4  # height over width that a flat hole gets
 BAND = 2.0  # half the height of the band that is stretched most, in heights of the hole
 REACH_V = 2.0  # up and down from the hole, in its widths: where the stretching fades
@@ -118,6 +120,48 @@ def _in_tile(island: Island, k: int, largest: float) -> Island:
     extent = max(float((high - low).max()), 1e-12)
     size = max(extent / max(largest, 1e-12), SMALLEST)
     return replace(island, uv=(island.uv - low) * (size / extent) + [TILE * k, 0.0])
+
+
+def straighten_holes(island: Island) -> Island:
+    """The island with v shifted so that the middle line of every slit keeps to one v, where it did not.
+
+    A slit runs along u from one end of its hole to the other: where the hole is bent or tilted it would cut the skin
+    beside it. The shift fades up and down and to the sides; u is unchanged.
+    """
+    for loop in boundary_loops(island)[1:]:
+        rim = island.uv[loop]
+        if slit_of(rim) is not None:
+            island = replace(island, uv=_straightened(island.uv, rim))
+    return island
+
+
+def _straightened(uv: Floats, rim: Floats) -> Floats:
+    """All points (m, 2), shifted so that the hole with this rim is straight; as they are where its slit stays in it."""
+    low, high = rim.min(axis=0), rim.max(axis=0)
+    width, level = float(high[0] - low[0]), 0.5 * float(low[1] + high[1])
+    u = low[0] + width * np.linspace(0.0, 1.0, COLUMNS)
+    middle, half = middle_line(rim, u)
+    off = middle - level
+    inner = slice(1, -1)
+    if (np.abs(off) < INSIDE * half)[inner].all():
+        return uv
+    outside = np.maximum(low[0] - uv[:, 0], uv[:, 0] - high[0]) / (REACH_U * width)
+    fade = (1.0 - smoothstep(outside)) * np.exp(-(((uv[:, 1] - level) / (REACH_V * width)) ** 2))
+    return np.column_stack([uv[:, 0], uv[:, 1] - fade * np.interp(uv[:, 0], u, off)])
+
+
+def middle_line(rim: Floats, u: Floats) -> tuple[Floats, Floats]:
+    """Middle and half the height in v of a hole with this rim (k, 2) at places ``u (n,)`` along it."""
+    start, end = rim, np.roll(rim, -1, axis=0)
+    middle, half = np.empty(len(u)), np.empty(len(u))
+    for k, at in enumerate(np.clip(u, rim[:, 0].min(), rim[:, 0].max())):
+        met = (np.minimum(start[:, 0], end[:, 0]) <= at) & (np.maximum(start[:, 0], end[:, 0]) >= at)
+        along = end[met, 0] - start[met, 0]
+        flat = np.abs(along) < 1e-12
+        share = np.where(flat, 0.0, (at - start[met, 0]) / np.where(flat, 1.0, along))
+        v = start[met, 1] + share * (end[met, 1] - start[met, 1])
+        middle[k], half[k] = 0.5 * (v.min() + v.max()), 0.5 * (v.max() - v.min())
+    return middle, half
 
 
 def open_flat_holes(island: Island) -> Island:

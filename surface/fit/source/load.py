@@ -14,7 +14,7 @@ from surface.fit.source.conventions import convention_of
 from surface.fit.source.expressions import with_expressions
 from surface.fit.source.frame import Frame, find_frame
 from surface.fit.source.kinds import unworn
-from surface.fit.source.mesh import FitMesh, check_mesh, renumbered
+from surface.fit.source.mesh import FitMesh, bare_where_damaged, check_mesh, renumbered
 from surface.fit.source.namenotes import name_notes
 from surface.fit.source.names import NameMap, map_names, read_names
 from surface.fit.source.orient import shapes_of_sides
@@ -62,7 +62,7 @@ class Loaded:
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     """Read and check a mesh.
 
-    Raises FitError: the file is missing, damaged or too large, has no texture coordinates, holds NaN, or its arrays do
+    Raises FitError: the file is missing, damaged or too large, holds NaN, or its arrays do
     not fit together; names file and element.
     """
     path = Path(path)
@@ -71,6 +71,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     mesh = _without(mesh, options.without, str(path))
     kept, notes = unworn(mesh)
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
+    mesh = bare_where_damaged(mesh)
     check_mesh(mesh, str(path))
     own = read_names(options.names) if options.names else None
     named = map_names(mesh.names, own, empty=empty_shapes(mesh), other=other)

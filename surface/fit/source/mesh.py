@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.readers.meshdata import Material
 
@@ -22,7 +22,7 @@ class FitMesh:
 
     vertices : (n, 3) float64, millimetres, y up, z forward.
     faces : (f, 4) int64, -1 fills the last place of a triangle.
-    uv : (t, 2) float64; face_uv : (f, 4) int64 into ``uv``, -1 as in ``faces``.
+    uv : (t, 2) float64; face_uv : (f, 4) int64 into ``uv``, -1 as in ``faces``; all -1 in a face without any.
     names : k shape names; deltas : (k, n, 3) float64, millimetres.
     piece : (f,) int64 into ``pieces``, names of the objects that faces belong to; empty where there are none.
     materials : what the file says of the colours of each of ``pieces``; empty where it says nothing of any.
@@ -60,24 +60,30 @@ def check_mesh(mesh: FitMesh, where: str) -> None:
             raise FitError(f"{where}: {key} has shape {got}, expected {want}", hint="export all arrays from one mesh")
     if f == 0:
         raise FitError(f"{where}: faces is empty", hint="export the mesh with its polygons")
-    _check_mapped(where, mesh)
-    for key, index, count in (("faces", mesh.faces, n), ("face_uv", mesh.face_uv, len(mesh.uv))):
-        bad = np.argwhere((index >= count) | (index < -1) | ((index < 0) & (np.arange(4) < 3)))
+    bare = (mesh.face_uv == -1).all(axis=1)[:, None]
+    for key, index, count, free in (("faces", mesh.faces, n, False), ("face_uv", mesh.face_uv, len(mesh.uv), bare)):
+        bad = np.argwhere(~free & ((index >= count) | (index < -1) | ((index < 0) & (np.arange(4) < 3))))
         if len(bad):
             raise FitError(f"{where}: {key}[{bad[0, 0]}] points at {index[tuple(bad[0])]}, but there are {count}")
-    if ((mesh.faces < 0) != (mesh.face_uv < 0)).any():
+    if (((mesh.faces < 0) != (mesh.face_uv < 0)) & ~bare).any():
         raise FitError(f"{where}: faces and face_uv have other corners", hint="export all arrays from one mesh")
     _check_finite(where, mesh)
 
 
-def _check_mapped(where: str, mesh: FitMesh) -> None:
-    bare = np.flatnonzero((mesh.face_uv[:, :3] < 0).any(axis=1)) if len(mesh.uv) else np.arange(len(mesh.faces))
-    if not len(bare):
-        return
-    part = f" (of {mesh.piece_of(bare[0])!r})" if len(mesh.pieces) > 1 else ""
-    what = "the mesh has" if len(bare) == len(mesh.faces) else f"faces[{bare[0]}]{part} has"
-    raise FitError(f"{where}: {what} no texture coordinates",
-                   hint="unwrap it first: omote fits in (u, v); or leave the object out: --without NAME")  # fmt: skip
+def is_mapped(mesh: FitMesh) -> bool:
+    """Do all faces have texture coordinates?"""
+    return bool((mesh.face_uv[:, :3] >= 0).all())
+
+
+def bare_where_damaged(mesh: FitMesh) -> FitMesh:
+    """The mesh without the texture coordinates of faces that have some for a part of their corners only, or have
+    numbers among them that only damage makes."""
+    uv = np.vstack([mesh.uv, np.zeros((1, 2))])  # the last row stands for none
+    fine: Bools = np.all(np.abs(uv) < LARGE, axis=1)
+    known = mesh.face_uv < len(mesh.uv)  # an index that points nowhere is named later
+    row_good = (fine[np.where(known, mesh.face_uv, -1)] & ((mesh.face_uv >= 0) == (mesh.faces >= 0))).all(axis=1)
+    keep = row_good | ~known.all(axis=1)
+    return replace(mesh, uv=np.where(fine[:-1, None], mesh.uv, 0.0), face_uv=np.where(keep[:, None], mesh.face_uv, -1))
 
 
 def _check_finite(where: str, mesh: FitMesh) -> None:

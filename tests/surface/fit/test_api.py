@@ -75,7 +75,7 @@ def test_the_lips_of_the_slit_part(fitted):
 
 
 def test_nothing_is_written_for_a_bad_mesh(tmp_path):
-    path = write_npz(tmp_path / "m.npz", slit_sheet(), uv=None)
+    path = write_npz(tmp_path / "m.npz", slit_sheet(), faces=None)
     with pytest.raises(FitError):
         fit_head(path, tmp_path / "head", name="bad")
     assert not (tmp_path / "head").exists()

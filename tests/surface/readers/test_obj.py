@@ -66,12 +66,10 @@ def test_polygons_become_fans(tmp_path):
         (CUBE_FACE + "f -9/1 2/2 3/3\n", "line 9: corner -9/1 points before"),
         (CUBE_FACE + "f 1/1 2/2 9/3\n", r"faces\[0\] points at 8, but there are 4"),
         (CUBE_FACE + "f 1/1 2/2 3/9\n", r"face_uv\[0\] points at 8, but there are 4"),
-        (CUBE_FACE + "f 1 2 3\n", "the mesh has no texture coordinates"),
         (CUBE_FACE, "faces is empty"),
         ("", "no line begins with v"),
         ("v 1 2\n", "line 1: v needs 3 numbers"),
         ("v 1 2 nan\n", "line 1: v number 0 is not a finite number"),
-        (CUBE_FACE + "o brow\nf 1/1 2/2 3/3\no lid\nf 1 2 3\n", r"faces\[1\] \(of 'lid'\) has no texture"),
     ],
 )
 def test_a_wrong_line_is_named(tmp_path, text, message):

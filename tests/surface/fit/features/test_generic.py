@@ -8,13 +8,19 @@ import pytest
 from meshfiles import remapped
 from slit_sheet import SIZE_MM, slit_sheet
 
-from surface.base.errors import FitError
 from surface.fit.features import generic
 from surface.fit.features.eyes import middle_x
 from surface.fit.features.generic import MOST_ISLANDS, POINTS, make_plan
+from surface.fit.source.islands import Island, boundary_loops, signed_areas
 from surface.fit.source.mesh import FitMesh, face_areas
+from surface.fit.source.owncharts import usable_islands
 
+NONE = np.zeros(0, np.int64)
 EYES = {"eyeBlinkLeft": 32.7, "eyeBlinkRight": -32.7}  # where they are, mm
+
+
+def islands_of(mesh: FitMesh, chosen: np.ndarray) -> list[Island]:
+    return usable_islands(mesh, np.flatnonzero(chosen), 1.0, [], "mesh")
 
 
 def joined(meshes: list[tuple[str, FitMesh]]) -> FitMesh:
@@ -105,10 +111,12 @@ def test_the_chin_tells_the_hinge():
     assert len(make_plan(replace(mesh, names=(), deltas=mesh.deltas[:0])).jaw) == 0
 
 
-def test_texture_coordinates_without_area_are_refused():
+def test_texture_coordinates_without_area_are_replaced():
     mesh = slit_sheet()
-    with pytest.raises(FitError, match="texture coordinates have no area"):
-        make_plan(replace(mesh, uv=mesh.uv * [1.0, 0.0]))
+    plan = make_plan(replace(mesh, uv=mesh.uv * [1.0, 0.0]))
+    assert "100 % of the surface squeezed" in plan.notes[0] and "omote made its own, 1 chart" in plan.notes[0]
+    ((_, (island,)),) = plan.parts
+    assert (signed_areas(island) > 0).all() and len(boundary_loops(island)) == 2
 
 
 def squares(*corners: tuple[float, float, float, float], names: tuple[str, ...] = ()) -> FitMesh:
@@ -157,7 +165,7 @@ def test_the_back_is_what_less_than_four_tenths_as_many_shapes_move() -> None:
     corners = [(300.0 * k, 0.0, 200.0, 0.0) for k in range(5)]
     amounts = [[9.0, 9.0 if k < 2 else 0.5, 9.0 if k < 1 else 0.5, 0.0, 1.5] for k in range(5)]
     mesh = moving(squares(*corners), *amounts)
-    parts = generic._skin(mesh, np.ones(5, bool), 1.0)
+    parts = generic._skin(mesh, np.ones(5, bool), 1.0, NONE, [])
     sizes = {part.name: [int(i.vertex.min()) // 4 for i in islands] for part, islands in parts}
     assert sizes == {"face": [0, 1, 4], "back": [2, 3]}
     (face, _), (back, _) = parts
@@ -165,24 +173,24 @@ def test_the_back_is_what_less_than_four_tenths_as_many_shapes_move() -> None:
     assert back.request.points == round(2450 * 2 / 3 - 0.5)
     assert (face.request.coarse, face.request.neutral_mm) == (0.1, 0.25)
     assert (back.request.coarse, back.request.neutral_mm) == (0.1, 0.4)
-    still = generic._skin(replace(mesh, deltas=0 * mesh.deltas), np.ones(5, bool), 1.0)
+    still = generic._skin(replace(mesh, deltas=0 * mesh.deltas), np.ones(5, bool), 1.0, NONE, [])
     assert [part.name for part, _ in still] == ["face"]
-    small = generic._skin(moving(squares((0, 0, 200, 0), (300, 0, 10, 0)), [9.0, 0.0]), np.ones(2, bool), 1.0)
+    small = generic._skin(moving(squares((0, 0, 200, 0), (300, 0, 10, 0)), [9.0, 0.0]), np.ones(2, bool), 1.0, NONE, [])
     assert small[1][0].request.points == 560
     many = squares((0, 0, 200, 0), *((300 + 20 * k, 0, 10, 0) for k in range(20)))
-    assert generic._skin(moving(many, [9.0] + [0.0] * 20), np.ones(21, bool), 1.0)[1][0].request.points == 800
+    assert generic._skin(moving(many, [9.0] + [0.0] * 20), np.ones(21, bool), 1.0, NONE, [])[1][0].request.points == 800
     wide = squares((0, 0, 200, 0), (300, 0, 900, 0))
-    assert generic._skin(moving(wide, [9.0, 0.0]), np.ones(2, bool), 1.0)[1][0].request.points == 2450
+    assert generic._skin(moving(wide, [9.0, 0.0]), np.ones(2, bool), 1.0, NONE, [])[1][0].request.points == 2450
 
 
 @pytest.mark.parametrize(("scale", "points"), [(1.0, 3769), (0.5, 4900), (2.0, 2450)])
 def test_a_face_larger_than_a_head_of_that_size_has_gets_up_to_twice_the_points(scale: float, points: int) -> None:
     mesh = moving(squares((0, 0, 447.2136, 0)), [9.0])  # 200,000 mm^2, 130,000 is a face
-    assert generic._skin(mesh, np.ones(1, bool), scale)[0][0].request.points == pytest.approx(points, abs=1)
+    assert generic._skin(mesh, np.ones(1, bool), scale, NONE, [])[0][0].request.points == pytest.approx(points, abs=1)
 
 
 def test_limits_of_a_part_are_those_of_a_head_of_its_size() -> None:
-    mesh, islands = slit_sheet(), generic._separated(slit_sheet(), np.ones(len(slit_sheet().faces), bool))
+    mesh, islands = slit_sheet(), islands_of(slit_sheet(), np.ones(len(slit_sheet().faces), bool))
     for scale in (1.0, 0.1):
         given = "skin", 500, 0.1, 0.25, scale, islands, mesh
         (face, _), (other, _) = generic._part("face", *given), generic._part("back", *given)
@@ -198,25 +206,27 @@ def test_limits_of_a_part_are_those_of_a_head_of_its_size() -> None:
 @pytest.mark.parametrize(("count", "depth"), [(1, 8), (12, 8), (13, 9), (24, 9), (25, 10)])
 def test_cells_get_deeper_where_more_islands_share_the_24_roots(count: int, depth: int) -> None:
     mesh = squares(*((300.0 * k, 0.0, 200.0, 0.0) for k in range(count)))
-    islands = generic._separated(mesh, np.ones(count, bool))
+    islands = islands_of(mesh, np.ones(count, bool))
     assert len(islands) == count
     assert generic._part("back", "skin", 500, 0.1, 0.25, 1.0, islands, mesh)[0].budget[2] == depth
 
 
-def test_islands_without_area_in_uv_are_dropped() -> None:
+def test_islands_without_area_in_uv_get_charts_of_their_own() -> None:
     mesh = squares((0, 0, 1, 0), (5, 0, 1, 0), (9, 0, 1, 0))
-    for factors, count in (((1.0, 1.0), 3), ((1.0, 0.0), 0), ((0.0, 1.0), 0), ((1e-2, 1e-2), 3)):
-        assert len(generic._separated(replace(mesh, uv=mesh.uv * factors), np.ones(3, bool))) == count
-    assert len(generic._separated(mesh, np.array([True, False, True]))) == 2
+    for factors in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (1e-2, 1e-2)):
+        islands = islands_of(replace(mesh, uv=mesh.uv * factors), np.ones(3, bool))
+        assert len(islands) == 3
+        assert all((signed_areas(i) > 0).all() for i in islands)
+    assert len(islands_of(mesh, np.array([True, False, True]))) == 2
 
 
 def test_the_area_of_an_island_is_that_of_its_faces() -> None:
     mesh = joined([("a", slit_sheet())])
-    (island,) = generic._separated(mesh, np.ones(len(mesh.faces), bool))
+    (island,) = islands_of(mesh, np.ones(len(mesh.faces), bool))
     assert generic._area(mesh, island) == pytest.approx(face_areas(mesh.vertices, mesh.faces).sum(), rel=1e-3)
     turned = squares((3, 4, 2, 5))
     turned = replace(turned, vertices=turned.vertices @ np.linalg.qr(np.arange(9.0).reshape(3, 3) ** 2 + np.eye(3))[0])
-    assert generic._area(turned, generic._separated(turned, np.ones(1, bool))[0]) == pytest.approx(4.0)
+    assert generic._area(turned, islands_of(turned, np.ones(1, bool))[0]) == pytest.approx(4.0)
 
 
 def test_others_get_points_by_their_share_of_the_skin() -> None:
@@ -235,8 +245,12 @@ def test_others_get_points_by_their_share_of_the_skin() -> None:
     assert {(p.request.coarse, p.request.neutral_mm) for p, _ in parts} == {(0.34, 0.5)}
     assert generic._others(mesh, label, [0], 4e6, 1.0, [])[0][0].request.points == 120
     assert generic._others(mesh, label, [0], 1e3, 1.0, [])[0][0].request.points == 2450
-    assert generic._others(replace(mesh, uv=mesh.uv * [1, 0]), label, [0], 1e3, 1.0, notes) == []
-    assert notes[-1] == "'Tongue': left out: no area in (u, v)"
+    flat = replace(mesh, vertices=mesh.vertices * [1, 0, 0], uv=mesh.uv * [1, 0])
+    assert generic._others(flat, label, [0], 1e3, 1.0, notes) == []
+    assert notes[-1] == "'Tongue': left out: no area"
+    made = list[str]()
+    assert len(generic._others(replace(mesh, uv=mesh.uv * [1, 0]), label, [0], 1e3, 1.0, made)) == 1
+    assert made[0].startswith("'Tongue': the file has no usable texture coordinates")
 
 
 def swinging(angle_deg: float, mm: float = 90.0, rows: float = 0.0) -> tuple[FitMesh, dict[str, np.ndarray]]:

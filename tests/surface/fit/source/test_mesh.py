@@ -59,8 +59,25 @@ def test_missing_uvs_name_the_key(tmp_path):
     assert "'uv' is missing" in str(refused(tmp_path, uv=None))
 
 
-def test_faces_without_uvs_are_refused(tmp_path):
-    assert "no texture coordinates" in str(refused(tmp_path, face_uv=np.full_like(slit_sheet().faces, -1)))
+def test_faces_without_uvs_are_read(tmp_path):
+    sheet = slit_sheet()
+    for bare in ({"face_uv": np.full_like(sheet.faces, -1)}, {"uv": None, "face_uv": None}):
+        loaded = load_mesh(write_npz(tmp_path / "m.npz", sheet, **bare))
+        assert not mesh_module.is_mapped(loaded.mesh) and len(loaded.mesh.faces) == len(sheet.faces)
+
+
+def test_damaged_texture_coordinates_are_none() -> None:
+    mesh = wall()
+    uv, face_uv = mesh.uv.copy(), mesh.face_uv.copy()
+    uv[0, 1] = np.nan  # of the first face
+    face_uv[1, 1] = -1
+    bare = mesh_module.bare_where_damaged(replace(mesh, uv=uv, face_uv=face_uv))
+    assert (bare.face_uv[:2] == -1).all() and np.array_equal(bare.face_uv[2], mesh.face_uv[2])
+    mesh_module.check_mesh(bare, "m")
+    face_uv[2, 0] = 99
+    beyond = mesh_module.bare_where_damaged(replace(mesh, face_uv=face_uv))
+    with pytest.raises(FitError, match=r"face_uv\[2\] points at 99"):
+        mesh_module.check_mesh(beyond, "m")
 
 
 def test_no_faces_are_refused(tmp_path):
@@ -165,25 +182,9 @@ def test_corners_point_at_what_is_there(key: str, face: int, corner: int, index:
     mesh_module.check_mesh(mesh, "m")
     changed = getattr(mesh, key).copy()
     changed[face, corner] = index
-    why = rf"m: {key}\[{face}\] points at {named}, but there are 6|no texture coordinates"
+    why = rf"m: {key}\[{face}\] points at {named}, but there are 6|other corners"
     with pytest.raises(FitError, match=why):
         mesh_module.check_mesh(replace(mesh, **{key: changed}), "m")
-
-
-def test_a_face_without_texture_is_named_with_its_piece() -> None:
-    mesh = wall()
-    bare = mesh.face_uv.copy()
-    bare[2] = -1
-    with pytest.raises(FitError, match=r"m: faces\[2\] \(of 'right'\) has no texture coordinates"):
-        mesh_module.check_mesh(replace(mesh, face_uv=bare), "m")
-    bare[1, 1] = -1
-    with pytest.raises(FitError, match=r"m: faces\[1\] \(of 'left'\) has no texture coordinates"):
-        mesh_module.check_mesh(replace(mesh, face_uv=bare), "m")
-    with pytest.raises(FitError, match=r"m: faces\[1\] has no texture coordinates"):  # there is only one piece
-        mesh_module.check_mesh(replace(mesh, face_uv=bare, pieces=("all",), piece=np.zeros(3, int)), "m")
-    for nothing in (replace(mesh, uv=np.zeros((0, 2))), replace(mesh, face_uv=np.full((3, 4), -1))):
-        with pytest.raises(FitError, match="m: the mesh has no texture coordinates"):
-            mesh_module.check_mesh(nothing, "m")
 
 
 def test_an_edge_of_three_faces_is_named_with_the_piece_of_the_first() -> None:
