@@ -101,7 +101,11 @@ def render(
 
 def fit(
     mesh: Annotated[
-        Path, typer.Argument(help="Mesh with UVs and shapes: .glb, .gltf, .obj, a folder of .obj files, or .npz.")
+        Path,
+        typer.Argument(
+            help="Mesh with UVs and shapes: .glb, .gltf, .obj, a folder of .obj files, or .npz; "
+            "without them, also .ply, .stl and .off, with --expressions-from."
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the head to write.")],
     name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
@@ -119,15 +123,30 @@ def fit(
         Path | None, typer.Option(metavar="FILE", help="Identity modes of the mesh (.npz): adds named variations.")
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the head that is there; only add --identities.")] = False,
+    expressions_from: Annotated[
+        str | None,
+        typer.Option(
+            "--expressions-from",
+            metavar="HEAD",
+            help="Head whose expressions a mesh without shapes gets: ict.",
+            autocompletion=names_of("heads"),
+        ),
+    ] = None,
+    landmarks: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Places picked on the mesh (.toml, .json, .pp), for --expressions-from."),
+    ] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for a report: figures, tables, error drawn on the face.")
     ] = None,
 ) -> None:
     """Turn a mesh with UVs and expression shapes into a head of control points.
 
-    Example: omote fit me.glb -o heads/me --report report
+    Examples: omote fit me.glb -o heads/me --report report;
+    omote fit scan.ply -o heads/scan --expressions-from ict
     """
     # start-up: --help does without any of these
+    from controller.tools.transfer import check_transfer, transfer
     from surface.fit.api import fit_head
     from surface.fit.identities import add_identities
     from surface.fit.points.report import face_bounds
@@ -135,6 +154,8 @@ def fit(
 
     if keep and identities is None:
         raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
+    given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep, "--report": report}
+    check_transfer(expressions_from, landmarks, given)
     if not keep:
         options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
         columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -146,7 +167,10 @@ def fit(
                 bar.update(task, description=step, completed=done)
 
             title = name or out.resolve().name
-            found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report)
+            if expressions_from is not None:
+                found = transfer(mesh, expressions_from, out, title, landmarks, options, progress)
+            else:
+                found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report)
         shaded = _decimate_and_shade(out)
         show_table(_error_table(found))
         missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)

@@ -1,0 +1,36 @@
+"""``omote fit --expressions-from``: give a mesh without shapes the expressions of a head."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from controller.base.errors import ConfigError
+from controller.base.paths import find_config
+from surface.base.progress import Progress
+from surface.fit.points.report import FitReport
+from surface.fit.source.load import LoadOptions
+from surface.fit.transfer.api import transfer_head
+
+
+def check_transfer(source: str | None, landmarks: Path | None, others: Mapping[str, object]) -> None:
+    """Check that options of ``omote fit`` go together; ``others`` are those that a transfer has no use for, by name.
+
+    Raises ConfigError.
+    """
+    if source is None and landmarks is not None:
+        raise ConfigError("--landmarks: only a transfer of expressions uses them", hint="--expressions-from ict")
+    for option, value in others.items():
+        if source is not None and value:
+            raise ConfigError(f"{option}: cannot be used with --expressions-from", hint="leave one of the two out")
+
+
+def transfer(
+    mesh: Path, source: str, out: Path, name: str, landmarks: Path | None, options: LoadOptions, progress: Progress
+) -> FitReport:  # fmt: skip
+    """Write a head in the form of a mesh with the expressions of the head ``source``, a name or a folder.
+
+    Raises ConfigError: no such head. Others as :func:`surface.fit.transfer.api.transfer_head` does.
+    """
+    head = find_config("heads", source)
+    return transfer_head(mesh, head, out, name=name, landmarks=landmarks, options=options, progress=progress)

@@ -1,0 +1,197 @@
+"""Find where the face is in a scan of unknown axes, unit and place: similarity from the scan to a head's frame.
+
+From landmarks it is computed at once (Umeyama, 1991). Without them many starts, by axis and by size, are improved by
+iterated closest points with normals (Besl and McKay, 1992), and the one whose face lies nearest both ways is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from surface.base.arrays import Bools, Floats
+from surface.base.errors import FitError
+from surface.fit.transfer.scan import Samples
+from surface.fit.transfer.template import Template
+
+COARSE, FINE = 350, 1500  # points of the template in a first and in a last search
+TARGETS = 12_000
+NORMAL = 0.12  # weight of normals in the search for closest points, in heights of the face
+SEEN = 0.03  # in heights of the face: width of a line of sight
+CLIP = 0.12  # in heights of the face: distances from here on count alike
+EXTENTS = (1.35, 1.8, 2.6, 3.3, 4.6, 16.5)  # heights of the face in the height of a mask, ..., a bust, a body
+BELOW_TOP = (0.25, 2.4)  # in heights of the face: where the tip of the nose may lie under the top of a mesh
+STEPS, LAST_STEPS, KEPT = 14, 40, 4
+GOOD, POOR = 0.085, 0.135  # scores: so good that nothing else is tried; so poor that there is no face
+SHARE = 0.75  # of the closest pairs count
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """Map p -> scale * turn @ p + shift. ``score``: mean distance both ways in heights of the face."""
+
+    turn: Floats
+    scale: float
+    shift: Floats
+    score: float = 0.0
+
+    def points(self, rows: Floats) -> Floats:
+        """Points (..., 3) moved."""
+        moved: Floats = self.scale * rows @ self.turn.T + self.shift
+        return moved
+
+
+def from_pairs(points: Floats, others: Floats, weight: Floats | None = None) -> Similarity:
+    """The similarity that brings points (n, 3) nearest to others (n, 3) (Umeyama, 1991)."""
+    w = np.ones(len(points)) if weight is None else weight
+    w = w / w.sum()
+    a0, b0 = w @ points, w @ others
+    a, b = points - a0, others - b0
+    u, size, vt = np.linalg.svd((w[:, None] * b).T @ a)
+    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    turn = u @ np.diag(sign) @ vt
+    scale = float((size * sign).sum() / max(float(w @ (a * a).sum(axis=1)), 1e-30))
+    return Similarity(turn, scale, b0 - scale * turn @ a0)
+
+
+def face_region(template: Template) -> Bools:
+    """(n,) which of a template's points are the front of the face, from below the chin to the forehead."""
+    p, h, tip = template.points, template.height, template.landmarks["nose_tip"]
+    low, high = template.landmarks["chin"][1] - 0.1 * h, template.landmarks["nose_bridge"][1] + 0.45 * h
+    out: Bools = (p[:, 1] > low) & (p[:, 1] < high) & (p[:, 2] > tip[2] - 0.85 * h) & (template.normals[:, 2] > -0.1)
+    return out & (template.face | (template.eye >= 0))
+
+
+def thinned(points: Floats, count: int) -> Floats:
+    """About ``count`` rows of points (n, 3), one of each cube of a grid."""
+    size = float(np.ptp(points, axis=0).max())
+    low, high = size / 400.0, size
+    for _ in range(18):
+        step = 0.5 * (low + high)
+        cells = np.unique(np.floor(points / step).astype(np.int64), axis=0, return_index=True)[1]
+        low, high = (step, high) if len(cells) > count else (low, step)
+    return np.sort(cells)
+
+
+class Aligner:
+    """Searches a scan, given by samples of it, for the face of a template."""
+
+    def __init__(self, template: Template, samples: Samples) -> None:
+        front = np.flatnonzero(face_region(template))
+        self._template, self._height = template, template.height
+        self._fine = front[thinned(template.points[front], FINE)]
+        self._coarse = front[thinned(template.points[front], COARSE)]
+        chosen = np.linspace(0, len(samples.points) - 1, min(TARGETS, len(samples.points))).astype(int)
+        self._at, self._out = samples.points[chosen], samples.normals[chosen]
+
+    def search(self, up: Floats | None, forward: Floats | None) -> Similarity:
+        """The best similarity from the scan to the template; ``up`` and ``forward`` are directions, if known."""
+        found = Similarity(np.eye(3), 1.0, np.zeros(3), 1.0)
+        turns = list(axis_turns(up, forward))
+        others = [t for t in tilted_turns() if _agrees(t, up, forward)]
+        for more in (turns[:1], turns[1:], others):  # most files have y up and z forward
+            if found.score > GOOD and more:
+                found = min(found, self._best(more), key=lambda s: s.score)
+        return found
+
+    def _best(self, turns: list[Floats]) -> Similarity:
+        starts = [self.refine(s, self._coarse, STEPS) for turn in turns for s in self._starts(turn)]
+        starts.sort(key=lambda s: s.score)
+        return min((self.refine(s, self._fine, LAST_STEPS) for s in starts[:KEPT]), key=lambda s: s.score)
+
+    def _starts(self, turn: Floats) -> Iterator[Similarity]:
+        """Starts with one rotation: by size of what is seen, the foremost point of the middle being the nose."""
+        at = self._at @ turn.T
+        top, height = at[:, 1].max(), float(np.ptp(at[:, 1]))
+        tip = self._template.landmarks["nose_tip"]
+        for extent in EXTENTS:
+            unit = height / extent
+            band = (at[:, 1] < top - BELOW_TOP[0] * unit) & (at[:, 1] > top - BELOW_TOP[1] * unit)
+            if not band.any():
+                continue
+            x = at[band, 0]
+            middle = np.abs(x - 0.5 * (x.min() + x.max())) < 0.5 * unit
+            nose = at[band][middle][at[band][middle, 2].argmax()] if middle.any() else at[band][at[band, 2].argmax()]
+            scale = self._height / unit
+            yield Similarity(turn, scale, tip - scale * nose)
+
+    def refine(self, start: Similarity, chosen: Floats, steps: int) -> Similarity:
+        """A start improved by iterated closest points, and its score."""
+        p, n = self._template.points[chosen], self._template.normals[chosen]
+        unit = self._height / start.scale
+        tree = cKDTree(np.hstack([self._at, NORMAL * unit * self._out]))
+        now = start
+        for _ in range(steps):
+            place = (p - now.shift) @ now.turn / now.scale
+            distance, near = tree.query(np.hstack([place, NORMAL * unit * (n @ now.turn)]))
+            kept = distance <= np.quantile(distance, SHARE)
+            new = from_pairs(self._at[near[kept]], p[kept])
+            scale = float(np.clip(new.scale, 0.55 * start.scale, 1.8 * start.scale))
+            middle = self._at[near[kept]].mean(axis=0)
+            now = Similarity(new.turn, scale, new.points(middle) - scale * new.turn @ middle)
+        return Similarity(now.turn, now.scale, now.shift, self.score(now, chosen))
+
+    def score(self, found: Similarity, chosen: Floats) -> float:
+        """Mean distance from the template's face to the scan and back, in heights of the face; normals count, too."""
+        p, n, h = self._template.points[chosen], self._template.normals[chosen], self._height
+        at, out = found.points(self._at), self._out @ found.turn.T
+        own = np.hstack([p, NORMAL * h * n])
+        before = np.array([0.0, 0.0, 0.3 * h])
+        inside = ((at > p.min(axis=0)) & (at < p.max(axis=0) + before)).all(axis=1) & (out[:, 2] > 0.0)
+        if inside.sum() < 30:
+            return 1.0
+        inside[inside] = foremost(at[inside], SEEN * h)
+        there = np.hstack([at, NORMAL * h * out])
+        forth = cKDTree(there).query(own, distance_upper_bound=CLIP * h)[0]
+        back = cKDTree(own).query(there[inside], distance_upper_bound=CLIP * h)[0]
+        return float(sum(np.minimum(d, CLIP * h).mean() for d in (forth, back)) / h)
+
+
+def foremost(points: Floats, size: float) -> Bools:
+    """(n,) which points (n, 3) are seen from the front: none is more than ``size`` before them nearby."""
+    column = np.floor(points[:, :2] / size).astype(np.int64)
+    column -= column.min(axis=0)
+    key = column[:, 0] * (column[:, 1].max() + 1) + column[:, 1]
+    front = np.full(key.max() + 1, -np.inf)
+    np.maximum.at(front, key, points[:, 2])
+    seen: Bools = points[:, 2] > front[key] - 2.0 * size
+    return seen
+
+
+def axis_turns(up: Floats | None, forward: Floats | None) -> Iterator[Floats]:
+    """Rotations (3, 3) that turn axes into axes, y up and z forward first."""
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            turn = np.zeros((3, 3))
+            turn[range(3), order] = signs
+            if np.linalg.det(turn) > 0 and _agrees(turn, up, forward):
+                yield turn
+
+
+def tilted_turns() -> Iterator[Floats]:
+    """Rotations between those of the axes: about 40 degrees apart."""
+    for q in Rotation.random(96, rng=np.random.default_rng(0)):
+        yield q.as_matrix()
+
+
+def _agrees(turn: Floats, up: Floats | None, forward: Floats | None) -> bool:
+    """Does a rotation turn a known direction up, and one forward?"""
+    pairs = [(up, turn[1]), (forward, turn[2])]
+    return all(wanted is None or float(row @ wanted) > 0.9 for wanted, row in pairs)
+
+
+def align(template: Template, samples: Samples, up: Floats | None, forward: Floats | None, where: str) -> Similarity:
+    """The similarity from a scan to the template's frame.
+
+    Raises FitError: nothing in the scan is like a face.
+    """
+    found = Aligner(template, samples).search(up, forward)
+    if found.score > POOR:
+        hint = "say where it is: --landmarks FILE, with nose_tip, chin and the corners of eyes and mouth"
+        raise FitError(f"{where}: no face was found in it", hint=hint)
+    return found

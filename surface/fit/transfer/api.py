@@ -1,0 +1,151 @@
+"""From a bare mesh and a head with expressions to a head in the mesh's form with these expressions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from surface.base.arrays import Floats
+from surface.base.errors import FitError
+from surface.base.progress import Progress, no_progress
+from surface.fit.points.report import FitReport
+from surface.fit.source.frame import AXES, UNITS
+from surface.fit.source.load import LoadOptions
+from surface.fit.transfer.align import Similarity, align, from_pairs
+from surface.fit.transfer.carry import carry
+from surface.fit.transfer.errors import face_report
+from surface.fit.transfer.landmarkfile import read_landmarks, swapped
+from surface.fit.transfer.lids import close_lids
+from surface.fit.transfer.places import scaled
+from surface.fit.transfer.register import Matcher, register
+from surface.fit.transfer.scan import Scan, read_scan, sample
+from surface.fit.transfer.template import Template, make_template
+from surface.head import Head, HeadData, save_data
+from surface.head.model.file import check_writable
+
+MANY = 250_000  # samples of the head once it is found
+MARGIN = 0.35  # in heights of the face: around a head, what belongs to it
+USUAL = (0.7, 1.45)  # sizes, relative to the head the expressions come from, that heads of people have
+WRONG, MUCH = (
+    0.2,
+    0.5,
+)  # RMS of landmarks off a head's own, in its heights; what a swap takes of it
+LEAST_PICKED = 4  # landmarks that a scan is aligned by; with fewer its face is looked for
+
+
+@dataclass(frozen=True)
+class Transferred:
+    """A head in the form of a scan, and how well it fits."""
+
+    head: HeadData
+    report: FitReport
+
+
+def transfer_head(
+    mesh_path: str | Path, source: str | Path, out_dir: str | Path, *, name: str, landmarks: Path | None = None,
+    options: LoadOptions = LoadOptions(), progress: Progress | None = None,
+) -> FitReport:  # fmt: skip
+    """Give a bare mesh the expressions of a head, and write the new head.
+
+    mesh_path : .obj, .glb, .gltf, .vrm, .npz, .ply, .stl or .off; its own shapes and texture coordinates are not used.
+    source : folder of the head that the expressions come from. out_dir : folder that gets head.toml and head.npz.
+    landmarks : file of places on the mesh (see :func:`surface.fit.transfer.landmarkfile.read_landmarks`).
+    options : ``unit``, ``up``, ``forward`` and ``without``; what is not given is found.
+
+    Raises FitError: the mesh or the landmarks cannot be read, no face was found, or the head has no eyes or openings.
+    HeadFileError: the head cannot be read, or the folder not be written to. Nothing is written then.
+    """
+    check_writable(out_dir)
+    scan = read_scan(mesh_path, options.without)
+    picked = read_landmarks(landmarks, scan) if landmarks is not None else {}
+    made = transfer(scan, Head.load(source), name, picked, options, progress or no_progress, str(mesh_path))
+    save_data(out_dir, made.head)
+    return made.report
+
+
+def transfer(
+    scan: Scan, head: Head, name: str, picked: dict[str, Floats], options: LoadOptions, progress: Progress, where: str
+) -> Transferred:  # fmt: skip
+    """As :func:`transfer_head`, in memory; ``picked`` are landmarks (3,) on the scan, ``where`` is its name."""
+    template = make_template(head, head.name)
+    progress("face", 0.02)
+    found = _find(scan, template, picked, options, where)
+    scan, marks = _in_frame(scan, template, found), {n: found.points(p) for n, p in picked.items()}
+    samples = sample(scan, MANY)
+    progress("face", 0.15)
+    warp, smooth = register(template, samples, marks, lambda done: progress("face", 0.15 + 0.5 * done))
+    provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
+    data = carry(head, template, warp, smooth, Matcher(samples), provenance, name)
+    progress("lids", 0.75)
+    data = close_lids(data, head.data)
+    progress("report", 0.95)
+    factor, notes = _true_size(found, options.unit, picked)
+    parts = [face_report(data, template, warp, samples)]
+    data = scaled(data, factor, data.eyes.mean(axis=0))
+    moving = [n for n in head.parameters if any(g.name == n for p in data.parts for g in p.groups)]
+    return Transferred(data, FitReport(name, parts, moving, notes=notes, scale=1.0))
+
+
+def _find(
+    scan: Scan, template: Template, picked: dict[str, Floats], options: LoadOptions, where: str
+) -> Similarity:  # fmt: skip
+    """The similarity from the scan to the head's frame."""
+    up, forward = (_direction(f"--{n}", w) for n, w in (("up", options.up), ("forward", options.forward)))
+    if up is not None and forward is not None and abs(float(up @ forward)) > 0.5:
+        raise FitError(f"--up {options.up} --forward {options.forward}: are one axis", hint="--up y --forward z")
+    if options.unit is not None and options.unit not in UNITS:
+        raise FitError(f"--unit {options.unit}: is not one of {', '.join(UNITS)}", hint="--unit cm")
+    if len(picked) < LEAST_PICKED:
+        return align(template, sample(scan), up, forward, where)
+    found, off = _by_landmarks(picked, template)
+    mirrored = _by_landmarks(swapped(picked), template)[1]
+    if off > WRONG and mirrored < MUCH * off:
+        hint = "left is the subject's left, which is on the right of a picture from the front"
+        raise FitError(f"{where}: left and right of its landmarks are exchanged", hint=hint)
+    if off > WRONG:
+        raise FitError(f"{where}: its landmarks do not lie as those of a face do", hint="check their names and places")
+    return found
+
+
+def _by_landmarks(picked: dict[str, Floats], template: Template) -> tuple[Similarity, float]:
+    """The similarity by landmarks, and how far off they are then (RMS, in heights of the face)."""
+    own = np.array([template.landmarks[n] for n in picked])
+    found = from_pairs(np.array(list(picked.values())), own)
+    off = np.linalg.norm(found.points(np.array(list(picked.values()))) - own, axis=1)
+    return found, float(np.sqrt((off**2).mean())) / template.height
+
+
+def _direction(option: str, word: str | None) -> Floats | None:
+    """The unit vector (3,) of an axis; None where none is given."""
+    if word is None:
+        return None
+    if word not in AXES:
+        raise FitError(f"{option} {word}: is not one of {', '.join(AXES)}", hint=f"{option} y")
+    axis, sign = AXES[word]
+    unit: Floats = sign * np.eye(3)[axis]
+    return unit
+
+
+def _in_frame(scan: Scan, template: Template, found: Similarity) -> Scan:
+    """The scan in the head's frame, without what is far from a head, such as the rest of a body."""
+    scan = scan.turned(found.turn, found.scale, found.shift)
+    margin = MARGIN * template.height
+    low, high = template.points.min(axis=0) - margin, template.points.max(axis=0) + margin
+    at = scan.vertices[scan.triangles].mean(axis=1)
+    return scan.kept(((at > low) & (at < high)).all(axis=1))
+
+
+def _true_size(found: Similarity, unit: str | None, picked: dict[str, Floats]) -> tuple[float, list[str]]:
+    """Factor from the head's frame to true millimetres, and what was found out, in words."""
+    how = f"by {len(picked)} landmarks" if len(picked) >= LEAST_PICKED else f"by its form, score {found.score:.3f}"
+    degrees = np.degrees(np.arccos(np.clip((np.trace(found.turn) - 1.0) / 2.0, -1.0, 1.0)))
+    notes = [f"face found {how}; turned by {degrees:.0f} degrees"]
+    if unit is not None:
+        return UNITS[unit] / found.scale, notes
+    guess = min(UNITS, key=lambda u: abs(np.log(UNITS[u] / found.scale)))
+    factor = UNITS[guess] / found.scale
+    if USUAL[0] < factor < USUAL[1]:
+        return factor, [*notes, f"unit taken for {guess}: {factor:.2f} times the size of the head it is compared with"]
+    return 1.0, [*notes, "unit unknown: made as large as the head that its expressions come from (say --unit)"]

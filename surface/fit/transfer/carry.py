@@ -1,0 +1,102 @@
+"""Carry a head over to a scan: every part, group, contact and pivot of it in the form of the scan."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from surface.base.arrays import Floats
+from surface.fit.transfer.places import place_eyes, place_jaw, place_neck, place_teeth
+from surface.fit.transfer.register import Matcher
+from surface.fit.transfer.skin import Ball, Skin, close_lips, follow_skin, rims_of, seat
+from surface.fit.transfer.template import Template
+from surface.fit.transfer.warp import Warp
+from surface.head import Group, Head, HeadData, PartData
+from surface.head.model.parameters import read_pose
+from surface.head.posing.rig import SkinRig
+
+REACH_MM = 3.0  # to either side: over so much skin the turn and stretch of a displacement are measured
+STRETCH = (0.6, 1.6)  # least and most of a displacement
+RIGID = ("teeth", "gums", "tongue")
+SETTLINGS = 3
+
+
+def carry(
+    head: Head, template: Template, warp: Warp, smooth: Warp, matcher: Matcher, provenance: dict[str, str], name: str
+) -> HeadData:  # fmt: skip
+    """The head as a map of space and the scan's detail make it.
+
+    smooth : a stiffer map, which displacements are turned and stretched by.
+    """
+    data = head.data
+    old, new = Ball(data.eyes, data.eye_radius), Ball(*place_eyes(template, warp))
+    teeth = place_teeth(head, warp)
+    skins = _skins(head, warp, matcher, old, new)
+    lips = next(c for c in data.contacts if c.name == "lips")
+    face = skins[lips.part]
+    parts = []
+    for part in data.parts:
+        if part.follows in ("left_eye", "right_eye"):
+            side = int(part.follows == "right_eye")
+            points = new.centres[side] + new.radius / old.radius * (part.points - old.centres[side])
+        elif part.material in RIGID:
+            points = teeth.points(part.points)
+        elif part.name in skins:
+            points = skins[part.name].control_points()
+        else:
+            points = seat(follow_skin(part.points, face, warp), part.points, old, new)
+        linear = np.tile(teeth.scale * np.eye(3), (len(points), 1, 1))
+        if part.material not in RIGID and part.follows == "skin":
+            linear = stretches(smooth, part.points)
+        parts.append(_with_points(part, points, linear))
+    scale = new.radius / old.radius
+    carried = replace(
+        data, name=name, provenance=provenance, neck=place_neck(data, template, warp), eyes=new.centres,
+        eye_radius=new.radius, jaw=place_jaw(data, warp), parts=parts,
+        contacts=[replace(c, reach_mm=scale * c.reach_mm) for c in data.contacts],
+    )  # fmt: skip
+    return settled(carried)
+
+
+def _skins(head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball) -> dict[str, Skin]:
+    """The parts that are seen as skin, on the scan."""
+    rims, scale = rims_of(head), new.radius / old.radius
+    lips = next(c for c in head.data.contacts if c.name == "lips")
+    out = {}
+    for part in head.parts:
+        if part.follows == "skin" and part.material == "skin" and part.name != "sockets":
+            skin = Skin(part, rims, warp)
+            skin.follow(matcher, scale)
+            if part.name == lips.part:
+                close_lips(skin, lips, scale)
+            skin.at = seat(skin.at, skin.rest, old, new)
+            out[part.name] = skin
+    return out
+
+
+def stretches(warp: Warp, points: Floats) -> Floats:
+    """(n, 3, 3) how displacements at points are turned and stretched: the map's derivatives, without folds."""
+    u, size, vt = np.linalg.svd(warp.jacobians(points, REACH_MM))
+    sign = np.linalg.det(u @ vt)
+    u[sign < 0, :, 2] *= -1.0
+    linear: Floats = np.einsum("nij,nj,njk->nik", u, np.clip(size, *STRETCH), vt)
+    return linear
+
+
+def _with_points(part: PartData, points: Floats, linear: Floats) -> PartData:
+    """The part with its control points elsewhere, its displacements turned by ``linear (n, 3, 3)``."""
+    groups = []
+    for g in part.groups:
+        moves = np.einsum("nij,nj->ni", linear[g.ids], g.moves)
+        groups.append(Group(g.name, g.ids, np.round(moves, 4).astype(np.float32)))
+    return replace(part, points=points, groups=groups)
+
+
+def settled(head: HeadData) -> HeadData:
+    """The head with its points at rest where its contacts leave them."""
+    rest = read_pose(np.zeros(59))
+    for _ in range(SETTLINGS):
+        points = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
+        head = replace(head, parts=[replace(p, points=at) for p, at in zip(head.parts, points, strict=True)])
+    return head

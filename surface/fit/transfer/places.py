@@ -1,0 +1,116 @@
+"""Where the parts of a head come to lie that are no skin: eyeballs, teeth, the jaw's hinge and the neck."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from surface.base.arrays import Floats
+from surface.fit.transfer.template import Template
+from surface.fit.transfer.warp import Warp
+from surface.head import Group, Head, HeadData, Jaw, Neck, PartData
+
+EYE_RADII = 1.5  # around an eyeball: skin that shows where it is
+TEETH = ("teeth", "gums", "tongue")
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Map p -> scale * p + shift: uniform scale without rotation, so that what turns about x still does."""
+
+    scale: float
+    shift: Floats
+
+    def points(self, rows: Floats) -> Floats:
+        """Points (..., 3) moved."""
+        moved: Floats = self.scale * rows + self.shift
+        return moved
+
+
+def placing(points: Floats, goals: Floats, weight: Floats | None = None) -> Placing:
+    """The placing that brings points (n, 3) nearest to goals (n, 3)."""
+    w = np.ones(len(points)) if weight is None else weight
+    w = w / w.sum()
+    a0, b0 = w @ points, w @ goals
+    a, b = points - a0, goals - b0
+    scale = float((w @ (a * b).sum(axis=1)) / max(float(w @ (a * a).sum(axis=1)), 1e-12))
+    return Placing(scale, b0 - scale * a0)
+
+
+def place_eyes(template: Template, warp: Warp) -> tuple[Floats, float]:
+    """Centres (2, 3) and radius of the eyeballs, out of the lids around each and its own front, where they go."""
+    found = []
+    for side, eye in enumerate(template.eyes):
+        own = template.eye == side
+        around = template.face & (np.linalg.norm(template.points - eye, axis=1) < EYE_RADII * template.radius)
+        points = template.points[own | around]
+        found.append(placing(points, warp(points)))
+    radius = template.radius * float(np.mean([p.scale for p in found]))
+    centres = []
+    for side, (eye, place) in enumerate(zip(template.eyes, found, strict=True)):
+        front = template.points[template.eye == side]
+        out = (front - eye) / template.radius  # the mean eyeball touches its front where the map puts it
+        centre = place.points(eye)
+        centre[2] = float(np.mean((warp(front) - radius * out)[:, 2]))
+        centres.append(centre)
+    return np.array(centres), radius
+
+
+def place_teeth(head: Head, warp: Warp) -> Placing:
+    """How teeth, gums and tongue move: as one, by where the map puts the teeth."""
+    points = [p.vertices for p in head.parts if p.material in TEETH]
+    if not points:
+        points = [p.vertices for p in head.parts if p.material == "mouth"] or [head.parts[0].vertices]
+    at = np.concatenate(points).astype(float)[::7]
+    return placing(at, warp(at))
+
+
+def place_jaw(data: HeadData, warp: Warp) -> Jaw:
+    """The jaw's path after the map: hinge, glide and tilts as the skin that follows the jaw is moved and scaled."""
+    face = max((p for p in data.parts if p.follows == "skin"), key=lambda p: float(p.jaw.sum()))
+    place = placing(face.points, warp(face.points), face.jaw + 1e-6)
+    centre = place.points(np.array(data.jaw.centre))
+    glide = place.scale * np.array(data.jaw.glide)
+    tilts = {}
+    for name, tilt in data.jaw.tilts.items():
+        linear, move = np.asarray(tilt)[:, :3], np.asarray(tilt)[:, 3]
+        tilts[name] = np.column_stack([linear, place.scale * move - linear @ place.shift])
+    return Jaw(tuple(centre.tolist()), data.jaw.angle_rad, tuple(glide.tolist()), tilts)
+
+
+def place_neck(data: HeadData, template: Template, warp: Warp) -> Neck:
+    """The neck's pivot and bend after the map."""
+    points = template.points[::5]
+    place, neck = placing(points, warp(points)), data.neck
+    x, y, z = place.points(np.array(neck.pivot)).tolist()
+    lift = float(place.shift[1] + neck.slope * place.shift[2])
+    return Neck((x, y, z), neck.slope, place.scale * neck.still + lift, place.scale * neck.whole + lift)
+
+
+def scaled(data: HeadData, factor: float, middle: Floats) -> HeadData:
+    """A head enlarged about a place; its budget, in mm, stays."""
+
+    def moved(p: Floats) -> Floats:
+        out: Floats = middle + factor * (p - middle)
+        return out
+
+    def enlarged(part: PartData) -> PartData:
+        groups = [Group(g.name, g.ids, np.float32(factor) * g.moves) for g in part.groups]
+        return replace(part, points=moved(part.points), groups=groups)
+
+    parts = [enlarged(p) for p in data.parts]
+    shift = (1.0 - factor) * middle
+    tilts = {
+        n: np.column_stack([t[:, :3], factor * t[:, 3] - t[:, :3] @ shift])
+        for n, t in ((n, np.asarray(t)) for n, t in data.jaw.tilts.items())
+    }
+    centre, glide = moved(np.array(data.jaw.centre)), factor * np.array(data.jaw.glide)
+    lift = float(shift[1] + data.neck.slope * shift[2])
+    px, py, pz = moved(np.array(data.neck.pivot)).tolist()
+    neck = Neck((px, py, pz), data.neck.slope, factor * data.neck.still + lift, factor * data.neck.whole + lift)
+    return replace(
+        data, parts=parts, eyes=moved(data.eyes), eye_radius=factor * data.eye_radius, neck=neck,
+        jaw=Jaw(tuple(centre.tolist()), data.jaw.angle_rad, tuple(glide.tolist()), tilts),
+        contacts=[replace(c, reach_mm=factor * c.reach_mm) for c in data.contacts],
+    )  # fmt: skip

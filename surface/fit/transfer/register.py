@@ -1,0 +1,172 @@
+"""Register a template to a scan without rigidity: iterated closest points whose map becomes less and less stiff.
+
+As in Amberg et al. (2007), Optimal Step Nonrigid ICP: closest points are accepted by distance and normal and never at
+the scan's borders, so that holes pull nothing. The map is one of space (:mod:`surface.fit.transfer.warp`); trimesh's
+registrations move the vertices of a mesh one by one, and match holes' borders, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from surface.base.arrays import Bools, Floats, Ints
+from surface.fit.transfer.align import thinned
+from surface.fit.transfer.places import placing
+from surface.fit.transfer.relief import Finder
+from surface.fit.transfer.scan import Samples
+from surface.fit.transfer.template import Template
+from surface.fit.transfer.warp import Warp
+from surface.head.model.parameters import smoothstep
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Iterations: stiffness of the map, farthest match in mm, how many; before them, landmarks are looked for up to
+    ``search`` mm away (0: they are not), each by itself if ``single``."""
+
+    stiffness: float
+    farthest: float
+    steps: int
+    search: float = 0.0
+    single: bool = False
+
+
+STAGES = (
+    Stage(30000.0, 25.0, 4), Stage(20000.0, 20.0, 4, 16.0), Stage(5000.0, 16.0, 4, 8.0), Stage(1500.0, 14.0, 4, 5.0),
+    Stage(500.0, 10.0, 5, 4.0, True), Stage(200.0, 8.0, 5, 3.0, True), Stage(60.0, 6.0, 5),
+)  # fmt: skip
+FEATURE_MM, FEATURES, FACE, REST = 26.0, 800, 350, 260  # nodes near eyes, mouth and nose; on the face; elsewhere
+NORMAL_MM = 14.0  # weight of normals in the search for closest points
+LEAST_COSINE = 0.5  # of the normals of a match
+SMOOTH = 500.0  # least stiffness of the smooth map
+STILL = 0.002  # weight of a node without match, which keeps its place
+FAR, FAR_MM = 0.05, (12.0, 40.0)  # the same far from every match; where that begins and where it is complete
+LANDMARK, FOUND = 30.0, (10.0, 1.5)  # weights of a landmark that is given, of one that was found with others, alone
+SLIDE = 0.35  # share of a match along the surface; the rest goes along the normal only
+
+
+@dataclass(frozen=True)
+class Matches:
+    """For every point: whether it has a match on the scan, and where it should go, (n, 3)."""
+
+    found: Bools
+    goals: Floats
+
+
+class Matcher:
+    """Finds points of a scan for points of a surface near it."""
+
+    def __init__(self, samples: Samples) -> None:
+        self._samples = samples
+        self._tree = cKDTree(np.hstack([samples.points, NORMAL_MM * samples.normals]))
+
+    def find(self, at: Floats, normals: Floats, farthest: float, slide: float) -> Matches:
+        """Matches for points (n, 3) with unit normals (n, 3), none farther than ``farthest`` mm."""
+        _, near = self._tree.query(np.hstack([at, NORMAL_MM * normals]))
+        there, out = self._samples.points[near], self._samples.normals[near]
+        off = there - at
+        cosine = (out * normals).sum(axis=1)
+        found = (np.linalg.norm(off, axis=1) < farthest) & (cosine > LEAST_COSINE) & ~self._samples.border[near]
+        along = (off * out).sum(axis=1)[:, None] * out
+        return Matches(found, at + along + slide * (off - along))
+
+
+def choose_nodes(template: Template) -> Ints:
+    """Points of a template that carry the map: dense at eyes, mouth and nose, sparse elsewhere."""
+    marks = np.array([p for n, p in template.landmarks.items() if n != "chin"])
+    distance = cKDTree(marks).query(template.points)[0]
+    features = distance < FEATURE_MM
+    chosen = []
+    for own, count in (
+        (features, FEATURES), (template.face & ~features, FACE), (~template.face & ~features, REST),
+    ):  # fmt: skip
+        ids = np.flatnonzero(own)
+        chosen.append(ids[thinned(template.points[ids], count)])
+    return np.concatenate(chosen)
+
+
+class Registration:
+    """Iterations from a template to the samples of a scan, which is aligned with it.
+
+    given : places (3,) on the scan by the template's names; the others are looked for by relief.
+    """
+
+    def __init__(self, template: Template, samples: Samples, given: dict[str, Floats]) -> None:
+        self._template, self._given = template, given
+        self._nodes = choose_nodes(template)
+        self._names = list(template.landmarks)
+        self._marks = np.array([template.landmarks[n] for n in self._names])
+        self._goals = self._marks.copy()
+        self._held = np.full(len(self._names), STILL)
+        for k, name in enumerate(self._names):
+            if name in given:
+                self._goals[k], self._held[k] = given[name], LANDMARK
+        self._matcher, self._finder = Matcher(samples), Finder(template, samples)
+        points = template.points[self._nodes]
+        self._centres = np.vstack([points, self._marks])
+        still = np.append(np.full(len(points), STILL), self._held)
+        self.warp = Warp(self._centres, np.vstack([points, self._goals]), still, STAGES[0].stiffness)
+        self._stiffer = self.warp
+
+    def look(self, search: float, single: bool) -> None:
+        """Look for landmarks up to ``search`` mm from where the map has them now, each by itself if ``single``."""
+        at = self.warp(np.vstack([self._template.points, self._marks]))
+        marks = dict(zip(self._names, at[len(self._template.points) :], strict=True))
+        find = self._finder.refine if single else self._finder.find
+        found = find(at[: len(self._template.points)], marks, search)
+        for k, name in enumerate(self._names):
+            if name in found and name not in self._given:
+                self._goals[k], sure = found[name]
+                self._held[k] = FOUND[single] * sure**2
+
+    def hold(self) -> None:
+        """Keep nodes that will have no match where the map has them now."""
+        self._stiffer = self.warp
+
+    def step(self, stiffness: float, farthest: float) -> None:
+        """One iteration: match, then the map that goes to the matches."""
+        template, nodes = self._template, self._nodes
+        at, out = self.warp.turned(template.points[nodes], template.normals[nodes])
+        match = self._matcher.find(at, out, farthest, SLIDE)
+        off = np.linalg.norm(match.goals - at, axis=1)
+        weight = np.where(match.found, 1.0 / (1.0 + (2.0 * off / farthest) ** 2), STILL)
+        goals, weight = self._unmatched(match.goals, weight, match.found)
+        goals = np.vstack([goals, self._goals])
+        self.warp = Warp(self._centres, goals, np.append(weight, self._held), stiffness)
+
+    def _unmatched(self, goals: Floats, weight: Floats, found: Bools) -> tuple[Floats, Floats]:
+        """Goals and weights of all nodes: those without a match stay where a stiffer map had them, and far from every
+        match, such as the back of a head of which only the face was scanned, follow it as a whole."""
+        points = self._template.points[self._nodes]
+        if found.sum() < 4:
+            return points, weight
+        whole = placing(points[found], goals[found])
+        far = smoothstep(cKDTree(points[found]).query(points)[0], *FAR_MM)[:, None]
+        place = (1.0 - far) * self._stiffer(points) + far * whole.points(points)
+        held = STILL + (FAR - STILL) * far[:, 0]
+        return np.where(found[:, None], goals, place), np.where(found, weight, held)
+
+
+def register(
+    template: Template, samples: Samples, given: dict[str, Floats], progress: Callable[[float], None]
+) -> tuple[Warp, Warp]:  # fmt: skip
+    """The map of space from a template to the samples of a scan, which is aligned with it, and a stiffer one.
+
+    given : places (3,) of landmarks on the scan by the template's names.
+    """
+    run = Registration(template, samples, given)
+    smooth = run.warp
+    for k, stage in enumerate(STAGES):
+        run.hold()
+        if stage.search:
+            run.look(stage.search, stage.single)
+        for _ in range(stage.steps):
+            run.step(stage.stiffness, stage.farthest)
+        if stage.stiffness >= SMOOTH:
+            smooth = run.warp
+        progress((k + 1) / len(STAGES))
+    return run.warp, smooth

@@ -1,0 +1,187 @@
+"""Find eyes, nose and mouth in a scan by their relief as seen from the front, whatever triangles it is made of.
+
+Relief is depth less its own mean over some millimetres: lips, lids and wings of the nose remain of it, and it
+depends on neither light nor colour. Pieces of the template's relief are looked for in the scan's by normalised
+cross-correlation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+from scipy.spatial import cKDTree
+
+from surface.base.arrays import Floats
+from surface.fit.transfer.scan import Samples, spread
+from surface.fit.transfer.template import Template
+
+PIXEL_MM = 0.8
+FINE_MM, BROAD_MM = 1.0, 6.0  # standard deviations: what is averaged away, and what is taken for flat
+COUNT = 250_000
+LEAST_SCORE = 0.6  # of a correlation that counts
+SIGHT_MM = 1.6  # around a landmark: the foremost point of the scan there is its place
+CENTRED_MM = 16.0  # so much of a shift costs as much correlation as :data:`SHIFT_COST`
+SHIFT_COST = 0.15
+FEATURES: tuple[tuple[tuple[str, ...], tuple[float, float]], ...] = (  # landmarks; half width and height, mm
+    (("left_eye_inner", "left_eye_outer", "left_eye_upper", "left_eye_lower"), (20.0, 13.0)),
+    (("right_eye_inner", "right_eye_outer", "right_eye_upper", "right_eye_lower"), (20.0, 13.0)),
+    (("nose_tip",), (20.0, 14.0)),
+    (("mouth_left", "mouth_right", "upper_lip", "lower_lip"), (30.0, 14.0)),
+)
+SINGLE = (
+    "left_eye_inner", "left_eye_outer", "right_eye_inner", "right_eye_outer", "mouth_left", "mouth_right", "upper_lip",
+    "lower_lip", "left_eye_upper", "left_eye_lower", "right_eye_upper", "right_eye_lower",
+)  # fmt: skip
+SINGLE_MM = (8.0, 8.0)
+
+
+@dataclass(frozen=True)
+class Relief:
+    """Height map seen from the front, row by y, column by x: relief in mm, and where it is known, 0 or 1.
+
+    origin : x and y of the first pixel's middle.
+    """
+
+    origin: Floats
+    relief: Floats
+    known: Floats
+
+    def pixel(self, place: Floats) -> tuple[int, int]:
+        """Row and column of a place (x, y, ...)."""
+        column, row = np.round((place[:2] - self.origin) / PIXEL_MM).astype(int)
+        return int(row), int(column)
+
+
+def make_relief(points: Floats, low: Floats, high: Floats) -> Relief:
+    """The relief of points (n, 3) between two corners (2,) in x and y."""
+    width, height = np.ceil((high - low) / PIXEL_MM).astype(int) + 1
+    column, row = np.round((points[:, :2] - low) / PIXEL_MM).astype(int).T
+    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    front = np.full((height, width), -np.inf)
+    np.maximum.at(front, (row[inside], column[inside]), points[inside, 2])
+    seen = np.isfinite(front)
+    front[~seen] = 0.0
+    fine, broad = (gaussian_filter(seen.astype(float), s / PIXEL_MM) for s in (FINE_MM, BROAD_MM))
+    level = front[seen].mean() if seen.any() else 0.0
+    offset = np.where(seen, front - level, 0.0)
+    near = gaussian_filter(offset, FINE_MM / PIXEL_MM) / np.maximum(fine, 1e-6)
+    far = gaussian_filter(offset, BROAD_MM / PIXEL_MM) / np.maximum(broad, 1e-6)
+    known = (fine > 0.25).astype(float)
+    return Relief(np.asarray(low, float), known * (near - far), known)
+
+
+def correlate(small: Relief, large: Relief, place: Floats, half: tuple[float, float], search: float) -> Floats:
+    """(k, k) normalised cross-correlation of a piece of ``small`` about a place with ``large``, by shifts up to
+    ``search`` mm in y (rows) and x (columns); -1 where too little is known."""
+    row, column = small.pixel(place)
+    dy, dx = (max(2, round(h / PIXEL_MM)) for h in half[::-1])
+    far = max(1, round(search / PIXEL_MM))
+    piece, own = _cut(small.relief, row, column, dy, dx), _cut(small.known, row, column, dy, dx)
+    field, there = (
+        _cut(large.relief, row, column, dy + far, dx + far),
+        _cut(large.known, row, column, dy + far, dx + far),
+    )
+    views = np.lib.stride_tricks.sliding_window_view(field, piece.shape)
+    known = np.lib.stride_tricks.sliding_window_view(there, piece.shape) * own
+    count = np.maximum(known.sum(axis=(2, 3)), 1.0)
+    a = (piece * known).sum(axis=(2, 3)) / count
+    b = (views * known).sum(axis=(2, 3)) / count
+    first, second = (piece - a[..., None, None]) * known, (views - b[..., None, None]) * known
+    norm = np.sqrt((first**2).sum(axis=(2, 3)) * (second**2).sum(axis=(2, 3)))
+    score = (first * second).sum(axis=(2, 3)) / np.maximum(norm, 1e-9)
+    return np.where(count > 0.5 * max(own.sum(), 1.0), score, -1.0)
+
+
+def _cut(image: Floats, row: int, column: int, dy: int, dx: int) -> Floats:
+    """(2 dy + 1, 2 dx + 1) pixels of an image around a place, 0 outside."""
+    padded = np.pad(image, ((dy, dy), (dx, dx)))
+    row, column = np.clip(row, 0, image.shape[0] - 1), np.clip(column, 0, image.shape[1] - 1)
+    return padded[row : row + 2 * dy + 1, column : column + 2 * dx + 1]
+
+
+def _shift(score: Floats) -> tuple[Floats, float]:
+    """Shift (x, y) in mm of the best of a correlation's scores (k, k), small ones preferred, and that score."""
+    far = score.shape[0] // 2
+    y, x = np.mgrid[-far : far + 1, -far : far + 1] * PIXEL_MM
+    cost = score - SHIFT_COST * (x**2 + y**2) / CENTRED_MM**2
+    row, column = np.unravel_index(int(cost.argmax()), cost.shape)
+    return np.array([x[row, column], y[row, column]]), float(score[row, column])
+
+
+class Finder:
+    """Looks for a template's landmarks in a scan, which is aligned with it."""
+
+    def __init__(self, template: Template, samples: Samples) -> None:
+        front = template.points[template.face]
+        margin = 25.0
+        self._low, self._high = front[:, :2].min(axis=0) - margin, front[:, :2].max(axis=0) + margin
+        self._low[1] = template.landmarks["chin"][1] - 60.0
+        seen = (samples.normals[:, 2] > 0.0) & (samples.points[:, 2] > front[:, 2].min())
+        self._points = samples.points[seen]
+        self._tree = cKDTree(self._points[:, :2])
+        self._scan = make_relief(self._points, self._low, self._high)
+        tri = template.triangles[(template.normals[template.triangles, 2] > 0.0).all(axis=1)]
+        face, self._share = spread(template.points, tri, COUNT)
+        self._corners = tri[face]
+        self._behind: dict[str, float] = {}
+
+    def find(self, at: Floats, marks: dict[str, Floats], search: float) -> dict[str, tuple[Floats, float]]:
+        """Places (3,) of features' landmarks in the scan, and how sure each is, 0..1.
+
+        at : (n, 3) the template's points, and marks : its landmarks, as a map brings them near the scan.
+        """
+        own = self._relief_of(at, marks)
+        found: dict[str, tuple[Floats, float]] = {}
+        maps = [correlate(own, self._scan, _middle(marks, names), half, search) for names, half in FEATURES]
+        both = 0.5 * (maps[0] + maps[1][:, ::-1])  # eyes are found together: a face is symmetric
+        for (names, _), score, mirrored in zip(FEATURES, (both, both, *maps[2:]), (1, -1, 1, 1), strict=True):
+            shift, sure = _shift(score)
+            self._add(found, marks, names, shift * [mirrored, 1.0], sure)
+        return found
+
+    def refine(self, at: Floats, marks: dict[str, Floats], search: float) -> dict[str, tuple[Floats, float]]:
+        """As :meth:`find`, but each landmark by itself."""
+        own = self._relief_of(at, marks)
+        found: dict[str, tuple[Floats, float]] = {}
+        for name in SINGLE:
+            score = correlate(own, self._scan, marks[name], SINGLE_MM, search)
+            if (other := mirrored(name)) != name:  # a face is symmetric: both sides are found together
+                score = 0.5 * (score + correlate(own, self._scan, marks[other], SINGLE_MM, search)[:, ::-1])
+            shift, sure = _shift(score)
+            self._add(found, marks, (name,), shift, sure)
+        return found
+
+    def _relief_of(self, at: Floats, marks: dict[str, Floats]) -> Relief:
+        points = np.einsum("mk,mkc->mc", self._share, at[self._corners])
+        tree = cKDTree(points[:, :2])
+        self._behind = {}
+        for name, mark in marks.items():  # rims of lips and lids lie behind what is seen before them
+            near = points[tree.query_ball_point(mark[:2], SIGHT_MM)]
+            self._behind[name] = float(mark[2] - near[:, 2].max()) if len(near) else 0.0
+        return make_relief(points, self._low, self._high)
+
+    def _add(
+        self, found: dict[str, tuple[Floats, float]], marks: dict[str, Floats], names: Sequence[str], shift: Floats,
+        sure: float,
+    ) -> None:  # fmt: skip
+        """Add landmarks, shifted, on the scan's surface; none where the correlation is poor or nothing is seen."""
+        if sure < LEAST_SCORE:
+            return
+        for name in names:
+            place = marks[name][:2] + shift
+            near = self._points[self._tree.query_ball_point(place, SIGHT_MM)]
+            if len(near):
+                found[name] = np.array([*place, near[:, 2].max() + self._behind[name]]), sure
+
+
+def mirrored(name: str) -> str:
+    """The name of the landmark on the other side of the face; its own in the middle."""
+    return name.replace("left", "*").replace("right", "left").replace("*", "right")
+
+
+def _middle(marks: dict[str, Floats], names: Sequence[str]) -> Floats:
+    middle: Floats = np.mean([marks[n] for n in names], axis=0)
+    return middle

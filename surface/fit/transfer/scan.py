@@ -1,0 +1,172 @@
+"""Read a bare mesh and sample its surface: any triangles will do, with holes, noise, loose pieces or none of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from surface.base.arrays import Bools, Floats, Ints
+from surface.base.errors import FitError
+from surface.base.extras import require
+from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
+from surface.readers.gltfmesh import read_gltf
+from surface.readers.meshdata import MOST_VERTICES, MeshData, read_bytes
+from surface.readers.npzmesh import read_npz
+from surface.readers.obj import read_obj
+
+OWN = {".glb": read_gltf, ".gltf": read_gltf, ".vrm": read_gltf, ".npz": read_npz, ".obj": read_obj}
+OTHERS = (".ply", ".stl", ".off")  # read by trimesh
+SAMPLES = 120_000
+SAME = 1e-6  # of the mesh's size: vertices nearer than this are one
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Triangles of a bare mesh, in any unit and axes.
+
+    vertices : (n, 3); triangles : (t, 3); original : (m,) int64, for each vertex of the file its place in ``vertices``.
+    """
+
+    vertices: Floats
+    triangles: Ints
+    original: Ints
+
+    def turned(self, turn: Floats, scale: float, shift: Floats) -> Scan:
+        """The scan with every vertex p at scale * turn @ p + shift."""
+        return replace(self, vertices=scale * self.vertices @ turn.T + shift)
+
+    def kept(self, faces: Bools) -> Scan:
+        """The scan with some of its triangles (t,)."""
+        return replace(self, triangles=self.triangles[faces])
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Points on a scan: ``points (m, 3)``, unit ``normals (m, 3)``, and whether each lies at a border of the scan."""
+
+    points: Floats
+    normals: Floats
+    border: Bools
+
+
+def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
+    """Read a mesh of which only the form is wanted.
+
+    without : objects or materials to leave out; a part of the name will do.
+
+    Raises FitError: the file is missing, damaged or too large, holds no triangle, or what is no finite number.
+    """
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind in OWN:
+        raw = OWN[kind](path)
+        return make_scan(raw.vertices, triangles(raw.faces[_wanted(raw, without, path)]), str(path))
+    if kind not in OTHERS:
+        raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
+                       hint=f"export it as {', '.join([*OWN, *OTHERS])}")  # fmt: skip
+    if without:
+        raise FitError(f"--without {without[0]}: {path} has no named objects", hint="leave it out")
+    return make_scan(*_by_trimesh(path, kind), str(path))
+
+
+def _wanted(raw: MeshData, without: tuple[str, ...], path: Path) -> Bools:
+    """(f,) which faces belong to no object whose name holds one of the words."""
+    out = np.zeros(len(raw.pieces), bool)
+    for word in without:
+        hit = [word.lower() in name.lower() for name in raw.pieces]
+        if not any(hit):
+            raise FitError(f"--without {word}: {path} holds {', '.join(raw.pieces)}", hint="take one of them")
+        out |= hit
+    kept: Bools = ~out[raw.piece] if len(without) else np.ones(len(raw.faces), bool)
+    return kept
+
+
+def _by_trimesh(path: Path, kind: str) -> tuple[Floats, Ints]:
+    """Vertices (n, 3) and triangles (t, 3) of a file in one of the formats of scanners and CAD programs."""
+    require("reading a scan", "trimesh")
+    import trimesh  # only for these formats
+
+    data = read_bytes(path)
+    try:
+        mesh = trimesh.load_mesh(BytesIO(data), file_type=kind[1:], process=False)
+        return np.array(mesh.vertices, np.float64).reshape(-1, 3), np.array(mesh.faces, np.int64).reshape(-1, 3)
+    except Exception as e:
+        raise FitError(f"{path}: is damaged or no {kind[1:].upper()} file ({e})", hint="export the scan again") from e
+
+
+def make_scan(vertices: Floats, faces: Ints, where: str) -> Scan:
+    """A scan of triangles (t, 3): vertices in one place become one, triangles without area are left out.
+
+    Raises FitError: see :func:`read_scan`.
+    """
+    if len(vertices) > MOST_VERTICES:
+        raise FitError(f"{where}: {len(vertices)} vertices; {MOST_VERTICES} are the most", hint="decimate it first")
+    if not len(faces):
+        raise FitError(f"{where}: holds no faces", hint="a cloud of points is not enough: export its triangles")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise FitError(f"{where}: a face points at a vertex that is not there", hint="export the scan again")
+    bad = np.flatnonzero(~(np.abs(vertices) < LARGE).all(axis=1))
+    if len(bad):
+        raise FitError(f"{where}: vertex {bad[0]} is not a finite number of usable size", hint="repair the scan")
+    size = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
+    if not size > SMALL:
+        raise FitError(f"{where}: all vertices are in one place", hint="export the scan again")
+    _, first, original = np.unique(np.round(vertices / (SAME * size)), axis=0, return_index=True, return_inverse=True)
+    points, faces = vertices[first], original.reshape(-1)[faces]
+    area = np.linalg.norm(_cross(points, faces), axis=1)
+    return Scan(points, faces[area > (SAME * size) ** 2], original.reshape(-1))
+
+
+def _cross(points: Floats, faces: Ints) -> Floats:
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    cross: Floats = np.cross(b - a, c - a)
+    return cross
+
+
+def borders_of(scan: Scan) -> tuple[Ints, Ints]:
+    """Directed edges, from and to, that only one triangle has."""
+    a, b = directed_edges(np.column_stack([scan.triangles, np.full(len(scan.triangles), -1)]))
+    n = len(scan.vertices)
+    _, index, count = np.unique(np.minimum(a, b) * n + np.maximum(a, b), return_inverse=True, return_counts=True)
+    open_ = count[index.reshape(-1)] == 1
+    return a[open_], b[open_]
+
+
+def spread(vertices: Floats, faces: Ints, count: int) -> tuple[Ints, Floats]:
+    """Places spread evenly over triangles, the same ones every time: triangle (count,) and shares of its corners."""
+    area = np.linalg.norm(_cross(vertices, faces), axis=1)
+    total = np.cumsum(area)
+    random = np.random.default_rng(0)
+    at = (np.arange(count) + random.random(count)) * (total[-1] / count)
+    face: Ints = np.minimum(np.searchsorted(total, at), len(area) - 1)
+    return face, random.dirichlet(np.ones(3), count)
+
+
+def sample(scan: Scan, count: int = SAMPLES) -> Samples:
+    """Points spread evenly over a scan's surface; normals are smooth."""
+    face, share = spread(scan.vertices, scan.triangles, count)
+    corners = scan.triangles[face]
+    points = np.einsum("mk,mkc->mc", share, scan.vertices[corners])
+    normals = np.einsum("mk,mkc->mc", share, vertex_normals(scan)[corners])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    edge = 0.5 * (scan.vertices[(ends := borders_of(scan))[0]] + scan.vertices[ends[1]])
+    area = 0.5 * np.linalg.norm(_cross(scan.vertices, scan.triangles), axis=1).sum()
+    near = 1.5 * np.sqrt(area / count)
+    border = np.zeros(count, bool)
+    if len(edge):
+        border = cKDTree(np.vstack([edge, scan.vertices[ends[0]]])).query(points)[0] < near
+    return Samples(points, normals, border)
+
+
+def vertex_normals(scan: Scan) -> Floats:
+    """(n, 3) unit normals, means over the triangles around each vertex by their areas."""
+    cross = _cross(scan.vertices, scan.triangles)
+    out = np.zeros_like(scan.vertices)
+    for k in range(3):
+        np.add.at(out, scan.triangles[:, k], cross)
+    unit: Floats = out / np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+    return unit

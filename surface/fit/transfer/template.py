@@ -1,0 +1,116 @@
+"""A head as what a scanner would see of it: skin and fronts of the eyeballs, with its landmarks found by geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats, Ints
+from surface.base.errors import FitError
+from surface.head import Contact, Head, HeadData, HeadPart
+
+SIDES = ("left", "right")
+NAMES = (
+    "nose_tip", "nose_bridge", "chin", "left_eye_inner", "left_eye_outer", "left_eye_upper", "left_eye_lower",
+    "right_eye_inner", "right_eye_outer", "right_eye_upper", "right_eye_lower", "mouth_left", "mouth_right",
+    "upper_lip", "lower_lip",
+)  # fmt: skip
+EYE_FRONT = 0.3  # of the eyeball's radius: what lies further forward can be seen between the lids
+
+
+@dataclass(frozen=True)
+class Template:
+    """Points (n, 3), unit normals (n, 3) and triangles (t, 3) of a head at rest as seen from outside, mm.
+
+    face : (n,) does it belong to the skin with the openings? eye : (n,) 0 or 1 on an eyeball's front, else -1.
+    landmarks : places (3,) by the names of :data:`NAMES`; eyes (2, 3), radius.
+    """
+
+    points: Floats
+    normals: Floats
+    triangles: Ints
+    face: Bools
+    eye: Ints
+    landmarks: dict[str, Floats]
+    eyes: Floats
+    radius: float
+
+    @property
+    def height(self) -> float:
+        """From the chin to the bridge of the nose, mm: the measure of a head."""
+        return float(self.landmarks["nose_bridge"][1] - self.landmarks["chin"][1])
+
+
+def make_template(head: Head, where: str) -> Template:
+    """The template of a head at rest.
+
+    Raises FitError: the head lacks eyes, or openings of mouth and lids.
+    """
+    head.pose(head.values({}))
+    data = head.data
+    contacts = {c.name: c for c in data.contacts}
+    if data.eye_radius <= 0 or not {"lips", "left_lids", "right_lids"} <= set(contacts):
+        raise FitError(f"--expressions-from {where}: the head has no eyes, or no openings of mouth and lids",
+                       hint="take one that has them, such as ict")  # fmt: skip
+    rows = [_seen(p, data, contacts["lips"].part) for p in head.parts]
+    rows = [r for r in rows if len(r[2])]
+    first = np.cumsum([0, *(len(r[0]) for r in rows)])
+    points, normals, _, face, eye = (np.concatenate([r[k] for r in rows]) for k in range(5))
+    triangles = np.concatenate([r[2] + k for r, k in zip(rows, first, strict=False)])
+    marks = find_landmarks(head, contacts)
+    return Template(points, normals, triangles, face, eye, marks, data.eyes.copy(), data.eye_radius)
+
+
+def _seen(part: HeadPart, data: HeadData, face: str) -> tuple[Floats, Floats, Ints, Bools, Ints]:
+    """Points, normals, triangles of what can be seen of a part; whether each point is the face's, on which eyeball."""
+    n, tri = len(part.vertices), part.triangles.astype(np.int64)
+    side = ("left_eye", "right_eye").index(part.follows) if part.follows in ("left_eye", "right_eye") else -1
+    if side >= 0:
+        kept = part.vertices[:, 2] > data.eyes[side, 2] + EYE_FRONT * data.eye_radius
+    else:
+        kept = np.full(n, part.follows == "skin" and part.material == "skin" and part.name != "sockets")
+    place = np.cumsum(kept) - 1
+    tri = place[tri[kept[tri].all(axis=1)]]
+    at, out = part.vertices[kept].astype(float), part.normals[kept].astype(float)
+    return at, out, tri, np.full(len(at), part.name == face), np.full(len(at), side)
+
+
+def find_landmarks(head: Head, contacts: dict[str, Contact]) -> dict[str, Floats]:
+    """The landmarks of a head at rest, out of the rims of its openings and its profile."""
+    surface = head.part(contacts["lips"].part).surface
+    rims = {n: surface.evaluate(c.places[:, :, 0].reshape(-1, 2)).reshape(2, -1, 3) for n, c in contacts.items()}
+    out: dict[str, Floats] = {}
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        rim = rims[f"{side}_lids"]
+        ends = sorted((rim[:, 0].mean(axis=0), rim[:, -1].mean(axis=0)), key=lambda p: sign * p[0])
+        out[f"{side}_eye_inner"], out[f"{side}_eye_outer"] = ends
+        out[f"{side}_eye_upper"], out[f"{side}_eye_lower"] = rim[:, rim.shape[1] // 2]
+    lips = rims["lips"]
+    ends = sorted((lips[:, 0].mean(axis=0), lips[:, -1].mean(axis=0)), key=lambda p: -p[0])
+    out["mouth_left"], out["mouth_right"] = ends
+    skin = head.part(contacts["lips"].part)
+    profile = skin.vertices[np.abs(skin.vertices[:, 0]) < 2.0].astype(float)
+    eyes_y = float(np.mean([out["left_eye_upper"][1], out["right_eye_upper"][1]]))
+    mouth_y = float(lips[:, :, 1].mean())
+    size = eyes_y - mouth_y
+    between = profile[(profile[:, 1] < eyes_y) & (profile[:, 1] > mouth_y + 0.2 * size)]
+    tip = between[between[:, 2].argmax()]
+    bridge = _at_height(profile, eyes_y)
+    upper = _front(profile, mouth_y, mouth_y + 0.15 * size)
+    lower = _front(profile, mouth_y - 0.2 * size, mouth_y)
+    chin = _front(profile, mouth_y - 0.75 * size, mouth_y - 0.4 * size)
+    return out | {"nose_tip": tip, "nose_bridge": bridge, "upper_lip": upper, "lower_lip": lower, "chin": chin}
+
+
+def _front(profile: Floats, low: float, high: float) -> Floats:
+    """The foremost point of a profile between two heights."""
+    own = profile[(profile[:, 1] >= low) & (profile[:, 1] <= high)]
+    foremost: Floats = own[own[:, 2].argmax()]
+    return foremost
+
+
+def _at_height(profile: Floats, y: float) -> Floats:
+    own = profile[np.abs(profile[:, 1] - y) < 3.0]
+    foremost: Floats = own[own[:, 2].argmax()]
+    return foremost
