@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -28,3 +31,9 @@ def test_the_net_of_a_sheet() -> None:
     side, points, knots = peers.net_of(SURFACE)
     assert (len(points), len(knots)) == (side * side, side + 4)
     assert (np.diff(knots) >= 0).all()
+
+
+def test_blendshapes_are_named_with_what_they_read() -> None:
+    """52 shapes of three float32 numbers a vertex."""
+    mesh: Any = SimpleNamespace(vertices=np.zeros((100_000, 3)))
+    assert [p.name for p in peers.vertex_sums(mesh) if "blendshapes" in p.name] == ["numpy 52 blendshapes, 62.4 MB"]

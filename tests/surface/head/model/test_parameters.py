@@ -95,3 +95,8 @@ def test_rotation_vector_is_the_rotations_axis_and_angle():
     k = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]]) / angle
     np.testing.assert_allclose(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k, turn, atol=1e-12)
     assert not rotation_vector(np.eye(3)).any()
+
+
+def test_a_whole_turn_of_the_head_and_of_the_eyes_is_as_many_degrees_as_documented():
+    np.testing.assert_allclose(np.degrees(HEAD_RAD), [60.0, 40.0, 30.0])
+    np.testing.assert_allclose(np.degrees(EYE_RAD), [35.0, 30.0])

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from surface.head import Head
 from surface.view import Camera, Offscreen
-from surface.view.draw.decimated_draw import JoinedParts
+from surface.view.draw.decimated_draw import DrawCall, JoinedParts
 
 SIZE = (320, 240)
 
@@ -84,3 +86,19 @@ def test_parts_that_are_joined_tell_what_changed_by_their_place_in_the_joined_ro
     parts[0].changed, parts[1].changed = [(1, 4)], [(0, 2), (5, 6)]
     assert joined.changed == [(1, 4), (second, second + 2), (second + 5, second + 6)]
     assert (joined.name, joined.material) == (parts[0].part.name, parts[0].part.material)
+
+
+def test_shared_buffers_are_sent_and_released_by_one_draw_call() -> None:
+    done: list[str] = []
+    triangles = np.arange(30).reshape(10, 3)
+    buffers: Any = SimpleNamespace(
+        triangles=triangles, upload=lambda: done.append("upload") or 7, release=lambda: done.append("release")
+    )
+    parts: list[Any] = [SimpleNamespace(part=name, triangles=triangles[:3]) for name in ("left", "right")]
+    owner, other = DrawCall(buffers, parts, 0, owner=True), DrawCall(buffers, parts[1:], 6, owner=False)
+    assert (owner.upload(), other.upload()) == (7, 0)
+    other.release()
+    assert done == ["upload"]
+    owner.release()
+    assert done == ["upload", "release"]
+    assert np.array_equal(owner.triangles, triangles[:6]) and np.array_equal(other.triangles, triangles[6:9])

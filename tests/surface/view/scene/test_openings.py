@@ -74,6 +74,7 @@ def test_heads_without_holes_or_skin_still_work(head: BallHead) -> None:
     for parts in ([eye], [eye, part(head, "teeth")]):
         openings = Openings(parts)
         assert openings.eye(eye)["lids"] == 0.0
+        assert all(np.shape(openings.eye(eye)[name]) == (LID_POINTS, 3) for name in ("lid_upper", "lid_lower"))
         assert np.linalg.norm(openings.mouth()["opening_area"]) > 0
     assert np.linalg.norm(Openings([closed]).mouth()["opening_area"]) > 0
 
