@@ -25,13 +25,13 @@ from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
 from surface.fit.source.anatomy import Landmarks
 from surface.fit.source.chart import Chart, make_chart
-from surface.fit.source.frame import head_scale
+from surface.fit.source.frame import EYES_AT, head_scale
 from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold
 from surface.fit.source.names import sources_of, to_arkit
-from surface.fit.source.place import CLOSE_MM, EYES_AT, find_neck, head_size, moved, place
+from surface.fit.source.place import CLOSE_MM, find_neck, head_size, moved, place
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
 from surface.head.model.file import check_writable, save_data

@@ -43,7 +43,8 @@ def test_the_figures_are_those_of_the_fit(folder, result):
     (part,) = table["parts"]
     assert part["control_points"] == result.report.points and set(part["shapes_mm"]) == {"jawOpen", "mouthSmileLeft"}
     assert part["neutral_mm"]["rms"] == result.report.parts[0].neutral.rms
-    assert table["left_out"] == ["odd"] and "tongueOut" in table["missing"] and table["notes"] == ["unit taken for mm"]
+    assert table["left_out"] == ["odd"] and "tongueOut" in table["missing"] and table["notes"][0] == "unit taken for mm"
+    assert table["notes"][1].startswith("placed: the file's unit is 1 mm")
     assert part["excluded_samples"] == int(result.parts[0].chart.folded.sum())
 
 
