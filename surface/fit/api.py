@@ -20,20 +20,20 @@ from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.points.lid_seating import close_lips, draw_brows, seat_lids, strengthen
-from surface.fit.points.recipe import PartRecipe, Recipe, recipe_for
+from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart
 from surface.fit.points.report import FitReport, FitResult, FittedPart, PartReport, measure
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
 from surface.fit.source.anatomy import Landmarks
 from surface.fit.source.chart import Chart, make_chart
-from surface.fit.source.frame import head_scale
+from surface.fit.source.frame import EYES_AT, head_scale
 from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
-from surface.fit.source.place import CLOSE_MM, EYES_AT, find_neck, head_size, moved, place
+from surface.fit.source.place import find_neck, head_size, place
 from surface.fit.source.repair import repaired
 from surface.fit.source.shapes import to_arkit
 from surface.fit.source.wrap import wrap_chart
@@ -78,7 +78,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     """Fit all parts of a mesh in memory; ``where`` names it in messages."""
     recipe = recipe_for(loaded.mesh) if is_mapped(loaded.mesh) else None
     if recipe is not None:
-        loaded = _at_recipes_place(loaded, recipe)
+        loaded = in_place(loaded, recipe)
         mesh = prepare(loaded.mesh, recipe)
         plan = recipe_plan(mesh, recipe)
     else:
@@ -185,15 +185,6 @@ def eyes_of(mesh: FitMesh, recipe: Recipe) -> tuple[Floats, float]:
         return np.zeros((2, 3)), 0.0
     centre = np.array(balls[1].centre)
     return np.stack([centre, centre * [-1.0, 1.0, 1.0]]), balls[1].radius
-
-
-def _at_recipes_place(loaded: Loaded, recipe: Recipe) -> Loaded:
-    """The mesh moved to where the recipe's own places, of neck and hinge, belong to it."""
-    balls = recipe.eyeballs(loaded.mesh)
-    if balls is None or not recipe.ball_at:
-        return loaded
-    shift = np.array(recipe.ball_at) - balls[0].centre
-    return moved(loaded, shift) if np.abs(shift).max() > CLOSE_MM else loaded
 
 
 def _neck(mesh: FitMesh, recipe: Recipe, marks: Landmarks = Landmarks()) -> Neck:

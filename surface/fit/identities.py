@@ -19,7 +19,7 @@ from surface.base.arrays import Array, Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
 from surface.fit.points.net import Net
-from surface.fit.points.recipe import Recipe, recipe_for
+from surface.fit.points.recipe import Recipe, in_place, recipe_for
 from surface.fit.points.solve import basis, solve
 from surface.fit.source.chart import Chart
 from surface.fit.source.load import load_mesh
@@ -66,10 +66,11 @@ def add_identities(head: str | Path, mesh_path: str | Path, modes_path: str | Pa
     HeadFileError: the head cannot be read.
     """
     data, wanted = load_data(head), read_wanted()
-    mesh = load_mesh(mesh_path).mesh
-    recipe = recipe_for(mesh)
-    if recipe is None or len(mesh.vertices) != wanted.vertices:
+    loaded = load_mesh(mesh_path)
+    recipe = recipe_for(loaded.mesh)
+    if recipe is None or len(loaded.mesh.vertices) != wanted.vertices:
         raise FitError(f"{mesh_path}: no variations are known for this mesh", hint="they are made for ICT-FaceKit's")
+    mesh = in_place(loaded, recipe).mesh
     modes = symmetric(mesh.vertices, read_modes(Path(modes_path), mesh, mesh_path))
     fields = dict(zip(wanted.identities, mixes(mesh.vertices, modes, wanted), strict=True))
     made = fit_identities(data, mesh, recipe, fields, str(head))

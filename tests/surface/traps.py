@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from surface.fit.source.frame import EYES_AT, find_frame
+from surface.fit.source.load import Loaded, _turned
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.place import EYES_AT
+from surface.fit.source.names import map_names
+from surface.fit.source.place import place
 
 EYE_X, EYE_RADIUS = 31.8, 12.1
 HALF = np.array([[EYE_X, 0.0, 0.0], [-EYE_X, 0.0, 0.0]])
@@ -133,3 +136,11 @@ def on_body(head: FitMesh) -> FitMesh:
     boots = [_tube((s * 80, -1540, -40), (s * 80, -1540, 160), 50, "Boots") for s in (1, -1)]
     whole = joined(head, trunk, *arms, *legs, *boots)
     return replace(whole, vertices=whole.vertices - [0.0, whole.vertices[:, 1].min(), 0.0])
+
+
+def placed(mesh: FitMesh, **options) -> Loaded:
+    """The mesh as a fit places it; options as of a frame."""
+    shapes = dict(zip(mesh.names, mesh.deltas, strict=True))
+    frame = find_frame(mesh.vertices, shapes, faces=mesh.faces, **options)
+    turned = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
+    return place(Loaded(turned, map_names(mesh.names), frame.notes, frame.placement, _turned(frame)))

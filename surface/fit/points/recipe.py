@@ -13,7 +13,9 @@ from surface.base import files
 from surface.base.arrays import Ints
 from surface.fit.points.lid_seating import Eyeball, fit_sphere
 from surface.fit.points.refine import FitRequest
+from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
+from surface.fit.source.place import CLOSE_MM, moved
 
 RECIPES = Path(__file__).parent / "recipes"
 Ranges = Sequence[Sequence[int]]
@@ -89,6 +91,15 @@ def recipe_for(mesh: FitMesh) -> Recipe | None:
         if (table.pop("vertices"), table.pop("faces")) == (len(mesh.vertices), len(mesh.faces)):
             return Recipe(**table | {key: [_part(t) for t in table[key]] for key in ("parts", "teeth")})
     return None
+
+
+def in_place(loaded: Loaded, recipe: Recipe) -> Loaded:
+    """The mesh moved to where the recipe's own places, of neck and hinge, belong to it."""
+    balls = recipe.eyeballs(loaded.mesh)
+    if balls is None or not recipe.ball_at:
+        return loaded
+    shift = np.array(recipe.ball_at) - balls[0].centre
+    return moved(loaded, shift) if np.abs(shift).max() > CLOSE_MM else loaded
 
 
 def _part(table: dict[str, Any]) -> PartRecipe:

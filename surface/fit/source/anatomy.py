@@ -99,7 +99,7 @@ def find_eyes(
         if not near:
             return lids
         best = min(near, key=lambda pair: _distance(pair, lids.centres))
-        return Eyes(_matched(best, lids.centres), lids.sided, True, "eyeballs and the shapes of the lids")
+        return Eyes(in_order(best, lids.centres), lids.sided, True, "eyeballs and the shapes of the lids")
     if not balls:
         return None
     pair = balls[0]
@@ -208,10 +208,10 @@ def _apart(pair: Floats) -> float:
     return float(np.linalg.norm(pair[0] - pair[1]))
 
 
-def _matched(pair: Floats, wanted: Floats) -> Floats:
-    """The pair in the order in which it is nearest to another."""
+def in_order(pair: Floats, wanted: Floats) -> Floats:
+    """A pair (2, 3) in the order in which it is nearest to another."""
     return min((pair, pair[::-1]), key=lambda p: float(np.linalg.norm(p - wanted)))
 
 
 def _distance(pair: Floats, wanted: Floats) -> float:
-    return float(np.linalg.norm(_matched(pair, wanted) - wanted, axis=1).max())
+    return float(np.linalg.norm(in_order(pair, wanted) - wanted, axis=1).max())

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from surface.base.errors import FitError
 from surface.readers.gltf import Gltf
+from surface.readers.meshdata import read_bytes
 
 OMOTE_OBJ = "written by omote; millimetres, y up, z forward"  # in the first line of OBJ files that omote exports
 
@@ -49,8 +49,4 @@ def _gltf(path: Path) -> Convention:
 
 
 def _first_line(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return file.readline(400).decode("utf-8", "replace")
-    except OSError as e:
-        raise FitError(f"{path}: cannot be read ({e})") from e
+    return read_bytes(path).partition(b"\n")[0].decode("utf-8", "replace")

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
-from surface.fit.source.anatomy import Eyes, Landmarks, find_landmarks, middle_of
+from surface.fit.source.anatomy import Eyes, Landmarks, find_landmarks, in_order, middle_of
 from surface.fit.source.conventions import Convention
+from surface.fit.source.match import match_face
 from surface.fit.source.orient import SQUARE, Orientation, axis_names, in_front, orient, snapped
 from surface.head.model.placement import Placement
 
@@ -19,6 +20,9 @@ HEAD_HEIGHT_MM = 250.0  # a head with neck; enough to distinguish units by the h
 EYES_MM = 65.4  # between the middles of what blinks, on the head that the bounds were set for
 HEIGHT_MM = 338.0  # of that head
 HUMAN = 1.6  # a head of a guessed unit is at most so much larger or smaller than usual
+EYES_AT = np.array([0.0, 36.1, 84.2])  # middle between the eyeballs' centres of the shipped head, mm
+HALF_APART = np.array([[31.8, 0.0, 0.0], [-31.8, 0.0, 0.0]])  # from there to each
+MOUTH_AT = np.array([0.0, -35.9, 102.3])  # middle of what its lips' shapes move
 DEFINED = 2.5  # and one of a unit that its format defines: figures may be large
 
 
@@ -60,10 +64,24 @@ def find_frame(
     if unit is not None and unit not in UNITS:
         raise FitError(f"--unit {unit}: is not one of {', '.join(UNITS)}", hint="--unit cm")
     marks = find_landmarks(vertices, np.zeros((0, 4), np.int64) if faces is None else faces, shapes)
+    if faces is not None and orient(vertices, marks) is None:
+        marks = _by_form(vertices, faces, marks, notes)
     turn = _turn(vertices, shapes, marks, up, forward, convention, notes)
     height = float(np.ptp(vertices @ turn[1]))
     scale, name = _scale(marks.eyes, height, unit, convention, notes)
     return Frame(turn, scale, tuple(notes), name, marks)
+
+
+def _by_form(vertices: Floats, faces: Ints, marks: Landmarks, notes: list[str]) -> Landmarks:
+    """Landmarks with eyes and mouth of a face that is found by its form; as they are where none is."""
+    face = match_face(vertices, faces)
+    if face is None:
+        return marks
+    eyes = Eyes(face.at(EYES_AT + HALF_APART), True, True, "the form of the face")
+    if marks.eyes is not None and np.linalg.norm(marks.eyes.middle - eyes.middle) < 0.5 * eyes.apart:
+        eyes = replace(marks.eyes, centres=in_order(marks.eyes.centres, eyes.centres), sided=True)
+    notes.append("the face was found by its form: no shapes of lids and lips tell where it is")
+    return replace(marks, eyes=eyes, mouth=face.at(MOUTH_AT))
 
 
 def eye_distance(vertices: Floats, shapes: dict[str, Floats]) -> float:

@@ -9,13 +9,11 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.fit.source.anatomy import Eyes, Landmarks
 from surface.fit.source.bust import cut_bust
-from surface.fit.source.frame import EYES_MM
+from surface.fit.source.frame import EYES_AT, EYES_MM
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Neck
 
-#: Middle between the eyeballs' centres of the shipped head, mm: where the eyes of every head are put.
-EYES_AT = np.array([0.0, 36.1, 84.2])
 #: From the middle of what blinks to the eyeball's centre, mm, on that head.
 INTO_EYE = np.array([0.0, -4.6, -10.4])
 #: The shipped head's neck from there: pivot, and y + slope * z of what stays still and of what turns as a whole.

@@ -39,7 +39,14 @@ def sheet(tmp_path_factory):
 def test_fit_says_what_it_did_and_guessed(sheet):
     mesh, head, output = sheet
     words = " ".join(output.split())
-    for expected in ("me: ", "2 shapes", "unit taken for m: all of it is 200 mm high", "no shape for", f"wrote {head}"):
+    for expected in (
+        "me: ",
+        "2 shapes",
+        "placed: the file's unit is m, up is y",
+        "no eyes",
+        "no shape for",
+        f"wrote {head}",
+    ):
         assert expected in words
     assert (mesh.parent / "report" / "report.md").is_file()
 
@@ -196,14 +203,16 @@ def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeyp
     monkeypatch.setattr("controller.tools.plugins.added_exporters", lambda: [other])
     monkeypatch.setattr(
         "surface.export.export_head",
-        lambda head, out, pose, added: calls.append((head.name, out, pose, added)) or [out, tmp_path / "more"],
+        lambda head, out, pose, added, frame: (
+            calls.append((head.name, out, pose, added, frame)) or [out, tmp_path / "more"]
+        ),
     )
     blamed = []
     monkeypatch.setattr("controller.tools.plugins.EXPORTERS.blaming", lambda kind: blamed.append(kind) or nullcontext())
     head = ["--head", str(sheet[1])]
     said = CliRunner().invoke(make_app(), ["export", "a.ODD", *head, "--set", "jawOpen=0.5", "--set", "headYaw=0"])
     assert said.exit_code == 0, said.exception
-    assert calls == [("me", Path("a.ODD"), {"jawOpen": 0.5}, [other])]
+    assert calls == [("me", Path("a.ODD"), {"jawOpen": 0.5}, [other], "head")]
     assert said.output.replace("\n", "") == f"wrote a.ODDwrote {tmp_path / 'more'}"
     assert CliRunner().invoke(make_app(), ["export", "b.glb", *head]).exit_code == 0
     assert calls[1][2] == {} and blamed == ["odd", ""]

@@ -5,25 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from traps import EYE_X, good_head, on_body, transformed
+from traps import EYE_X, good_head, on_body, placed, transformed
 
 from surface.fit.source.conventions import GLTF, VRM0
-from surface.fit.source.frame import EYES_MM, UNITS, find_frame
-from surface.fit.source.load import Loaded, _turned
+from surface.fit.source.frame import EYES_AT, EYES_MM, UNITS, find_frame
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.names import map_names
 from surface.fit.source.orient import SQUARE
-from surface.fit.source.place import EYES_AT, find_neck, head_size, place
+from surface.fit.source.place import find_neck, head_size
 
 HEAD = good_head()
 BODY = on_body(HEAD)
-
-
-def placed(mesh: FitMesh, **options) -> Loaded:
-    shapes = dict(zip(mesh.names, mesh.deltas, strict=True))
-    frame = find_frame(mesh.vertices, shapes, faces=mesh.faces, **options)
-    turned = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
-    return place(Loaded(turned, map_names(mesh.names), frame.notes, frame.placement, _turned(frame)))
 
 
 @pytest.mark.parametrize("unit", UNITS)
