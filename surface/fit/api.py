@@ -93,7 +93,10 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
-    report = FitReport(name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes], scale)
+    report = FitReport(
+        name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes], scale,
+        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces,
+    )  # fmt: skip
     return FitResult(head, report, fitted_parts)
 
 

@@ -92,6 +92,17 @@ def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
     return kept, notes + ([f"left out: {', '.join(out)}"] if out else [])
 
 
+def piece_kinds(mesh: FitMesh, kept: Bools) -> dict[str, str]:
+    """What each object of a mesh is; ``kept`` (f,) are the faces that are not left out."""
+    out = {}
+    for k, name in enumerate(mesh.pieces):
+        own = mesh.piece == k
+        if own.any():
+            said = kind_name(name).replace("_", " ")
+            out[name] = said if kept[own].any() else f"{said}, left out"
+    return out
+
+
 def _moves(mesh: FitMesh, own: Bools) -> bool:
     """Whether shapes move some faces (f,) nearly as far as they move anything."""
     used = np.unique(mesh.faces[own])

@@ -49,7 +49,7 @@ class NameMap:
     stand_ins : parameters made from a vowel, a viseme or a mood.
     presets : such shapes that are understood but not needed, since their parameters have shapes of their own.
     spare : shapes that mean what another shape already does.
-    mouth, eyes : shapes that tell where those are; -1 where there are none.
+    mouth, eyes : shapes that tell where those are; none where no shape does.
     """
 
     sources: dict[str, list[Source]]
@@ -61,6 +61,10 @@ class NameMap:
     spare: tuple[str, ...] = ()
     mouth: tuple[int, ...] = ()
     eyes: tuple[int, ...] = ()
+
+    def made_of(self, names: tuple[str, ...]) -> dict[str, list[str]]:
+        """For each parameter the names of the shapes that it is made of."""
+        return {p: [names[s.index] for s in every] for p, every in self.sources.items()}
 
 
 @dataclass
