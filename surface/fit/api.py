@@ -29,8 +29,8 @@ from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold
 from surface.fit.source.names import sources_of
+from surface.fit.source.naming.shapes import to_arkit
 from surface.fit.source.repair import repaired
-from surface.fit.source.shapes import to_arkit
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
 from surface.head.model.file import check_writable, save_data

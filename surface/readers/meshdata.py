@@ -92,6 +92,6 @@ def check_size(where: str, vertices: int, shapes: int) -> None:
 def read_bytes(path: Path) -> bytes:
     """The content of a file that is not too large. Raises FitError: missing, unreadable or too large."""
     if not os.path.exists(path):
-        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
+        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .vrm, .obj or .npz mesh")
     with reading(path, FitError):
         return read_file(path, DATA_LIMIT)

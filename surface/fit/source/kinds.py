@@ -67,6 +67,11 @@ def material_of(name: str) -> str:
     return kind_of(name).material
 
 
+def is_known(name: str) -> bool:
+    """Whether any word in a piece's name is in the table."""
+    return any(_said(part) is not None for part in name.split("/"))
+
+
 def kind_name(name: str) -> str:
     """Name of the kind that a piece's name tells."""
     return kind_of(name).name

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from surface.base.arrays import Bools
 from surface.base.errors import FitError
-from surface.fit.source.expressions import with_expressions
 from surface.fit.source.frame import find_frame
 from surface.fit.source.kinds import piece_kinds, unworn
 from surface.fit.source.mesh import FitMesh, check_mesh, renumbered
-from surface.fit.source.namenotes import name_notes
 from surface.fit.source.names import NameMap, map_names, read_names
-from surface.fit.source.shapes import empty_shapes, to_arkit
+from surface.fit.source.naming.expressions import with_expressions
+from surface.fit.source.naming.namenotes import name_notes
+from surface.fit.source.naming.shapes import empty_shapes, share_of, to_arkit
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MeshData
 from surface.readers.npzmesh import read_npz
@@ -69,7 +70,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
     check_mesh(mesh, str(path))
     own = read_names(options.names) if options.names else None
-    named = map_names(mesh.names, own, empty=empty_shapes(mesh), other=other)
+    named = map_names(mesh.names, own, empty=empty_shapes(mesh), other=other, share=partial(share_of, mesh))
     arkit = to_arkit(mesh, named)
     shapes = dict(zip(arkit.names, arkit.deltas, strict=True))
     frame = find_frame(mesh.vertices, shapes, unit=options.unit, up=options.up, forward=options.forward)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from slit_sheet import slit_sheet
 
-from surface.fit.source.kinds import kind_name, kind_of, kinds, material_of, unworn
+from surface.fit.source.kinds import is_known, kind_name, kind_of, kinds, material_of, unworn
 from surface.fit.source.mesh import FitMesh
 
 NAMES = {
@@ -55,6 +55,7 @@ def test_the_material_decides_but_skin_is_no_kind_of_hair():
     assert kind_name("Teeth/Std_Skin") == "teeth" and kind_name("Top/Skin") == "skin"
     assert material_of("Hair") == "brow" and material_of("EyeIris") == material_of("Shirt") == "skin"
     assert kind_of("EyeIris").rule == "eye"
+    assert is_known("Body/xyz") and is_known("Head") and not is_known("Mesh/Material.001")
 
 
 def two_pieces(name: str, moves: float) -> FitMesh:
