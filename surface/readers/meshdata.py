@@ -12,6 +12,7 @@ from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT, read_file, reading
 
+PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}  # by their first bytes
 MOST_VERTICES = 400_000
 MOST_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
 
@@ -75,6 +76,11 @@ class MeshData:
     pieces: tuple[str, ...]
     materials: tuple[Material | None, ...] = ()
     expressions: tuple[Expression, ...] = ()
+
+
+def kind_of_picture(data: bytes) -> str:
+    """The MIME type of a picture by its first bytes; "" for one that is not PNG, JPEG or WebP."""
+    return next((kind for start, kind in PICTURES.items() if data.startswith(start)), "")
 
 
 def check_size(where: str, vertices: int, shapes: int) -> None:
