@@ -146,7 +146,7 @@ def _made(shape: str, found: _Found) -> list[Source]:
         return [Source(by_side[side])]
     if not side and len(by_side) == 2:
         return [Source(by_side["Left"]), Source(by_side["Right"])]
-    if side and set(by_side) == {""} and key in names_table()["sided"]:
+    if side and "" in by_side and key in names_table()["sided"]:
         return [Source(by_side[""], side)]
     for group in sums().get(shape, []):
         parts = [_whole(found.get(part, {})) for part in group]

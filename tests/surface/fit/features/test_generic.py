@@ -299,7 +299,7 @@ def test_others_get_points_by_their_share_of_the_skin() -> None:
         "'Box': skin: 1 islands as piece_3",
     ]  # fmt: skip
     assert generic._others(mesh, label, [3], 40_000.0, 1.0, notes) == []
-    assert notes.pop() == "'Iris': left out: iris, which an exact eyeball replaces"
+    assert notes.pop() == "'Iris': left out: iris, part of an eye"
     assert {(p.request.coarse, p.request.neutral_mm) for p, _ in parts} == {(0.34, 0.5)}
     assert generic._others(mesh, label, [0], 4e6, 1.0, [])[0][0].request.points == 120
     assert generic._others(mesh, label, [0], 1e3, 1.0, [])[0][0].request.points == 2450
@@ -355,6 +355,6 @@ def test_bad_hair_is_no_reason_to_refuse_a_face() -> None:
     check_manifold(mesh, "m")
     assert len(notes) >= 2 and all("Hair" in n for n in notes)
     plan = make_plan(mesh)
-    assert [p.name for p, _ in plan.parts][0] == "face" and "brow" in {p.material for p, _ in plan.parts}
+    assert plan.parts[0][0].name == "face" and "brow" in {p.material for p, _ in plan.parts}
     face = mesh.vertices[np.unique(mesh.faces[mesh.piece == 0])]
     np.testing.assert_array_equal(face, slit_sheet().vertices)

@@ -69,6 +69,8 @@ def test_a_shape_for_both_sides_is_cut_down_the_middle():
     np.testing.assert_allclose(left + right, field[0])
     assert (left[mesh.vertices[:, 0] > 15] == 1).all() and (left[mesh.vertices[:, 0] < -15] == 0).all()
     assert map_names(("jaw",)).sources == {}
+    one = map_names(("Blink", "blink_l")).sources  # the other side is half of the shape for both
+    assert one == {"eyeBlinkLeft": [Source(1)], "eyeBlinkRight": [Source(0, "Right")]}
 
 
 def test_halves_add_up():
@@ -213,9 +215,14 @@ def test_notes_say_what_was_made_of_what():
     assert "jawOpen is made from 'A' about the mouth" in notes
     assert "mouthFunnel is made from 'O' about the mouth, less its share of 'A'" in notes
     assert "mouthSmileLeft and Right are made from the halves of 'Joy' about the mouth, less its share of 'A'" in notes
-    assert notes[-1] == "empty, they move nothing: viseme_sil"
+    assert (
+        notes[0] == "7 shapes: 5 make 6 parameters, 1 doubled, 1 empty"
+        and notes[-1] == "empty, they move nothing: viseme_sil"
+    )
+    counted = name_notes(("jawOpen", "A", "odd", "jaw_open"), map_names(("jawOpen", "A", "odd", "jaw_open")))
+    assert counted[0] == "4 shapes: 1 make 1 parameters, 1 presets and visemes, 1 doubled, 1 not understood"
     only = map_names(("target0",), other={0: ["Joy"]})
-    assert name_notes(("target0",), only, {0: ["Joy"]}) == [
+    assert name_notes(("target0",), only, {0: ["Joy"]})[1:] == [
         "mouthSmileLeft and Right are made from the halves of 'Joy' (target0)"
     ]
 
