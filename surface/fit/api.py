@@ -33,9 +33,9 @@ from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
+from surface.fit.source.naming.shapes import to_arkit
 from surface.fit.source.place import find_neck, head_size, place
 from surface.fit.source.repair import repaired
-from surface.fit.source.shapes import to_arkit
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
 from surface.head.model.file import check_writable, save_data
@@ -104,7 +104,10 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     notes = [*loaded.notes, *plan.notes, *findings(head, loaded.marks)]
-    report = FitReport(name, reports, moving, missing, loaded.named.left_out, notes, scale)
+    report = FitReport(
+        name, reports, moving, missing, loaded.named.left_out, notes, scale,
+        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces,
+    )  # fmt: skip
     return FitResult(head, report, fitted_parts)
 
 

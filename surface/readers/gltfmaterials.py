@@ -13,11 +13,9 @@ from typing import Any
 
 from surface.base.errors import FitError
 from surface.readers.gltf import Gltf
-from surface.readers.meshdata import Material
+from surface.readers.meshdata import Material, kind_of_picture
 
 ALPHA = ("OPAQUE", "MASK", "BLEND")
-PICTURES = ("image/png", "image/jpeg", "image/webp")
-BEGINNINGS = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
 WHITE = (1.0, 1.0, 1.0, 1.0)
 _OLD = "KHR_materials_pbrSpecularGlossiness"
 _Rows = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -106,8 +104,8 @@ def _image(file: Gltf, source: Any) -> tuple[bytes | None, str]:
     where = f"images[{source}]"
     inside = "bufferView" in image
     data = file.view_bytes(image["bufferView"], where) if inside else file.uri_bytes(image.get("uri"), where)
-    mime = next((kind for start, kind in BEGINNINGS.items() if data.startswith(start)), "")
-    return (data, mime) if mime in PICTURES else (None, "")
+    mime = kind_of_picture(data)
+    return (data, mime) if mime else (None, "")
 
 
 def _image_of_uv(moved: dict[str, Any]) -> _Rows:

@@ -200,8 +200,6 @@ def _targets(file: Gltf, table: dict[str, Any], names: list[str], count: int, wh
         at = f"{where}.targets[{k}] ({name})"
         if not isinstance(target, dict):
             raise file.error(at, "is no object")
-        if name in out:
-            raise file.error(at, "this name occurs twice", "give every shape its own name")
         if "POSITION" in target:
             out[name] = file.floats(target["POSITION"], 3, at)
             if len(out[name]) != count:

@@ -7,6 +7,8 @@ damaged in them is left out: the mesh is whole without.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
+from itertools import count as count_from
 from typing import Any
 
 from surface.readers.gltf import Gltf
@@ -16,11 +18,20 @@ PERCENT = 0.01  # VRM 0 gives weights in percent
 
 
 def target_names(file: Gltf, index: int, count: int) -> list[str]:
-    """Names of the morph targets of a mesh, at least ``count``: what the file calls them, or their numbers."""
+    """Names of the morph targets of a mesh, at least ``count``: what the file calls them, or their numbers.
+
+    No two are equal: a name that occurs again is numbered.
+    """
     mesh = _table(file.items("meshes")[index])
     found = _named(mesh) or next((n for p in _list(mesh.get("primitives")) if (n := _named(_table(p)))), [])
     prefix = f"mesh{index}_" if _unnamed(file) > 1 else ""
-    return found + [f"{prefix}target{k}" for k in range(len(found), count)]
+    every = found + [f"{prefix}target{k}" for k in range(len(found), count)]
+    seen: set[str] = set()
+    for k, name in enumerate(every):
+        numbered = (f"{name} ({n})" for n in count_from(2))
+        every[k] = next(n for n in chain([name], numbered) if n not in seen)
+        seen.add(every[k])
+    return every
 
 
 def _named(table: dict[str, Any]) -> list[str]:

@@ -12,6 +12,7 @@ from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT, read_file, reading
 
+PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}  # by their first bytes
 MOST_VERTICES = 400_000
 MOST_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
 
@@ -77,6 +78,11 @@ class MeshData:
     expressions: tuple[Expression, ...] = ()
 
 
+def kind_of_picture(data: bytes) -> str:
+    """The MIME type of a picture by its first bytes; "" for one that is not PNG, JPEG or WebP."""
+    return next((kind for start, kind in PICTURES.items() if data.startswith(start)), "")
+
+
 def check_size(where: str, vertices: int, shapes: int) -> None:
     """Refuse a mesh that would not fit into memory, before arrays are allocated for it.
 
@@ -92,6 +98,6 @@ def check_size(where: str, vertices: int, shapes: int) -> None:
 def read_bytes(path: Path) -> bytes:
     """The content of a file that is not too large. Raises FitError: missing, unreadable or too large."""
     if not os.path.exists(path):
-        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
+        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .vrm, .obj or .npz mesh")
     with reading(path, FitError):
         return read_file(path, DATA_LIMIT)

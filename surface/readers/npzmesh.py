@@ -46,7 +46,7 @@ def read_npz(path: Path) -> MeshData:
 
 def _arrays(path: Path) -> dict[str, Array]:
     if not path.exists():
-        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .obj or .npz mesh")
+        raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .vrm, .obj or .npz mesh")
     with reading(path, FitError, hint=f"save {', '.join(KEYS)} with numpy.savez"):
         arrays = read_npz_file(path)
     bare = not any(key in arrays for key in MAPPED)

@@ -9,6 +9,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.readers.meshdata import MeshData, check_size, read_bytes
+from surface.readers.mtl import read_mtl
 
 Corner = tuple[int, int]
 Lines = list[tuple[int, bytes]]
@@ -74,6 +75,8 @@ class _Parser:
         self._faces: list[list[Corner]] = []
         self._piece: list[int] = []
         self._pieces: dict[str, int] = {}
+        self._material: dict[str, str] = {}  # of each piece
+        self._library = ""
 
     def _error(self, line: int, why: str) -> FitError:
         """The error for a line, counted from 1."""
@@ -91,9 +94,13 @@ class _Parser:
             elif word == b"vt":
                 self._textures.append((number, rest))
             elif word == b"f":
-                self._face(number, rest, "/".join(x for x in (group, material) if x))
+                piece = "/".join(x for x in (group, material) if x)
+                self._material[piece] = material
+                self._face(number, rest, piece)
             elif word in (b"o", b"g"):
                 group = rest.strip().decode("utf-8", "replace")
+            elif word == b"mtllib":
+                self._library = rest.strip().decode("utf-8", "replace")
             elif word == b"usemtl":
                 material = rest.strip().decode("utf-8", "replace")
 
@@ -145,4 +152,6 @@ class _Parser:
         faces, face_uv = filled[..., 0], filled[..., 1]
         face_uv[np.any((face_uv < 0) & (faces >= 0), axis=1)] = -1
         uv, piece = self.points(self._textures, "vt", 2), np.array(self._piece, np.int64)
-        return MeshData(vertices, faces, uv, face_uv, names, deltas, piece, tuple(self._pieces))
+        known = read_mtl(self.path.parent, self._library) if self._library else {}
+        materials = tuple(known.get(self._material[p]) for p in self._pieces) if known else ()
+        return MeshData(vertices, faces, uv, face_uv, names, deltas, piece, tuple(self._pieces), materials)

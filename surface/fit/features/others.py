@@ -50,7 +50,8 @@ def is_skin(mesh: FitMesh, label: Ints, count: int) -> Bools:
 def why_out(name: str, kind: Kind, islands: int, most: int) -> str:
     """Why an object is not fitted, in words; "" for one that is. ``islands`` is how many charts it has."""
     if kind.rule == "eye":
-        return f"{name!r}: left out: {kind.name.replace('_', ' ')}, which an exact eyeball replaces"
+        word = kind.name.replace("_", " ")
+        return f"{name!r}: left out: {word if kind.name == 'eye' else f'{word}, part of an eye'}"
     if islands == 0:
         return f"{name!r}: left out: no area in (u, v)"
     return f"{name!r}: left out: {islands} separate pieces are too many to fit" if islands > most else ""

@@ -22,7 +22,8 @@ LONGEST = 4  # words of one entry of the table
 INSIDE = 5  # letters of an entry that counts as the beginning or the end of a longer word, too
 ENDINGS = ("lash", "lashes", "brow", "brows", "hair")  # shorter ones that end longer words
 SKIN, PROP = "skin", "prop"
-MOVED = 0.5  # of the largest movement: a piece that moves so far belongs to the face, whatever its name
+MOST_NAMES = 4  # of one kind that a note names
+MOVED = 0.5  # of the largest movement: a piece that shapes move by this is of the face, whatever its name
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,8 @@ def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
 
     Names are not believed where shapes move the piece as they move the face, or where nothing would be left.
     """
-    kept, notes, out = np.ones(len(mesh.faces), bool), [], []
+    kept, notes = np.ones(len(mesh.faces), bool), []
+    out: dict[str, list[str]] = {}
     for k, name in enumerate(mesh.pieces):
         kind, own = kind_of(name), mesh.piece == k
         if kind.rule != "out" or not own.any():
@@ -89,10 +91,27 @@ def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
             notes.append(f"{name!r}: named as {kind.name}, but shapes move it: kept as skin")
         else:
             kept &= ~own
-            out.append(f"{name!r} ({kind.name})")
+            out.setdefault(kind.name, []).append(name)
     if not kept.any():
         return np.ones(len(mesh.faces), bool), []
-    return kept, notes + ([f"left out: {', '.join(out)}"] if out else [])
+    return kept, notes + [f"{kind} left out: {listed(names)}" for kind, names in out.items()]
+
+
+def listed(names: list[str]) -> str:
+    """Names of pieces in one line; of very many the first ones, and how many more."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(map(repr, names[:MOST_NAMES])) + more
+
+
+def piece_kinds(mesh: FitMesh, kept: Bools) -> dict[str, str]:
+    """What each object of a mesh is; ``kept`` (f,) are the faces that are not left out."""
+    out = {}
+    for k, name in enumerate(mesh.pieces):
+        own = mesh.piece == k
+        if own.any():
+            said = kind_name(name).replace("_", " ")
+            out[name] = said if kept[own].any() else f"{said}, left out"
+    return out
 
 
 def _moves(mesh: FitMesh, own: Bools) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,14 @@ from surface.base.arrays import Bools, Floats
 from surface.base.errors import FitError
 from surface.fit.source.anatomy import Eyes, Landmarks
 from surface.fit.source.conventions import convention_of
-from surface.fit.source.expressions import with_expressions
 from surface.fit.source.frame import Frame, find_frame
-from surface.fit.source.kinds import unworn
+from surface.fit.source.kinds import piece_kinds, unworn
 from surface.fit.source.mesh import FitMesh, bare_where_damaged, check_mesh, renumbered
-from surface.fit.source.namenotes import name_notes
 from surface.fit.source.names import NameMap, map_names, read_names
+from surface.fit.source.naming.expressions import with_expressions
+from surface.fit.source.naming.namenotes import name_notes
+from surface.fit.source.naming.shapes import empty_shapes, share_of
 from surface.fit.source.orient import shapes_of_sides
-from surface.fit.source.shapes import empty_shapes
 from surface.head.model.placement import Placement
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MeshData
@@ -50,6 +51,7 @@ class Loaded:
     """A mesh in head space, which of its shapes make ARKit's, and what was guessed.
 
     placement : from the file's coordinates; marks : landmarks in head space.
+    pieces : the file's objects and what kind each is.
     """
 
     mesh: FitMesh
@@ -57,6 +59,7 @@ class Loaded:
     notes: tuple[str, ...] = ()
     placement: Placement = field(default_factory=Placement)
     marks: Landmarks = field(default_factory=Landmarks)
+    pieces: dict[str, str] = field(default_factory=dict)
 
 
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
@@ -70,18 +73,19 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)})
     mesh = _without(mesh, options.without, str(path))
     kept, notes = unworn(mesh)
+    pieces = piece_kinds(mesh, kept)
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
     mesh = bare_where_damaged(mesh)
     check_mesh(mesh, str(path))
     own = read_names(options.names) if options.names else None
-    named = map_names(mesh.names, own, empty=empty_shapes(mesh), other=other)
+    named = map_names(mesh.names, own, empty=empty_shapes(mesh), other=other, share=partial(share_of, mesh))
     frame = find_frame(
         mesh.vertices, _shapes(mesh, named), unit=options.unit, up=options.up, forward=options.forward,
         faces=mesh.faces, convention=convention_of(path),
     )  # fmt: skip
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
     every = (*frame.notes, *notes, *name_notes(mesh.names, named, other))
-    return Loaded(mesh, named, every, frame.placement, _turned(frame))
+    return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces)
 
 
 def _shapes(mesh: FitMesh, named: NameMap) -> dict[str, Floats]:

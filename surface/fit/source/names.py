@@ -1,6 +1,6 @@
 """Map shape names of other heads to ARKit's 52.
 
-Names are read by :mod:`surface.fit.source.wordings`; a user's own table comes before it::
+Names are read by :mod:`surface.fit.source.naming.wordings`; a user's own table comes before it::
 
     [names]
     "MyHead_grin_links" = "mouthSmileLeft"
@@ -11,16 +11,17 @@ is at the end of ``presets.toml``.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from surface.base import files
 from surface.base.errors import FitError
-from surface.fit.source.wordings import is_junk, names_table, presets_table, read_name, read_preset, sums
+from surface.fit.source.naming.wordings import is_junk, names_table, presets_table, read_name, read_preset, sums
 from surface.head.model.parameters import SHAPES
 
 EXAMPLE = 'a table looks like: [names] "My_Smile_L" = "mouthSmileLeft"'
+MUCH = 0.25  # of another shape: with more of it, one is a mixture of both
 _Found = dict[str, dict[str, int]]
 
 
@@ -49,7 +50,7 @@ class NameMap:
     stand_ins : parameters made from a vowel, a viseme or a mood.
     presets : such shapes that are understood but not needed, since their parameters have shapes of their own.
     spare : shapes that mean what another shape already does.
-    mouth, eyes : shapes that tell where those are; -1 where there are none.
+    mouth, eyes : shapes that tell where those are; none where no shape does.
     """
 
     sources: dict[str, list[Source]]
@@ -61,6 +62,10 @@ class NameMap:
     spare: tuple[str, ...] = ()
     mouth: tuple[int, ...] = ()
     eyes: tuple[int, ...] = ()
+
+    def made_of(self, names: tuple[str, ...]) -> dict[str, list[str]]:
+        """For each parameter the names of the shapes that it is made of."""
+        return {p: [names[s.index] for s in every] for p, every in self.sources.items()}
 
 
 @dataclass
@@ -82,16 +87,16 @@ def sources_of(names: tuple[str, ...]) -> dict[str, list[int]]:
 
 def map_names(
     names: tuple[str, ...], own: Mapping[str, str] | None = None, *, empty: Collection[int] = (),
-    other: Mapping[int, Iterable[str]] | None = None,
+    other: Mapping[int, Iterable[str]] | None = None, share: Callable[[int, int], float] = lambda shape, of: 0.0,
 ) -> NameMap:  # fmt: skip
     """Find ARKit's 52 among shape names.
 
     own : maps further names and comes first. empty : shapes that move nothing. other : further names of shapes, that
-        count where their own are not understood.
+        count where their own are not understood. share : how much of another shape is in one, 0..1.
     """
     read = _read_all(names, own or {}, empty, other or {})
     every = {s: [Source(read.exact[s])] if s in read.exact else _made(s, read.found) for s in SHAPES}
-    stand_ins = _stand_ins(every, read.presets)
+    stand_ins = _stand_ins(every, read.presets, share)
     every |= stand_ins
     sources = {shape: made for shape, made in every.items() if made}
     used = {s.index for made in sources.values() for s in made}
@@ -141,7 +146,7 @@ def _made(shape: str, found: _Found) -> list[Source]:
         return [Source(by_side[side])]
     if not side and len(by_side) == 2:
         return [Source(by_side["Left"]), Source(by_side["Right"])]
-    if side and set(by_side) == {""} and key in names_table()["sided"]:
+    if side and "" in by_side and key in names_table()["sided"]:
         return [Source(by_side[""], side)]
     for group in sums().get(shape, []):
         parts = [_whole(found.get(part, {})) for part in group]
@@ -157,17 +162,25 @@ def _whole(by_side: dict[str, int]) -> list[Source]:
     return [Source(i) for i in by_side.values()] if len(by_side) == 2 else []
 
 
-def _stand_ins(every: Mapping[str, list[Source]], presets: Mapping[str, int]) -> dict[str, list[Source]]:
-    """Sources of parameters without shapes, by the first row of the table that the mesh has a preset for."""
-    out: dict[str, list[Source]] = {}
-    for row in presets_table()["stand_in"]:
+def _stand_ins(
+    every: Mapping[str, list[Source]], presets: Mapping[str, int], share: Callable[[int, int], float]
+) -> dict[str, list[Source]]:  # fmt: skip
+    """Sources of parameters without shapes, by the first row of the table that the mesh has a preset for.
+
+    A row whose shape has much of what is to be taken away comes last: a smile that opens the mouth wide is little of a
+    smile without that.
+    """
+    found: dict[str, list[tuple[bool, int, Source]]] = {}
+    for order, row in enumerate(presets_table()["stand_in"]):
         index, less = presets.get(row["from"]), presets.get(row.get("less", ""), -1)
         if index is None:
             continue
+        much = less >= 0 and share(index, less) > MUCH
         for shape, side in _sides_of(row["parameter"]):
-            if not every[shape] and shape not in out:
-                out[shape] = [Source(index, side, row.get("region", ""), less)]
-    return out
+            if not every[shape]:
+                source = Source(index, side, row.get("region", ""), less)
+                found.setdefault(shape, []).append((much, order, source))
+    return {shape: [min(rows, key=lambda row: row[:2])[2]] for shape, rows in found.items()}
 
 
 def _sides_of(key: str) -> list[tuple[str, str]]:

@@ -1,5 +1,7 @@
 """surface.readers.gltftargets: names of morph targets, and expressions of VRM files, both versions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from meshfiles import GlbBuilder, glb
@@ -93,3 +95,12 @@ def test_expressions_of_arkit_names_need_no_shapes_of_such_names(tmp_path):
     found = load_mesh(path).named
     assert {n: s[0].index for n, s in found.sources.items()} == {"eyeBlinkLeft": 1, "jawOpen": 0}
     assert found.stand_ins == ()
+
+
+def test_a_name_that_occurs_again_is_numbered(tmp_path):
+    mesh = slit_sheet()
+    builder = glb(replace(mesh, names=("a", "a", "a (2)"), deltas=np.concatenate([mesh.deltas, mesh.deltas[:1]])))
+    found = read(tmp_path, builder)
+    assert found.names == ("a", "a (2)", "a (2) (2)")
+    np.testing.assert_array_equal(found.deltas[0], found.deltas[2])
+    assert np.abs(found.deltas[0] - found.deltas[1]).max() > 0

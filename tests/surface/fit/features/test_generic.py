@@ -12,8 +12,9 @@ from surface.fit.features import generic
 from surface.fit.features.eyes import middle_x
 from surface.fit.features.generic import MOST_ISLANDS, POINTS, make_plan
 from surface.fit.source.islands import Island, boundary_loops, signed_areas
-from surface.fit.source.mesh import FitMesh, face_areas
+from surface.fit.source.mesh import FitMesh, check_manifold, face_areas
 from surface.fit.source.owncharts import usable_islands
+from surface.fit.source.repair import repaired
 
 NONE = np.zeros(0, np.int64)
 EYES = {"eyeBlinkLeft": 32.7, "eyeBlinkRight": -32.7}  # where they are, mm
@@ -241,7 +242,7 @@ def test_others_get_points_by_their_share_of_the_skin() -> None:
         "'Box': skin: 1 islands as piece_3",
     ]  # fmt: skip
     assert generic._others(mesh, label, [3], 40_000.0, 1.0, notes) == []
-    assert notes.pop() == "'Iris': left out: iris, which an exact eyeball replaces"
+    assert notes.pop() == "'Iris': left out: iris, part of an eye"
     assert {(p.request.coarse, p.request.neutral_mm) for p, _ in parts} == {(0.34, 0.5)}
     assert generic._others(mesh, label, [0], 4e6, 1.0, [])[0][0].request.points == 120
     assert generic._others(mesh, label, [0], 1e3, 1.0, [])[0][0].request.points == 2450
@@ -285,3 +286,22 @@ def test_a_jaw_moves_by_three_millimetres_and_twelve_vertices_at_least() -> None
         few["jawOpen"][moved[-count:]] = shapes["jawOpen"][moved[-count:]]
         assert len(generic._hinge(mesh, few, 1.0)[1]) == (12 if count == 12 else 0)
     assert len(generic._hinge(mesh, {"mouthClose": shapes["jawOpen"]}, 1.0)[1]) == 0
+
+
+def test_bad_hair_is_no_reason_to_refuse_a_face() -> None:
+    cards = joined([("face", slit_sheet()), ("Hair", ball((0, 95, 0), 8)), ("Top", ball((0, -95, 0), 8))])
+    rows = np.flatnonzero(cards.piece == 1)
+    wall = cards.faces[rows[:3]][:, [0, 2, 1, 3]]  # doubled the other way round, and a fin on an edge of three faces
+    fin = np.array([[*cards.faces[rows[0], :2], cards.faces[rows[9], 2], -1]])
+    bad = replace(
+        cards, faces=np.vstack([cards.faces, wall, fin]),
+        face_uv=np.vstack([cards.face_uv, cards.face_uv[rows[:3]], cards.face_uv[rows[:1]]]),
+        piece=np.concatenate([cards.piece, np.full(4, 1)]),
+    )  # fmt: skip
+    mesh, notes = repaired(bad)
+    check_manifold(mesh, "m")
+    assert len(notes) >= 2 and all("Hair" in n for n in notes)
+    plan = make_plan(mesh)
+    assert plan.parts[0][0].name == "face" and "brow" in {p.material for p, _ in plan.parts}
+    face = mesh.vertices[np.unique(mesh.faces[mesh.piece == 0])]
+    np.testing.assert_array_equal(face, slit_sheet().vertices)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from slit_sheet import slit_sheet
 
-from surface.fit.source.kinds import kind_name, kind_of, kinds, material_of, unworn
+from surface.fit.source.kinds import is_known, kind_name, kind_of, kinds, listed, material_of, unworn
 from surface.fit.source.mesh import FitMesh
 
 NAMES = {
@@ -55,6 +55,7 @@ def test_the_material_decides_but_skin_is_no_kind_of_hair():
     assert kind_name("Teeth/Std_Skin") == "teeth" and kind_name("Top/Skin") == "skin"
     assert material_of("Hair") == "brow" and material_of("EyeIris") == material_of("Shirt") == "skin"
     assert kind_of("EyeIris").rule == "eye"
+    assert is_known("Body/xyz") and is_known("Head") and not is_known("Mesh/Material.001")
 
 
 def two_pieces(name: str, moves: float) -> FitMesh:
@@ -72,7 +73,12 @@ def test_what_is_worn_is_left_out_and_said():
     mesh = two_pieces("Jacket", 1.0)
     kept, notes = unworn(mesh)
     np.testing.assert_array_equal(kept, mesh.piece == 0)
-    assert notes == ["left out: 'Jacket' (clothes)"]
+    assert notes == ["clothes left out: 'Jacket'"]
+    piece, names = np.minimum(np.arange(len(mesh.faces)) // 8, 9), ("face", *["Shirt", "Boots"] * 4, "x")
+    many = replace(mesh, piece=piece, pieces=names, names=(), deltas=mesh.deltas[:0])
+    shirts = "'Shirt', 'Shirt', 'Shirt', 'Shirt'"
+    assert unworn(many)[1] == [f"clothes left out: {shirts}", f"boots left out: {shirts.replace('Shirt', 'Boots')}"]
+    assert listed(list("abcdef")) == "'a', 'b', 'c', 'd' and 2 more"
     assert unworn(two_pieces("Hair", 1.0))[0].all() and unworn(two_pieces("neck", 1.0))[1] == []
 
 

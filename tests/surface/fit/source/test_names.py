@@ -7,10 +7,10 @@ import pytest
 from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
-from surface.fit.source.namenotes import name_notes
 from surface.fit.source.names import Source, map_names, read_names, sources_of
-from surface.fit.source.shapes import empty_shapes, to_arkit
-from surface.fit.source.wordings import names_table, presets_table
+from surface.fit.source.naming.namenotes import name_notes
+from surface.fit.source.naming.shapes import empty_shapes, to_arkit
+from surface.fit.source.naming.wordings import names_table, presets_table
 from surface.head.model.parameters import SHAPES
 
 
@@ -69,6 +69,8 @@ def test_a_shape_for_both_sides_is_cut_down_the_middle():
     np.testing.assert_allclose(left + right, field[0])
     assert (left[mesh.vertices[:, 0] > 15] == 1).all() and (left[mesh.vertices[:, 0] < -15] == 0).all()
     assert map_names(("jaw",)).sources == {}
+    one = map_names(("Blink", "blink_l")).sources  # the other side is half of the shape for both
+    assert one == {"eyeBlinkLeft": [Source(1)], "eyeBlinkRight": [Source(0, "Right")]}
 
 
 def test_halves_add_up():
@@ -213,8 +215,38 @@ def test_notes_say_what_was_made_of_what():
     assert "jawOpen is made from 'A' about the mouth" in notes
     assert "mouthFunnel is made from 'O' about the mouth, less its share of 'A'" in notes
     assert "mouthSmileLeft and Right are made from the halves of 'Joy' about the mouth, less its share of 'A'" in notes
-    assert notes[-1] == "empty, they move nothing: viseme_sil"
+    assert (
+        notes[0] == "7 shapes: 5 make 6 parameters, 1 doubled, 1 empty"
+        and notes[-1] == "empty, they move nothing: viseme_sil"
+    )
+    counted = name_notes(("jawOpen", "A", "odd", "jaw_open"), map_names(("jawOpen", "A", "odd", "jaw_open")))
+    assert counted[0] == "4 shapes: 1 make 1 parameters, 1 presets and visemes, 1 doubled, 1 not understood"
     only = map_names(("target0",), other={0: ["Joy"]})
-    assert name_notes(("target0",), only, {0: ["Joy"]}) == [
+    assert name_notes(("target0",), only, {0: ["Joy"]})[1:] == [
         "mouthSmileLeft and Right are made from the halves of 'Joy' (target0)"
     ]
+
+
+def test_a_mood_that_opens_the_mouth_comes_after_one_that_does_not():
+    names = ("A", "Joy", "Fun", "Sorrow", "Angry")
+    plain = map_names(names)
+    assert [plain.sources[p][0].index for p in ("mouthSmileLeft", "mouthFrownLeft")] == [1, 3]
+    wide = map_names(names, share=lambda shape, of: 0.9 if of == 0 and shape in (1, 3) else 0.1)
+    assert [wide.sources[p][0].index for p in ("mouthSmileLeft", "mouthFrownLeft")] == [2, 4]
+    alone = map_names(names[:2], share=lambda shape, of: 0.9)
+    assert alone.sources["mouthSmileRight"] == [Source(1, "Right", "mouth", 0)]
+
+
+def test_brows_that_are_pieces_belong_to_the_brows():
+    mesh = slit_sheet()
+    up = mesh.vertices[:, 1]
+    field = np.exp(-(((up - 40) / 20.0) ** 2))[:, None] * [0, 1.0, 0]
+    mouth = np.exp(-(((up + 50) / 8.0) ** 2))[:, None] * [0, 1.0, 0]
+    high = (up[mesh.faces].mean(axis=1) > 55).astype(int)
+    mesh = replace(mesh, names=("A", "Blink", "Angry"), deltas=np.stack([mouth, field, 5 * field]),
+                   piece=high, pieces=("Face", "FaceBrow"))  # fmt: skip
+    made = to_arkit(mesh, map_names(mesh.names))
+    frown = sum(d for n, d in zip(made.names, made.deltas, strict=True) if n.startswith("browDown"))
+    brow = np.unique(mesh.faces[high == 1])
+    np.testing.assert_allclose(frown[brow], 5 * field[brow])
+    assert np.abs(frown[up < 30]).max() < 0.3

@@ -13,7 +13,9 @@ def name_notes(names: tuple[str, ...], mapped: NameMap, other: Mapping[int, Iter
     """Notes about shapes with these names, and with other names that the file gives them, for report and terminal."""
     titles = [_title(name, (other or {}).get(k, ())) for k, name in enumerate(names)]
     whole = bool(mapped.mouth and mapped.eyes)
-    notes = [_stand_in(p, mapped.sources[p], titles, whole) for p in mapped.stand_ins if not _has_left(p, mapped)]
+    plain = not (mapped.stand_ins or mapped.presets or mapped.spare or mapped.empty or mapped.left_out)
+    notes = [] if plain else [_count(names, mapped)]
+    notes += [_stand_in(p, mapped.sources[p], titles, whole) for p in mapped.stand_ins if not _has_left(p, mapped)]
     for what, every in (
         ("understood, and made from parameters", mapped.presets),
         ("not taken, another shape means the same", mapped.spare),
@@ -21,6 +23,17 @@ def name_notes(names: tuple[str, ...], mapped: NameMap, other: Mapping[int, Iter
     ):
         notes += [f"{what}: {listed(every)}"] if every else []
     return notes
+
+
+def _count(names: tuple[str, ...], mapped: NameMap) -> str:
+    """How many shapes there are of each sort, such as: 67 shapes: 52 make 52 parameters, 14 presets, 1 empty."""
+    used = {s.index for every in mapped.sources.values() for s in every}
+    sorts = (
+        (len(mapped.presets), "presets and visemes"), (len(mapped.spare), "doubled"), (len(mapped.empty), "empty"),
+        (len(mapped.left_out), "not understood"),
+    )  # fmt: skip
+    rest = "".join(f", {count} {what}" for count, what in sorts if count)
+    return f"{len(names)} shapes: {len(used)} make {len(mapped.sources)} parameters{rest}"
 
 
 def _title(name: str, other: Iterable[str]) -> str:

@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Bools, Floats
+from surface.fit.source.kinds import kind_name
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import NameMap, Source
 
 MIDDLE = 0.06  # half the band about the middle in which a shape for both sides fades from one to the other, in widths
 EMPTY = 1e-5  # of the mesh's size: a shape that moves no vertex as far as this is empty
 MOUTH_END, EYES_BEGIN = 0.35, 0.75  # between mouth (0) and eyes (1) a mood fades from one to the other
+LIDS = 0.98  # share of what lids do that lies below the end of their region
 BROWS = 0.25  # of the same length: above the lids eyes fade into brows over this
 
 
@@ -33,13 +35,19 @@ def to_arkit(mesh: FitMesh, mapped: NameMap) -> FitMesh:
 
 
 def _own(mesh: FitMesh, source: Source) -> Floats:
-    """(n, 3) what a shape does, less its share of another by least squares; never more than all of that one."""
+    """(n, 3) what a shape does, less its share of another."""
     move: Floats = mesh.deltas[source.index]
     if source.less < 0:
         return move
-    other = mesh.deltas[source.less]
-    power = float((other**2).sum())
-    return move - np.clip(float((move * other).sum()) / power, 0.0, 1.0) * other if power > 0 else move
+    rest: Floats = move - share_of(mesh, source.index, source.less) * mesh.deltas[source.less]
+    return rest
+
+
+def share_of(mesh: FitMesh, shape: int, other: int) -> float:
+    """How much of another shape is in one, by least squares, 0..1."""
+    a, b = mesh.deltas[shape], mesh.deltas[other]
+    power = float((b**2).sum())
+    return float(np.clip(float((a * b).sum()) / power, 0.0, 1.0)) if power > 0 else 0.0
 
 
 def _sides(mesh: FitMesh) -> dict[str, Floats]:
@@ -62,17 +70,38 @@ def _regions(mesh: FitMesh, mapped: NameMap) -> dict[str, Floats]:
     out = {"": one, "mouth": one, "eyes": one, "brows": one}
     if not (mapped.mouth and mapped.eyes):
         return out
+    brow = _of_kind(mesh, "brow")
     mouth, lids = (_moved(mesh, indices) for indices in (mapped.mouth, mapped.eyes))
+    lids = np.where(brow, 0.0, lids)
+    if not lids.sum() > 0:
+        return out
     low, high = (weight @ mesh.vertices / weight.sum() for weight in (mouth, lids))
     length = float(((high - low) ** 2).sum())
     if not length > 0:
         return out
     along = (mesh.vertices - low) @ (high - low) / length
     above = _rise(along, 0.5 * (MOUTH_END + EYES_BEGIN), 0.5 * (EYES_BEGIN - MOUTH_END))
+    brows = np.where(brow, 1.0, _rise(along, _brow_line(along, lids, brow), 0.5 * BROWS))
+    return {"": one, "mouth": 1.0 - above, "eyes": above * (1.0 - brows), "brows": brows}
+
+
+def _brow_line(along: Floats, lids: Floats, brow: Bools) -> float:
+    """Where eyes have faded into brows by half: a little below brows that are pieces, or else above what lids move."""
+    if brow.any():
+        return float(np.quantile(along[brow], 0.05)) - 0.5 * BROWS
     order = np.argsort(along)
     reached = np.cumsum(lids[order]) / lids.sum()
-    brows = _rise(along, float(along[order][np.searchsorted(reached, 0.98)]) + 0.5 * BROWS, 0.5 * BROWS)
-    return {"": one, "mouth": 1.0 - above, "eyes": above * (1.0 - brows), "brows": brows}
+    return float(along[order][np.searchsorted(reached, LIDS)]) + 0.5 * BROWS
+
+
+def _of_kind(mesh: FitMesh, kind: str) -> Bools:
+    """(n,) which vertices belong to pieces of a kind."""
+    out = np.zeros(len(mesh.vertices), bool)
+    for k, name in enumerate(mesh.pieces):
+        if kind_name(name) == kind:
+            used = np.unique(mesh.faces[mesh.piece == k])
+            out[used[used >= 0]] = True
+    return out
 
 
 def _moved(mesh: FitMesh, indices: tuple[int, ...]) -> Floats:
