@@ -101,7 +101,7 @@ def render(
 
 def fit(
     mesh: Annotated[
-        Path, typer.Argument(help="Mesh with UVs and shapes: .glb, .gltf, .obj, a folder of .obj files, or .npz.")
+        Path, typer.Argument(help="Mesh with UVs and shapes: .glb, .gltf, .vrm, .obj, a folder of .obj files, or .npz.")
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the head to write.")],
     name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
@@ -128,7 +128,7 @@ def fit(
     # start-up: --help does without any of these
     from surface.fit.api import fit_head
     from surface.fit.identities import add_identities
-    from surface.fit.points.report import face_bounds
+    from surface.fit.points.report import face_bounds, kinds_line
     from surface.fit.source.load import LoadOptions
 
     if keep and identities is None:
@@ -148,7 +148,7 @@ def fit(
         shaded = _decimate_and_shade(out)
         show_table(_error_table(found))
         missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)
-        remarks = [face_bounds(found), *found.notes]
+        remarks = [face_bounds(found), *filter(None, [kinds_line(found)]), *found.notes]
         remarks += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
         remarks += [f"left out, not ARKit's: {left_out}"] if left_out else []
         remarks += [] if shaded else [_NO_SHADE]

@@ -31,6 +31,7 @@ from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold
 from surface.fit.source.names import sources_of
+from surface.fit.source.repair import repaired
 from surface.fit.source.shapes import to_arkit
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
@@ -77,6 +78,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         mesh = prepare(loaded.mesh, recipe)
         plan = recipe_plan(mesh, recipe)
     else:
+        loaded = _repaired(loaded)
         check_manifold(loaded.mesh, where)
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
@@ -97,8 +99,17 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
-    report = FitReport(name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes], scale)
+    report = FitReport(
+        name, reports, moving, missing, loaded.named.left_out, [*loaded.notes, *plan.notes], scale,
+        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces,
+    )  # fmt: skip
     return FitResult(head, report, fitted_parts)
+
+
+def _repaired(loaded: Loaded) -> Loaded:
+    """The mesh as a manifold, and notes of what that took."""
+    mesh, notes = repaired(loaded.mesh)
+    return replace(loaded, mesh=mesh, notes=(*loaded.notes, *notes))
 
 
 def _fit_parts(

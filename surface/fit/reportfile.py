@@ -63,6 +63,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
         "format": FORMAT, "version": VERSION, "head": report.name, "scale": report.scale,
         "control_points": report.points, "parameters": report.parameters,
         "missing": list(report.missing), "left_out": list(report.left_out), "notes": list(report.notes),
+        "shapes": report.shapes, "empty": list(report.empty), "presets": list(report.presets), "pieces": report.pieces,
         "parts": [
             {
                 "name": p.name, "control_points": p.points, "samples": p.samples, "excluded_samples": p.folded,
@@ -95,11 +96,30 @@ def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) 
     lines += ["", *(f"![error]({name})" for name in pictures)]
     lines += [LEGEND] if pictures else ["No OpenGL was there to draw the error."]
     lines += ["", "## A uniform cubic NURBS net beside the face", "", *_net_lines(nets)]
+    lines += _source_lines(report)
     for p in report.parts:
         if p.shapes:
             lines += ["", f"## Shapes of {p.name}", "", "| shape | RMS | 99 % | max |", "|---|---|---|---|"]
             lines += [f"| {n} | {_figures(e)} |" for n, e in p.shapes.items()]
     return "\n".join(lines) + "\n"
+
+
+def _source_lines(report: FitReport) -> list[str]:
+    """Tables of the mesh's pieces and of the shapes that parameters were made of."""
+    lines = []
+    if report.pieces:
+        lines += ["", "## Pieces of the mesh", "", "| piece | kind |", "|---|---|"]
+        lines += [f"| {_cell(name)} | {kind} |" for name, kind in report.pieces.items()]
+    if report.shapes:
+        lines += ["", "## Shapes of the mesh", "", "| parameter | made of |", "|---|---|"]
+        lines += [f"| {p} | {_cell(', '.join(names))} |" for p, names in report.shapes.items()]
+    for title, names in (("empty", report.empty), ("understood, made from parameters", report.presets)):
+        lines += ["", f"{title}: {', '.join(names)}"] if names else []
+    return lines
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")
 
 
 def _figures(errors: Errors) -> str:

@@ -1,7 +1,7 @@
 """Reader of glTF 2.0 containers and accessors; every index and length is checked before it is used.
 
-Reads ``.glb`` and ``.gltf`` with buffers inside, beside or in data URIs; accessors of all component types, normalised,
-interleaved and sparse (glTF 2.0 specification, sections 3.6, 4.4 and 5.1). Wrong content raises
+Reads ``.glb``, ``.vrm`` and ``.gltf`` with buffers inside, beside or in data URIs; accessors of all component types,
+normalised, interleaved and sparse (glTF 2.0 specification, sections 3.6, 4.4 and 5.1). Wrong content raises
 :class:`surface.base.errors.FitError` with the path and the element.
 """
 
@@ -24,7 +24,14 @@ from surface.readers.meshdata import read_bytes
 MAGIC, JSON_CHUNK, BIN_CHUNK = b"glTF", 0x4E4F534A, 0x004E4942
 TYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit", "EXT_texture_webp"}
+# Extensions without which a mesh is not read rightly: what each is, and what to do. All others that a file may require
+# change colours, light, sound, bones or tables of other programs, and leave the mesh as it is.
+REFUSED = {
+    "KHR_draco_mesh_compression": ("Draco compression", "uncompress it: npx @gltf-transform/cli cp IN.glb OUT.glb"),
+    "EXT_meshopt_compression": ("meshopt compression", "uncompress it: npx gltfpack -noq -i IN.glb -o OUT.glb"),
+    "KHR_meshopt_compression": ("meshopt compression", "uncompress it: npx gltfpack -noq -i IN.glb -o OUT.glb"),
+    "EXT_mesh_gpu_instancing": ("copies of one mesh", "export every copy as a mesh of its own"),
+}
 MOST_ELEMENTS = 4_000_000  # of one accessor
 MOST_ITEMS = 10_000  # nodes, accessors and so on
 
@@ -32,7 +39,7 @@ MOST_ITEMS = 10_000  # nodes, accessors and so on
 class Gltf:
     """An opened file: its JSON document and the bytes of its buffers.
 
-    path : .glb or .gltf
+    path : .glb, .vrm or .gltf
 
     Raises FitError: missing, damaged, cut short, too large, or in need of an extension that is not read.
     """
@@ -55,10 +62,10 @@ class Gltf:
         version = self.value(self.value(self.document, "asset", dict, "JSON"), "version", str, "asset")
         if not version.startswith("2."):
             raise self.error("asset.version", f"is {version!r}", "export it as glTF 2.0")
-        unread = [x for x in self.document.get("extensionsRequired") or [] if x not in UNDERSTOOD]
+        unread = [x for x in self.document.get("extensionsRequired") or [] if x in REFUSED]
         if unread:
-            hint = "export without compression (Draco, meshopt)"
-            raise self.error("extensionsRequired", f"{unread[0]!r} is not read here", hint)
+            what, hint = REFUSED[unread[0]]
+            raise self.error("extensionsRequired", f"{unread[0]!r} ({what}) is not read here", hint)
 
     def error(self, where: str, why: str, hint: str = "export the file again") -> FitError:
         """The error for an element of the file."""

@@ -14,28 +14,26 @@ import numpy as np
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.features.eyes import Eyes, find_eyes, middle_x
+from surface.fit.features.others import by_object, is_skin, why_out
 from surface.fit.features.rigging import rigid_fit
 from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
 from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island, find_islands, signed_areas
+from surface.fit.source.kinds import kind_name
 from surface.fit.source.layout import lay_out, open_flat_holes, separate
-from surface.fit.source.mesh import FitMesh, components, face_areas, renumbered, triangles
+from surface.fit.source.mesh import FitMesh, components, face_areas, triangles
 from surface.mesh.tessellate import MOST_ROOTS
 
-WORDS = {  # in the name of an object or material -> material of the part; the first that fits
-    "lash": "lash", "brow": "brow", "hair": "brow", "beard": "brow", "teeth": "teeth", "tooth": "teeth",
-    "tongue": "tongue", "gum": "gums", "mouth": "mouth", "cavity": "mouth", "oral": "mouth",
-}  # fmt: skip
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.9  # in spacings of the mesh; its triangles may be of any size, and the largest around a place count
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
 DEPTH = 8  # of the cells; more where many islands lie side by side, since roots are shared by all
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
-TOOTH_MM, TEETH = 24.0, 12  # so many pieces no larger than this are teeth
 MOVING = 0.4  # an island moved by at least this share of the shapes that move the most mobile one is the face's
+LESS = 1e-6  # what is said to be no skin counts as face only where there is nothing else
 MOVES_MM = 1.0  # of a head of usual size: what moves less does not count as moved
 
 
@@ -64,7 +62,7 @@ def make_plan(mesh: FitMesh) -> Plan:
     """
     shapes = dict(zip(mesh.names, mesh.deltas, strict=True))
     scale = head_scale(mesh.vertices, shapes)
-    eyes = find_eyes(mesh, partial(_largest, mesh, scale), np.array([_kind(n) != "skin" for n in mesh.pieces], bool))
+    eyes = find_eyes(mesh, partial(_largest, mesh, scale))
     label, sizes = _pieces(mesh, eyes.faces)
     rest = [int(k) for k in np.argsort(-_presence(mesh, label, sizes, scale)) if sizes[k] > 0]
     if not rest:
@@ -91,7 +89,7 @@ def _pieces(mesh: FitMesh, gone: Bools | None = None) -> tuple[Ints, Floats]:
         label = np.full(len(gone), len(sizes))
         label[~gone] = own
         return label, np.append(sizes, 0.0)
-    kinds = np.array([_kind(name) for name in mesh.pieces] or ["skin"])
+    kinds = np.array([kind_name(name) for name in mesh.pieces] or ["skin"])
     known, kind_of = np.unique(kinds, return_inverse=True)
     kind = kind_of.ravel()[mesh.piece] if len(mesh.piece) else np.zeros(len(mesh.faces), np.int64)
     corner = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces) * len(known) + kind[:, None]
@@ -100,24 +98,15 @@ def _pieces(mesh: FitMesh, gone: Bools | None = None) -> tuple[Ints, Floats]:
     return label.astype(np.int64), np.bincount(label, face_areas(mesh.vertices, mesh.faces)).astype(np.float64)
 
 
-def _kind(name: str) -> str:
-    """Part of a head that an object's or material's name stands for; skin without a known word."""
-    return next((m for word, m in WORDS.items() if word in name.lower()), "skin")
-
-
 def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats:
-    """How much of a face each piece is: its area, times the shapes that move it."""
+    """How much of a face each piece is: its area, times the shapes that move it; little of it for hair and the like."""
     used = mesh.faces >= 0
     piece = np.zeros(len(mesh.vertices), np.int64)
     piece[mesh.faces[used]] = np.repeat(label, used.sum(axis=1))
     moving = np.zeros(len(sizes))  # shapes that move each
     for delta in mesh.deltas:
         moving[np.unique(piece[np.abs(delta).max(axis=1) > MOVES_MM * scale])] += 1
-    return sizes * (1.0 + moving)
-
-
-def _points(mesh: FitMesh, chosen: Bools) -> Floats:
-    return mesh.vertices[renumbered(mesh.faces[chosen])[0]]
+    return sizes * (1.0 + moving) * np.where(is_skin(mesh, label, len(sizes)), 1.0, LESS)
 
 
 def _skin(mesh: FitMesh, chosen: Bools, scale: float) -> list[tuple[PartRecipe, list[Island]]]:
@@ -163,34 +152,16 @@ def _others(
 ) -> list[tuple[PartRecipe, list[Island]]]:  # fmt: skip
     """All further pieces, one part for each object or material that they belong to."""
     out: list[tuple[PartRecipe, list[Island]]] = []
-    for (name, material), own in _by_material(mesh, label, pieces, scale).items():
-        islands = _separated(mesh, np.isin(label, own))
-        if not 0 < len(islands) <= MOST_ISLANDS:
-            why = f"{len(islands)} separate pieces are too many to fit" if islands else "no area in (u, v)"
-            notes.append(f"{name!r}: left out: {why}")
+    for (name, kind), own in by_object(mesh, label, pieces, scale).items():
+        islands = [] if kind.rule == "eye" else _separated(mesh, np.isin(label, own))
+        if why := why_out(name, kind, len(islands), MOST_ISLANDS):
+            notes.append(why)
             continue
         share = sum(_area(mesh, i) for i in islands) / max(skin_area, 1e-9)
         points = int(np.clip(1.5 * POINTS * share, min(3 * LEAST * len(islands), POINTS), POINTS))
-        title = f"{material if material != 'skin' else 'piece'}_{len(out) + 1}"
-        out.append(_part(title, material, points, 0.34, 0.5, scale, islands, mesh))
-        notes.append(f"{name!r}: {len(islands)} islands as {title}")
-    return out
-
-
-def _by_material(mesh: FitMesh, label: Ints, pieces: list[int], scale: float) -> dict[tuple[str, str], list[int]]:
-    """Pieces by the object they belong to and the material it says; a row of small unnamed ones is teeth."""
-    out: dict[tuple[str, str], list[int]] = {}
-    small: dict[str, list[int]] = {}
-    for k in pieces:
-        name = mesh.piece_of(int(np.argmax(label == k)))
-        material = _kind(name)
-        tiny = np.ptp(_points(mesh, label == k), axis=0).max() < TOOTH_MM * scale
-        if material == "skin" and tiny:
-            small.setdefault(name, []).append(k)
-        else:
-            out.setdefault((name, material), []).append(k)
-    for name, own in small.items():
-        out.setdefault((name, "teeth" if len(own) >= TEETH else "skin"), []).extend(own)
+        title = f"{kind.material if kind.material != 'skin' else 'piece'}_{len(out) + 1}"
+        out.append(_part(title, kind.material, points, 0.34, 0.5, scale, islands, mesh))
+        notes.append(f"{name!r}: {kind.name}: {len(islands)} islands as {title}")
     return out
 
 

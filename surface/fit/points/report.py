@@ -11,6 +11,7 @@ from surface.fit.points.refine import Fitted
 from surface.fit.source.chart import Chart
 from surface.head.model.data import HeadData
 
+MOST_NAMES = 4  # of one kind that a line names
 RMS_MM, P99_MM, SHAPES_MM = 0.25, 0.8, 0.08  # bounds for a face on a head of usual size
 
 
@@ -50,6 +51,9 @@ class FitReport:
     parameters : ARKit's names that the head has shapes for; missing : those it has none for.
     left_out : shapes of the mesh that mean none of them; notes : what was guessed or left out, in words.
     scale : size of the head relative to the one that the bounds were set for.
+    shapes : for each parameter the mesh's shapes that it was made of; empty : shapes that move nothing; presets :
+        vowels, visemes and moods that are understood, and made from parameters instead.
+    pieces : the mesh's objects and what kind each is, left out or not.
     """
 
     name: str
@@ -59,6 +63,10 @@ class FitReport:
     left_out: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
     scale: float = 1.0
+    shapes: dict[str, list[str]] = field(default_factory=dict)
+    empty: tuple[str, ...] = ()
+    presets: tuple[str, ...] = ()
+    pieces: dict[str, str] = field(default_factory=dict)
 
     @property
     def points(self) -> int:
@@ -93,6 +101,18 @@ def face_bounds(report: FitReport) -> str:
     figures = ", ".join(f"{name} {got:.3f} of {most * report.scale:.3f} mm" for name, got, most in pairs)
     kept = all(got <= most * report.scale for _, got, most in pairs)
     return f"{face.name}: {'within' if kept else 'beyond'} the bounds for its size ({report.scale:.2f}): {figures}"
+
+
+def kinds_line(report: FitReport) -> str:
+    """The mesh's objects by their kinds, in words; "" where there is no more than one."""
+    by_kind: dict[str, list[str]] = {}
+    for name, kind in report.pieces.items():
+        by_kind.setdefault(kind, []).append(name)
+    parts = [
+        f"{kind} ({', '.join(names[:MOST_NAMES])}{', ...' * (len(names) > MOST_NAMES)})"
+        for kind, names in by_kind.items()
+    ]
+    return f"pieces: {'; '.join(parts)}" if len(report.pieces) > 1 else ""
 
 
 def measure(name: str, chart: Chart, fitted: Fitted, names: tuple[str, ...]) -> PartReport:

@@ -67,9 +67,9 @@ def material_of(name: str) -> str:
     return kind_of(name).material
 
 
-def is_known(name: str) -> bool:
-    """Whether any word in a piece's name is in the table."""
-    return any(_said(part) is not None for part in name.split("/"))
+def kind_name(name: str) -> str:
+    """Name of the kind that a piece's name tells."""
+    return kind_of(name).name
 
 
 def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
@@ -77,20 +77,37 @@ def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
 
     Names are not believed where shapes move the piece as they move the face, or where nothing would be left.
     """
-    kept = np.ones(len(mesh.faces), bool)
-    notes = []
-    most = np.abs(mesh.deltas).max(initial=0.0)
+    kept, notes, out = np.ones(len(mesh.faces), bool), [], []
     for k, name in enumerate(mesh.pieces):
         kind, own = kind_of(name), mesh.piece == k
         if kind.rule != "out" or not own.any():
             continue
-        used = np.unique(mesh.faces[own])
-        if most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= MOVED * most:
+        if _moves(mesh, own):
             notes.append(f"{name!r}: named as {kind.name}, but shapes move it: kept as skin")
         else:
             kept &= ~own
-            notes.append(f"{name!r}: left out: {kind.name}")
-    return (kept, notes) if kept.any() else (np.ones(len(mesh.faces), bool), [])
+            out.append(f"{name!r} ({kind.name})")
+    if not kept.any():
+        return np.ones(len(mesh.faces), bool), []
+    return kept, notes + ([f"left out: {', '.join(out)}"] if out else [])
+
+
+def piece_kinds(mesh: FitMesh, kept: Bools) -> dict[str, str]:
+    """What each object of a mesh is; ``kept`` (f,) are the faces that are not left out."""
+    out = {}
+    for k, name in enumerate(mesh.pieces):
+        own = mesh.piece == k
+        if own.any():
+            said = kind_name(name).replace("_", " ")
+            out[name] = said if kept[own].any() else f"{said}, left out"
+    return out
+
+
+def _moves(mesh: FitMesh, own: Bools) -> bool:
+    """Whether shapes move some faces (f,) nearly as far as they move anything."""
+    used = np.unique(mesh.faces[own])
+    most = np.abs(mesh.deltas).max(initial=0.0)
+    return bool(most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= MOVED * most)
 
 
 @cache

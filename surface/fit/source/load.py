@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from surface.base.arrays import Bools
 from surface.base.errors import FitError
 from surface.fit.source.expressions import with_expressions
 from surface.fit.source.frame import find_frame
-from surface.fit.source.kinds import unworn
+from surface.fit.source.kinds import piece_kinds, unworn
 from surface.fit.source.mesh import FitMesh, check_mesh, renumbered
 from surface.fit.source.namenotes import name_notes
 from surface.fit.source.names import NameMap, map_names, read_names
@@ -43,11 +43,15 @@ class LoadOptions:
 
 @dataclass(frozen=True)
 class Loaded:
-    """A mesh in head space, which of its shapes make ARKit's, and what was guessed."""
+    """A mesh in head space, which of its shapes make ARKit's, and what was guessed.
+
+    pieces : the file's objects and what kind each is.
+    """
 
     mesh: FitMesh
     named: NameMap
     notes: tuple[str, ...] = ()
+    pieces: dict[str, str] = field(default_factory=dict)
 
 
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
@@ -61,6 +65,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)})
     mesh = _without(mesh, options.without, str(path))
     kept, notes = unworn(mesh)
+    pieces = piece_kinds(mesh, kept)
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
     check_mesh(mesh, str(path))
     own = read_names(options.names) if options.names else None
@@ -69,7 +74,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     shapes = dict(zip(arkit.names, arkit.deltas, strict=True))
     frame = find_frame(mesh.vertices, shapes, unit=options.unit, up=options.up, forward=options.forward)
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
-    return Loaded(mesh, named, (*frame.notes, *notes, *name_notes(mesh.names, named)))
+    return Loaded(mesh, named, (*frame.notes, *notes, *name_notes(mesh.names, named, other)), pieces)
 
 
 def _read(path: Path, shapes: Path | None) -> MeshData:

@@ -2,32 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+
 from surface.fit.source.names import NameMap, Source
 
 MOST = 12  # names of one list that are written out
 
 
-def name_notes(names: tuple[str, ...], mapped: NameMap) -> list[str]:
-    """Notes about shapes with these names, for the report and the terminal."""
-    notes = [f"{p} is made from {_what(names, mapped.sources[p])}" for p in mapped.stand_ins]
-    if mapped.presets:
-        notes.append(f"understood, and made from parameters: {listed(mapped.presets)}")
-    if mapped.spare:
-        notes.append(f"not taken, another shape means the same: {listed(mapped.spare)}")
-    if mapped.empty:
-        notes.append(f"empty, they move nothing: {listed(mapped.empty)}")
+def name_notes(names: tuple[str, ...], mapped: NameMap, other: Mapping[int, Iterable[str]] | None = None) -> list[str]:
+    """Notes about shapes with these names, and with other names that the file gives them, for report and terminal."""
+    titles = [_title(name, (other or {}).get(k, ())) for k, name in enumerate(names)]
+    whole = bool(mapped.mouth and mapped.eyes)
+    notes = [_stand_in(p, mapped.sources[p], titles, whole) for p in mapped.stand_ins if not _has_left(p, mapped)]
+    for what, every in (
+        ("understood, and made from parameters", mapped.presets),
+        ("not taken, another shape means the same", mapped.spare),
+        ("empty, they move nothing", mapped.empty),
+    ):
+        notes += [f"{what}: {listed(every)}"] if every else []
     return notes
 
 
-def _what(names: tuple[str, ...], sources: list[Source]) -> str:
-    return " and ".join(_one(names, s) for s in sources)
+def _title(name: str, other: Iterable[str]) -> str:
+    more = [o for o in other if o != name]
+    return f"{more[0]!r} ({name})" if more else repr(name)
 
 
-def _one(names: tuple[str, ...], source: Source) -> str:
-    """One source in words, such as: the left half of 'Joy' about the mouth, less its share of 'A'."""
-    part = f"the {source.side.lower()} half of {names[source.index]!r}" if source.side else repr(names[source.index])
-    where = {"": "", "mouth": " about the mouth", "eyes": " about the eyes", "brows": " about the brows"}[source.region]
-    return part + where + (f", less its share of {names[source.less]!r}" if source.less >= 0 else "")
+def _has_left(parameter: str, mapped: NameMap) -> bool:
+    """Whether this is a right side that the note of the left one tells of, too."""
+    left = parameter.removesuffix("Right") + "Left"
+    if not parameter.endswith("Right") or left not in mapped.stand_ins:
+        return False
+    return [s.index for s in mapped.sources[left]] == [s.index for s in mapped.sources[parameter]]
+
+
+def _stand_in(parameter: str, sources: list[Source], titles: list[str], cut: bool) -> str:
+    what = " and ".join(_one(s, titles, cut) for s in sources)
+    if sources[0].side == "Left" and parameter.endswith("Left") and "Look" not in parameter:
+        return f"{parameter} and Right are made from the halves of {what}"
+    return f"{parameter} is made from {f'the {sources[0].side.lower()} half of ' if sources[0].side else ''}{what}"
+
+
+def _one(source: Source, titles: list[str], cut: bool) -> str:
+    """One source in words, such as: 'Joy' about the mouth, less its share of 'A'."""
+    where = f" about the {source.region}" if source.region and cut else ""
+    return titles[source.index] + where + (f", less its share of {titles[source.less]}" if source.less >= 0 else "")
 
 
 def listed(every: tuple[str, ...]) -> str:

@@ -49,7 +49,7 @@ class NameMap:
     stand_ins : parameters made from a vowel, a viseme or a mood.
     presets : such shapes that are understood but not needed, since their parameters have shapes of their own.
     spare : shapes that mean what another shape already does.
-    mouth, eyes : shapes that tell where those are; -1 where there are none.
+    mouth, eyes : shapes that tell where those are; none where no shape does.
     """
 
     sources: dict[str, list[Source]]
@@ -61,6 +61,10 @@ class NameMap:
     spare: tuple[str, ...] = ()
     mouth: tuple[int, ...] = ()
     eyes: tuple[int, ...] = ()
+
+    def made_of(self, names: tuple[str, ...]) -> dict[str, list[str]]:
+        """For each parameter the names of the shapes that it is made of."""
+        return {p: [names[s.index] for s in every] for p, every in self.sources.items()}
 
 
 @dataclass
@@ -94,7 +98,7 @@ def map_names(
     stand_ins = _stand_ins(every, read.presets)
     every |= stand_ins
     sources = {shape: made for shape, made in every.items() if made}
-    used = {k for made in sources.values() for s in made for k in (s.index, s.less)}
+    used = {s.index for made in sources.values() for s in made}
     rest = [i for i in range(len(names)) if i not in used and i not in empty]
     spare = [i for i in rest if read.meant.get(i) in {s.removesuffix("Left").removesuffix("Right") for s in sources}]
     unread = [i for i in rest if i not in read.moods and i not in spare and not is_junk(names[i])]

@@ -19,7 +19,7 @@ CORNERS = {a + b for a in "udtb" for b in "lr"} | {
     b + a for a in "udtb" for b in "lr"
 }  # one word for a part and a side
 WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|左|右|[^\W\d_a-zA-Z左右]+")
-COPY = re.compile(r"[._ ](?:\d+|copy|clone)$", re.IGNORECASE)  # as programs number what they copy
+COPY = re.compile(r"(?:\.\d+|_0\d\d|[._ ]copy|[._ ]clone)$", re.IGNORECASE)  # as programs number what they copy
 NUMBERED = re.compile(r"(?<![A-Za-z])[A-Z]\d\d(?=_)")  # Character Creator numbers its names of ARKit's shapes
 LOOK = {"eyelook", "eyeslook"}
 

@@ -11,8 +11,8 @@ from surface.base.errors import FitError
 from surface.fit import reportfile
 from surface.fit.api import fit_mesh
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
-from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds
-from surface.fit.reportfile import EXCLUDED, _colours, write_report
+from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds, kinds_line
+from surface.fit.reportfile import EXCLUDED, _colours, as_markdown, write_report
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
 from surface.fit.source.load import Loaded
@@ -45,6 +45,20 @@ def test_the_figures_are_those_of_the_fit(folder, result):
     assert part["neutral_mm"]["rms"] == result.report.parts[0].neutral.rms
     assert table["left_out"] == ["odd"] and "tongueOut" in table["missing"] and table["notes"] == ["unit taken for mm"]
     assert part["excluded_samples"] == int(result.parts[0].chart.folded.sum())
+
+
+def test_pieces_and_shapes_stand_in_it(folder, result):
+    table = json.loads((folder / "report.json").read_text())
+    assert table["shapes"] == {"jawOpen": ["jawOpen"], "mouthSmileLeft": ["mouthSmile_L"]}
+    assert (table["empty"], table["presets"], table["pieces"]) == ([], [], {})
+    report = replace(
+        result.report, pieces={"Head": "skin", "Hat|1": "hat, left out"}, empty=("odd2",), presets=("Joy",)
+    )
+    text = as_markdown(report, [UniformNet(9, 0.1), UniformNet(9, 0.2)], [])
+    for words in ("| Hat\\|1 | hat, left out |", "| mouthSmileLeft | mouthSmile_L |", "empty: odd2",
+                  "understood, made from parameters: Joy"):  # fmt: skip
+        assert words in text
+    assert kinds_line(report) == "pieces: skin (Head); hat, left out (Hat|1)" and kinds_line(result.report) == ""
 
 
 def test_it_can_be_read(folder):

@@ -51,7 +51,8 @@ JSON = chunk(0x4E4F534A, b'{"asset": {"version": "2.0"}, "buffers": [{"byteLengt
         (b'{"asset": {}}', "asset.version: is missing"),
         (b'{"asset": []}', r"JSON.asset: '\[\]' is no object"),
         (b'{"asset": {"version": "3.0"}}', "asset.version: is '3.0'"),
-        (b'{"asset": {"version": "2.1"}, "extensionsRequired": ["X_y"]}', "'X_y' is not read"),
+        (b'{"asset": {"version": "2.1"}, "extensionsRequired": ["EXT_meshopt_compression"]}', "meshopt compression"),
+        (b'{"asset": {"version": "2.1"}, "extensionsRequired": ["X_y", "KHR_draco_mesh_compression"]}', "Draco"),
     ],
 )
 def test_damaged_containers_are_refused(tmp_path, raw, why):
@@ -60,6 +61,11 @@ def test_damaged_containers_are_refused(tmp_path, raw, why):
     with pytest.raises(FitError, match=why) as caught:
         Gltf(path)
     assert str(path) in str(caught.value) and caught.value.hint
+
+
+def test_unknown_extensions_are_no_reason_to_refuse_a_mesh(tmp_path):
+    required = ["EXT_texture_webp", "KHR_materials_unlit", "VRMC_vrm", "X_of_tomorrow"]
+    assert text_file(tmp_path, extensionsRequired=required).items("nodes") == []
 
 
 def test_the_first_chunk_of_a_kind_counts_and_unknown_ones_are_skipped(tmp_path):

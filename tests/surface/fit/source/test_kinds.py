@@ -1,0 +1,88 @@
+"""Kinds of pieces by their names, in the spelling of several makers; and what is worn is left out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slit_sheet import slit_sheet
+
+from surface.fit.source.kinds import kind_name, kind_of, kinds, material_of, unworn
+from surface.fit.source.mesh import FitMesh
+
+NAMES = {
+    "skin": [
+        "Head", "Wolf3D_Head/Wolf3D_Skin", "Wolf3D_Body/Wolf3D_Body", "Body/N00_000_00_Body_00_SKIN (Instance)",
+        "Face/N00_000_00_Face_00_SKIN", "CC_Base_Body/Std_Skin_Head", "CC_Base_Body/Std_Nails", "head_lod0_mesh",
+        "EyeSocket", "Eyelid_L", "Popeye", "BrownSkin", "Shirt/Std_Skin_Body", "Mesh", "Sphere.002", "", "顔", "kao",
+    ],
+    "eye": ["EyeLeft/Wolf3D_Eye", "helper-l-eye", "Human.high-poly", "eyeLeft_lod0_mesh", "Std_Eye_L", "目"],
+    "eye_white": ["Face/N00_000_00_EyeWhite_00_EYE", "Sclera", "shirome", "白目"],
+    "iris": ["Face/N00_000_00_EyeIris_00_EYE", "Irises", "hitomi", "瞳"],
+    "highlight": ["Face/N00_000_00_EyeHighlight_00_EYE", "eye_highlight"],
+    "eye_cover": ["Std_Cornea_L", "CC_Base_EyeOcclusion/Std_Eye_Occlusion_L", "TearLine", "eyeshell_lod0", "EyeWet"],
+    "lash": ["EyeLashes_L", "Face/N00_000_00_FaceEyeline_00_FACE", "helper-l-eyelashes-1", "Std_Eyelash", "matsuge"],
+    "brow": ["eyebrow001", "Face/N00_000_00_FaceBrow_00_FACE", "mayu", "眉毛"],
+    "hair": ["HAIR", "Hair001/N00_000_Hair_00_HAIR", "HairBack", "Wolf3D_Hair/Wolf3D_Hair", "前髪", "ponytail01"],
+    "beard": ["Beard.001", "Wolf3D_Beard", "hige"],
+    "teeth": ["lower_teeth", "Tooth12", "Wolf3D_Teeth", "Std_Upper_Teeth", "teeth_base", "lowerteethmesh", "歯"],
+    "gums": ["Gums"],
+    "tongue": ["MyTongue/pink", "tongue01", "CC_Base_Tongue/Std_Tongue", "舌"],
+    "mouth": ["mouth_bag", "OralCavity", "Face/N00_000_00_FaceMouth_00_FACE", "saliva_lod0"],
+    "glasses": ["Wolf3D_Glasses/x", "Sunglasses", "megane"],
+    "hat": ["Wolf3D_Headwear", "fedora", "Cap01", "帽子"],
+    "clothes": ["Wolf3D_Outfit_Top", "Body/N00_010_01_Onepiece_00_CLOTH_01", "male_casualsuit01", "服"],
+    "boots": ["Wolf3D_Outfit_Footwear", "Body/N00_008_01_Shoes_01_CLOTH_01 (Instance)", "shoes01", "kutsu"],
+    "prop": ["joint-head", "joint-tongue-4", "helper-tights", "helper-hair", "chair"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "kind"), [(n, kind) for kind, every in NAMES.items() for n in every])
+def test_names_of_many_makers(name, kind):
+    assert kind_name(name) == kind
+
+
+def test_every_kind_has_a_rule_and_every_entry_is_read_as_its_kind():
+    assert {k.rule for k in kinds().values()} == {"skin", "part", "eye", "out"}
+    assert {k.material for k in kinds().values()} == {"skin", "lash", "brow", "teeth", "gums", "tongue", "mouth"}
+    from surface.fit.source.kinds import _table
+
+    for kind, row in _table().items():
+        assert {word: kind_name(word) for word in row["words"]} == dict.fromkeys(row["words"], kind)
+
+
+def test_the_material_decides_but_skin_is_no_kind_of_hair():
+    assert kind_name("Face/HairMaterial") == "hair" and kind_name("Hair/Material.001") == "hair"
+    assert kind_name("Teeth/Std_Skin") == "teeth" and kind_name("Top/Skin") == "skin"
+    assert material_of("Hair") == "brow" and material_of("EyeIris") == material_of("Shirt") == "skin"
+    assert kind_of("EyeIris").rule == "eye"
+
+
+def two_pieces(name: str, moves: float) -> FitMesh:
+    """A sheet whose upper half has a name of its own, and moves by so many mm in a shape that moves the rest by 10."""
+    mesh = slit_sheet()
+    upper = (mesh.vertices[mesh.faces].mean(axis=1)[:, 1] > 0).astype(int)
+    share = np.full(len(mesh.vertices), 10.0)
+    share[np.unique(mesh.faces[upper == 1])] = moves
+    delta = np.zeros((1, len(mesh.vertices), 3))
+    delta[0, :, 2] = share
+    return replace(mesh, piece=upper, pieces=("face", name), names=("jawOpen",), deltas=delta)
+
+
+def test_what_is_worn_is_left_out_and_said():
+    mesh = two_pieces("Jacket", 1.0)
+    kept, notes = unworn(mesh)
+    np.testing.assert_array_equal(kept, mesh.piece == 0)
+    assert notes == ["left out: 'Jacket' (clothes)"]
+    assert unworn(two_pieces("Hair", 1.0))[0].all() and unworn(two_pieces("neck", 1.0))[1] == []
+
+
+def test_names_are_not_believed_against_what_shapes_do():
+    kept, notes = unworn(two_pieces("Hoodie", 8.0))
+    assert kept.all() and notes == ["'Hoodie': named as clothes, but shapes move it: kept as skin"]
+    mesh = two_pieces("Hat", 0.0)
+    kept, notes = unworn(replace(mesh, pieces=("Mask_Shirt", "Hat"), names=(), deltas=mesh.deltas[:0]))
+    assert kept.all() and notes == []  # nothing would be left
+
+
+def test_meshes_without_pieces_are_kept():
+    assert unworn(slit_sheet())[0].all()
