@@ -10,7 +10,7 @@ from surface.fit.source.islands import Island, boundary_loops
 from surface.fit.source.mesh import FitMesh
 
 CENTRES, RADIUS = np.array([[32.0, 40.0, 40.0], [-32.0, 40.0, 40.0]]), 12.0
-COLUMNS, ROWS = 65, 49
+COLUMNS, ROWS = 65, 85
 HALF_WIDTH, HALF_HEIGHT = 13.0, 5.5  # of the opening between lids, mm
 ABOVE = 0.6  # of the lids above the eyeball, mm
 SIZE = np.array([180.0, 220.0])
@@ -44,10 +44,10 @@ def _placed(x: np.ndarray, y: np.ndarray, row: int, openness: float) -> np.ndarr
     height = HALF_HEIGHT * np.clip(1.0 - across**2, 0.0, None) * openness
     rows = np.unique(y)
     seam = 0.5 * (rows[row] + rows[row + 1])
-    half = 0.5 * (rows[row + 1] - rows[row]) * np.exp(-(across**2) / 2)
+    half = 0.5 * (rows[row + 1] - rows[row]) * 0.9
     off = y - seam
     apart = np.exp(-((np.maximum(np.abs(off) - half, 0) / 14.0) ** 2))
-    pinched = off - np.sign(off) * half * apart * (np.abs(across) < 1.3)
+    pinched = off - np.sign(off) * half * apart * np.clip((1.6 - np.abs(across)) / 0.5, 0.0, 1.0)
     new_y = 40.0 - 1.0 * apart * (1 - openness) + pinched + np.sign(off) * height * apart + (seam - 40.0) * (1 - apart)
     z = 62.0 - 0.0042 * x**2 - 0.0015 * (new_y - 10.0) ** 2
     ball = (RADIUS + ABOVE) ** 2 - (np.abs(x) - CENTRES[0, 0]) ** 2 - (new_y - CENTRES[0, 1]) ** 2

@@ -12,11 +12,11 @@ from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import sources_of
 from surface.head.model.parameters import smoothstep
 
-OVERLAP_MM = 0.6  # further than to where they meet: contacts keep lids from passing through each other
+OVERLAP_MM = 1.0  # further than to where they meet: contacts keep lids from passing through each other
 UPPER = 0.85  # share of the way that the upper lid goes
 BLINKS = 0.6  # of the opening's height: a shape that leaves more open is no whole blink and stays as it is
 REACH = 0.7  # rad round the eyeball from a lid's edge: where the change has faded out
-CORNER = 0.06  # of the opening's width: in its corners lids meet at rest
+CORNER = 0.12  # of the opening's width: how far beyond its corners the change has faded out
 COLUMNS = 33
 
 
@@ -79,8 +79,9 @@ def _lengthened(rest: Floats, move: Floats, before: _Edges, after: _Edges, radiu
     """(n, 3) what to add to a blink's displacements, so that both edges meet and overlap a little."""
     local = rest + move
     along = (local[:, 0] - after.x[0]) / (after.x[-1] - after.x[0])
-    inner = smoothstep(np.minimum(along, 1.0 - along), 0.0, CORNER)
-    need = np.maximum(after.gap + OVERLAP_MM / radius, 0.0)
+    inner = 1.0 - smoothstep(np.maximum(-along, along - 1.0), 0.0, CORNER)
+    overlap = OVERLAP_MM / radius * np.clip(4.0 * before.gap / max(float(before.gap.max()), 1e-9), 0.0, 1.0)
+    need = np.maximum(after.gap + overlap, 0.0)
     own, angle = np.interp(local[:, 0], after.x, need) * inner, _angle(rest)
     upper, lower = (np.interp(rest[:, 0], before.x, side) for side in (before.upper, before.lower))
     is_upper = angle >= 0.5 * (upper + lower)

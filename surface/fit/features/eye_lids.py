@@ -2,36 +2,62 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.features.eye_blink import shut_blinks
 from surface.fit.features.eyes import Eyes
-from surface.fit.points.lid_seating import AHEAD, Eyeball, seat_lids
-from surface.fit.source.mesh import FitMesh, renumbered
+from surface.fit.points.eyeball import CORNEA
+from surface.fit.points.lid_seating import AHEAD, LID_MM, Eyeball, seat_lids
+from surface.fit.source.mesh import FitMesh, directed_edges, renumbered
 from surface.fit.source.names import sources_of
 from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.rig import optical_axis
 
 REACH = 1.9  # in radii: lids lie no further from the centre
 DEEP = 0.2  # in radii: skin further inside an eyeball is no lid
+LEAST_MM, MOST_MM = 0.2, 0.7  # of lids above an eyeball: however fine their faces are, and however coarse
 TELL_MM = 1.0  # a lid that is moved further at rest is worth a note
 
 
-def fit_lids(mesh: FitMesh, eyes: Eyes, gazes: Floats) -> tuple[FitMesh, list[str]]:
+def fit_lids(mesh: FitMesh, eyes: Eyes) -> tuple[FitMesh, list[str]]:
     """The mesh with its lids on the eyeballs and shut by blinks, and what was changed, in words.
 
-    gazes : (k, 2, 3) where the eyes look in every shape.
+    Shapes by which eyes look somewhere are added where they are missing: lids give way to the cornea.
     """
     if eyes.radius <= 0:
         return mesh, []
+    mesh = with_looks(mesh)
     shut, notes = shut_blinks(mesh, eyes.openings, eyes.centres, eyes.radius)
     left, right = ((float(x), float(y), float(z)) for x, y, z in eyes.centres)
     ball = Eyeball(left, eyes.radius, right)
-    seated = seat_lids(shut, ball, ball, _lids(mesh, eyes.centres, eyes.radius, eyes.faces), gazes)
+    lids = _lids(mesh, eyes.centres, eyes.radius, eyes.faces)
+    least = _least_height(mesh, lids, eyes.radius)
+    seated = seat_lids(shut, ball, ball, lids, gazes_of(mesh), under_gaze=True, least=least)
     most = float(np.linalg.norm(seated.vertices - mesh.vertices, axis=1).max(initial=0.0))
     notes += [f"lids were moved by up to {most:.1f} mm, out of the eyeballs"] if most > TELL_MM else []
     return seated, notes
+
+
+def _least_height(mesh: FitMesh, lids: Ints, radius: float) -> float:
+    """Height above the eyeball, mm, at which lids' faces clear its cornea with their middles, too: the sagitta of half
+    their edges is within it."""
+    a, b = directed_edges(mesh.faces)
+    near = np.isin(a, lids) & np.isin(b, lids)
+    if not near.any():
+        return LID_MM[0]
+    edge = float(np.median(np.linalg.norm(mesh.vertices[a[near]] - mesh.vertices[b[near]], axis=1)))
+    return float(np.clip(LEAST_MM + edge**2 / (8.0 * CORNEA * radius), LID_MM[0], MOST_MM))
+
+
+def with_looks(mesh: FitMesh) -> FitMesh:
+    """The mesh with all shapes by which eyes look somewhere; those that were missing move nothing."""
+    known = sources_of(mesh.names)
+    new = [n for n in NAMES if n.startswith("eyeLook") and n not in known]
+    none = np.zeros((len(new), *mesh.vertices.shape))
+    return replace(mesh, names=(*mesh.names, *new), deltas=np.concatenate([mesh.deltas, none]))
 
 
 def _lids(mesh: FitMesh, eyes: Floats, radius: float, eye_faces: Bools) -> Ints:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from surface.fit.source.kinds import is_known, kind_of
+from surface.fit.source.kinds import kind_of
 
 JOINED = re.compile(r"(?:left|right|(?:^|[^a-z])[lr])eyes?(?![a-z])", re.IGNORECASE)  # one word for both
 COVERS = ("eye_cover", "highlight", "iris")
@@ -13,7 +13,9 @@ SKIN_BESIDE = ("lid", "socket", "eyebag", "eye bag", "eye_bag")
 
 def is_eye(name: str) -> bool:
     """Does a piece of this name, ``object/material``, belong to an eye?"""
-    return kind_of(name).rule == "eye" or (not is_known(name) and JOINED.search(name) is not None)
+    return kind_of(name).rule == "eye" or (
+        kind_of(name).rule == "skin" and JOINED.search(name) is not None and not _beside_skin(name)
+    )
 
 
 def is_cover(name: str) -> bool:
@@ -29,4 +31,8 @@ def is_iris(name: str) -> bool:
 def is_beside(name: str) -> bool:
     """Does it name something near an eye that is no part of it, as a lid or a lash?"""
     kind = kind_of(name)
-    return kind.rule == "part" or (kind.rule == "skin" and any(w in name.lower() for w in SKIN_BESIDE))
+    return kind.rule in ("part", "out") or (kind.rule == "skin" and _beside_skin(name))
+
+
+def _beside_skin(name: str) -> bool:
+    return any(word in name.lower() for word in SKIN_BESIDE)

@@ -53,15 +53,14 @@ class Eyes:
     notes: list[str] = field(default_factory=list)
 
 
-def find_eyes(mesh: FitMesh, skin_of: Callable[[Bools], Bools], kept: Bools) -> Eyes:
+def find_eyes(mesh: FitMesh, skin_of: Callable[[Bools], Bools]) -> Eyes:
     """Find both eyes.
 
     skin_of : which faces (f,) are skin, once those (f,) that are eyes are left out.
-    kept : (pieces of the mesh,) those that are hair, teeth or the like, by their names, and no part of an eye.
     """
     near = blink_middles(mesh)
     middle = float(near[:, 0].mean()) if near is not None else middle_x(mesh)
-    kept = kept | np.array([is_beside(name) for name in mesh.pieces], bool)
+    kept = np.array([is_beside(name) for name in mesh.pieces], bool)
     sides, what, gone = _piece_sides(mesh, middle, near, kept)
     skin = skin_of(gone)
     if not sides:

@@ -21,7 +21,7 @@ from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
 from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island
-from surface.fit.source.kinds import kind_name, material_of
+from surface.fit.source.kinds import kind_name
 from surface.fit.source.layout import lay_out, open_flat_holes, straighten_holes
 from surface.fit.source.mesh import FitMesh, components, face_areas, triangles
 from surface.fit.source.owncharts import usable_islands
@@ -65,9 +65,7 @@ def make_plan(mesh: FitMesh) -> Plan:
     """
     shapes = dict(zip(mesh.names, mesh.deltas, strict=True))
     scale = head_scale(mesh.vertices, shapes)
-    eyes = find_eyes(
-        mesh, partial(_largest, mesh, scale), np.array([material_of(n) != "skin" for n in mesh.pieces], bool)
-    )
+    eyes = find_eyes(mesh, partial(_largest, mesh, scale))
     label, sizes = _pieces(mesh, eyes.faces)
     rest = [int(k) for k in np.argsort(-_presence(mesh, label, sizes, scale)) if sizes[k] > 0]
     if not rest:
