@@ -148,7 +148,7 @@ def fit(
         shaded = _decimate_and_shade(out)
         show_table(_error_table(found))
         missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)
-        remarks = [face_bounds(found), *found.notes]
+        remarks = [face_bounds(found), *(found.dense.lines() if found.dense else []), *found.notes]
         remarks += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
         remarks += [f"left out, not ARKit's: {left_out}"] if left_out else []
         remarks += [] if shaded else [_NO_SHADE]
