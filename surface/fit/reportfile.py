@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +71,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
             }
             for p in report.parts
         ],
-        "distances": asdict(report.dense) if report.dense else None,
+        "distances": asdict(replace(report.dense, sticking={})) if report.dense else None,
         "nurbs": {
             "control_points": nets[0].points, "rms_mm": nets[0].rms, "uniform_nets": [asdict(n) for n in nets[1:]],
         },

@@ -26,6 +26,7 @@ class _Pair:
 
     def __init__(self, part: FittedPart, number: int, subject: Subject, mesh: FitMesh) -> None:
         self.name, self.number = part.name, number
+        self._uv = np.asarray(subject.parts[number].uv, np.float64)
         faces = mesh.faces[faces_of(mesh, part)]
         self._cut = subject.parts[number].triangles.astype(np.int64), triangles(faces)
         self._used = np.unique(self._cut[0]), np.unique(self._cut[1])
@@ -50,15 +51,21 @@ class _Pair:
         to_surface = self._trees[0].distances(self._samples(1, mesh), self._near[1])
         return [(to_mesh, self._fold_of[self._near[0]]), (to_surface, self._fold_at)]
 
+    def sticking(self, to_mesh: Floats, fold: Bools, limit: float) -> Floats:
+        """(k, 2) in (u, v): the surface's vertices that are further from the mesh than ``limit``, outside folds."""
+        used = self._used[0]
+        rows = used[(to_mesh[: len(used)] > limit) & ~fold[: len(used)]]
+        return self._uv[rows[rows < len(self._uv)]]
+
 
 def measure_dense(
-    head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart]
+    head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart], limit: float = np.inf
 ) -> DenseErrors:  # fmt: skip
     """Distances between a head and the mesh that it was fitted to, in neutral and with each of its shapes at 1.
 
     The head is posed as it always is, with its jaw, eyes, contacts and wrinkles. Samples are all vertices and centres
     of triangles on both sides; each part is compared with the faces that it was fitted to, folds apart.
-    sources : by parameter, the shapes of the mesh that add up to it.
+    sources : by parameter, the shapes of the mesh that add up to it. limit : mm, from which a vertex sticks out.
     """
     subject = Subject(Head(head))
     places = Places(subject, find_mouth(subject))
@@ -67,11 +74,14 @@ def measure_dense(
     pairs = [_Pair(p, numbers[p.name], subject, mesh) for p, own in zip(parts, owned, strict=True) if own.any()]
     found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
     worst: dict[bool, Spot] = {}
+    sticking: dict[tuple[str, str], Floats] = {}
     for shape in (NEUTRAL, *(n for n in sources if n in subject.claimed)):
         posed = subject.rest if shape == NEUTRAL else subject.at_one(shape)
         moved = mesh.vertices + _displacement(mesh, sources, shape)
         for pair in pairs:
             both = pair.distances(posed[pair.number].astype(np.float64), moved)
+            if len(places_out := pair.sticking(*both[0], limit)):
+                sticking[pair.name, shape] = places_out
             in_folds = np.concatenate([d[fold] for d, fold in both])
             found[pair.name][shape] = Both(*_outside_folds(both), errors_of(in_folds))
             for spot, fold in _greatest(pair, both, shape, places, subject.parts[pair.number].material):
@@ -79,7 +89,7 @@ def measure_dense(
     rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
     added = tuple(p.name for p in subject.parts if p.name not in found)
     samples = sum(len(r) for p in pairs for r in p.rest)
-    return DenseErrors(found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples)
+    return DenseErrors(found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking)
 
 
 def _outside_folds(both: list[tuple[Floats, Bools]]) -> tuple[Errors, Errors]:

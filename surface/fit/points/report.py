@@ -77,6 +77,7 @@ class DenseErrors:
     worst, worst_fold : the greatest outside and inside folds, as nostrils, which a fit holds only loosely.
     added : parts of the head that the mesh does not have. left_out : pieces of the mesh that the head does not have.
     samples : measured in every shape, both ways.
+    sticking : by part and shape, (k, 2) in (u, v): vertices of the surface that are further from the mesh than a limit.
     """
 
     parts: dict[str, dict[str, Both]]
@@ -85,6 +86,7 @@ class DenseErrors:
     added: tuple[str, ...]
     left_out: tuple[str, ...]
     samples: int
+    sticking: dict[tuple[str, str], Floats] = field(default_factory=dict)
 
     def lines(self) -> list[str]:
         """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
