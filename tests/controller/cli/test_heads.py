@@ -137,6 +137,7 @@ def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path):
     lines = said.output.splitlines()
     assert lines[-2] == "greatest error 1.23 mm: shape jawOpen, left cheek (face, mesh to surface)"
     assert lines[-3] == "not in the mesh, so not measured: eye_left" and "hat (3 faces)" in lines[-4]
+    report.dense = None
     calls.clear()
     report.missing, report.left_out, report.notes = ["jawOpen", "noseSneer"], ["x", "y"], []
     more = ["--name", "you", "--shapes", "s", "--names", "n.toml", "--unit", "cm", "--up", "z", "--forward", "-y"]
