@@ -178,6 +178,7 @@ def fit(
         remarks += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
         remarks += [f"left out, not ARKit's: {left_out}"] if left_out else []
         remarks += [] if shaded else [_NO_SHADE]
+        remarks += reversed(found.dense.lines()) if found.dense else []
         for line in remarks:
             console.print(line, soft_wrap=True, markup=False)
         console.print(f"wrote {out}", soft_wrap=True)

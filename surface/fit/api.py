@@ -19,6 +19,7 @@ from surface.fit.features.joins import find_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.wrinkles import with_deep_wrinkles
+from surface.fit.measures.mend import mend_spikes, turned_faces
 from surface.fit.points.lid_seating import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart
@@ -103,10 +104,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
-    notes = [*loaded.notes, *plan.notes, *findings(head, loaded.marks)]
+    head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
+    notes = [*loaded.notes, *plan.notes, *turned_faces(mesh), *mended, *findings(head, loaded.marks)]
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
-        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces,
+        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces, dense,
     )  # fmt: skip
     return FitResult(head, report, fitted_parts)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from surface.base.arrays import Floats, Floats32
 from surface.base.errors import FitError, MissingPackage, ViewError
 from surface.base.progress import Progress
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
-from surface.fit.points.report import Errors, FitReport, FitResult, FittedPart, face_bounds
+from surface.fit.points.report import NEUTRAL, DenseErrors, Errors, FitReport, FitResult, FittedPart, face_bounds
 from surface.fit.source.chart import TILE
 from surface.head import Head
 
@@ -72,6 +72,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
             }
             for p in report.parts
         ],
+        "distances": asdict(replace(report.dense, sticking={})) if report.dense else None,
         "nurbs": {
             "control_points": nets[0].points, "rms_mm": nets[0].rms, "uniform_nets": [asdict(n) for n in nets[1:]],
         },
@@ -84,6 +85,7 @@ def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) 
     lines += [f"- {note}" for note in [face_bounds(report), *report.notes]]
     lines += [f"- no shape for: {', '.join(report.missing)}"] if report.missing else []
     lines += [f"- left out, not ARKit's: {', '.join(report.left_out)}"] if report.left_out else []
+    lines += _distance_lines(report.dense) if report.dense else []
     lines += ["", "Distances between mesh and surface at the same (u, v), mm.", ""]
     lines += [
         "| part | control points | samples | excluded | RMS | 99 % | max | mean RMS of shapes |",
@@ -120,6 +122,22 @@ def _source_lines(report: FitReport) -> list[str]:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|").replace("\n", " ")
+
+
+def _distance_lines(dense: DenseErrors) -> list[str]:
+    """True distances of the posed head from the mesh and back: neutral of every part, and its worst shape each way."""
+    lines = ["", f"True distances of {dense.samples} samples in every shape, the head posed as it is drawn, mm.", ""]
+    lines += [f"- {line}" for line in dense.lines()]
+    lines += [
+        "", "| part | way | RMS | 99 % | max | greatest of all shapes | in folds |", "|---|---|---|---|---|---|---|"
+    ]  # fmt: skip
+    for name, by_shape in dense.parts.items():
+        folds = max(b.folds.max for b in by_shape.values())
+        for way, words in (("to_mesh", "surface to mesh"), ("to_surface", "mesh to surface")):
+            most, shape = max((getattr(b, way).max, s) for s, b in by_shape.items())
+            neutral = _figures(getattr(by_shape[NEUTRAL], way))
+            lines.append(f"| {name} | {words} | {neutral} | {most:.3f} {shape} | {folds:.3f} |")
+    return lines
 
 
 def _figures(errors: Errors) -> str:

@@ -12,6 +12,7 @@ from surface.fit.source.chart import Chart
 from surface.head.model.data import HeadData
 
 MOST_NAMES = 4  # of one kind that a line names
+NEUTRAL = "neutral"
 RMS_MM, P99_MM, SHAPES_MM = 0.25, 0.8, 0.08  # bounds for a face on a head of usual size
 
 
@@ -45,6 +46,61 @@ class PartReport:
 
 
 @dataclass(frozen=True)
+class Spot:
+    """The greatest error: how far, mm, in which shape, of which part, where; from the surface to the mesh or back."""
+
+    mm: float
+    shape: str
+    part: str
+    place: str
+    to_mesh: bool
+
+    def __str__(self) -> str:
+        way = "surface to mesh" if self.to_mesh else "mesh to surface"
+        shape = "the neutral face" if self.shape == NEUTRAL else f"shape {self.shape}"
+        return f"{self.mm:.2f} mm: {shape}, {self.place} ({self.part}, {way})"
+
+
+@dataclass(frozen=True)
+class Both:
+    """Errors of one part in one shape: of its surface from the mesh, of the mesh from its surface, both outside folds;
+    and of both inside folds."""
+
+    to_mesh: Errors
+    to_surface: Errors
+    folds: Errors
+
+
+@dataclass(frozen=True)
+class DenseErrors:
+    """Errors by part, then by shape, :data:`NEUTRAL` first; the greatest of all; and what was not measured.
+
+    worst, worst_fold : the greatest outside and inside folds, as nostrils, which a fit holds only loosely.
+    added : parts of the head that the mesh does not have. left_out : pieces of the mesh that the head does not have.
+    samples : measured in every shape, both ways.
+    sticking : by part and shape, (k, 2) in (u, v): vertices of the surface that are further from the mesh than a limit.
+    """
+
+    parts: dict[str, dict[str, Both]]
+    worst: Spot | None
+    worst_fold: Spot | None
+    added: tuple[str, ...]
+    left_out: tuple[str, ...]
+    samples: int
+    sticking: dict[tuple[str, str], Floats] = field(default_factory=dict)
+
+    def lines(self) -> list[str]:
+        """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
+        out = [f"greatest error {self.worst}"] if self.worst else []
+        if self.worst_fold:
+            out.append(f"in folds (nostrils, ear canals, corners), which are held only loosely: {self.worst_fold}")
+        out += [f"not in the mesh, so not measured: {', '.join(self.added)}"] if self.added else []
+        return out + (
+            [f"faces of the mesh that no fitted part holds: {', '.join(self.left_out)}"] if self.left_out else []
+        )
+
+
+@dataclass(frozen=True)
 class FitReport:
     """The whole head.
 
@@ -54,6 +110,7 @@ class FitReport:
     shapes : for each parameter the mesh's shapes that it was made of; empty : shapes that move nothing; presets :
         vowels, visemes and moods that are understood, and made from parameters instead.
     pieces : the mesh's objects and what kind each is, left out or not.
+    dense : errors of the posed head by true distances, both ways.
     """
 
     name: str
@@ -67,6 +124,7 @@ class FitReport:
     empty: tuple[str, ...] = ()
     presets: tuple[str, ...] = ()
     pieces: dict[str, str] = field(default_factory=dict)
+    dense: DenseErrors | None = None
 
     @property
     def points(self) -> int:
@@ -118,12 +176,13 @@ def kinds_line(report: FitReport) -> str:
 def measure(name: str, chart: Chart, fitted: Fitted, names: tuple[str, ...]) -> PartReport:
     """Errors of a fitted chart over all samples outside folds."""
     counted = ~chart.folded
-    shapes = {n: _errors(e[counted]) for n, e in zip(names, fitted.shape_error, strict=False)}
+    shapes = {n: errors_of(e[counted]) for n, e in zip(names, fitted.shape_error, strict=False)}
     samples = int(counted.sum())
-    return PartReport(name, len(fitted.net), samples, len(counted) - samples, _errors(fitted.error[counted]), shapes)
+    return PartReport(name, len(fitted.net), samples, len(counted) - samples, errors_of(fitted.error[counted]), shapes)
 
 
-def _errors(distance: Floats) -> Errors:
+def errors_of(distance: Floats) -> Errors:
+    """Figures of distances (m,), mm."""
     if not len(distance):
         return Errors(0.0, 0.0, 0.0)
     return Errors(float(np.sqrt((distance**2).mean())), float(np.percentile(distance, 99)), float(distance.max()))

@@ -14,6 +14,7 @@ from controller.base.parameters import PARAMETERS
 from controller.cli.app import make_app
 from controller.cli.console import console
 from surface.base.errors import ExportError, FitError, HeadFileError, ViewError
+from surface.fit.points.report import DenseErrors, Spot
 from surface.fit.source.load import LoadOptions
 
 SURFACE = str(Path(__file__).parents[2] / "surface")
@@ -100,7 +101,7 @@ def fitted(monkeypatch):
     neutral = SimpleNamespace(rms=0.1234, p99=0.5678, max=1.2345)
     part = SimpleNamespace(name="face", points=77, neutral=neutral, mean_shape_rms=0.0456)
     report = SimpleNamespace(name="me", points=123, parameters=["a", "b"], parts=[part], missing=[], left_out=[],
-                             notes=["a note [x]"])  # fmt: skip
+                             notes=["a note [x]"], dense=None)  # fmt: skip
     calls = []
 
     def fit_head(mesh, out, *, name, progress, options, report_dir):
@@ -137,6 +138,13 @@ def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path):
     assert "part control points RMS 99 % max mean RMS of shapes" in words
     assert "face 77 0.123 0.568 1.234 0.046" in words
     assert words.endswith(f"face: 1.2 mm [max] a note [x] wrote {out}")
+    worst = Spot(1.234, "jawOpen", "face", "left cheek", False)
+    report.dense = DenseErrors({}, worst, None, ("eye_left",), ("hat (3 faces)",), 99)
+    said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out)])
+    lines = said.output.splitlines()
+    assert lines[-2] == "greatest error 1.23 mm: shape jawOpen, left cheek (face, mesh to surface)"
+    assert lines[-3] == "not in the mesh, so not measured: eye_left" and "hat (3 faces)" in lines[-4]
+    report.dense = None
     calls.clear()
     report.missing, report.left_out, report.notes = ["jawOpen", "noseSneer"], ["x", "y"], []
     more = ["--name", "you", "--shapes", "s", "--names", "n.toml", "--unit", "cm", "--up", "z", "--forward", "-y"]

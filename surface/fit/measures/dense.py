@@ -1,0 +1,145 @@
+"""Errors of a fitted head as it is really posed: distances of dense samples from the surface to the mesh and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats
+from surface.check.mouth import find_mouth
+from surface.check.places import Places
+from surface.check.subject import Subject, pose_of
+from surface.fit.measures.closest import ClosestTree
+from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, errors_of
+from surface.fit.source.mesh import FitMesh, triangles
+from surface.head import Head
+from surface.head.model.data import HeadData
+from surface.head.model.parameters import TONGUE_NEEDS
+
+
+class _Pair:
+    """A part of the head and the faces of the mesh that it was fitted to, with samples of both.
+
+    rest : samples of the surface and of the mesh at rest, each (m, 3).
+    """
+
+    def __init__(self, part: FittedPart, number: int, subject: Subject, mesh: FitMesh) -> None:
+        self.name, self.number = part.name, number
+        self._uv = np.asarray(subject.parts[number].uv, np.float64)
+        faces = mesh.faces[faces_of(mesh, part)]
+        self._cut = subject.parts[number].triangles.astype(np.int64), triangles(faces)
+        self._used = np.unique(self._cut[0]), np.unique(self._cut[1])
+        at = subject.rest[number].astype(np.float64), mesh.vertices
+        self._trees = ClosestTree(at[0], self._cut[0]), ClosestTree(at[1], self._cut[1])
+        self._near = [np.zeros(len(t) + len(u), np.int64) for t, u in zip(self._cut, self._used, strict=True)]
+        self.rest = self._samples(0, at[0]), self._samples(1, at[1])
+        folded = _folded(mesh, part)
+        flat: Bools = np.asarray(folded[self._cut[1]].any(axis=1))
+        self._fold_of, self._fold_at = flat[self._trees[1].order], np.concatenate([folded[self._used[1]], flat])
+
+    def _samples(self, k: int, vertices: Floats) -> Floats:
+        """Vertices and centres of triangles of the head's part (0) or of the mesh (1)."""
+        at = np.asarray(vertices, np.float64)
+        return np.concatenate([at[self._used[k]], at[self._cut[k]].mean(axis=1)])
+
+    def distances(self, surface: Floats, mesh: Floats) -> list[tuple[Floats, Bools]]:
+        """From the surface's samples to the mesh, and from the mesh's to the surface, mm, and which lie in folds."""
+        for tree, vertices in zip(self._trees, (surface, mesh), strict=True):
+            tree.move(vertices)
+        to_mesh = self._trees[1].distances(self._samples(0, surface), self._near[0])
+        to_surface = self._trees[0].distances(self._samples(1, mesh), self._near[1])
+        return [(to_mesh, self._fold_of[self._near[0]]), (to_surface, self._fold_at)]
+
+    def sticking(self, to_mesh: Floats, fold: Bools, limit: float) -> Floats:
+        """(k, 2) in (u, v): the surface's vertices that are further from the mesh than ``limit``, outside folds."""
+        used = self._used[0]
+        rows = used[(to_mesh[: len(used)] > limit) & ~fold[: len(used)]]
+        return self._uv[rows[rows < len(self._uv)]]
+
+
+def measure_dense(
+    head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart], limit: float = np.inf
+) -> DenseErrors:  # fmt: skip
+    """Distances between a head and the mesh that it was fitted to, in neutral and with each of its shapes at 1.
+
+    The head is posed as it always is, with its jaw, eyes, contacts and wrinkles. Samples are all vertices and centres
+    of triangles on both sides; each part is compared with the faces that it was fitted to, folds apart.
+    sources : by parameter, the shapes of the mesh that add up to it. limit : mm, from which a vertex sticks out.
+    """
+    subject = Subject(Head(head))
+    places = Places(subject, find_mouth(subject))
+    numbers = {p.name: k for k, p in enumerate(subject.parts)}
+    owned = [faces_of(mesh, p) for p in parts]
+    pairs = [_Pair(p, numbers[p.name], subject, mesh) for p, own in zip(parts, owned, strict=True) if own.any()]
+    found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
+    worst: dict[bool, Spot] = {}
+    sticking: dict[tuple[str, str], Floats] = {}
+    for shape in (NEUTRAL, *(n for n in sources if n in subject.claimed)):
+        posed = subject.rest if shape == NEUTRAL else subject.at_one(shape)
+        moved = mesh.vertices + _displacement(mesh, sources, shape)
+        for pair in pairs:
+            both = pair.distances(posed[pair.number].astype(np.float64), moved)
+            if len(places_out := pair.sticking(*both[0], limit)):
+                sticking[pair.name, shape] = places_out
+            in_folds = np.concatenate([d[fold] for d, fold in both])
+            found[pair.name][shape] = Both(*_outside_folds(both), errors_of(in_folds))
+            for spot, fold in _greatest(pair, both, shape, places, subject.parts[pair.number].material):
+                worst[fold] = max(worst.get(fold, spot), spot, key=lambda s: s.mm)
+    rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
+    added = tuple(p.name for p in subject.parts if p.name not in found)
+    samples = sum(len(r) for p in pairs for r in p.rest)
+    return DenseErrors(found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking)
+
+
+def _outside_folds(both: list[tuple[Floats, Bools]]) -> tuple[Errors, Errors]:
+    to_mesh, to_surface = (errors_of(distance[~fold]) for distance, fold in both)
+    return to_mesh, to_surface
+
+
+def _greatest(
+    pair: _Pair, both: list[tuple[Floats, Bools]], shape: str, places: Places, material: str
+) -> Iterator[tuple[Spot, bool]]:  # fmt: skip
+    """The greatest errors of a part in one shape, both ways, outside and inside folds, and whether inside."""
+    for k, (distance, fold) in enumerate(both):
+        for inside in (False, True):
+            rows = np.flatnonzero(fold == inside)
+            if len(rows):
+                row = int(rows[distance[rows].argmax()])
+                place = places.name(pair.rest[k][row], material)
+                yield Spot(float(distance[row]), shape, pair.name, place, k == 0), inside
+
+
+def faces_of(mesh: FitMesh, part: FittedPart) -> Bools:
+    """(f,) the faces that a chart samples: those whose corners it all uses."""
+    used = np.zeros(len(mesh.vertices) + 1, bool)
+    used[part.chart.mix.indices] = True
+    used[-1] = True  # the missing fourth corner of triangles
+    return np.asarray(used[mesh.faces].all(axis=1))
+
+
+def _folded(mesh: FitMesh, part: FittedPart) -> Bools:
+    """(n,) vertices of the mesh that lie in folds of a chart, which its fit holds only loosely."""
+    mix = part.chart.mix
+    alone = np.diff(mix.indptr) == 1  # samples that are a vertex
+    out = np.zeros(len(mesh.vertices), bool)
+    out[mix.indices[mix.indptr[:-1][alone & part.chart.folded]]] = True
+    return out
+
+
+def _displacement(mesh: FitMesh, sources: dict[str, list[int]], shape: str) -> Floats:
+    """(n, 3) of the mesh's vertices in the pose that shows a shape."""
+    amounts = {n: v for n, v in pose_of(shape).items() if n in sources} if shape != NEUTRAL else {}
+    if shape == "tongueOut" and "jawOpen" in sources:  # opens the jaw as far as it needs
+        amounts["jawOpen"] = TONGUE_NEEDS
+    out = np.zeros_like(mesh.vertices)
+    for name, amount in amounts.items():
+        out += amount * mesh.deltas[sources[name]].sum(axis=0)
+    return out
+
+
+def _pieces(mesh: FitMesh, faces: Bools) -> tuple[str, ...]:
+    """Names of the objects that faces (f,) belong to, with their number."""
+    rows = np.flatnonzero(faces)
+    names = [mesh.piece_of(int(r)) or "unnamed" for r in rows]
+    return tuple(f"{n} ({names.count(n)} faces)" for n in sorted(set(names)))

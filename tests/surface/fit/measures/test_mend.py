@@ -1,0 +1,97 @@
+"""Control points that stick out of the mesh are put right; what cannot be mended is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slit_sheet import slit_sheet
+
+from surface.base.errors import FitError
+from surface.fit.api import fit_mesh
+from surface.fit.measures import mend
+from surface.fit.measures.dense import measure_dense
+from surface.fit.measures.mend import mend_spikes, turned_faces
+from surface.fit.points.report import FitResult
+from surface.fit.source.load import Loaded
+from surface.fit.source.mesh import FitMesh
+from surface.fit.source.names import map_names, sources_of
+from surface.head.model.data import Group, HeadData
+
+
+@pytest.fixture(scope="module")
+def mesh() -> FitMesh:
+    return slit_sheet()
+
+
+@pytest.fixture(scope="module")
+def result(mesh: FitMesh) -> FitResult:
+    return fit_mesh(Loaded(mesh, map_names(mesh.names)), "sheet", lambda part, done: None)
+
+
+def fine_point(head: HeadData) -> int:
+    """A control point in the middle of the left upper quarter."""
+    part = head.parts[0]
+    centres = np.column_stack([part.knots_u.mean(axis=1), part.knots_v.mean(axis=1)])
+    return int(np.argmin(np.linalg.norm(centres - [0.3, 0.78], axis=1)))
+
+
+def spiked(head: HeadData, mm: float) -> HeadData:
+    part = head.parts[0]
+    points = part.points.copy()
+    points[fine_point(head)] += [0.0, 0.0, mm]
+    return replace(head, parts=[replace(part, points=points), *head.parts[1:]])
+
+
+def greatest(head: HeadData, result: FitResult, mesh: FitMesh) -> float:
+    dense = measure_dense(head, mesh, sources_of(mesh.names), result.parts)
+    return max(b.to_mesh.max for b in dense.parts[head.parts[0].name].values())
+
+
+def test_a_spike_at_rest_is_mended(result: FitResult, mesh: FitMesh) -> None:
+    head = spiked(result.head, 90.0)
+    before = greatest(head, result, mesh)
+    mended, dense, notes = mend_spikes(head, mesh, sources_of(mesh.names), result.parts, 1.0)
+    assert before > 15.0 and greatest(mended, result, mesh) < 4.0
+    assert len(notes) >= 1 and "neutral" in notes[0] and dense.worst is not None
+
+
+def test_a_spike_in_a_shape_is_mended_and_the_rest_stays(result: FitResult, mesh: FitMesh) -> None:
+    part = result.head.parts[0]
+    bad = fine_point(result.head)
+    groups = []
+    for g in part.groups:
+        moves = np.zeros((len(part.points), 3), np.float32)
+        moves[g.ids] = g.moves
+        moves[bad] += np.float32([0.0, 0.0, 90.0]) * (g.name == "jawOpen")
+        ids = np.flatnonzero(np.abs(moves).max(axis=1) > 0).astype(np.int32)
+        groups.append(Group(g.name, ids, moves[ids]))
+    head = replace(result.head, parts=[replace(part, groups=groups), *result.head.parts[1:]])
+    mended, _, notes = mend_spikes(head, mesh, sources_of(mesh.names), result.parts, 1.0)
+    assert greatest(head, result, mesh) > 15.0 and greatest(mended, result, mesh) < 4.0
+    assert "jawOpen" in notes[0]
+    np.testing.assert_array_equal(mended.parts[0].points, part.points)
+
+
+def test_a_good_fit_is_left_as_it_is(result: FitResult, mesh: FitMesh) -> None:
+    head, _, notes = mend_spikes(result.head, mesh, sources_of(mesh.names), result.parts, 1.0)
+    assert head is result.head and notes == []
+
+
+def test_what_cannot_be_mended_is_refused(
+    result: FitResult, mesh: FitMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    monkeypatch.setattr(mend, "NEIGHBOURS", 0)
+    with pytest.raises(FitError, match="the fitted face sticks out of the mesh by") as caught:
+        mend_spikes(spiked(result.head, 300.0), mesh, sources_of(mesh.names), result.parts, 1.0)
+    assert "at rest" in str(caught.value) and "unwrap the mesh" in caught.value.hint
+
+
+def test_faces_turned_over_in_the_texture_are_counted(mesh: FitMesh) -> None:
+    assert turned_faces(mesh) == []
+    uv = mesh.uv.copy()
+    inner = int(np.argmin(np.linalg.norm(uv - [0.25, 0.25], axis=1)))
+    uv[inner] += [0.09, 0.0]
+    (note,) = turned_faces(replace(mesh, uv=uv))
+    assert note.endswith("are turned over in (u, v)") and 1 <= int(note.split()[0]) <= 4
