@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from slit_sheet import slit_sheet
 
-from surface.fit.points.nurbsnet import MULTIPLES, uniform_nets
+from surface.fit.points.nurbsnet import STEP, STEPS, uniform_nets
 from surface.fit.source.chart import TILE, Chart, make_chart
 from surface.fit.source.islands import find_islands
 
@@ -20,21 +20,31 @@ def cubic(uv: np.ndarray) -> np.ndarray:
     return np.column_stack([20 * u, 10 * v**2, 5 * u**3 - 8 * u * v])
 
 
-def test_the_first_net_has_about_as_many_points_and_is_exact_for_a_cubic(chart):
-    (net,) = uniform_nets(chart, cubic(chart.uv), 120, 0.01)
-    assert 90 < net.points < 150 and net.rms < 0.01
+def test_a_cubic_needs_the_smallest_net(chart):
+    nets = uniform_nets(chart, cubic(chart.uv), 120, 0.01)
+    assert nets[-1].rms < 0.01 and nets[-1].points < 100
+    assert all(n.rms > 0.01 for n in nets[:-1])
 
 
-def test_nets_grow_until_one_is_good_enough(chart):
+def test_the_smallest_net_that_is_good_enough_is_found_to_a_tenth(chart):
     u, v = chart.uv.T
     targets = np.column_stack([u, v, np.sin(25 * u) * np.sin(25 * v)])
-    every = uniform_nets(chart, targets, 60, 0.0)
-    assert len(every) == len(MULTIPLES)
-    sizes, errors = [n.points for n in every], [n.rms for n in every]
-    np.testing.assert_allclose(sizes, 60 * np.array(MULTIPLES), rtol=0.25)
-    assert errors == sorted(errors, reverse=True) and errors[-1] < 0.2 * errors[0]
-    enough = uniform_nets(chart, targets, 60, errors[2])
-    assert enough == every[:3]
+    nets = uniform_nets(chart, targets, 60, 0.05)
+    sizes, errors = [n.points for n in nets], [n.rms for n in nets]
+    assert sizes == sorted(sizes) and errors[-1] <= 0.05 < errors[-2]
+    assert sizes[-1] < 1.35 * sizes[-2]
+    (largest,) = uniform_nets(chart, targets, 60, 0.0)
+    assert largest.points == pytest.approx(60 * STEP ** STEPS[1], rel=0.25)
+
+
+def test_nets_are_split_at_slits(chart):
+    (cut,) = chart.cuts
+    across = (chart.uv[:, 0] - 0.5 * (cut.start + cut.end)) / (0.5 * (cut.end - cut.start))
+    hump = 9.0 * np.clip(1.0 - across**2, 0.0, 1.0) ** 2  # fades where the slit ends
+    targets = np.column_stack([*chart.uv.T, np.where(chart.uv[:, 1] > cut.v, 0.0, hump)])
+    whole = Chart(chart.uv, chart.mix, chart.weight, chart.spacing, chart.folded, [], [])
+    with_slit, without = (uniform_nets(c, targets, 60, 0.0)[0].rms for c in (chart, whole))
+    assert with_slit < 0.9 * without
 
 
 def test_only_the_first_tile_counts_and_folds_are_not_measured(chart):
@@ -42,9 +52,10 @@ def test_only_the_first_tile_counts_and_folds_are_not_measured(chart):
     beside = chart.uv + np.array([TILE, 0.0])
     rows = {k: np.concatenate([getattr(chart, k)] * 2) for k in ("weight", "spacing", "folded")}
     two = Chart(np.vstack([chart.uv, beside]), chart.mix, **rows, loops=[], loop_vertices=[])
+    whole = Chart(chart.uv, chart.mix, **{k: getattr(chart, k) for k in rows}, loops=[], loop_vertices=[])
     (alone,), (first,) = (
-        uniform_nets(chart, targets, 120, 1.0),
-        uniform_nets(two, np.vstack([targets, targets * 9]), 120, 1.0),
+        uniform_nets(whole, targets, 12, 0.0),
+        uniform_nets(two, np.vstack([targets, targets * 9]), 12, 0.0),
     )
     assert alone == first
     chart.folded[:5] = True
