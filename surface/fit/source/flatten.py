@@ -127,7 +127,7 @@ def _with_form(points: Floats, tri: Ints) -> Floats:
 def _relaxed(points: Floats, tri: Ints, start: Floats, rim: Ints) -> Floats:
     """The map after as many rounds of SLIM as leave it one-to-one."""
     with importing("making charts of a mesh without usable texture coordinates", "igl"):
-        import igl
+        import igl  # most meshes bring texture coordinates of their own
 
     best, size = start, float(np.ptp(start, axis=0).max())
     faces = np.asfortranarray(tri.astype(np.int32))
