@@ -14,6 +14,7 @@ EXTRAS = {
     "imgui_bundle": ("imgui-bundle", "view"),
     "scipy": ("scipy", "fit"),
     "trimesh": ("trimesh", "fit"),
+    "igl": ("libigl", "fit"),
     "rhino3dm": ("rhino3dm", "cad"),
 }
 """Name of a package and the extra of pyproject.toml that brings it, by the name under which it is imported."""

@@ -14,6 +14,7 @@ from scipy.sparse import csr_matrix, identity
 from scipy.sparse.linalg import splu
 
 from surface.base.arrays import Bools, Floats, Ints
+from surface.base.extras import importing
 from surface.fit.source.islands import Island, boundary_loops
 
 ROUNDS, STEPS = 12, 4  # of SLIM: after so many steps the map is looked at
@@ -125,7 +126,8 @@ def _with_form(points: Floats, tri: Ints) -> Floats:
 
 def _relaxed(points: Floats, tri: Ints, start: Floats, rim: Ints) -> Floats:
     """The map after as many rounds of SLIM as leave it one-to-one."""
-    import igl  # most meshes bring texture coordinates of their own
+    with importing("making charts of a mesh without usable texture coordinates", "igl"):
+        import igl  # most meshes bring texture coordinates of their own
 
     best, size = start, float(np.ptp(start, axis=0).max())
     faces = np.asfortranarray(tri.astype(np.int32))

@@ -198,12 +198,14 @@ def front_seams(mesh: FitMesh, islands: list[Island], faces: Ints) -> float:
 
 
 def _front(mesh: FitMesh, faces: Ints) -> Bools:
-    """(n,) vertices that look forwards, where most of the movement is (or in the middle of a mesh without shapes)."""
+    """(n,) vertices that look forwards, where most of the movement is; none where shapes do not tell."""
     used = np.unique(mesh.faces[faces])
     used = used[used >= 0]
     moved = np.linalg.norm(mesh.deltas[:, used], axis=2).sum(axis=0)
-    share = moved / moved.sum() if moved.sum() > 0 else np.full(len(used), 1.0 / len(used))
     inside = np.zeros(len(mesh.vertices), bool)
+    if not moved.sum() > 0:
+        return inside
+    share = moved / moved.sum()
     inside[used] = True
     for axis in (0, 1):
         order = np.argsort(mesh.vertices[used, axis])

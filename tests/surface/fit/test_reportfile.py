@@ -15,11 +15,9 @@ from surface.base.errors import FitError, ViewError
 from surface.fit import reportfile
 from surface.fit.api import fit_mesh
 from surface.fit.features.eyes import MISSING
-from surface.fit.points.nurbsnet import UniformNet, uniform_nets
+from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds, kinds_line
 from surface.fit.reportfile import EXCLUDED, SCALE, _colours, as_markdown, as_table, write_report
-from surface.fit.source.chart import make_chart
-from surface.fit.source.islands import find_islands
 from surface.fit.source.load import Loaded
 from surface.fit.source.names import map_names
 from surface.head import Head
@@ -259,19 +257,6 @@ def test_nothing_is_left_where_it_cannot_be_written(result, tmp_path):
     with pytest.raises(FitError, match="the report cannot be written"):
         write_report(result, tmp_path / "file", lambda part, done: None)
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
-
-
-def test_uniform_nets_grow_until_they_are_as_good():
-    mesh = slit_sheet()
-    (island,) = find_islands(mesh)
-    chart = make_chart(mesh, [island], normalise=False)
-    targets = chart.mix @ mesh.vertices
-    targets[:, 2] = 9 * np.sin(40 * chart.uv[:, 0]) * np.exp(-(((chart.uv[:, 0] - 0.7) / 0.1) ** 2))
-    nets = uniform_nets(chart, targets, 100, 0.05)
-    assert [n.rms for n in nets] == sorted((n.rms for n in nets), reverse=True)
-    assert 80 < nets[0].points < 130 and nets[0].rms > 0.3
-    assert nets[-1].rms <= 0.05 or len(nets) == 5
-    assert len(uniform_nets(chart, targets, 100, 1e9)) == 1
 
 
 def test_the_verdict_on_uniform_nets_is_the_first_that_is_as_good() -> None:

@@ -1,0 +1,119 @@
+"""Unusable texture coordinates are noticed, and replaced by charts without flips, overlaps or spikes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import uv_traps
+from slit_sheet import slit_sheet
+
+from surface.fit.points.refine import FitRequest, fit_chart
+from surface.fit.points.solve import basis
+from surface.fit.source.chart import make_chart
+from surface.fit.source.flatten import crosses_itself
+from surface.fit.source.islands import Island, boundary_loops, signed_areas
+from surface.fit.source.layout import lay_out, middle_line, open_flat_holes, straighten_holes
+from surface.fit.source.mesh import FitMesh
+from surface.fit.source.owncharts import own_islands, usable_islands
+from surface.fit.source.uvcheck import measure_uv
+
+
+def every(mesh: FitMesh) -> np.ndarray:
+    return np.arange(len(mesh.faces))
+
+
+def one_to_one(island: Island) -> bool:
+    """No face the wrong way round, and no outline that crosses itself."""
+    return bool((signed_areas(island) > 0).all()) and not crosses_itself(island.uv[boundary_loops(island)[0]])
+
+
+def test_good_coordinates_stay_as_they_are():
+    mesh = slit_sheet()
+    notes: list[str] = []
+    (island,) = usable_islands(mesh, every(mesh), 1.0, notes, "face", face=True)
+    assert notes == []
+    np.testing.assert_array_equal(np.unique(island.uv, axis=0), np.unique(mesh.uv, axis=0))
+    moved = replace(mesh, uv=mesh.uv + np.array([3.0, -2.0]))  # another tile
+    assert not measure_uv(moved, every(moved), face=True).faults()
+
+
+@pytest.mark.parametrize(
+    ("trap", "said"),
+    [
+        (uv_traps.bare, "none at all"),
+        (uv_traps.flipped, "faces flipped"),
+        (uv_traps.overlapping, "a seam of"),
+        (lambda m: replace(m, uv=m.uv * [1.0, 0.0]), "100 % of the surface squeezed"),
+    ],
+)
+def test_traps_are_named_and_replaced_by_one_disc_with_the_slit_as_a_hole(trap, said):
+    mesh = trap(slit_sheet())
+    notes: list[str] = []
+    (island,) = usable_islands(mesh, every(mesh), 1.0, notes, "face", face=True)
+    assert said in notes[0] and "omote made its own, 1 chart without flipped" in notes[0]
+    assert one_to_one(island) and len(island.faces) == len(mesh.faces) and len(boundary_loops(island)) == 2
+    again = replace(mesh, uv=island.uv, face_uv=island.faces)
+    order = replace(again, faces=np.where(island.faces >= 0, island.vertex[island.faces], -1))
+    assert measure_uv(order, every(order)).apart_mm == 0.0
+
+
+def test_a_bad_island_is_replaced_and_the_other_stays():
+    mesh = slit_sheet()
+    count = len(mesh.uv)
+    two = replace(
+        mesh, vertices=np.vstack([mesh.vertices, mesh.vertices + np.array([300.0, 0, 0])]),
+        faces=np.vstack([mesh.faces, mesh.faces + count]),
+        uv=np.vstack([mesh.uv, uv_traps.flipped(mesh).uv + 2.0]), face_uv=np.vstack([mesh.faces, mesh.faces + count]),
+        deltas=np.tile(mesh.deltas, (1, 2, 1)),
+    )  # fmt: skip
+    notes: list[str] = []
+    made, given = usable_islands(two, every(two), 1.0, notes, "coat")
+    assert "the file has not everywhere usable texture coordinates" in notes[0]
+    assert given.vertex.max() < count <= made.vertex.min()
+    np.testing.assert_array_equal(np.unique(given.uv, axis=0), np.unique(mesh.uv, axis=0))
+
+
+@pytest.mark.parametrize("seam_in_front", [False, True])
+def test_a_decimated_face_with_cylindrical_coordinates_is_fitted_without_spikes(shared, seam_in_front):
+    mesh = uv_traps.around(uv_traps.arkit_like(shared), seam_in_front=seam_in_front)
+    assert "faces flipped" in measure_uv(mesh, every(mesh), face=True).faults()[0]
+    islands = own_islands(mesh, every(mesh), face=True)
+    assert all(one_to_one(i) for i in islands)
+    (face,) = lay_out(mesh, islands[:1])
+    assert len(face.faces) > 0.95 * len(mesh.faces)
+    face = open_flat_holes(straighten_holes(face))
+    holes = sorted((face.uv[loop] for loop in boundary_loops(face)[1:]), key=lambda rim: -float(np.ptp(rim[:, 0])))
+    assert all(np.ptp(rim, axis=0)[0] > np.ptp(rim, axis=0)[1] for rim in holes[:3])  # mouth and eyes lie along u
+    if seam_in_front:
+        check_no_spikes(mesh, face, 400)
+
+
+def check_no_spikes(mesh: FitMesh, island: Island, points: int) -> None:
+    """Fit an island; nowhere, samples or not, may it move further than the mesh does around."""
+    request = FitRequest(points, neutral_mm=0.25, shape_mm=0.45, finest=0.9, astray_mm=1.8, spare=60)
+    fitted = fit_chart(mesh, make_chart(mesh, [island], normalise=False, doubt_slivers=True), request)
+    uv, corner, _ = uv_traps.strewn(island)
+    rows = basis(fitted.net, uv)
+    for move, delta in zip(fitted.moves, mesh.deltas, strict=True):
+        longest = np.linalg.norm(delta[corner], axis=2).max(axis=1)
+        assert (np.linalg.norm(rows @ move, axis=1) < longest + 3.0).all()
+
+
+def test_contradicting_samples_raise_no_spike():
+    mesh = uv_traps.overlapping(slit_sheet())
+    island = Island(np.arange(len(mesh.uv)), mesh.uv, mesh.faces)
+    request = FitRequest(400, coarse=0.1)
+    fitted = fit_chart(mesh, make_chart(mesh, [island], normalise=False), request)
+    moved = np.linalg.norm(basis(fitted.net, uv_traps.strewn(island)[0]) @ fitted.moves[0], axis=1)
+    assert moved.max() < np.linalg.norm(mesh.deltas[0], axis=1).max() + 2.5
+
+
+def test_bent_holes_become_straight_along_u():
+    mesh = slit_sheet()
+    bent = mesh.uv + np.column_stack([np.zeros(len(mesh.uv)), 0.5 * (mesh.uv[:, 0] - 0.5) ** 2 + 0.2 * mesh.uv[:, 0]])
+    island = Island(np.arange(len(mesh.uv)), bent, mesh.faces)
+    straight = straighten_holes(island)
+    rim = straight.uv[boundary_loops(straight)[1]]
+    u = np.linspace(rim[:, 0].min(), rim[:, 0].max(), 21)[1:-1]
+    middle, half = middle_line(rim, u)
+    assert np.ptp(middle) < 0.2 * half.min() and (signed_areas(straight) > 0).all()
