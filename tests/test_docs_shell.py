@@ -195,9 +195,11 @@ def has_packages(line: str) -> None:
 
 
 def has_program(line: str) -> None:
-    """A script of the checkout, or code that imports what is there."""
+    """A script or a module of the checkout, or code that imports what is there."""
     first, *more = shlex.split(line)[1:]
-    if first == "-c":
+    if first == "-m":
+        assert (ROOT / more[0].replace(".", "/")).with_suffix(".py").is_file()
+    elif first == "-c":
         exec(more[0].partition(";")[0])
     else:
         assert (ROOT / first).is_file()

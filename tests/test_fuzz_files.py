@@ -18,6 +18,7 @@ import pytest
 
 from tests.fuzz.corpus import Kind
 from tests.fuzz.files import Fuzzer, Turn, turns_of
+from tests.fuzz.guided import Target
 from tests.fuzz.mutators import mutate
 from tests.fuzz.structures import change_tree, damage_arrays
 
@@ -137,3 +138,13 @@ def test_arrays_of_every_shape_can_be_damaged() -> None:
     np.savez(stored, none=np.zeros(0), one=np.array(7), many=np.ones((3, 4)), names=np.array(["a", "bc"]))
     changed = [damage_arrays(stored.getvalue(), random.Random(k)) for k in range(500)]
     assert None not in changed and len(set(changed)) > 100
+
+
+def test_the_guided_fuzzer_keeps_the_first_finding_of_each_sort(tmp_path: Path) -> None:
+    target = Target(
+        Kind("k", "k.dat", [b""], lambda path: int(path.read_bytes())), tmp_path / "work", tmp_path / "kept"
+    )
+    for data in (b"0", b"x1", b"70", b"x2", b"70"):
+        target(data)
+    assert target.runs == 5 and len(target.sorts) == 2
+    assert [path.read_bytes() for path in sorted((tmp_path / "kept").glob("*.dat"))] == [b"x1", b"70"]

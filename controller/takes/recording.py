@@ -27,6 +27,7 @@ SUFFIX = ".rec"
 
 _KIND, _VERSION = "omote recording", 1
 _LONGEST_LINE = 1 << 20
+_SHORTEST_TICK_S, _LONGEST_TICK_S = 1e-4, 1.0
 _COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live")
 
 
@@ -182,7 +183,11 @@ def _header(path: Path, lines: Iterator[tuple[int, list[Any]]], parameters: Para
         raise ControllerError(f"{path}: not a recording of version {_VERSION}", hint="record it again")
     if items[4] != list(parameters.names):
         raise ControllerError(f"{path}: recorded with other parameters", hint="use the vocabulary it was recorded with")
-    return items[2], float(items[3])
+    seed, period_s = items[2:4]
+    numbers = not isinstance(seed, bool) and isinstance(period_s, int | float) and not isinstance(period_s, bool)
+    if not (numbers and seed >= 0 and _SHORTEST_TICK_S <= period_s <= _LONGEST_TICK_S):
+        raise _damaged(path, 1)
+    return seed, float(period_s)
 
 
 def _damaged(path: Path, number: int) -> ControllerError:

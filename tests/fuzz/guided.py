@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import io
 import random
 import re
 import subprocess
@@ -19,6 +18,7 @@ import sys
 import tempfile
 import time
 import traceback
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -27,7 +27,7 @@ from typing import Any
 from tests.fuzz.corpus import Kind, kinds
 from tests.fuzz.files import warm_up
 from tests.fuzz.mutators import MUTATORS, flip_bits, mutate
-from tests.fuzz.outcome import Outcome
+from tests.fuzz.outcome import MOST_TEXT, Outcome
 from tests.fuzz.processes import time_used
 from tests.fuzz.reading import quickened
 
@@ -48,20 +48,20 @@ class Target:
 
     def __init__(self, kind: Kind, folder: Path, keep: Path) -> None:
         self.runs, self.sorts = 0, set[str]()
-        self._kind, self._path, self._keep = kind, kind.lay_out(folder), keep
+        self._kind, self._folder, self._path, self._keep = kind, folder, kind.lay_out(folder), keep
 
     def __call__(self, data: bytes) -> None:
         """Read one file; never raises, so that the fuzzer goes on."""
         self.runs += 1
         self._path.write_bytes(data)
-        before_s, said = time_used(), io.StringIO()
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        before_s, said = time_used(), self._folder / "said.txt"
+        with streams(said):
             try:
                 code = self._kind.read(self._path)
             except Exception:  # noqa: BLE001  it is the finding
                 code = 99
                 traceback.print_exc()
-        outcome = Outcome(code, time_used() - before_s, 0.0, said.getvalue())
+        outcome = Outcome(code, time_used() - before_s, 0.0, said.read_text(errors="replace")[:MOST_TEXT])
         if outcome.fault:
             self._note(data, outcome)
 
@@ -76,6 +76,19 @@ class Target:
         (self._keep / f"{stem}-{self._path.name}").write_bytes(data)
         (self._keep / f"{stem}.txt").write_text(f"{outcome.fault}\n{outcome.output}", encoding="utf-8")
         print(f"{self._kind.name}: {outcome.fault}: {last[:200]}", flush=True)
+
+
+@contextlib.contextmanager
+def streams(path: Path) -> Iterator[None]:
+    """Turn the output of this process to a file, as that of a command may be."""
+    kept = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = path.open("w", encoding="utf-8"), path.open("a", encoding="utf-8")
+    try:
+        yield
+    finally:
+        for stream in (sys.stdout, sys.stderr):  # those that omote put in their place
+            stream.close()
+        sys.stdout, sys.stderr = kept
 
 
 def instrument(fuzzer: Any) -> int:

@@ -12,8 +12,11 @@ from unittest.mock import patch
 
 from typer.main import get_command
 
+from controller.base.paths import find_config
 from controller.cli import app
+from controller.tools.check import DEFAULT_HEAD
 from surface.base.errors import SurfaceError
+from surface.head.model import file
 from surface.readers import rhino
 
 
@@ -48,9 +51,17 @@ def reports(read: Callable[[Path], object]) -> Callable[[Path], int]:
 
 @contextmanager
 def quickened() -> Iterator[None]:
-    """No work is done again for each file: commands are put together once, and .3dm files tried in a forked process."""
+    """No work is done again for each file: commands are put together once, the shipped head that groups belong to is
+    read once, and .3dm files are tried in a forked process.
+    """
     command = get_command(app.make_app())
-    with patch.object(app, "make_app", lambda: command), patch.object(rhino, "_is_readable", _tried_in_fork):
+    shipped, load = find_config("heads", DEFAULT_HEAD), file.load_data
+    head = load(shipped)
+    with (
+        patch.object(app, "make_app", lambda: command),
+        patch.object(file, "load_data", lambda path: head if path == shipped else load(path)),
+        patch.object(rhino, "_is_readable", _tried_in_fork),
+    ):
         yield
 
 

@@ -74,7 +74,8 @@ class _Section:
         return [_Section(self.path, t, f"{self.where}{key}[{i}].") for i, t in enumerate(tables)]
 
     def _value(self, key: str, kind: type | tuple[type, ...]) -> Any:
-        if not isinstance(self.table.get(key), kind):
+        value = self.table.get(key)
+        if not isinstance(value, kind) or isinstance(value, bool):  # bool is an int, and no key wants one
             raise self.error(key, "missing" if key not in self.table else f"{self.table[key]!r} is of the wrong kind")
         return self.table[key]
 

@@ -102,6 +102,16 @@ def test_broken_files_say_why(tmp_path: Path, text: str, message: str) -> None:
         list(replay(path, P))
 
 
+@pytest.mark.parametrize(
+    ("seed", "period"),
+    [("0", '"x"'), ("0", "null"), ("0", "0"), ("0", "-1"), ("0", "NaN"), ("0", "1e9"), ("0", "true"), ("-1", "0.01")],
+)
+def test_a_seed_or_a_length_of_a_tick_that_none_has_is_damage(tmp_path: Path, seed: str, period: str) -> None:
+    (tmp_path / "a").write_text(f'["omote recording",1,{seed},{period},{json.dumps(P.names)}]\n')
+    with pytest.raises(ControllerError, match="line 1: damaged"):
+        list(replay(tmp_path / "a", P))
+
+
 @pytest.mark.parametrize("line", ['["system","ls"]', '["tick",1]', '["gaze","a","b",0]', "[1", '["write_layer","x"]'])
 def test_a_damaged_line_is_named_and_nothing_else_is_called(tmp_path: Path, line: str) -> None:
     path = tmp_path / "a"

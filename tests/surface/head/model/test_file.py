@@ -80,6 +80,12 @@ def test_contacts_come_back(folder):
     assert got.places.dtype == float
 
 
+def test_a_truth_value_is_no_number(folder):
+    save_data(folder, small_head(contacts=[Contact("lids", "a", ("b",), 1, 5.5, 0.75, np.zeros((2, 3, 3, 2)))]))
+    edit(folder, "eye = 1", "eye = true")
+    broken(folder, r"contacts\[0\]\.eye: True is of the wrong kind")
+
+
 def test_an_edited_rule_needs_numbers(folder):
     save_data(folder, small_head(rules=[Rule("fold", ({"jawOpen": 1.0},), 2.0)]))
     edit(folder, "jawOpen = 1.0", 'jawOpen = "much"')
