@@ -19,7 +19,7 @@ from surface.head.posing.rig import SkinRig
 REACH_MM = 3.0  # to either side: over so much skin the turn and stretch of a displacement are measured
 STRETCH = (0.6, 1.6)  # least and most of a displacement
 RIGID = ("teeth", "gums", "tongue")
-SETTLINGS = 3
+SETTLINGS = 2
 
 
 def carry(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
@@ -90,19 +90,20 @@ def _laplacian(triangles: Ints, n: int) -> coo_matrix:
 def close_lips(skin: Skin, contact: Contact, scale: float) -> None:
     """Take back what the scan's lips stand further apart than those of the head the skin comes from."""
     rows = skin.surface.evaluate(contact.places.reshape(-1, 2)).reshape(*contact.places.shape[:3], 3)
-    moved = _followed(rows.reshape(-1, 3), skin.rest, skin.at - skin.rest).reshape(rows.shape)
-    apart = moved[0, :, 0] - moved[1, :, 0] - (scale - 1.0) * (rows[0, :, 0] - rows[1, :, 0])
+    uv = skin.mesh.uv  # in which the lips are apart; in space each touches the other
+    share = _nearest_shares(contact.places[:, :, 0].reshape(-1, 2), uv)
+    moved = (share @ (skin.at - skin.rest)).reshape(*rows.shape[:2], 3)
+    apart = moved[0] - moved[1] - (scale - 1.0) * (rows[0, :, 0] - rows[1, :, 0])
     apart[:, [0, 2]] = 0.0
     x = rows[:, :, 0, 0].mean(axis=0)
     order = np.argsort(x)
-    touching = rows.shape[2] * 2 // 3
-    distance = np.stack([cKDTree(side[:, :touching].reshape(-1, 3)).query(skin.rest)[0] for side in rows])
+    distance = np.stack([cKDTree(side.reshape(-1, 2)).query(uv)[0] for side in contact.places])
     rim = np.stack([cKDTree(side[:, 0]).query(skin.rest)[0] for side in rows])
     side = (distance[1] < distance[0]).astype(int)
     fade = 1.0 - smoothstep(rim.min(axis=0), 0.0, LIP_FADE_MM)
     push = np.column_stack([np.interp(skin.rest[:, 0], x[order], apart[order, k]) for k in range(3)])
-    share = np.where(side == 0, -contact.share, 1.0 - contact.share)
-    skin.at = skin.at + (share * fade)[:, None] * push
+    part = np.where(side == 0, -contact.share, 1.0 - contact.share)
+    skin.at = skin.at + (part * fade)[:, None] * push
 
 
 def seat(points: Floats, rest: Floats, old: Ball, new: Ball) -> Floats:
@@ -117,6 +118,15 @@ def seat(points: Floats, rest: Floats, old: Ball, new: Ball) -> Floats:
     move = np.abs(share) * (new.radius + above - length)
     seated: Floats = points + (move / length)[:, None] * offset
     return seated
+
+
+def _nearest_shares(places: Floats, uv: Floats) -> csr_matrix:
+    """(m, n) shares of the nearest of uv (n, 2) in each of places (m, 2)."""
+    distance, near = cKDTree(uv).query(places, k=3)
+    weight = 1.0 / (distance + 1e-6)
+    weight /= weight.sum(axis=1, keepdims=True)
+    rows = np.repeat(np.arange(len(places)), 3)
+    return csr_matrix((weight.ravel(), (rows, near.ravel())), shape=(len(places), len(uv)))
 
 
 def _followed(points: Floats, rest: Floats, moves: Floats) -> Floats:
