@@ -14,7 +14,7 @@ from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.rig import SkinRig
 
 SIDES = (("left_lids", "eyeBlinkLeft"), ("right_lids", "eyeBlinkRight"))
-TRIES, STEP, RANGE = 6, 0.8, (-0.3, 1.0)  # of scaling a blink; share of the gap per step; least and most change
+TRIES, STEP, RANGE = 8, 0.8, (-0.3, 1.5)  # of scaling a blink; share of the gap per step; least and most change
 SHORT_MM = 1.0  # lids whose way is shorter than this, at the corners, are changed less
 
 
