@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from surface.fit.points.report import FitReport  # start-up: --help does without it
 
 _NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
+_NO_SHAPES = "the mesh has no shapes: --expressions-from ict gives it those of another head"
 Identity = Annotated[
     str | None,
     typer.Option(
@@ -177,6 +178,7 @@ def fit(
         remarks = [face_bounds(found), *filter(None, [kinds_line(found)]), *found.notes]
         remarks += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
         remarks += [f"left out, not ARKit's: {left_out}"] if left_out else []
+        remarks += [_NO_SHAPES] if not found.parameters else []
         remarks += [] if shaded else [_NO_SHADE]
         remarks += reversed(found.dense.lines()) if found.dense else []
         for line in remarks:

@@ -28,10 +28,8 @@ from surface.head.model.file import check_writable
 MANY = 250_000  # samples of the head once it is found
 MARGIN = 0.35  # in heights of the face: around a head, what belongs to it
 USUAL = (0.7, 1.45)  # sizes, relative to the head the expressions come from, that heads of people have
-WRONG, MUCH = (
-    0.2,
-    0.5,
-)  # RMS of landmarks off a head's own, in its heights; what a swap takes of it
+WRONG = 0.2  # in heights of the face: RMS of a face's landmarks off the head's own
+SWAPPED, MUCH = 0.04, 0.5  # the same where sides may be exchanged; share of it that is left by exchanging them
 LEAST_PICKED = 4  # landmarks that a scan is aligned by; with fewer its face is looked for
 
 
@@ -101,7 +99,7 @@ def _find(
         return align(template, sample(scan), up, forward, where)
     found, off = _by_landmarks(picked, template)
     mirrored = _by_landmarks(swapped(picked), template)[1]
-    if off > WRONG and mirrored < MUCH * off:
+    if off > SWAPPED and mirrored < MUCH * off:
         hint = "left is the subject's left, which is on the right of a picture from the front"
         raise FitError(f"{where}: left and right of its landmarks are exchanged", hint=hint)
     if off > WRONG:

@@ -19,7 +19,7 @@ from surface.head.posing.rig import SkinRig
 REACH_MM = 3.0  # to either side: over so much skin the turn and stretch of a displacement are measured
 STRETCH = (0.6, 1.6)  # least and most of a displacement
 RIGID = ("teeth", "gums", "tongue")
-SETTLINGS = 3
+SETTLINGS = 2
 
 
 def carry(
@@ -43,7 +43,7 @@ def carry(
         elif part.material in RIGID:
             points = teeth.points(part.points)
         elif part.name in skins:
-            points = skins[part.name].control_points()
+            points = skins[part.name].points
         else:
             points = seat(follow_skin(part.points, face, warp), part.points, old, new)
         linear = np.tile(teeth.scale * np.eye(3), (len(points), 1, 1))
@@ -68,9 +68,10 @@ def _skins(head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball) -> di
         if part.follows == "skin" and part.material == "skin" and part.name != "sockets":
             skin = Skin(part, rims, warp)
             skin.follow(matcher, scale)
+            skin.at = seat(skin.at, skin.rest, old, new)
+            skin.solve()
             if part.name == lips.part:
                 close_lips(skin, lips, scale)
-            skin.at = seat(skin.at, skin.rest, old, new)
             out[part.name] = skin
     return out
 

@@ -14,7 +14,7 @@ from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.rig import SkinRig
 
 SIDES = (("left_lids", "eyeBlinkLeft"), ("right_lids", "eyeBlinkRight"))
-TRIES, STEP, RANGE = 8, 0.7, (-0.3, 1.0)  # of scaling a blink; share of the gap per step; least and most change
+TRIES, STEP, RANGE = 8, 0.8, (-0.3, 1.5)  # of scaling a blink; share of the gap per step; least and most change
 SHORT_MM = 1.0  # lids whose way is shorter than this, at the corners, are changed less
 
 
@@ -51,7 +51,8 @@ def _gap(head: HeadData, contact: Contact, edges: csr_matrix, shape: str, value:
     above the highest of the lower one, mm."""
     face = _face(head, contact)
     values = np.array([value if n == shape else 0.0 for n in NAMES])
-    at = edges @ SkinRig(face, head).apply(read_pose(values))
+    alone = replace(head, contacts=[contact])  # others are too far away to matter, and cost time
+    at = edges @ SkinRig(face, alone).apply(read_pose(values))
     rest = (edges @ face.points).reshape(*contact.places.shape[:3], 3)
     upper, lower = np.asarray(at).reshape(*contact.places.shape[:3], 3)
     touching = upper.shape[1] * 2 // 3
@@ -62,14 +63,10 @@ def _gap(head: HeadData, contact: Contact, edges: csr_matrix, shape: str, value:
 def _with_share(head: HeadData, shape: str, x: Floats, share: Floats) -> HeadData:
     """The head with the groups of a shape enlarged by ``share`` at places ``x``."""
     order = np.argsort(x)
-    parts = []
-    for part in head.parts:
-        groups = []
-        for g in part.groups:
-            if g.name == shape:
-                more = 1.0 + np.interp(part.points[g.ids, 0], x[order], share[order])
-                groups.append(Group(g.name, g.ids, (more[:, None] * g.moves).astype(np.float32)))
-            else:
-                groups.append(g)
-        parts.append(replace(part, groups=groups))
+
+    def enlarged(part: PartData, g: Group) -> Group:
+        more = 1.0 + np.interp(part.points[g.ids, 0], x[order], share[order])
+        return Group(g.name, g.ids, (more[:, None] * g.moves).astype(np.float32))
+
+    parts = [replace(p, groups=[enlarged(p, g) if g.name == shape else g for g in p.groups]) for p in head.parts]
     return replace(head, parts=parts)

@@ -153,13 +153,22 @@ def sample(scan: Scan, count: int = SAMPLES) -> Samples:
     points = np.einsum("mk,mkc->mc", share, scan.vertices[corners])
     normals = np.einsum("mk,mkc->mc", share, vertex_normals(scan)[corners])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
-    edge = 0.5 * (scan.vertices[(ends := borders_of(scan))[0]] + scan.vertices[ends[1]])
     area = 0.5 * np.linalg.norm(_cross(scan.vertices, scan.triangles), axis=1).sum()
-    near = 1.5 * np.sqrt(area / count)
-    border = np.zeros(count, bool)
-    if len(edge):
-        border = cKDTree(np.vstack([edge, scan.vertices[ends[0]]])).query(points)[0] < near
+    near = 1.5 * float(np.sqrt(area / count))
+    line = _border_line(scan, near)
+    border = cKDTree(line).query(points)[0] < near if len(line) else np.zeros(count, bool)
     return Samples(points, normals, border)
+
+
+def _border_line(scan: Scan, apart: float) -> Floats:
+    """Points (k, 3) along the border of a scan, none further than ``apart`` from the next."""
+    a, b = (scan.vertices[ids] for ids in borders_of(scan))
+    pieces = np.ceil(np.linalg.norm(b - a, axis=1) / apart).astype(np.int64)
+    edge = np.repeat(np.arange(len(a)), pieces)
+    first = np.cumsum(pieces) - pieces
+    share = ((np.arange(len(edge)) - first[edge]) / np.maximum(pieces, 1)[edge])[:, None]
+    line: Floats = a[edge] + share * (b - a)[edge]
+    return line
 
 
 def vertex_normals(scan: Scan) -> Floats:

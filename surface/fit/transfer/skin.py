@@ -22,7 +22,8 @@ from surface.head.model.parameters import smoothstep
 DETAIL_MM, PASSES = 5.0, 3  # of the scan, which the skin is moved by at most in one pass
 SMOOTH = 0.6  # of detail, against how closely it is followed
 RIM_MM = (1.5, 4.0)  # from the rim of an opening: nearer than the first the scan shows no skin, further all of it
-LIP_FADE_MM = 14.0
+CLOSINGS = 12  # each leaves a share of the gap, for points farther away move less
+LIP_FADE_MM = (3.0, 16.0)  # from where lips meet: skin moves with them, does not move
 FAIR = 1e-3
 NEAR, NEAR_MM = 6, 12.0  # points of the skin that another part follows, and how far
 
@@ -36,7 +37,10 @@ class Ball:
 
 
 class Skin:
-    """One part of skin as triangles: ``rest (n, 3)`` on the head it comes from, ``at (n, 3)`` on the scan."""
+    """One part of skin as triangles: ``rest (n, 3)`` on the head it comes from, ``at (n, 3)`` on the scan.
+
+    ``points (k, 3)`` are the control points of its surface, set by :meth:`solve`.
+    """
 
     def __init__(self, part: HeadPart, rims: Floats, warp: Warp) -> None:
         self.name, self.surface, self.mesh = part.name, part.surface, part.mesh
@@ -44,6 +48,7 @@ class Skin:
         self.rest = part.vertices[:n].astype(float)
         self.at = warp(self.rest)
         distance = cKDTree(rims).query(self.rest)[0] if len(rims) else np.full(n, np.inf)
+        self.points = part.surface.points.copy()
         self._seen = smoothstep(distance, *RIM_MM)
         self._matrix = _laplacian(part.mesh.triangles, n)
 
@@ -67,13 +72,15 @@ class Skin:
         unit: Floats = out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None]
         return unit
 
-    def control_points(self) -> Floats:
-        """(n, 3) positions of the surface's control points that put it where the skin lies, in least squares."""
+    def solve(self) -> None:
+        """Find the control points that put the surface where the skin lies, in least squares; the skin then lies where
+        the surface does."""
         s = self.surface
         net = Net(np.zeros((s.n, 4), np.int64), *s.padded)
         b = s.basis_matrix(self.mesh.uv, side=self.mesh.side)
         moves = solve(net, b, np.ones(len(self.rest)), self.at - b @ s.points, FAIR)
-        return np.asarray(s.points + moves)
+        self.points = s.points + moves
+        self.at = b @ self.points
 
 
 def _laplacian(triangles: Ints, n: int) -> coo_matrix:
@@ -88,21 +95,44 @@ def _laplacian(triangles: Ints, n: int) -> coo_matrix:
 
 
 def close_lips(skin: Skin, contact: Contact, scale: float) -> None:
-    """Take back what the scan's lips stand further apart than those of the head the skin comes from."""
-    rows = skin.surface.evaluate(contact.places.reshape(-1, 2)).reshape(*contact.places.shape[:3], 3)
-    moved = _followed(rows.reshape(-1, 3), skin.rest, skin.at - skin.rest).reshape(rows.shape)
-    apart = moved[0, :, 0] - moved[1, :, 0] - (scale - 1.0) * (rows[0, :, 0] - rows[1, :, 0])
-    apart[:, [0, 2]] = 0.0
-    x = rows[:, :, 0, 0].mean(axis=0)
-    order = np.argsort(x)
-    touching = rows.shape[2] * 2 // 3
-    distance = np.stack([cKDTree(side[:, :touching].reshape(-1, 3)).query(skin.rest)[0] for side in rows])
-    rim = np.stack([cKDTree(side[:, 0]).query(skin.rest)[0] for side in rows])
-    side = (distance[1] < distance[0]).astype(int)
-    fade = 1.0 - smoothstep(rim.min(axis=0), 0.0, LIP_FADE_MM)
-    push = np.column_stack([np.interp(skin.rest[:, 0], x[order], apart[order, k]) for k in range(3)])
-    share = np.where(side == 0, -contact.share, 1.0 - contact.share)
-    skin.at = skin.at + (share * fade)[:, None] * push
+    """Take back what the scan's lips stand further apart than those of the head the skin comes from.
+
+    Column by column the lowest place of the upper lip and the highest of the lower one are brought together again.
+    """
+    rows = contact.places.shape[2] * 2 // 3
+    places, surface = contact.places[:, :, :rows], skin.surface
+    share = surface.basis_matrix(places.reshape(-1, 2))
+    lines, gap = _lip_lines((share @ surface.points).reshape(*places.shape[:3], 3))
+    order = np.argsort(lines[0, :, 0])
+    up, before = _lip_share(surface, contact, lines), skin.points.copy()
+    amount = np.zeros(len(order))
+    for _ in range(CLOSINGS):
+        apart = _lip_lines((share @ skin.points).reshape(*places.shape[:3], 3))[1] - scale * gap
+        amount = np.maximum(amount + apart, 0.0)
+        push = np.interp(surface.points[:, 0], lines[0, order, 0], amount[order])
+        skin.points[:, 1] = before[:, 1] + up * push
+    b = surface.basis_matrix(skin.mesh.uv, side=skin.mesh.side)
+    skin.at = skin.at + b @ (skin.points - before)
+
+
+def _lip_share(surface: DCPSurface, contact: Contact, lines: Floats) -> Floats:
+    """(n,) how far up each control point moves per millimetre that lips, meeting in ``lines (2, k, 3)``, are apart."""
+    uv = np.column_stack([k[:, 1:4].mean(axis=1) for k in surface.padded])  # in it, not in space, lips are apart
+    side = np.stack([cKDTree(own.reshape(-1, 2)).query(uv)[0] for own in contact.places]).argmin(axis=0)
+    distance = np.stack([cKDTree(line).query(surface.points)[0] for line in lines])
+    fade = 1.0 - smoothstep(distance[side, np.arange(len(uv))], *LIP_FADE_MM)
+    out: Floats = np.where(side == 0, -contact.share, 1.0 - contact.share) * fade
+    return out
+
+
+def _lip_lines(at: Floats) -> tuple[Floats, Floats]:
+    """(2, k, 3) where the columns of two lips, samples (2, k, m, 3), are nearest to each other, and (k,) how far they
+    are apart there."""
+    upper, lower = at
+    k = np.arange(len(upper))
+    lines = np.stack([upper[k, upper[..., 1].argmin(axis=1)], lower[k, lower[..., 1].argmax(axis=1)]])
+    gap: Floats = lines[0, :, 1] - lines[1, :, 1]
+    return lines, gap
 
 
 def seat(points: Floats, rest: Floats, old: Ball, new: Ball) -> Floats:

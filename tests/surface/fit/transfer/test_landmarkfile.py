@@ -1,0 +1,63 @@
+"""Files of picked landmarks."""
+
+import numpy as np
+import pytest
+
+from surface.base.errors import FitError
+from surface.fit.transfer.landmarkfile import read_landmarks, swapped
+from surface.fit.transfer.scan import make_scan
+
+SCAN = make_scan(np.array([[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 9]], float), np.array([[0, 1, 2], [0, 2, 3]]), "x")
+PICKED = """<!DOCTYPE PickedPoints><PickedPoints><DocumentData/>
+<point x="1" y="2" z="0.5" name="chin" active="1"/><point x="0" y="0" z="0" name="0" active="0"/></PickedPoints>"""
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.toml", "[landmarks]\nchin = [1, 2, 0.5]\nnose_tip = 2\n"),
+        ("a.toml", "chin = [1.0, 2.0, 0.5]\nnose_tip = 2\n"),
+        ("a.json", '{"landmarks": {"chin": [1, 2, 0.5], "nose_tip": {"vertex": 2}}}'),
+    ],
+)
+def test_places_and_vertices_are_read(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    found = read_landmarks(tmp_path / name, SCAN)
+    np.testing.assert_allclose(found["chin"], [1, 2, 0.5])
+    np.testing.assert_allclose(found["nose_tip"], [9, 9, 0])
+
+
+def test_active_points_picked_in_meshlab_are_read(tmp_path):
+    (tmp_path / "a.pp").write_text(PICKED)
+    found = read_landmarks(tmp_path / "a.pp", SCAN)
+    assert list(found) == ["chin"] and found["chin"].tolist() == [1, 2, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.txt", "", "is none of .toml, .json, .pp"),
+        ("a.toml", "", "holds no landmark"),
+        ("a.toml", "chin = [1, 2", "a.toml"),
+        ("a.toml", "nose = [1, 2, 0]", "nose: is no landmark"),
+        ("a.toml", "chin = [1, 2]", "chin: .* neither a place nor a vertex"),
+        ("a.toml", "chin = [1, 2, inf]", "neither a place"),
+        ("a.toml", "chin = true", "neither a place"),
+        ("a.toml", "chin = 4", "there is no vertex 4"),
+        ("a.toml", "chin = [1000, 2000, 500]", r"outside the mesh.*\(0, 0, 0\)"),
+        ("a.json", "[1, 2]", "no table of landmarks"),
+        ("a.json", "{", "a.json"),
+        ("a.pp", "<points", "no XML"),
+        ("a.pp", PICKED.replace('"1" y', '"one" y'), "neither a place"),
+        ("a.pp", PICKED.replace('name="0" active="0"', 'name="chin"'), "picked twice"),
+    ],
+)
+def test_every_mistake_is_named(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(FitError, match=message) as caught:
+        read_landmarks(tmp_path / name, SCAN)
+    assert caught.value.hint or name in str(caught.value)
+
+
+def test_sides_are_exchanged():
+    assert set(swapped({"left_eye_inner": SCAN.vertices[0], "chin": SCAN.vertices[1]})) == {"right_eye_inner", "chin"}

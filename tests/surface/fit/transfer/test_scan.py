@@ -1,0 +1,75 @@
+"""Reading of bare meshes, and samples of their surface."""
+
+import numpy as np
+import pytest
+
+from surface.base.errors import FitError
+from surface.fit.transfer.scan import borders_of, make_scan, read_scan, sample
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+TWO = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def write_obj(path, vertices, faces, names=()):
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices]
+    for k, face in enumerate(faces):
+        lines += [f"o {names[k]}"] if names else []
+        lines += ["f " + " ".join(str(i + 1) for i in face)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_vertices_in_one_place_become_one():
+    loose = make_scan(SQUARE[TWO].reshape(-1, 3), np.arange(6).reshape(2, 3), "x")
+    assert len(loose.vertices) == 4 and len(borders_of(loose)[0]) == 4
+    np.testing.assert_allclose(loose.vertices[loose.original], SQUARE[TWO].reshape(-1, 3))
+
+
+def test_samples_are_even_and_know_the_border():
+    found = sample(make_scan(10 * SQUARE, TWO, "x"), 4000)
+    counts = np.histogram2d(*found.points[:, :2].T, bins=4, range=[[0, 10], [0, 10]])[0]
+    assert counts.min() > 0.7 * counts.mean()
+    np.testing.assert_allclose(found.normals, np.tile([0, 0, 1], (4000, 1)), atol=1e-12)
+    inside = np.abs(found.points[:, :2] - 5).max(axis=1)
+    assert found.border[inside > 4.95].all() and not found.border[inside < 4].any()
+
+
+def test_a_ply_file_is_read(tmp_path):
+    path = tmp_path / "scan.ply"
+    head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    path.write_text(head + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n")
+    assert len(read_scan(path).triangles) == 2
+
+
+def test_an_obj_file_needs_no_texture_coordinates_and_objects_can_be_left_out(tmp_path):
+    path = write_obj(tmp_path / "scan.obj", SQUARE, TWO, ["skin", "hair"])
+    assert len(read_scan(path).triangles) == 2
+    assert len(read_scan(path, ("HAIR",)).triangles) == 1
+    with pytest.raises(FitError, match=r"--without hat.*skin, hair"):
+        read_scan(path, ("hat",))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.txt", "", "is no mesh"),
+        ("a.ply", "ply\nformat ascii 1.0\nelement vertex 9\n", "damaged"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
+        ("a.obj", "v 2 2 2\nv 2 2 2\nv 2 2 2\nf 1 2 3\n", "in one place"),
+    ],
+)
+def test_what_is_no_scan_is_refused_by_name(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(FitError, match=message) as caught:
+        read_scan(tmp_path / name)
+    assert name in str(caught.value)
+
+
+def test_a_missing_file_and_numbers_that_are_none():
+    with pytest.raises(FitError, match="no such"):
+        read_scan("nowhere.stl")
+    with pytest.raises(FitError, match="vertex 1 is not a finite"):
+        make_scan(np.array([[0, 0, 0], [np.nan, 0, 0], [1, 0, 0]]), TWO[:1], "x")
+    with pytest.raises(FitError, match="not there"):
+        make_scan(SQUARE, TWO + 2, "x")
