@@ -143,7 +143,7 @@ def fit(
 ) -> None:
     """Turn a mesh with UVs and expression shapes into a head of control points.
 
-    Examples: omote fit me.glb -o heads/me --report report;
+    Example: omote fit me.glb -o heads/me --report report; without shapes:
     omote fit scan.ply -o heads/scan --expressions-from ict
     """
     # start-up: --help does without any of these

@@ -26,16 +26,16 @@ from surface.fit.points.refine import fit_chart
 from surface.fit.points.report import FitReport, FitResult, FittedPart, PartReport, measure
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
-from surface.fit.source.anatomy import Landmarks
 from surface.fit.source.chart import Chart, make_chart
-from surface.fit.source.frame import EYES_AT, head_scale
 from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
 from surface.fit.source.naming.shapes import to_arkit
-from surface.fit.source.place import find_neck, head_size, place
+from surface.fit.source.placing.anatomy import Landmarks
+from surface.fit.source.placing.frame import EYES_AT, head_scale
+from surface.fit.source.placing.place import find_neck, head_size, place
 from surface.fit.source.repair import repaired
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData

@@ -77,11 +77,12 @@ class Worker:
 def attempt(job: Job, most_s: float) -> Outcome:
     """Do one job in a forked process of its own."""
     with tempfile.TemporaryFile() as output:
+        before = int(STATM.read_text().split()[1]) * PAGE_MB  # what the child begins with; not this process's own peak
         child = os.fork()
         if child == 0:
             _do_alone(job, output, most_s)
         status, used = _wait(child, most_s)
-        grown = (used.ru_maxrss - resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) / 1024
+        grown = used.ru_maxrss / 1024 - before
         text = _text_of(output)
         return Outcome(os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime, grown, text, most_s)
 

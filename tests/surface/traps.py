@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from surface.fit.source.frame import EYES_AT, find_frame
 from surface.fit.source.load import Loaded, _turned
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names
-from surface.fit.source.place import place
+from surface.fit.source.placing.frame import EYES_AT, find_frame
+from surface.fit.source.placing.place import place
 
 EYE_X, EYE_RADIUS = 31.8, 12.1
 HALF = np.array([[EYE_X, 0.0, 0.0], [-EYE_X, 0.0, 0.0]])

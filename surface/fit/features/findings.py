@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.fit.source.anatomy import Landmarks
-from surface.fit.source.orient import axis_names
+from surface.fit.source.placing.anatomy import Landmarks
+from surface.fit.source.placing.orient import axis_names
 from surface.head.model.data import HeadData
 from surface.head.model.placement import Placement
 

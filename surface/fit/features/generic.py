@@ -19,12 +19,12 @@ from surface.fit.features.rigging import rigid_fit
 from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.chart import TILE
-from surface.fit.source.frame import head_scale
 from surface.fit.source.islands import Island
 from surface.fit.source.kinds import kind_name
 from surface.fit.source.layout import lay_out, open_flat_holes, straighten_holes
 from surface.fit.source.mesh import FitMesh, components, face_areas, triangles
 from surface.fit.source.owncharts import usable_islands
+from surface.fit.source.placing.frame import head_scale
 from surface.mesh.tessellate import MOST_ROOTS
 
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves

@@ -53,5 +53,5 @@ def why_out(name: str, kind: Kind, islands: int, most: int) -> str:
         word = kind.name.replace("_", " ")
         return f"{name!r}: left out: {word if kind.name == 'eye' else f'{word}, part of an eye'}"
     if islands == 0:
-        return f"{name!r}: left out: no area in (u, v)"
+        return f"{name!r}: left out: no area"
     return f"{name!r}: left out: {islands} separate pieces are too many to fit" if islands > most else ""

@@ -15,7 +15,7 @@ from surface.fit.points.lid_seating import Eyeball, fit_sphere
 from surface.fit.points.refine import FitRequest
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.place import CLOSE_MM, moved
+from surface.fit.source.placing.place import CLOSE_MM, moved
 
 RECIPES = Path(__file__).parent / "recipes"
 Ranges = Sequence[Sequence[int]]

@@ -22,9 +22,9 @@ from surface.fit.source.chart import Chart, Places
 from surface.fit.source.mesh import FitMesh
 
 HOLDS = (1.0, 30.0, 1e3, 3e4)  # how strongly points around strays are held, one turn after another
-FAR = (
-    1.5  # times the error that mends: where nothing helped, control points beyond the mesh's own range are put into it
-)
+FAR = 1.5  # times the error that is mended: control points there are put into the mesh's own range where nothing helped
+WORTH = 1.25  # times the RMS of the first fit: what mends a spike may cost so much elsewhere
+FEWER = 0.9  # of the places that strayed, or of the largest error: less progress ends the mending
 
 
 @dataclass(frozen=True)
@@ -114,19 +114,32 @@ def _mended(
 ) -> Fitted:  # fmt: skip
     """The fit without spikes between its samples; the errors that come with it are those of the chart's own samples."""
     within, held = chart, np.zeros((0, 2))
-    places, best = places_of(chart, mesh), fitted
+    places, best, enough = places_of(chart, mesh), fitted, WORTH * _rms(chart, fitted)
+    count, most = len(places.uv) + 1, np.inf
     for factor in HOLDS:
         strays = _strays(mesh, chart, fitted, request.astray_mm)
         if not strays.any():
             return fitted
+        now = _most(mesh, chart, fitted)
+        if strays.sum() > FEWER * count and now > FEWER * most:
+            break
+        count, most = int(strays.sum()), now
         held = np.concatenate([held, places.uv[strays]])
         within = _with_samples(within, places.take(around(places, places.mix[np.flatnonzero(strays)])))
         fitted = _on(mesh, chart, _refined(mesh, within, fitted.net, request, Hold(held, factor), report))
-        best = min(best, fitted, key=lambda f: _most(mesh, chart, f))
+        if _rms(chart, fitted) <= enough:
+            best = min(best, fitted, key=lambda f: _most(mesh, chart, f))
     off = dense_errors(mesh, chart, best.net, best.points, best.moves)
     far = np.maximum(off.neutral, off.worst) > FAR * request.astray_mm
     points, moves = bounded(mesh, chart, best.net, best.points, best.moves, far)
-    return _on(mesh, chart, replace(best, points=points, moves=moves))
+    put = _on(mesh, chart, replace(best, points=points, moves=moves))
+    return put if _most(mesh, chart, put) < off.most and _rms(chart, put) <= enough else best
+
+
+def _rms(chart: Chart, fitted: Fitted) -> float:
+    """RMS (mm) of the neutral face at the chart's own samples outside folds."""
+    off = fitted.error[~chart.folded]
+    return float(np.sqrt((off**2).mean())) if len(off) else 0.0
 
 
 def _most(mesh: FitMesh, chart: Chart, fitted: Fitted) -> float:

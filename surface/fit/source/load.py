@@ -10,16 +10,16 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats
 from surface.base.errors import FitError
-from surface.fit.source.anatomy import Eyes, Landmarks
-from surface.fit.source.conventions import convention_of
-from surface.fit.source.frame import Frame, find_frame
 from surface.fit.source.kinds import piece_kinds, unworn
 from surface.fit.source.mesh import FitMesh, bare_where_damaged, check_mesh, renumbered
 from surface.fit.source.names import NameMap, map_names, read_names
 from surface.fit.source.naming.expressions import with_expressions
 from surface.fit.source.naming.namenotes import name_notes
 from surface.fit.source.naming.shapes import empty_shapes, share_of
-from surface.fit.source.orient import shapes_of_sides
+from surface.fit.source.placing.anatomy import Eyes, Landmarks
+from surface.fit.source.placing.conventions import convention_of
+from surface.fit.source.placing.frame import Frame, find_frame
+from surface.fit.source.placing.orient import shapes_of_sides
 from surface.head.model.placement import Placement
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MeshData
@@ -34,7 +34,7 @@ class LoadOptions:
     """How to interpret a mesh file; what is not given is guessed.
 
     shapes : folder with one OBJ a shape; names : TOML table of shape names.
-    unit, up, forward : see :func:`surface.fit.source.frame.find_frame`.
+    unit, up, forward : see :func:`surface.fit.source.placing.frame.find_frame`.
     without : objects or materials to leave out; a part of the name will do.
     """
 

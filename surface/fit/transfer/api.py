@@ -11,8 +11,8 @@ from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
 from surface.fit.points.report import FitReport
-from surface.fit.source.frame import AXES, UNITS
 from surface.fit.source.load import LoadOptions
+from surface.fit.source.placing.frame import AXES, UNITS
 from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.carry import carry
 from surface.fit.transfer.errors import face_report

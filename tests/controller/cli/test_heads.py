@@ -101,7 +101,7 @@ def fitted(monkeypatch):
     neutral = SimpleNamespace(rms=0.1234, p99=0.5678, max=1.2345)
     part = SimpleNamespace(name="face", points=77, neutral=neutral, mean_shape_rms=0.0456)
     report = SimpleNamespace(name="me", points=123, parameters=["a", "b"], parts=[part], missing=[], left_out=[],
-                             notes=["a note [x]"], dense=None)  # fmt: skip
+                             notes=["a note [x]"], dense=None, pieces={})  # fmt: skip
     calls = []
 
     def fit_head(mesh, out, *, name, progress, options, report_dir):

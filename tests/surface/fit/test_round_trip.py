@@ -10,8 +10,8 @@ from surface.export import export_head
 from surface.fit.features.generic import make_plan
 from surface.fit.source.load import load_mesh
 from surface.fit.source.mesh import check_manifold
-from surface.fit.source.names import to_arkit
-from surface.fit.source.place import place
+from surface.fit.source.naming.shapes import to_arkit
+from surface.fit.source.placing.place import place
 from surface.head import Head
 from surface.head.model.file import load_data
 from surface.head.model.placement import Placement

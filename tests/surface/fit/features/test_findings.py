@@ -6,7 +6,7 @@ import numpy as np
 from small_head import all_points, part, small_head
 
 from surface.fit.features.findings import findings
-from surface.fit.source.anatomy import Eyes, Landmarks
+from surface.fit.source.placing.anatomy import Eyes, Landmarks
 from surface.head.model.placement import Placement
 
 EYES = Landmarks(Eyes(np.array([[30.0, 30, 0], [-30, 30, 0]]), True, True, "two balls"))

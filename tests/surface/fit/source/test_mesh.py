@@ -8,7 +8,6 @@ from slit_sheet import slit_sheet, write_npz
 
 from surface.base.errors import FitError
 from surface.fit.source import mesh as mesh_module
-from surface.fit.source.frame import find_frame
 from surface.fit.source.load import load_mesh
 from surface.fit.source.mesh import (
     FitMesh,
@@ -20,6 +19,7 @@ from surface.fit.source.mesh import (
     renumbered,
     triangles,
 )
+from surface.fit.source.placing.frame import find_frame
 
 
 def refused(tmp_path, **other) -> FitError:

@@ -8,10 +8,10 @@ import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
-from surface.fit.source.anatomy import Eyes, Landmarks, find_landmarks, in_order, middle_of
-from surface.fit.source.conventions import Convention
-from surface.fit.source.match import match_face
-from surface.fit.source.orient import SQUARE, Orientation, axis_names, in_front, orient, snapped
+from surface.fit.source.placing.anatomy import Eyes, Landmarks, find_landmarks, in_order, middle_of
+from surface.fit.source.placing.conventions import Convention
+from surface.fit.source.placing.match import match_face
+from surface.fit.source.placing.orient import SQUARE, Orientation, axis_names, in_front, orient, snapped
 from surface.head.model.placement import Placement
 
 UNITS = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
@@ -55,7 +55,7 @@ def find_frame(
     """Find axes and unit: as given, else as the format defines where the head's anatomy does not contradict it, else
     by eyes, mouth and size of the head.
 
-    shapes : displacements (n, 3) by ARKit's names; see :func:`surface.fit.source.anatomy.find_landmarks`.
+    shapes : displacements (n, 3) by ARKit's names; see :func:`surface.fit.source.placing.anatomy.find_landmarks`.
     unit : one of :data:`UNITS`; up, forward : x, y, z, -x, -y or -z. convention : what the format defines.
 
     Raises FitError: an unknown word, or up and forward along one axis.

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Floats, Ints
 from surface.base.files import read_npz
 from surface.fit.source.mesh import triangles
-from surface.fit.source.symmetry import Mirror, find_mirrors
+from surface.fit.source.placing.symmetry import Mirror, find_mirrors
 
 TEMPLATE = Path(__file__).with_name("face_template.npz")  # the front of the shipped head, mm, 400 points and normals
 NOSE = np.array([0.0, 0.0, 130.5])  # its tip

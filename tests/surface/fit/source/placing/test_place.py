@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from traps import EYE_X, good_head, on_body, placed, transformed
 
-from surface.fit.source.conventions import GLTF, VRM0
-from surface.fit.source.frame import EYES_AT, EYES_MM, UNITS, find_frame
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.orient import SQUARE
-from surface.fit.source.place import find_neck, head_size
+from surface.fit.source.placing.conventions import GLTF, VRM0
+from surface.fit.source.placing.frame import EYES_AT, EYES_MM, UNITS, find_frame
+from surface.fit.source.placing.orient import SQUARE
+from surface.fit.source.placing.place import find_neck, head_size
 
 HEAD = good_head()
 BODY = on_body(HEAD)

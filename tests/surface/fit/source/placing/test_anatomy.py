@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from traps import EYE_X, good_head, on_body, transformed
 
-from surface.fit.source.anatomy import find_eyes, find_landmarks
-from surface.fit.source.frame import EYES_AT
-from surface.fit.source.orient import SQUARE
+from surface.fit.source.placing.anatomy import find_eyes, find_landmarks
+from surface.fit.source.placing.frame import EYES_AT
+from surface.fit.source.placing.orient import SQUARE
 
 HEAD = good_head()
 EYES = EYES_AT + np.outer([EYE_X, -EYE_X], [1.0, 0.0, 0.0])

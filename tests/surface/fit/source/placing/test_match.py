@@ -8,10 +8,10 @@ import pytest
 from slit_sheet import slit_sheet
 from traps import joined, on_body, placed, transformed
 
-from surface.fit.source.match import match_face
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.orient import SQUARE
-from surface.fit.source.symmetry import find_mirrors
+from surface.fit.source.placing.match import match_face
+from surface.fit.source.placing.orient import SQUARE
+from surface.fit.source.placing.symmetry import find_mirrors
 from surface.head import Head
 
 EYES = np.array([[31.8, 36.1, 84.2], [-31.8, 36.1, 84.2]])

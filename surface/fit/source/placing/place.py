@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.source.anatomy import Eyes, Landmarks
-from surface.fit.source.bust import cut_bust
-from surface.fit.source.frame import EYES_AT, EYES_MM
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
+from surface.fit.source.placing.anatomy import Eyes, Landmarks
+from surface.fit.source.placing.bust import cut_bust
+from surface.fit.source.placing.frame import EYES_AT, EYES_MM
 from surface.head.model.data import Neck
 
 #: From the middle of what blinks to the eyeball's centre, mm, on that head.

@@ -5,8 +5,8 @@ import pytest
 from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
-from surface.fit.source.anatomy import find_landmarks
-from surface.fit.source.frame import EYES_MM, eye_distance, find_frame, head_scale
+from surface.fit.source.placing.anatomy import find_landmarks
+from surface.fit.source.placing.frame import EYES_MM, eye_distance, find_frame, head_scale
 
 TURNS = {  # how the file's axes stand: rows are the file's x, y, z seen from the head
     "blender": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),

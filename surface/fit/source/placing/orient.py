@@ -9,7 +9,7 @@ from itertools import permutations, product
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.source.anatomy import Eyes, Landmarks
+from surface.fit.source.placing.anatomy import Eyes, Landmarks
 
 #: Angle (degrees) from straight up, towards the back, of the line from lips or jaw to the eyes of an upright head:
 #: (eyes found as balls, or on the lids). Measured on the shipped head.
@@ -88,7 +88,7 @@ def axis_names(turn: Floats) -> tuple[str, str]:
 
 
 def shapes_of_sides(sources: Mapping[str, list[tuple[int, str]]], deltas: Floats) -> dict[str, Floats]:
-    """Displacements (n, 3) by ARKit's names for :func:`surface.fit.source.anatomy.find_landmarks`.
+    """Displacements (n, 3) by ARKit's names for :func:`surface.fit.source.placing.anatomy.find_landmarks`.
 
     sources : (index, side) of the shapes that make each parameter; what would be cut into sides, which needs the axes,
     is given whole under the name without a side.

@@ -6,8 +6,8 @@ import pytest
 from meshfiles import glb
 from slit_sheet import slit_sheet
 
-from surface.fit.source.conventions import GLTF, OBJ, VRM0, Convention, convention_of
 from surface.fit.source.load import load_mesh
+from surface.fit.source.placing.conventions import GLTF, OBJ, VRM0, Convention, convention_of
 
 
 @pytest.mark.parametrize(("change", "wanted"), [

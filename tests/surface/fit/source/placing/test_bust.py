@@ -3,9 +3,9 @@
 import numpy as np
 from traps import good_head, on_body, transformed
 
-from surface.fit.source.bust import cut, cut_bust, outline
-from surface.fit.source.frame import EYES_AT
 from surface.fit.source.mesh import FitMesh, check_manifold, check_mesh, triangles
+from surface.fit.source.placing.bust import cut, cut_bust, outline
+from surface.fit.source.placing.frame import EYES_AT
 
 HEAD = good_head()
 
