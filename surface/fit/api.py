@@ -45,6 +45,7 @@ from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
 
+LOOSE_MM = 3.0  # RMS of a head of usual size: a part beside the face that is further off, as hair, is left out
 # pose that decides how finely a part is cut into triangles
 SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
 
@@ -123,16 +124,22 @@ def _fit_parts(
     mesh: FitMesh, recipe: Recipe, plan: Plan, rig: HeadRig, progress: Progress
 ) -> tuple[list[PartData], list[PartReport], list[FittedPart]]:  # fmt: skip
     """Every chart of the plan, teeth, hair and eyeballs; progress counts control points."""
-    parts, reports, fitted_parts = [], [], []
+    parts: list[PartData] = []
+    reports, fitted_parts = [], []
     ends = np.cumsum([0, *(p.request.points for p, _ in plan.parts)]) / max(
         sum(p.request.points for p, _ in plan.parts), 1
     )
+    scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     still = replace(mesh, names=(), deltas=mesh.deltas[:0])  # for parts that move as a whole
     for (part, islands), low, high in zip(plan.parts, ends, ends[1:], strict=False):
         chart, step = part_chart(mesh, part, islands), part_of(progress, low, high)
         fitted = fit_chart(mesh if part.follows == "skin" else still, chart, part.request, partial(step, part.name))
+        report = measure(part.name, chart, fitted, mesh.names)
+        if parts and not recipe.parts and report.neutral.rms > LOOSE_MM * scale:
+            plan.notes.append(f"{part.name}: left out: it cannot be fitted, {report.neutral.rms:.1f} mm RMS")
+            continue
         parts.append(skin_part(part, chart, fitted, rig))
-        reports.append(measure(part.name, chart, fitted, mesh.names))
+        reports.append(report)
         fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))
         if recipe.hair and recipe.hair["face"] == part.name:
             parts += hair_parts(mesh, chart, fitted, recipe.hair["brow"], rig)

@@ -12,8 +12,9 @@ from surface.fit.source.islands import Island, find_islands, signed_areas
 from surface.fit.source.layout import separate
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.fit.source.regions import connected, face_regions, in_two, own_corners
-from surface.fit.source.uvcheck import SQUEEZED_SHARE, measure_uv, squeezed_share
+from surface.fit.source.uvcheck import SQUEEZED_SHARE, measure_uv, squeezed_share, unevenness
 
+UNEVEN, WORTH = 2.2, 0.85  # so uneven a chart of a face is replaced, by one that is so much more even
 LEAST = 24  # faces of a region that is cut in two only because it is squeezed
 NONE = np.zeros(0, np.int64)
 
@@ -28,7 +29,8 @@ def usable_islands(
     """
     faults = measure_uv(mesh, faces, scale, face=face).faults(scale)
     if not faults:
-        return _as_given(mesh, faces)
+        given = _as_given(mesh, faces)
+        return _evener(mesh, faces, scale, notes, given, others) if face and given else given
     bad = faces if face else _at_fault(mesh, faces, scale)
     good = _as_given(mesh, np.setdiff1d(faces, bad))
     made = own_islands(mesh, bad, scale, face=face, others=others)
@@ -38,6 +40,22 @@ def usable_islands(
         f"{len(made)} {'charts' if len(made) != 1 else 'chart'} without flipped or overlapping faces"
     )
     return [*made, *good]
+
+
+def _evener(
+    mesh: FitMesh, faces: Ints, scale: float, notes: list[str], given: list[Island], others: Ints
+) -> list[Island]:  # fmt: skip
+    """The face's islands as the texture has them, or charts of our own where parts of these are squeezed: there (u, v)
+    has little room for control points.
+    """
+    before = unevenness(mesh, given)
+    if before <= UNEVEN:
+        return given
+    made = own_islands(mesh, faces, scale, face=True, others=others)
+    if not made or unevenness(mesh, made) > WORTH * before:
+        return given
+    notes.append(f"face: its texture coordinates are squeezed {before:.1f} times in places: omote made its own")
+    return made
 
 
 def _as_given(mesh: FitMesh, faces: Ints) -> list[Island]:

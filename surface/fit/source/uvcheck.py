@@ -111,6 +111,14 @@ def squeezed_share(mesh: FitMesh, island: Island) -> float:
     return float(surface[_stretch(mesh, island) > SQUEEZED].sum() / max(float(surface.sum()), 1e-12))
 
 
+def unevenness(mesh: FitMesh, islands: list[Island]) -> float:
+    """How many times as much as is usual all but a hundredth of the surface of islands is stretched, at most."""
+    stretch = np.concatenate([_stretch(mesh, island) for island in islands])
+    area = np.concatenate([face_areas(mesh.vertices[i.vertex], i.faces) for i in islands])
+    order = np.argsort(stretch)
+    return float(stretch[order][np.searchsorted(np.cumsum(area[order]), 0.99 * area.sum())])
+
+
 def _stretch(mesh: FitMesh, island: Island) -> Floats:
     """(f,) the longest way on the surface per way in (u, v), relative to what is usual in the island."""
     a, b, c = island.faces[:, :3].T

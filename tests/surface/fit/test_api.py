@@ -4,15 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from eye_face import joined
 from slit_sheet import slit_sheet, write_npz
 
 from surface.base.errors import FitError
-from surface.fit import fit_head
-from surface.fit.api import eyes_of, part_chart, prepare, recipe_plan
+from surface.fit import api, fit_head
+from surface.fit.api import eyes_of, fit_mesh, part_chart, prepare, recipe_plan
 from surface.fit.features.eye_lids import gazes_of
 from surface.fit.points.recipe import PartRecipe, Recipe
 from surface.fit.points.refine import FitRequest
+from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
+from surface.fit.source.names import map_names
 from surface.head import Head
 
 
@@ -164,3 +167,15 @@ def test_eyes_look_where_their_shapes_say_and_else_ahead():
     np.testing.assert_allclose(np.linalg.norm([jaw, down, out], axis=2), 1.0)
     named = replace(mesh, names=("jawOpen", "eyeLookUp_L", "nothing"))
     assert gazes_of(named)[1][0][1] > 0.2 and gazes_of(named)[2].tolist() == [[0, 0, 1], [0, 0, 1]]
+
+
+def test_a_part_that_cannot_be_fitted_is_left_out_by_name_and_the_face_never_is(monkeypatch):
+    small = slit_sheet()
+    hair = replace(small, vertices=0.4 * small.vertices + [0.0, 90.0, 5.0], names=(), deltas=small.deltas[:0])
+    mesh = joined([("Face", small), ("Hair", hair)])
+    for most, parts in ((1e3, ["face", "brow_1"]), (0.0, ["face"])):
+        monkeypatch.setattr(api, "LOOSE_MM", most)
+        result = fit_mesh(Loaded(mesh, map_names(mesh.names)), "me", lambda *_: None)
+        assert [part.name for part in result.report.parts] == parts
+        assert [p.name for p in result.head.parts if p.follows == "skin"] == parts
+        assert any("brow_1: left out: it cannot be fitted" in note for note in result.report.notes) == (most == 0.0)

@@ -226,7 +226,7 @@ def test_unplug_and_replug_under_another_name(bus: SimulatedBus, tmp_path: Path)
 
 
 def test_unplug_strikes_at_its_time_without_any_traffic(tmp_path: Path):
-    with SimulatedBus((1,), link=tmp_path / "port", faults=("unplug:at=0.05s:for=0.05s",)) as bus:
+    with SimulatedBus((1,), link=tmp_path / "port", faults=("unplug:at=0.05s:for=0.5s",)) as bus:
         first = os.readlink(bus.path)
         wait_until(lambda: not (tmp_path / "port").is_symlink() or os.readlink(tmp_path / "port") != first)
         wait_until((tmp_path / "port").is_symlink)

@@ -20,7 +20,7 @@ EYES = np.array([[31.8, 36.1, 84.2], [-31.8, 36.1, 84.2]])
 @pytest.fixture(scope="module")
 def bare() -> FitMesh:
     """The shipped head's skin as a scan would have it: no shapes, no eyeballs, one object."""
-    head = Head.load(Path(__file__).parents[4] / "configs" / "heads" / "ict")
+    head = Head.load(Path(__file__).parents[5] / "configs" / "heads" / "ict")
     parts = []
     for name in ("face", "back"):
         part = head.part(name)

@@ -129,7 +129,7 @@ def test_the_neck_stands_below_the_eyes_and_turns_what_is_above_it():
 
 @pytest.mark.parametrize(("k", "unit"), [(3, "m"), (18, "ft")])
 def test_the_real_head_comes_to_the_same_place(k, unit):
-    path = Path(__file__).parents[5] / "shared" / "data" / "ict-facekit" / "ict_neutral_and_expressions.npz"
+    path = Path(__file__).parents[6] / "shared" / "data" / "ict-facekit" / "ict_neutral_and_expressions.npz"
     if not path.exists():
         pytest.skip("ICT-FaceKit's mesh is beside the repository only where it is built")
     raw = np.load(path)
