@@ -186,6 +186,7 @@ def test_s4_a_late_reply_is_not_the_answer_to_the_next_question(wire: Wire, thei
     wire.answer = LateOnce(111, 222)
     port, packets = theirs
     assert packets.read4ByteTxRx(port, 1, POSITION)[1] == bare.COMM_RX_TIMEOUT
+    port.setPacketTimeout = lambda size: port.setPacketTimeoutMillis(1e3 * GENEROUS_S)
     value, result, _ = packets.read4ByteTxRx(port, 1, GOAL)
     assert (value, result) == (111, bare.COMM_SUCCESS), "the bare SDK tells late replies apart by now"
     port.ser.close()
