@@ -150,7 +150,6 @@ def fit(
     from controller.tools.transfer import check_transfer, transfer
     from surface.fit.api import fit_head
     from surface.fit.identities import add_identities
-    from surface.fit.points.report import face_bounds, kinds_line
     from surface.fit.source.load import LoadOptions
 
     if keep and identities is None:
@@ -174,20 +173,26 @@ def fit(
                 found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report)
         shaded = _decimate_and_shade(out)
         show_table(_error_table(found))
-        missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)
-        remarks = [face_bounds(found), *filter(None, [kinds_line(found)]), *found.notes]
-        remarks += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
-        remarks += [f"left out, not ARKit's: {left_out}"] if left_out else []
-        remarks += [_NO_SHAPES] if not found.parameters else []
-        remarks += [] if shaded else [_NO_SHADE]
-        remarks += reversed(found.dense.lines()) if found.dense else []
-        for line in remarks:
+        for line in _remarks(found, shaded):
             console.print(line, soft_wrap=True, markup=False)
         console.print(f"wrote {out}", soft_wrap=True)
     if identities is not None:
         with console.status("fitting identities"):
             added = add_identities(out, mesh, identities)
         console.print(f"identities: {', '.join(added)}", soft_wrap=True)
+
+
+def _remarks(found: FitReport, shaded: bool) -> list[str]:
+    """What is said below the table of a fit: bounds, pieces, notes, what is missing, the greatest errors last."""
+    from surface.fit.points.report import face_bounds, kinds_line  # start-up: --help does without it
+
+    missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)
+    lines = [face_bounds(found), *filter(None, [kinds_line(found)]), *found.notes]
+    lines += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
+    lines += [f"left out, not ARKit's: {left_out}"] if left_out else []
+    lines += [_NO_SHAPES] if not found.parameters else []
+    lines += [] if shaded else [_NO_SHADE]
+    return lines + (found.dense.lines()[::-1] if found.dense else [])
 
 
 def _decimate_and_shade(out: Path) -> bool:

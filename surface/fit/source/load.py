@@ -71,7 +71,8 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     path = Path(path)
     raw = _read(path, options.shapes)
     mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)})
-    mesh = _without(mesh, options.without, str(path))
+    if options.without:
+        mesh = keep_faces(mesh, wanted_faces(mesh, options.without, str(path)))
     kept, notes = unworn(mesh)
     pieces = piece_kinds(mesh, kept)
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
@@ -122,15 +123,16 @@ def _read(path: Path, shapes: Path | None) -> MeshData:
                    hint=f"export it as {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")  # fmt: skip
 
 
-def _without(mesh: FitMesh, words: tuple[str, ...], where: str) -> FitMesh:
-    """The mesh less the objects whose names hold one of the words."""
+def wanted_faces(mesh: FitMesh | MeshData, words: tuple[str, ...], where: str) -> Bools:
+    """(f,) which faces belong to no object whose name holds one of the words. Raises FitError: none holds a word."""
     out = np.zeros(len(mesh.pieces), bool)
     for word in words:
         hit = [word.lower() in name.lower() for name in mesh.pieces]
         if not any(hit):
             raise FitError(f"--without {word}: {where} holds {', '.join(mesh.pieces)}", hint="take one of them")
         out |= hit
-    return keep_faces(mesh, ~out[mesh.piece]) if len(words) else mesh
+    kept: Bools = ~out[mesh.piece] if words else np.ones(len(mesh.faces), bool)
+    return kept
 
 
 def keep_faces(mesh: FitMesh, kept: Bools) -> FitMesh:

@@ -12,9 +12,10 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.base.extras import require
+from surface.fit.source.load import wanted_faces
 from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
 from surface.readers.gltfmesh import read_gltf
-from surface.readers.meshdata import MOST_VERTICES, MeshData, read_bytes
+from surface.readers.meshdata import MOST_VERTICES, read_bytes
 from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj
 
@@ -64,25 +65,13 @@ def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
     kind = path.suffix.lower()
     if kind in OWN:
         raw = OWN[kind](path)
-        return make_scan(raw.vertices, triangles(raw.faces[_wanted(raw, without, path)]), str(path))
+        return make_scan(raw.vertices, triangles(raw.faces[wanted_faces(raw, without, str(path))]), str(path))
     if kind not in OTHERS:
         raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
                        hint=f"export it as {', '.join([*OWN, *OTHERS])}")  # fmt: skip
     if without:
         raise FitError(f"--without {without[0]}: {path} has no named objects", hint="leave it out")
     return make_scan(*_by_trimesh(path, kind), str(path))
-
-
-def _wanted(raw: MeshData, without: tuple[str, ...], path: Path) -> Bools:
-    """(f,) which faces belong to no object whose name holds one of the words."""
-    out = np.zeros(len(raw.pieces), bool)
-    for word in without:
-        hit = [word.lower() in name.lower() for name in raw.pieces]
-        if not any(hit):
-            raise FitError(f"--without {word}: {path} holds {', '.join(raw.pieces)}", hint="take one of them")
-        out |= hit
-    kept: Bools = ~out[raw.piece] if len(without) else np.ones(len(raw.faces), bool)
-    return kept
 
 
 def _by_trimesh(path: Path, kind: str) -> tuple[Floats, Ints]:

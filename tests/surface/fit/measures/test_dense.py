@@ -7,25 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slit_sheet import slit_sheet
 
-from surface.fit.api import fit_mesh
 from surface.fit.measures.dense import measure_dense
 from surface.fit.points.report import FitResult
 from surface.fit.reportfile import as_markdown, as_table
-from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.names import map_names, sources_of
-
-
-@pytest.fixture(scope="module")
-def mesh() -> FitMesh:
-    return slit_sheet()
-
-
-@pytest.fixture(scope="module")
-def result(mesh: FitMesh) -> FitResult:
-    return fit_mesh(Loaded(mesh, map_names(mesh.names)), "sheet", lambda part, done: None)
+from surface.fit.source.names import sources_of
 
 
 def measured(result: FitResult, mesh: FitMesh, **changed: object):

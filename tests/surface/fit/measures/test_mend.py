@@ -6,28 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
-from surface.fit.api import fit_mesh
 from surface.fit.measures import mend
 from surface.fit.measures.dense import measure_dense
 from surface.fit.measures.mend import mend_spikes, turned_faces
 from surface.fit.points.report import FitResult
-from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.names import map_names, sources_of
+from surface.fit.source.names import sources_of
 from surface.head.model.data import Group, HeadData
-
-
-@pytest.fixture(scope="module")
-def mesh() -> FitMesh:
-    return slit_sheet()
-
-
-@pytest.fixture(scope="module")
-def result(mesh: FitMesh) -> FitResult:
-    return fit_mesh(Loaded(mesh, map_names(mesh.names)), "sheet", lambda part, done: None)
 
 
 def fine_point(head: HeadData) -> int:
