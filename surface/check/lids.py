@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from surface.base.arrays import Floats32
 from surface.check.raster import View
 from surface.check.subject import Subject
@@ -20,11 +18,3 @@ def eye_opening(subject: Subject, side: int, vertices: list[Floats32]) -> float:
     (x0, y0), (x1, y1) = at[:, :2].min(axis=0), at[:, :2].max(axis=0)
     picture = View((x0, x1), (y0, y1), STEP * subject.scale).draw(subject.shapes(vertices))
     return float((picture.parts == number).sum(axis=0).max() * picture.view.step)
-
-
-def skin_over(subject: Subject, side: int, margin: float = 1.6) -> list[np.ndarray]:
-    """(m,) which vertices of every part lie within ``margin`` radii in front of an eye's centre at rest."""
-    assert subject.eyes is not None
-    centre, radius = subject.eyes[side], subject.head.data.eye_radius
-    away = [v - centre for v in subject.rest]
-    return [(np.linalg.norm(a, axis=1) < margin * radius) & (a[:, 2] > 0) for a in away]
