@@ -168,7 +168,7 @@ class Run:
         if self._main.returncode is None:
             found.append("it does not end")
         if "Traceback" in said:
-            found.append(f"a traceback: {said[-1500:]}")
+            found.append("a traceback: " + said[max(0, said.index("Traceback") - 600) :][:5000])
         return found
 
     def left(self) -> list[str]:

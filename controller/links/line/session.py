@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache, cached_property
@@ -69,6 +70,7 @@ class LineSession:
         self._sink = sink
         self._name = name
         self._checksums = ChecksumRule(checksum)
+        self._version = package_version()  # read once at the start: later there may be no file descriptor left
         self._parameters = sink.parameters
         self._grammar = Grammar(sink.parameters, lambda name: sink.vocabulary[name].name, scripted=scripted)
         self._decoder = LineDecoder()
@@ -196,7 +198,8 @@ class LineSession:
         self.faults, self.last_fault = self.faults + 1, f"{type(error).__name__}: {error}"
         if self.last_fault not in self._logged and len(self._logged) < _LOGGED:
             self._logged.add(self.last_fault)
-            log.error("%s: %s; %s", self._name, self.last_fault, consequence, exc_info=error)
+            shown = error if os.environ.get("OMOTE_DEBUG") else None
+            log.error("%s: %s; %s", self._name, self.last_fault, consequence, exc_info=shown)
 
     def _act(self, command: Command, now_ns: int) -> bool:
         """Pass a command that changes the face to the sink; False when it is a question."""
@@ -248,7 +251,7 @@ class LineSession:
                 return f"LIST {words[0]} " + " ".join(self._list(words[0]))
             case "HELLO":
                 limits = f"parameters={len(self._parameters)} max_line={MAX_LINE} max_rate_hz={MAX_RATE_HZ:g}"
-                return f"HELLO omote {package_version()} protocol={VERSION} {limits} checksum={self._checksums.mode}"
+                return f"HELLO omote {self._version} protocol={VERSION} {limits} checksum={self._checksums.mode}"
         return " ".join(["PONG", *words])
 
     @cached_property

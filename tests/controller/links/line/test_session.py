@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.links.line.protocol import MAX_LINE, MAX_REPLY, Reply, checksum, format_words, parse_reply
 from controller.links.line.script import Script
-from controller.links.line.session import LineSession
+from controller.links.line.session import LineSession, package_version
 from controller.links.line.show import Shows
 from controller.vocabulary.vocabulary import Vocabulary
 
@@ -308,6 +309,21 @@ def test_an_error_of_omote_in_a_stream_ends_the_stream_only(talk: Talk, monkeypa
     assert talk.session.stream(talk.now) == b"" and talk.session.due_ns() is None
     assert (talk.session.faults, talk.session.last_fault) == (1, "ZeroDivisionError: no values")
     assert talk.say("PING").ok and talk.say("GET jawOpen").code == 31
+
+
+def test_hello_opens_no_file(talk: Talk, monkeypatch: pytest.MonkeyPatch) -> None:
+    package_version.cache_clear()
+    monkeypatch.setattr("importlib.metadata.version", lambda name: (_ for _ in ()).throw(OSError(24, "no descriptor")))
+    assert talk.say("HELLO").text.startswith(f"HELLO omote {version('omote')} ")
+
+
+@pytest.mark.parametrize("debug", ["", "1"])
+def test_an_error_of_omote_shows_a_traceback_to_developers_only(
+    talk: Talk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, debug: str
+) -> None:
+    monkeypatch.setenv("OMOTE_DEBUG", debug)
+    talk.session.fault(OSError("no descriptor"), "it goes on")
+    assert "OSError: no descriptor" in caplog.text and bool(caplog.records[0].exc_info) is bool(debug)
 
 
 def test_a_file_that_is_wrong_refuses_the_line_that_needs_it(talk: Talk, monkeypatch: pytest.MonkeyPatch) -> None:
