@@ -80,7 +80,7 @@ def bare_where_damaged(mesh: FitMesh) -> FitMesh:
     numbers among them that only damage makes."""
     uv = np.vstack([mesh.uv, np.zeros((1, 2))])  # the last row stands for none
     fine: Bools = np.all(np.abs(uv) < LARGE, axis=1)
-    known = mesh.face_uv < len(mesh.uv)  # an index that points nowhere is named later
+    known = (mesh.face_uv >= -1) & (mesh.face_uv < len(mesh.uv))  # an index that points nowhere is named later
     row_good = (fine[np.where(known, mesh.face_uv, -1)] & ((mesh.face_uv >= 0) == (mesh.faces >= 0))).all(axis=1)
     keep = row_good | ~known.all(axis=1)
     return replace(mesh, uv=np.where(fine[:-1, None], mesh.uv, 0.0), face_uv=np.where(keep[:, None], mesh.face_uv, -1))

@@ -74,10 +74,11 @@ def test_damaged_texture_coordinates_are_none() -> None:
     bare = mesh_module.bare_where_damaged(replace(mesh, uv=uv, face_uv=face_uv))
     assert (bare.face_uv[:2] == -1).all() and np.array_equal(bare.face_uv[2], mesh.face_uv[2])
     mesh_module.check_mesh(bare, "m")
-    face_uv[2, 0] = 99
-    beyond = mesh_module.bare_where_damaged(replace(mesh, face_uv=face_uv))
-    with pytest.raises(FitError, match=r"face_uv\[2\] points at 99"):
-        mesh_module.check_mesh(beyond, "m")
+    for nowhere in (99, -(1 << 62)):
+        face_uv[2, 0] = nowhere
+        beyond = mesh_module.bare_where_damaged(replace(mesh, face_uv=face_uv))
+        with pytest.raises(FitError, match=rf"face_uv\[2\] points at {nowhere}"):
+            mesh_module.check_mesh(beyond, "m")
 
 
 def test_no_faces_are_refused(tmp_path):
