@@ -13,6 +13,7 @@ import json
 import os
 import stat
 import struct
+import sys
 import tokenize
 import tomllib
 import zipfile
@@ -199,7 +200,15 @@ def read_npz(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> dict[str,
             raise ValueError(f"not a sound archive of arrays: {why}") from error
     if foreign := [name for name, array in found.items() if not isinstance(array, np.ndarray)]:
         raise ValueError(f"{foreign[0]} is no array")  # numpy gives the bytes of a member that it does not know
+    if damaged := [name for name, array in found.items() if array.dtype.kind == "U" and not _is_text(array)]:
+        raise ValueError(f"{damaged[0]} holds characters that do not exist")
     return found
+
+
+def _is_text(array: NDArray[Any]) -> bool:
+    """Are all characters of an array of texts code points that may be printed and written?"""
+    points = np.frombuffer(array.astype(array.dtype.newbyteorder("=")).tobytes(), np.uint32)
+    return bool(((points < 0xD800) | ((points > 0xDFFF) & (points <= sys.maxunicode))).all())
 
 
 def _check_archive(file: IO[bytes], limit: int) -> None:

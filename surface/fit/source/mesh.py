@@ -101,6 +101,8 @@ def _check_finite(where: str, mesh: FitMesh) -> None:
 
 def check_manifold(mesh: FitMesh, where: str) -> None:
     """Raise FitError, naming the edge, where more than two faces meet or two neighbours run opposite ways round."""
+    if not len(mesh.faces):
+        raise FitError(f"{where}: all faces are without area", hint="export the mesh again")
     a, b = directed_edges(mesh.faces)
     n = len(mesh.vertices)
     edge = np.minimum(a, b) * n + np.maximum(a, b)

@@ -189,3 +189,15 @@ def test_a_damaged_name_in_an_archive_is_told_without_the_words_of_the_interpret
 def test_python_objects_are_not_loaded(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="Python objects"):
         files.read_npz(archive(tmp_path / "a.npz", a=npy(np.array([{}], dtype=object))))
+
+
+@pytest.mark.parametrize("point", [0x110000, 0xFFFFFFFF, 0xD800, 0xDFFF])
+@pytest.mark.parametrize("order", "<>")
+def test_characters_that_do_not_exist_are_named(tmp_path: Path, point: int, order: str) -> None:
+    text = np.array(["jaw", "\U0010ffff\ud7ff\ue000"], f"{order}U3")
+    path = archive(tmp_path / "a.npz", names=npy(text))
+    assert np.array_equal(files.read_npz(path)["names"], text)
+    assert files.read_npz(archive(tmp_path / "none.npz", names=npy(np.zeros((2, 0), "U3"))))["names"].size == 0
+    text.view(f"{order}u4")[1] = point
+    with pytest.raises(ValueError, match=r"^names holds characters that do not exist"):
+        files.read_npz(archive(tmp_path / "b.npz", names=npy(text)))

@@ -123,6 +123,8 @@ def flat(faces: list[list[int]], points: int = 9, **other) -> FitMesh:
 
 def test_a_sheet_is_a_manifold_and_a_fan_of_three_faces_is_not():
     check_manifold(slit_sheet(), "m")
+    with pytest.raises(FitError, match="m: all faces are without area"):
+        check_manifold(flat(np.zeros((0, 4), int)), "m")
     check_manifold(flat([[0, 1, 2, -1], [2, 1, 3, -1], [3, 1, 4, 5]]), "m")
     with pytest.raises(FitError, match=r"m: not a manifold: the edge between vertices 1 and 2 belongs to 3 faces") as e:
         check_manifold(flat([[0, 1, 2, -1], [2, 1, 3, -1], [5, 6, 7, 8], [2, 1, 4, -1]]), "m")
