@@ -56,7 +56,7 @@ def test_a_head_without_eyes_is_named_by_its_mouth_or_by_its_size() -> None:
     by_mouth = Places(head, mouth)
     assert by_mouth.apart == pytest.approx(70.0)
     np.testing.assert_allclose(by_mouth.centre, [0.0, -66.0 + 1.06 * 70.0, 9.0 - 0.4 * 70.0])
-    assert by_mouth.name(mouth.middle + [0.0, 7.0, 5.0]) == "upper lip"
+    assert by_mouth.name(np.add(mouth.middle, [0.0, 7.0, 5.0])) == "upper lip"
     by_size = Places(head, None)
     np.testing.assert_allclose(by_size.centre, [20.0, 80.0, 30.0 - 35.0])
     assert by_size.apart == pytest.approx(70.0) and by_size.down == pytest.approx(1.06)
