@@ -52,11 +52,12 @@ def test_a_jaw_that_does_not_open_has_no_line_of_lips() -> None:
     assert find_mouth(plain.subject(plain.eyeball(0), jaw=0.4)) is None
 
 
-def test_a_mouth_of_less_than_five_pixels_is_none() -> None:
-    bite = plain.part("bite", *plain.sheet((0, 1.2), (-1, 0), 0.2, 9.0),
-                      moves={"jawOpen": np.tile([0.0, -9.0, 0.0], (42, 1))})  # fmt: skip
+@pytest.mark.parametrize(("pixels", "found"), [(4, False), (5, True)])
+def test_a_mouth_is_five_pixels_wide_at_least(pixels: int, found: bool) -> None:
+    points, triangles = plain.sheet((-0.1, 0.5 * pixels - 0.4), (-1, 0), 0.1, 9.0)
+    bite = plain.part("bite", points, triangles, moves={"jawOpen": np.tile([0.0, -9.0, 0.0], (len(points), 1))})
     still = plain.part("face", *plain.sheet((-60, 60), (-60, 60), 10.0))
-    assert find_mouth(plain.subject(still, bite)) is None
+    assert (find_mouth(plain.subject(still, bite)) is not None) == found
 
 
 def test_the_longest_run_closes_gaps_of_one_and_begins_again_after_wider_ones() -> None:

@@ -208,6 +208,23 @@ def test_weights_and_numbers_that_no_surface_can_have_are_named(tmp_path: Path, 
             saved(tmp_path, rhino, form)
 
 
+class Valid:
+    """A surface that says that it is valid, whatever its points are."""
+
+    IsValid = True
+
+    def __init__(self, form: Any) -> None:
+        self.ToNurbsSurface = lambda: form
+
+
+@pytest.mark.parametrize("values", [(0, 0, 0, 0.0), (0, 0, 0, -1.0), (np.inf, 0, 0, 1.0), (0, 0, 0, np.nan)])
+def test_a_point_without_place_or_weight_is_named(tmp_path: Path, rhino: Any, values: tuple[float, ...]) -> None:
+    form = net(rhino)
+    form.Points[(2, 3)] = rhino.Point4d(*values)
+    with pytest.raises(SurfaceFileError, match=r"control point \(2, 3\) is \[.*not finite, or no positive weight"):
+        reader._nurbs(Location(tmp_path / "a.3dm"), Valid(form))
+
+
 def test_without_rhino3dm_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rhino3dm", None)
     (tmp_path / "a.3dm").write_bytes(b"")
