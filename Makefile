@@ -29,7 +29,7 @@ check: setup ## check style and types
 # Not in requirements.lock: only this target needs it, and it depends on a dozen packages.
 mutate: setup ## mutation testing of a room, 50 changed lines: make mutate ROOM=drivers SEED=1
 	@$(PY) -c 'import cosmic_ray' 2>/dev/null || $(if $(UV),$(UV) pip install --python $(PY),$(PY) -m pip install) --quiet 'cosmic-ray>=8.4'
-	@$(PY) -m tests.mutate $(ROOM) --seed $(or $(SEED),1)
+	@$(PY) -m tests.mutate $(ROOM) --seed $(or $(SEED),1) $(if $(UNDER),--under $(UNDER))
 
 # COUNT files of each kind and lines; the same seed damages them in the same way.
 fuzz: setup ## read damaged files of every kind, and damaged lines: make fuzz COUNT=1000 SEED=1 MINUTES=60 JOBS=2

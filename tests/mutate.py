@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 from collections import defaultdict
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,7 +75,7 @@ class Mutant:
 def main() -> int:
     """Sample, run, report; exit code 1 where fewer than ``--least`` percent were killed."""
     given = _arguments()
-    mutants = sample(given.room, given.count, given.seed)
+    mutants, equivalent = sample(given.room, given.count, given.seed, given.under)
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copies: SimpleQueue[Path] = SimpleQueue()
         for job in range(given.jobs):
@@ -82,18 +83,26 @@ def main() -> int:
         _refuse_red_tests(copies, {test for mutant in mutants for test in tests_of(mutant.module)})
         with ThreadPoolExecutor(given.jobs) as pool:
             noticed = list(pool.map(lambda mutant: _is_killed(mutant, copies), mutants))
-    interval = binomtest(sum(noticed), len(mutants)).proportion_ci(method="wilson")
-    print(f"\n{given.room}, seed {given.seed}: {sum(noticed)} of {len(mutants)} mutants killed,", end=" ")
-    print(f"{sum(noticed) / len(mutants):.0%} (95 % interval {interval.low:.0%} to {interval.high:.0%})")
+    print(f"\n{' '.join([given.room, *given.under])}, seed {given.seed}: {_share(sum(noticed), len(mutants))}")
+    if equivalent:
+        print(f"with {equivalent} listed as equivalent: {_share(sum(noticed), len(mutants) + equivalent)}")
     for mutant, killed in zip(mutants, noticed, strict=True):
         if not killed:
             print(f"  survived  {mutant.title()}")
     return int(100 * sum(noticed) < given.least * len(mutants))
 
 
+def _share(killed: int, of: int) -> str:
+    """How many mutants were killed, in percent, and how sure that is."""
+    interval = binomtest(killed, of).proportion_ci(method="wilson")
+    share = f"{killed / of:.0%} (95 % interval {interval.low:.0%} to {interval.high:.0%})"
+    return f"{killed} of {of} mutants killed, {share}"
+
+
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.mutate", description=str(__doc__).splitlines()[0])
     parser.add_argument("room", help="surface, controller, drivers, or a folder or module of one of them")
+    parser.add_argument("--under", nargs="+", default=[], help="only these folders or modules of the room")
     parser.add_argument("--count", type=int, default=50, help="how many mutants (default 50)")
     parser.add_argument("--seed", type=int, default=1, help="which sample (default 1)")
     parser.add_argument("--jobs", type=int, default=max(1, min(4, os.cpu_count() or 1)), help="how many run at once")
@@ -101,20 +110,27 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def sample(room: str, count: int, seed: int) -> list[Mutant]:
-    """`count` mutants of `room`, no two at the same place, and none that is listed as equivalent."""
+def sample(room: str, count: int, seed: int, under: Sequence[str] = ()) -> tuple[list[Mutant], int]:
+    """`count` mutants of `room`, no two at the same place, and how many were left out as listed equivalent ones.
+
+    `under`: the folders or modules of the room that are meant, all where there are none.
+    """
     lines = EQUIVALENT.read_text().splitlines() if EQUIVALENT.is_file() else []
     equivalent = {line.rpartition("  #")[0] for line in lines}  # the last one: the line of code may have a comment
-    places = [place for module in modules_in(room) for place in _places(module)]
-    draw, chosen = random.Random(seed), list[Mutant]()
+    places = [place for module in modules_in(room, under) for place in _places(module)]
+    draw, chosen, left_out = random.Random(seed), list[Mutant](), 0
     draw.shuffle(places)
     for place in places:
         mutant = draw.choice(place)
-        if _compiles(mutant.code()) and mutant.title() not in equivalent:
+        if not _compiles(mutant.code()):
+            continue
+        if mutant.title() in equivalent:
+            left_out += 1
+        else:
             chosen.append(mutant)
         if len(chosen) == count:
             break
-    return chosen
+    return chosen, left_out
 
 
 def _compiles(code: str) -> bool:
@@ -126,12 +142,18 @@ def _compiles(code: str) -> bool:
     return True
 
 
-def modules_in(room: str) -> list[str]:
-    """Paths of the modules of a room, or of a part of one, from the root."""
-    path = ROOT / room
+def modules_in(room: str, under: Sequence[str] = ()) -> list[str]:
+    """Paths of the modules of a room, or of a part of one, from the root; where `under` has paths, only those there."""
+    for part in (room, *under):
+        if not _modules_of(part):
+            raise SystemExit(f"no modules in {part}; give a room (surface, controller, drivers), a folder or a module")
+    meant = {module for part in under for module in _modules_of(part)}
+    return [module for module in _modules_of(room) if not under or module in meant]
+
+
+def _modules_of(part: str) -> list[str]:
+    path = ROOT / part
     found = [path] if path.is_file() else sorted(path.rglob("*.py"))
-    if not found:
-        raise SystemExit(f"no modules in {room}; give a room (surface, controller, drivers), a folder or a module")
     return [p.relative_to(ROOT).as_posix() for p in found]
 
 

@@ -162,7 +162,7 @@ def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
     ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
     known = np.unique(ends, return_inverse=True)[1].reshape(-1)
     square = (points**2).sum(axis=1)
-    near = np.maximum(square[:, None] + square - 2.0 * points @ points.T, 0.0) < reach**2
+    near = square[:, None] + square - 2.0 * points @ points.T < reach**2
     links = known[np.argwhere(near)]
     return _components(links, int(known.max(initial=-1)) + 1)[known].reshape(-1, 2)
 

@@ -25,8 +25,7 @@ def _draw(points: Any, triangles: Any, part: int, corner: Any, step: float, dept
         x0, x1 = (min(a[0], b[0], c[0]) - corner[0]) / step, (max(a[0], b[0], c[0]) - corner[0]) / step
         y0, y1 = (min(a[1], b[1], c[1]) - corner[1]) / step, (max(a[1], b[1], c[1]) - corner[1]) / step
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        outside = x1 < 0 or y1 < 0 or x0 > w - 1 or y0 > h - 1
-        if outside or not (abs(area) > 1e-12):
+        if not abs(area) > 1e-12:
             continue
         for j in range(max(0, int(np.ceil(y0))), min(h - 1, int(np.floor(y1))) + 1):
             for i in range(max(0, int(np.ceil(x0))), min(w - 1, int(np.floor(x1))) + 1):

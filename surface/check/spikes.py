@@ -75,7 +75,7 @@ def heights(values: Any, start: Any, ring: Any, out: Any) -> None:
             j = ring[k]
             dx, dy, dz = values[i, 0] - values[j, 0], values[i, 1] - values[j, 1], values[i, 2] - values[j, 2]
             least = min(least, dx * x + dy * y + dz * z)
-        out[i] = max(least, 0.0)
+        out[i] = least
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from surface import Domain
 from surface.mesh import loops
@@ -62,7 +63,7 @@ def test_even_odd_is_that_of_counted_crossings_at_every_height() -> None:
 
 def test_bands_of_a_loop_list_every_segment_that_meets_them() -> None:
     rng = np.random.default_rng(7)
-    segments = rng.uniform(2.0, 5.0, (31, 4))
+    segments = rng.uniform(2.0, 2.4, (31, 4))
     low, scale, start, ids = loops._by_band(segments)
     assert low == segments[:, [1, 3]].min() and len(start) == 16 and start[0] == 0 and start[-1] == len(ids)
     for band in range(15):
@@ -148,6 +149,37 @@ def test_edges_along_a_loop_are_at_most_a_quarter_of_it_and_at_least_the_floor()
     np.testing.assert_allclose(sizes(CIRCLE, 1e-3, 0.2), 0.2)
     turned = np.roll(CIRCLE[::-1], 123, axis=0)  # wherever it begins, whichever way it goes
     np.testing.assert_allclose(sizes(turned, 1e-3, 0.0), np.roll(sizes(CIRCLE, 1e-3, 0.0)[::-1], 123))
+
+
+def brute_sizes(ring: np.ndarray, error: float, sharp: np.ndarray) -> np.ndarray:
+    """As the docstring has it, point by point: chords over as many points on either side, until one bows too far or
+    ends in a corner; no longer than the distance of any point that is half as far again along the loop."""
+    k, out = len(ring), []
+    step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    for i in range(k):
+        size, at = step.sum() / 4, np.roll(np.arange(k), -i)
+        for w in range(1, k // 4):
+            if sharp[i] or sharp[at[np.r_[1:w, 1 - w : 0]]].any():
+                break
+            chord = ring[at[w]] - ring[at[-w]]
+            sag = abs(float(np.linalg.det([chord, ring[i] - ring[at[-w]]]))) / np.linalg.norm(chord)
+            if sag > error:
+                size = min(size, np.linalg.norm(chord) * np.sqrt(error / sag))
+                break
+        ahead = np.concatenate([[0.0], np.cumsum(step[at])[:-1]])  # of the point at each of `at`
+        along, gap = np.minimum(ahead, step.sum() - ahead), np.linalg.norm(ring[at] - ring[i], axis=1)
+        out.append(min([size, *gap[(along > 1.5 * gap) & (along > 0.0)]]))
+    return np.array(out)
+
+
+@pytest.mark.parametrize("error", [1e-3, 3e-2])
+def test_sizes_are_those_of_every_chord_and_every_gap(error: float) -> None:
+    rng = np.random.default_rng(12)
+    angle = np.sort(rng.uniform(0, 2 * np.pi, 61))  # uneven steps
+    ring = np.column_stack([np.cos(angle), 0.3 * np.sin(angle)]) * (1 + 0.1 * np.sin(5 * angle))[:, None]
+    sharp = np.zeros(61, bool)
+    sharp[[7, 30, 33]] = True
+    np.testing.assert_allclose(sizes(ring, error, 0.0, sharp), brute_sizes(ring, error, sharp), rtol=1e-9)
 
 
 def test_an_edge_bows_by_the_error_where_a_loop_bends() -> None:

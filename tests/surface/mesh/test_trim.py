@@ -45,6 +45,9 @@ def test_area_is_kept_and_no_triangle_is_flat(name: str, n: int) -> None:
     directed = flat.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     assert len(np.unique(directed, axis=0)) == len(directed)
     assert len(np.unique(flat.triangles)) == len(flat.uv)
+    assert len(flat.owner) == len(flat.triangles)
+    cell = (np.stack(np.divmod(flat.owner, n), axis=1) + 0.5) / n  # vertices move by less than a cell
+    assert np.abs(flat.uv[flat.triangles].mean(axis=1) - cell).max() < 1.2 / n
 
 
 def test_sharp_corners_become_vertices() -> None:

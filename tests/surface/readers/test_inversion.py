@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from surface import DCPSurface
+from surface.readers import inversion
 from surface.readers.inversion import invert
 from tests.surface import shapes
 
@@ -63,3 +67,93 @@ def test_of_two_folds_that_touch_the_nearest_sample_does_not_decide() -> None:
     found, distance = invert(surface, surface.evaluate(uv))
     assert distance.max() < 1e-9
     assert np.abs(found - uv).max() < 1e-6
+
+
+@pytest.mark.parametrize("constant", ["u", "v"])
+def test_points_about_a_pole_are_found(constant: str) -> None:
+    """A cone: at its tip one derivative is zero."""
+    angle, height = np.linspace(0.0, 1.5, 5), np.linspace(0.0, 1.0, 4)
+    net = np.stack([np.outer(np.cos(angle), height), np.outer(np.sin(angle), height), np.tile(height, (5, 1))], axis=-1)
+    net = net if constant == "u" else net.swapaxes(0, 1)
+    degrees = (2, 1) if constant == "u" else (1, 2)
+    count = net.shape[:2]
+    knots = [np.concatenate([np.zeros(p + 1), np.arange(1.0, n - p), np.full(p + 1, n - p)])
+             for p, n in zip(degrees, count, strict=True)]  # fmt: skip
+    surface = DCPSurface.from_nurbs(*degrees, *knots, net, np.ones(count))
+    along = np.column_stack([np.linspace(0.0, knots[0][-1], 30), np.linspace(0.0, 1e-3, 30)])
+    uv = along if constant == "u" else along[:, ::-1] * [1.0, knots[1][-1] / knots[0][-1]]
+    points = np.vstack([surface.evaluate(uv), [[0.0, 0.0, 0.0]]])
+    found, distance = invert(surface, points)
+    assert distance.max() < 1e-9
+    assert np.abs(surface.evaluate(found) - points).max() < 1e-9
+
+
+def sloped(su: tuple[float, ...], sv: tuple[float, ...], shrink: float = 1.0) -> SimpleNamespace:
+    """The plane u su + v sv over 0..1, whose derivatives it gives as ``shrink`` times what they are."""
+    axes = np.array([su, sv], float)
+
+    def derivatives(uv: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return uv @ axes, *(np.tile(shrink * axis, (len(uv), 1)) for axis in axes)
+
+    return SimpleNamespace(rect=(0.0, 1.0, 0.0, 1.0), evaluate=lambda uv: uv @ axes, derivatives=derivatives)
+
+
+def test_a_step_solves_the_least_squares_of_both_directions_or_takes_half_of_each_where_they_are_one() -> None:
+    points, uv = np.array([[0.7, 0.9, 0.3], [0.1, 0.4, 2.0]]), np.array([[0.5, 0.2], [0.0, 1.0]])
+    for su, sv in (((2.0, 0.5, 0.0), (0.3, 1.0, 1.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 4.0))):
+        axes = np.array([su, sv])
+        wanted = np.linalg.lstsq(axes.T, (points - uv @ axes).T, rcond=None)[0].T
+        np.testing.assert_allclose(inversion._step(sloped(su, sv), points, uv), wanted)  # type: ignore[arg-type]
+    pole = inversion._step(sloped((0, 0, 0), (0, 2.0, 0)), points, uv)  # type: ignore[arg-type]
+    np.testing.assert_allclose(pole, [[0.0, (0.45 - 0.2) / 2], [0.0, (0.2 - 1.0) / 2]])
+    pole = inversion._step(sloped((0, 2.0, 0), (0, 0, 0)), points, uv)  # type: ignore[arg-type]
+    np.testing.assert_allclose(pole, [[(0.45 - 0.5) / 2, 0.0], [0.1, 0.0]])
+    both = inversion._step(sloped((0, 2.0, 0), (0, 4.0, 0)), points, uv)  # type: ignore[arg-type]
+    off = points[:, 1] - uv @ [2.0, 4.0]
+    np.testing.assert_allclose(both, np.column_stack([off / 4, off / 8]))
+
+
+@pytest.mark.parametrize("shrink", [1.0, 0.1, 0.01])
+def test_steps_that_are_too_long_are_shortened_and_grow_again(shrink: float) -> None:
+    surface, points = sloped((2.0, 0.0, 0.0), (0.0, 1.0, 0.0), shrink), np.array([[0.9, 0.7, 0.0], [1.0, 0.2, 0.3]])
+    uv, distance = inversion._gauss_newton(surface, points, np.full((2, 2), 0.4))  # type: ignore[arg-type]
+    np.testing.assert_allclose(uv, points[:, :2] / [2.0, 1.0], atol=1e-8)
+    np.testing.assert_allclose(distance, [0.0, 0.3], atol=1e-7)
+
+
+def test_a_search_ends_at_the_rectangles_border() -> None:
+    surface, points = sloped((2.0, 0.0, 0.0), (0.0, 1.0, 0.0)), np.array([[9.0, 0.5, 0.0], [0.5, -3.0, 0.0]])
+    uv, distance = inversion._gauss_newton(surface, points, np.full((2, 2), 0.4))  # type: ignore[arg-type]
+    np.testing.assert_allclose(uv, [[1.0, 0.5], [0.25, 0.0]])
+    np.testing.assert_allclose(distance, [7.0, 3.0])
+
+
+def test_searches_begin_evenly_and_at_three_places_in_each_span() -> None:
+    knots = np.array([[0.0, 0.0, 0.0, 3.0], [0.0, 0.0, 3.0, 4.0], [0.0, 3.0, 4.0, 9.0]])
+    even = np.linspace(0.0, 4.0, 48)
+    spans = [0.5, 1.5, 2.5, 3 + 1 / 6, 3.5, 3 + 5 / 6]
+    np.testing.assert_allclose(inversion._stations(knots, 0.0, 4.0), np.unique(np.concatenate([even, spans])))
+    many = inversion._stations(np.linspace(0.0, 1.0, 201)[None], 0.0, 1.0)
+    assert 360 <= len(many) <= 360 + 48 and np.diff(many).max() < 1 / 150  # of 600, spread over all
+    few = inversion._stations(np.linspace(0.0, 1.0, 121)[None], 0.0, 1.0)
+    assert len(few) == 360 + 48  # just as many as are allowed
+
+
+def test_quarters_are_of_the_rectangle_and_none_is_empty() -> None:
+    grid = np.array([[0.1, 0.9], [0.5, 0.5], [0.6, 0.4], [0.7, 0.8], [0.51, 0.5]])
+    quarters = inversion._quarters(SimpleNamespace(rect=(0.0, 1.0, 0.0, 1.0)), grid)  # type: ignore[arg-type]
+    assert [q.tolist() for q in quarters] == [[1], [2, 4], [0], [3]]
+    assert [q.tolist() for q in inversion._quarters(SimpleNamespace(rect=(0.0, 4.0, 0.0, 1.2)), grid)] == [  # type: ignore[arg-type]
+        [1, 2, 4], [0, 3]
+    ]  # fmt: skip
+
+
+def test_the_nearest_sample_is_that_of_all_distances(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inversion, "AT_ONCE", 100)
+    rng = np.random.default_rng(3)
+    samples, points = rng.normal(size=(30, 3)) + 50.0, rng.normal(size=(17, 3)) + 50.0
+    wanted = np.linalg.norm(points[:, None] - samples, axis=2).argmin(axis=1)
+    np.testing.assert_array_equal(inversion._nearest(samples, points), wanted)
+    monkeypatch.setattr(inversion, "AT_ONCE", 1)  # one at a time at least
+    np.testing.assert_array_equal(inversion._nearest(samples, points), wanted)
+    assert len(inversion._nearest(samples, points[:0])) == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -206,6 +207,42 @@ def test_weights_and_numbers_that_no_surface_can_have_are_named(tmp_path: Path, 
         form.Points[(1, 1)] = rhino.Point4d(*values)
         with pytest.raises(SurfaceFileError, match=r"object 0 \(.*(not valid|control point \(1, 1\) is)"):
             saved(tmp_path, rhino, form)
+
+
+class Valid:
+    """A surface that says that it is valid, whatever its points are."""
+
+    IsValid = True
+
+    def __init__(self, form: Any) -> None:
+        self.ToNurbsSurface = lambda: form
+
+
+@pytest.mark.parametrize("values", [(0, 0, 0, 0.0), (0, 0, 0, -1.0), (np.inf, 0, 0, 1.0), (0, 0, 0, np.nan)])
+def test_a_point_without_place_or_weight_is_named(tmp_path: Path, rhino: Any, values: tuple[float, ...]) -> None:
+    form = net(rhino)
+    form.Points[(2, 3)] = rhino.Point4d(*values)
+    with pytest.raises(SurfaceFileError, match=r"control point \(2, 3\) is \[.*not finite, or no positive weight"):
+        reader._nurbs(Location(tmp_path / "a.3dm"), Valid(form))
+
+
+def test_edges_run_as_their_trims_do_and_a_pole_has_none() -> None:
+    edge = SimpleNamespace(
+        Domain=SimpleNamespace(T0=2.0, T1=5.0), PointAt=lambda t: SimpleNamespace(X=t, Y=2.0 * t, Z=-t)
+    )
+    trims = [SimpleNamespace(EdgeIndex=k, IsReversed=r) for k, r in ((0, False), (-1, False), (0, True))]
+    loop = SimpleNamespace(TrimCount=3, Trims=trims)
+    there, pole, back = reader._edges(SimpleNamespace(Edges=[edge]), loop, 1e-3)
+    assert pole.points.shape == (0, 3)
+    np.testing.assert_allclose(there.points[[0, -1]], [[2.0, 4.0, -2.0], [5.0, 10.0, -5.0]])
+    np.testing.assert_array_equal(back.points, there.points[::-1])
+
+
+@pytest.mark.parametrize(("off", "along"), [(0.0, True), (3e-7, True), (5e-7, False)])
+def test_a_loop_on_the_rectangles_border_trims_nothing(off: float, along: bool) -> None:
+    """Within 1e-7 of its longer side, which is 4 here."""
+    loop = np.array([[1.0, 2.0], [4.0, 2.0], [4.0 + off, 3.0], [2.0, 6.0], [1.0, 6.0]])
+    assert reader._along_border(loop, (1.0, 4.0, 2.0, 6.0)) == along
 
 
 def test_without_rhino3dm_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surface import DCPSurface
+from surface.spline import refine
 from tests.surface import shapes
 
 
@@ -122,3 +123,10 @@ def test_only_named_points_are_split() -> None:
     rest = np.delete(np.arange(64), 27)
     assert np.array_equal(made.surface.points[:63], surface.points[rest])
     assert sorted(made.parent[made.point >= 63].tolist()) == [27, 27]
+
+
+def test_middles_are_of_spans_that_share_more_than_an_end() -> None:
+    knots = np.array([[0.0, 0.0, 1.0, 3.0, 4.0], [2.0, 2.5, 3.0, 3.0, 7.0]])
+    found = refine._middles(knots, 1.0, 3.0)
+    np.testing.assert_array_equal(found, [[np.nan, np.nan, 2.0, np.nan], [2.25, 2.75, np.nan, np.nan]])
+    np.testing.assert_array_equal(refine._middles(knots, 0.5, 3.1)[:, 1:], [[0.5, 2.0, 3.5], [2.75, np.nan, 5.0]])

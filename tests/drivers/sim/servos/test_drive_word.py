@@ -160,6 +160,13 @@ def test_sensed_registers_of_an_ax():
     assert get("Moving") == 0
 
 
+@pytest.mark.parametrize(("now_s", "tick"), [(0.0, 0), (0.25, 250), (32.767, 32767), (32.7685, 0), (40.0, 7232)])
+def test_the_tick_of_an_mx_counts_milliseconds_in_fifteen_bits(now_s: float, tick: int):
+    one = drive("mx1-28")
+    one.sense(now_s)
+    assert one.registers.get("Realtime Tick") == tick
+
+
 def test_speeds_are_in_the_unit_of_the_models_register():
     one = drive("sts3215", Operating_Mode=1, Goal_Velocity=100)
     one.ticks_s = 3.0

@@ -12,6 +12,7 @@ from surface.head.posing.contact_kernels import (
     find_overlap,
     lift_points,
     move_points,
+    overlap_at,
     place_samples,
 )
 from surface.head.posing.rig import optical_axis
@@ -141,6 +142,20 @@ def test_overlap_is_found_between_the_samples_of_a_profile():
     samples[1, :, :, 1] = [-9.0, -9.0, -9.0, 2.0, 2.5]
     find_overlap(samples, PRESS, SOFT, push)
     np.testing.assert_allclose(push, 1.5 - PRESS, atol=1e-9)  # the upper is at 0.5 at depth 1, at 1.5 at depth 3
+
+
+def test_a_profile_reaches_as_far_as_its_highest_line_at_a_depth():
+    rng = np.random.default_rng(8)
+    heights, depths = rng.normal(size=7), rng.uniform(2.0, 9.0, 7)
+    depths[4] = depths[3]  # a step straight up
+    for depth in (*rng.uniform(1.0, 10.0, 60), depths[0], depths[6]):
+        lines = [
+            np.interp(depth, *zip(*sorted(zip(depths[j : j + 2], heights[j : j + 2], strict=True)), strict=True))
+            for j in range(6) if j != 3 and depths[j : j + 2].min() <= depth <= depths[j : j + 2].max()
+        ]  # fmt: skip
+        for sign in (1.0, -1.0):
+            wanted = max((sign * (line - 0.3) for line in lines), default=-1e9)
+            assert overlap_at(0.3, depth, heights, depths, sign) == pytest.approx(wanted)
 
 
 def test_sides_are_compared_at_the_same_x():

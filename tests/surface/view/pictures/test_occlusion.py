@@ -202,6 +202,8 @@ def test_no_two_directions_are_near_each_other(count: int) -> None:
     directions = sphere_directions(count)
     between = np.degrees(np.arccos(np.clip(directions @ directions.T, -1, 1)))[~np.eye(count, dtype=bool)]
     assert between.min() > 0.75 * np.degrees(np.sqrt(4 * np.pi / count))
+    turn = np.diff(np.unwrap(np.arctan2(directions[:, 2], directions[:, 0])))
+    assert np.degrees(turn) % 360 == pytest.approx(360 - 137.50776405)  # the golden angle
     assert directions[0, 1] == pytest.approx(1 - 1 / count) and directions[-1, 1] == pytest.approx(1 / count - 1)
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from ball_head import BallHead
 from surface.head import Head
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data
+from surface.view.scene import framing as framing_module
 from surface.view.scene.camera import PRESETS, Camera
 from surface.view.scene.framing import EYES, Framing, framed, framing_of
 
@@ -90,3 +92,76 @@ def test_a_framing_scales_about_the_eyes_and_moves_with_them():
 def _project(camera: Camera, point: np.ndarray) -> np.ndarray:
     clip = camera.matrix(1.0).astype(float) @ [*point, 1.0]
     return clip[:3] / clip[3]
+
+
+def one_part(groups: list[Group], points: np.ndarray, eyes: float = 0.0) -> SimpleNamespace:
+    """As much of a head's data as its framing reads; ``eyes``: half their distance, mm."""
+    part = SimpleNamespace(material="skin", points=points, groups=groups)
+    at = np.array([[eyes, 36.1, 84.2], [-eyes, 36.1, 84.2]])
+    return SimpleNamespace(parts=[part], eyes=at, eye_radius=12.0 if eyes else 0.0)
+
+
+AT = np.array([0.0, 36.1, 84.2])
+CROWN, LIPS, EAR = (AT + np.array(shift) for shift in ((0, 108.7, -70), (0, -68.0, 20), (92.1, 0, -90)))
+
+
+@pytest.mark.parametrize(("places", "eyes", "size"), [
+    ([CROWN], 31.8, 1.0),
+    ([2 * (CROWN - AT) + AT], 31.8, 2.0),  # by its crown
+    ([CROWN, 2 * (EAR - AT) + AT], 31.8, 2.0),  # by its width at the ears, at either side
+    ([CROWN, 2 * (EAR - AT) * [-1, 1, 1] + AT], 31.8, 2.0),
+    ([CROWN, 2 * (EAR - AT) + AT + [0, 67.0, 0]], 31.8, 2.0),
+    ([CROWN, 2 * (EAR - AT) + AT - [0, 69.0, 0]], 31.8, 1.0),  # shoulders do not count
+    ([0.3 * (CROWN - AT) + AT], 31.8, 0.7),  # a face that has no more
+    ([9 * (CROWN - AT) + AT], 31.8, 2.5),  # a hat
+    ([9 * (CROWN - AT) + AT], 63.6, 5.0),
+    ([2 * (CROWN - AT) + AT], 0.0, 2.0),
+])  # fmt: skip
+def test_a_head_is_as_large_as_its_crown_and_its_ears_show_it(places: list, eyes: float, size: float) -> None:
+    data = one_part([], np.zeros((1, 3)), eyes)
+    assert framing_module._size(data, np.array(places), AT) == pytest.approx(size, rel=1e-3)
+
+
+def test_a_head_without_eyes_is_measured_by_its_lips() -> None:
+    lips = Group("mouthFunnel", np.array([0], np.int32), np.ones((1, 3), np.float32))
+    data = one_part([lips], (3 * (LIPS - AT) + AT)[None])
+    assert framing_module._size(data, np.array([9 * (CROWN - AT) + AT]), AT) == pytest.approx(7.5, rel=1e-3)
+    assert framing_module._size(data, np.array([0.1 * (CROWN - AT) + AT]), AT) == pytest.approx(2.1, rel=1e-3)
+
+
+def test_eyes_are_where_the_lids_blink_or_below_the_crown() -> None:
+    """Lids lie 0.5 mm above the eyes' middle and 9.4 mm before it, 63 mm apart, on a head of usual size."""
+    places = 2.0 * np.array([[31.5, 36.6, 93.6], [-31.5, 36.6, 93.6]]) + [5.0, 6.0, 7.0]
+    blinks = [Group(f"eyeBlink{s}", np.array([k], np.int32), np.ones((1, 3), np.float32))
+              for k, s in enumerate(("Left", "Right"))]  # fmt: skip
+    at, known = framing_module._eyes(one_part(blinks, places), places)
+    np.testing.assert_allclose(at, 2.0 * AT + [5.0, 6.0, 7.0], atol=1e-6)
+    assert known
+    box = np.array([[-175.2, -338.0, -50.0], [193.2, 338.0, 250.0]])
+    at, known = framing_module._eyes(one_part(blinks[:1], places), box)
+    np.testing.assert_allclose(at, [9.0, 338.0 - 2 * 108.7, 250.0 - 2 * 46.0])
+    assert not known
+    assert framing_module._height(box) == pytest.approx(2.0)
+    assert framing_module._height(box * [3, 1, 1]) == pytest.approx(2.0)
+    assert framing_module._height(box * [0.5, 1, 1]) == pytest.approx(1.0)
+    assert framing_module._height(0 * box) == 1e-3
+
+
+def test_a_few_points_that_move_far_do_not_move_the_middle() -> None:
+    points = np.array([[0.0, 5, 0], [1, 4, 0], [2, 3, 0], [900, 900, 0]])
+    middle = framing_module._weighted_median(points, np.array([1.0, 1.0, 1.0, 2.0]))
+    np.testing.assert_array_equal(middle, [2, 5, 0])
+    np.testing.assert_array_equal(framing_module._weighted_median(points, np.array([0.0, 1.0, 0.0, 0.5])), [1, 4, 0])
+
+
+@pytest.mark.parametrize(("size", "shift", "same"), [
+    (1.0, (11.9, 0, 0), True), (1.0, (0, -12.1, 0), False), (1.14, (0, 0, 0), True), (1.17, (0, 0, 0), False),
+    (0.88, (0, 0, 0), True), (0.85, (0, 0, 0), False),
+])  # fmt: skip
+def test_a_head_that_hardly_differs_is_seen_from_the_same_places(size: float, shift: tuple, same: bool) -> None:
+    crown = size * (CROWN - AT) + AT + shift
+    surface = SimpleNamespace(evaluate=lambda uv: np.tile(crown, (len(uv), 1)))
+    data = one_part([], np.zeros((1, 3)), 31.8)
+    data.eyes = data.eyes + shift
+    part = SimpleNamespace(material="skin", surface=surface, uv=np.zeros((900, 2)))
+    assert (framing_of(SimpleNamespace(parts=[part], data=data)) == Framing()) == same

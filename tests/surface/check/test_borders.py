@@ -1,0 +1,217 @@
+"""Borders, seams and holes of sheets, against every pair of edges, scipy's components and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from surface.check import borders
+from surface.check.mouth import Mouth
+from surface.check.places import Places
+from surface.check.subject import Subject
+from tests.surface.check import plain
+
+ABOVE = np.add(plain.EYES, [0.0, 200.0, 0.0])  # eyes far from the borders here
+
+
+def sheet(name: str, x: tuple[float, float], y: tuple[float, float] = (-40.0, 40.0), step: float = 4.0, **more: object):
+    points, triangles = plain.sheet(x, y, step)
+    return plain.part(name, points, triangles, **more)  # type: ignore[arg-type]
+
+
+def holed(x: tuple[float, float], y: tuple[float, float], z: float = 0.0, **more: object):
+    """A sheet of skin from -80 to 80 mm with a hole."""
+    points, triangles = plain.sheet((-80, 80), (-80, 80), 4.0, z)
+    return plain.part("face", points, plain.without(points, triangles, x, y), **more)  # type: ignore[arg-type]
+
+
+def texts(head: Subject, mouth: Mouth | None = None) -> list[str]:
+    return [f.text for f in borders.holes(head, mouth, Places(head, None), borders.find_borders(head))]
+
+
+def brute(middle: np.ndarray, ends: np.ndarray) -> float:
+    """Distance of a point from an edge (2, 3), by a fine walk along it."""
+    along = np.linspace(0.0, 1.0, 4001)[:, None]
+    return float(np.linalg.norm(ends[0] + along * (ends[1] - ends[0]) - middle, axis=1).min())
+
+
+@pytest.mark.parametrize("reach", [0.8, 3.0])
+def test_the_nearest_edge_that_shares_no_vertex(reach: float) -> None:
+    random = np.random.default_rng(4)
+    points = random.uniform(0.0, 4.0, (24, 3))
+    ids = np.array([random.choice(24, 2, replace=False) for _ in range(14)])
+    ends = points[ids]
+    ends[3, 1] = ends[3, 0]  # an edge of no length
+    middles = ends.mean(axis=1)
+    distance, other = np.zeros(14), np.zeros(14, np.int64)
+    borders._nearest(middles, ids, ends, ids, reach, distance, other)
+    for i in range(14):
+        away = [np.inf if set(ids[j]) & set(ids[i]) else brute(middles[i], ends[j]) for j in range(14)]
+        best = int(np.argmin(away))
+        if away[best] < reach:
+            assert other[i] == best and distance[i] == pytest.approx(away[best], abs=2e-3)
+        else:
+            assert other[i] == -1 and distance[i] == np.inf
+
+
+def test_a_long_edge_is_found_from_its_far_end() -> None:
+    """From more than ten times the reach away along either axis."""
+    ids, own = np.array([[0, 1]]), np.array([[2, 3]])
+    for far in ([15.0, 0, 0], [0, 15.0, 0], [-15.0, 0, 0], [0, -15.0, 0]):
+        ends, middle = np.array([[[0.0, 0, 0], far]]), np.array([[0.0, 0.0, 0.5]]) + far
+        distance, other = np.zeros(1), np.zeros(1, np.int64)
+        borders._nearest(middle, own, ends, ids, 1.0, distance, other)
+        assert other[0] == 0 and distance[0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("gap", "scale", "sewn"), [(0.3, 1, True), (0.5, 1, False), (0.7, 2, True), (0.9, 2, False)])
+def test_borders_that_lie_together_are_sewn(gap: float, scale: int, sewn: bool) -> None:
+    head = plain.subject(sheet("a", (0, 40)), sheet("b", (40 + gap, 80)), eyes=scale * plain.EYES)
+    found = borders.find_borders(head)
+    assert len(found.part) == 2 * (10 + 20) * 2
+    at = found.at(head.rest)
+    along = (np.abs(at[..., 0] - 40.0) < 1.0).all(axis=1)
+    np.testing.assert_array_equal(found.sewn, along & sewn)
+    np.testing.assert_array_equal(found.sewn, found.mate >= 0)
+    mates = found.mate[found.sewn]
+    assert (found.part[mates] == 1 - found.part[found.sewn]).all()
+    assert (np.abs(at[mates].mean(axis=1)[:, 1] - at[found.sewn].mean(axis=1)[:, 1]) < 1e-3).all()
+    assert (found.ids - found.ends == np.where(found.part == 0, 0, len(head.rest[0]))[:, None]).all()
+
+
+def test_vertices_in_one_place_are_one_and_slivers_are_none() -> None:
+    points, triangles = plain.sheet((0, 40), (0, 40), 4.0)
+    split = plain.part("face", points[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3))
+    rim = borders.find_borders(plain.subject(split))
+    assert len(rim.part) == 40 and not rim.sewn.any()
+    doubled = np.vstack([triangles, [[0, 0, 1], [5, 6, 6], [7, 3, 7]]])
+    assert len(borders._welded(plain.subject(plain.part("face", points, doubled)), 0)) == len(triangles)
+
+
+def test_only_sheets_that_deform_with_the_skin_have_borders() -> None:
+    mouth = sheet("m", (0, 40), material="mouth")
+    tongue = sheet("t", (50, 90), material="tongue")
+    others = [sheet("e", (0, 40), material="eye"), sheet("s", (0, 40), follows="skull")]
+    found = borders.find_borders(plain.subject(*others, mouth, tongue))
+    assert set(found.part.tolist()) == {2, 3}
+    assert len(borders.find_borders(plain.subject(*others)).part) == 0
+    assert texts(plain.subject(*others)) == []
+
+
+def test_a_hole_is_named_with_its_length_and_place_and_the_outer_border_is_none() -> None:
+    assert texts(plain.subject(holed((0, 0), (0, 0)))) == []
+    found = texts(plain.subject(holed((8, 28), (40, 52))))
+    assert found == ["a hole in part 'face', 64 mm round: left forehead"]
+
+
+@pytest.mark.parametrize("height", [4.0, 8.0])
+def test_a_hole_beside_another_is_one_of_its_own(height: float) -> None:
+    points, triangles = plain.sheet((-80, 80), (-80, 80), 4.0)
+    left = plain.without(points, triangles, (8, 28), (40, 40 + height))
+    both = plain.part("face", points, plain.without(points, left, (-28, -8), (40, 52)))
+    found = texts(plain.subject(both))
+    assert sorted(t.rpartition(": ")[2] for t in found) == ["left forehead", "right forehead"]
+
+
+@pytest.mark.parametrize(("step", "named"), [(1.0, False), (1.5, True)])
+def test_a_slit_narrower_than_a_hole_is_none(step: float, named: bool) -> None:
+    """By four times its area by its length round, 2.4 mm on a head of twice the usual size: a slit of 42 by 1 mm has
+    1.95 mm, one of 42 by 1.5 mm has 2.9 mm."""
+    points, triangles = plain.sheet((-42, 42), (-42, 42), step)
+    slit = plain.part("face", points, plain.without(points, triangles, (-21, 21), (0, step)))
+    assert len(texts(plain.subject(slit, eyes=np.add(2.0 * plain.EYES, [0.0, 900.0, 0.0])))) == named
+
+
+def test_the_width_of_a_loop() -> None:
+    corner = np.array([[0.0, 0, 0], [30, 0, 0], [30, 6, 0], [0, 6, 0]]) @ np.linalg.qr(np.eye(3) + 0.3)[0] + 7.0
+    middle, width = borders._form(np.stack([corner, np.roll(corner, -1, axis=0)], axis=1))
+    np.testing.assert_allclose(middle, corner.mean(axis=0))
+    assert width == pytest.approx(4.0 * 180.0 / 72.0)
+    assert borders._form(np.ones((1, 2, 3)))[1] == 0.0
+
+
+@pytest.mark.parametrize(("x", "opening"), [(31.8, True), (31.8 + 20.0, True), (31.8 + 20.8, False), (-31.8, False)])
+def test_the_rim_of_an_eye_with_an_eyeball_is_no_hole(x: float, opening: bool) -> None:
+    head = plain.subject(sheet("face", (-40, 40)), plain.eyeball(0))
+    assert borders._is_opening(head, None, np.array([x, 0.0, 0.0])) == opening
+
+
+@pytest.mark.parametrize(("away", "opening"), [(37.0, True), (-37.0, True), (38.0, False)])
+def test_the_rim_of_the_mouth_is_no_hole(away: float, opening: bool) -> None:
+    head, mouth = plain.subject(sheet("face", (-40, 40)), eyes=None), plain.line_of_lips(-66.0)
+    for axis in range(3):
+        at = np.array([0.0, -66.0, 0.0]) + away * np.eye(3)[axis]
+        assert borders._is_opening(head, mouth, at) == opening
+    assert not borders._is_opening(head, None, at)
+
+
+def opened(mm: float, pose: str = "jawOpen", **options: object) -> Subject:
+    """Two sheets that share a border at x = 0, of which a pose moves the right one away, its far end by as much."""
+    right = sheet("b", (-40, 0))
+    right.moves = {pose: np.tile(np.float32([-mm, 0, 0]), (len(right.rest), 1)),
+                   "cheekPuff": np.tile(np.float32([0, 0, 0.5]), (len(right.rest), 1))}  # fmt: skip
+    left = sheet("a", (0, 40))
+    return plain.subject(left, plain.part("b", right.rest, right.triangles, moves=right.moves), **options)
+
+
+@pytest.mark.parametrize(("mm", "said"), [(0.9, None), (1.3, "1.3 mm"), (3.4, "3.4 mm"), (9.0, "4.0 mm or more")])
+def test_a_seam_that_opens_in_a_pose_is_named_with_how_far(mm: float, said: str | None) -> None:
+    found = texts(opened(mm, eyes=ABOVE))
+    assert len(found) == (said is not None)
+    if said is not None:
+        assert found[0].startswith(f"with jawOpen = 1 a seam opens by {said}: ")
+    assert texts(opened(1.9, eyes=2.0 * ABOVE)) == []
+
+
+def test_a_seam_that_opens_at_the_mouth_is_none() -> None:
+    head = opened(9.0, eyes=ABOVE)
+    assert len(texts(head, plain.line_of_lips(0.0, 20.0))) == 1
+    assert texts(head, plain.line_of_lips(0.0, 60.0)) == []
+
+
+def test_a_seam_that_slides_along_itself_stays_shut() -> None:
+    head = opened(0.0, eyes=ABOVE)
+    head.head.parts[1].moves["mouthLeft"] = np.tile(np.float32([0, 8.0, 0]), (len(head.rest[1]), 1))  # type: ignore[attr-defined]
+    head.__dict__["claimed"] = ("mouthLeft",)
+    found = texts(head)  # but for its ends, from which the neighbour has slid away
+    assert len(found) == 1 and "4.0 mm or more" in found[0]
+    kept = borders.find_borders(head)
+    distance, mate = np.zeros(len(kept.part)), np.zeros(len(kept.part), np.int64)
+    at = kept.at(head.posed({"mouthLeft": 1.0}))
+    borders._nearest(at.mean(axis=1), kept.ids, at, kept.ids, 4.0, distance, mate)
+    inner = kept.sewn & (np.abs(at.mean(axis=1)[:, 1]) < 30.0)
+    assert distance[inner].max() < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_components_are_those_of_scipy(seed: int) -> None:
+    links = np.random.default_rng(seed).integers(0, 60, (45, 2))
+    _, wanted = connected_components(coo_array((np.ones(45), links.T), (60, 60)), directed=False)
+    label = borders._components(links, 60)
+    assert [label[k] for k in range(60)] == [int(np.flatnonzero(wanted == wanted[k])[0]) for k in range(60)]
+    assert borders._components(np.zeros((0, 2), np.int64), 3).tolist() == [0, 1, 2]
+
+
+def test_chains_are_edges_that_share_ends() -> None:
+    ids = np.array([[0, 1], [5, 6], [1, 2], [6, 7], [8, 9]])
+    assert [c.tolist() for c in borders._chains(ids)] == [[0, 2], [1, 3], [4]]
+    assert borders._chains(np.zeros((0, 2), np.int64)) == []
+
+
+def test_ends_that_lie_together_are_one() -> None:
+    at = np.array([[[0.0, 0, 0], [5, 0, 0]], [[5.2, 0, 0], [9, 0, 0]], [[9.5, 0, 0], [12, 0, 0]]]) + 30.0
+    pairs = np.array([[4, 7], [9, 2], [11, 3]])
+    found = borders.Borders(np.zeros(3), pairs, pairs, np.zeros(3, bool), np.full(3, -1))
+    joined = borders._joined(found, at, np.arange(3), 0.4)
+    assert joined[0, 1] == joined[1, 0] and len(set(joined.ravel().tolist())) == 5
+    assert len(borders._joined(found, at, np.array([0, 2]), 0.4)) == 2
+    assert borders._joined(found, at, np.zeros(0, np.int64), 0.4).shape == (0, 2)
+
+
+def test_sheets_are_joined_by_triangles_and_by_seams() -> None:
+    head = plain.subject(sheet("a", (0, 40)), sheet("b", (40, 80)), sheet("c", (100, 120)))
+    label = borders._sheets(head, borders.find_borders(head))
+    first, second, third = np.split(label, np.cumsum([len(r) for r in head.rest])[:-1])
+    assert set(first) == set(second) == {0} and set(third) == {len(first) + len(second)}

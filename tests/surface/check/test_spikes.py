@@ -1,0 +1,147 @@
+"""Spikes of known height on sheets; rings against scipy's tree, heights against plain arithmetic."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from surface.check import spikes
+from surface.check.borders import find_borders
+from surface.check.places import Places
+from surface.check.subject import Subject
+from tests.surface.check import plain
+
+
+def cone(x: float, y: float, height: float, radius: float = 4.0, **more: object):
+    """A sheet with a cone on it, vertices 2 mm apart."""
+    points, triangles = plain.sheet((-60, 60), (-90, 60), 2.0)
+    away = np.hypot(points[:, 0] - x, points[:, 1] - y)
+    points[:, 2] += height * np.clip(1.0 - away / radius, 0.0, None)
+    return plain.part("face", points, triangles, **more)  # type: ignore[arg-type]
+
+
+def texts(*parts, **options: object) -> list[str]:
+    head: Subject = plain.subject(*parts, **options)
+    return [f.text for f in spikes.spikes(head, Places(head, None), find_borders(head))]
+
+
+@pytest.mark.parametrize("count", [40, 90])
+def test_rings_are_all_points_between_two_distances(count: int) -> None:
+    points = np.random.default_rng(1).uniform(-9.0, 9.0, (90, 3))
+    points[:3] = [[0, 0, 0], [4.5, 0, 0], [0, 7.8, 0]]  # 0.75 and 1.3 times 6, which still belong
+    ring = spikes.find_rings(points, count, 6.0)
+    away = np.linalg.norm(points[:, None] - points, axis=2)
+    tree = cKDTree(points)
+    assert len(ring.start) == count + 1
+    for i in range(count):
+        own = ring.ids[ring.start[i] : ring.start[i + 1]]
+        near = {j for j in tree.query_ball_point(points[i], 7.8 + 1e-9) if away[i, j] >= 4.5 - 1e-12}
+        assert set(own.tolist()) == near and len(own) == len(near)
+
+
+def test_a_height_is_the_least_along_the_mean_way_from_the_ring() -> None:
+    values = np.random.default_rng(2).normal(size=(9, 3))
+    ring, start = np.array([3, 4, 5, 6, 7, 8, 1, 2]), np.array([0, 4, 6, 6])
+    values[0] += 9.0
+    out = np.full(3, -1.0)
+    spikes.heights(values, start, ring, out)
+    for i in range(2):
+        way = (values[i] - values[ring[start[i] : start[i + 1]]]).sum(axis=0)
+        least = ((values[i] - values[ring[start[i] : start[i + 1]]]) @ (way / np.linalg.norm(way))).min()
+        assert out[i] == pytest.approx(least)
+    assert out[0] > 5.0 and out[2] == 0.0  # nothing is round the third
+
+
+def test_nothing_sticks_out_where_the_ring_lies_round_it_evenly() -> None:
+    values = np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    assert spikes.Ring(np.array([0, 4]), np.array([1, 2, 3, 4])).heights(values).tolist() == [0.0]
+
+
+def test_samples_are_all_vertices_in_use_and_places_on_large_triangles() -> None:
+    face = plain.part("face", np.array([[9.0, 9, 9], [0, 0, 0], [8, 0, 0], [0, 8, 0]]), [[1, 2, 3]])
+    small = plain.part("small", np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
+    others = [plain.part("e", small.rest, small.triangles, material="eye"),
+              plain.part("s", small.rest, small.triangles, follows="skull")]  # fmt: skip
+    head = plain.subject(face, *others, small)
+    samples = spikes.find_samples(head, 3.0)
+    assert samples.vertices == 6 and samples.part.tolist() == [0, 0, 0, 3, 3, 3] + [0] * 12
+    at = samples.at(head.rest)
+    np.testing.assert_allclose(at[:6], [[0, 0, 0], [8, 0, 0], [0, 8, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    grid = {(2 * i, 2 * j) for i in range(5) for j in range(5) if i + j <= 4} - {(0, 0), (8, 0), (0, 8)}
+    assert {(round(x), round(y)) for x, y, _ in at[6:]} == grid  # the hypotenuse takes four steps of 3 mm
+    np.testing.assert_allclose(samples.share.sum(axis=1), 1.0)
+
+
+def test_an_edge_is_filled_by_as_many_steps_as_it_needs_and_no_more_than_forty() -> None:
+    at = np.array([[0.0, 0, 0], [6, 0, 0], [0, 3, 0], [900, 0, 0]])
+    assert len(spikes._filled(at, np.array([[0, 1, 2]]), 6.8)[0]) == 0  # its longest edge is 6.7 mm
+    assert len(spikes._filled(at, np.array([[0, 1, 2]]), 6.0)[0]) == 3
+    assert len(spikes._filled(at, np.array([[0, 3, 2]]), 1.0)[0]) == 41 * 42 // 2 - 3
+
+
+def test_the_corner_of_a_border_is_no_spike() -> None:
+    points, ring = np.array([[0.0, 0, 0], [9, 0, 0], [20, 0, 0]]), spikes.Ring(np.zeros(1), np.zeros(0))
+    high = ring.high(points, np.array([[2.0, 0, 0], [50, 0, 0]]), np.array([5.0, 4.0, 1.0]), 3.0, 2.5)
+    assert high.tolist() == [0.0, 4.0, 0.0]
+    assert ring.high(points, np.zeros((0, 3)), np.array([5.0, 4.0, 1.0]), 3.0, 2.5).tolist() == [5.0, 4.0, 0.0]
+
+
+@pytest.mark.parametrize(("height", "named"), [(3.0, False), (3.6, True), (20.0, True)])
+def test_a_spike_is_steeper_than_half_of_the_rings_radius(height: float, named: bool) -> None:
+    found = texts(cone(40.0, 40.0, height))  # 0.55 of 6 mm are 3.3 mm
+    assert len(found) == named
+    for text in found:  # a ring about a high cone meets its foot
+        assert text.startswith("part 'face' sticks out by ") and text.endswith(" mm or more: left brow")
+        assert 3.4 < float(text.split()[5]) <= height + 0.05
+
+
+def test_a_spike_on_a_head_of_twice_the_size_is_twice_as_high() -> None:
+    points, triangles = plain.sheet((-120, 120), (-180, 120), 4.0)
+    for height, named in ((6.0, 0), (7.2, 1)):
+        at = points.copy()
+        at[:, 2] += height * (np.hypot(at[:, 0] - 80, at[:, 1] - 80) < 1.0)
+        assert len(texts(plain.part("face", at, triangles), eyes=2.0 * plain.EYES)) == named
+
+
+def test_what_has_its_like_on_the_other_side_is_no_spike() -> None:
+    both, left = cone(40.0, 40.0, 9.0), cone(40.0, 40.0, 9.0)
+    mirror = np.hypot(both.rest[:, 0] + 40.0, both.rest[:, 1] - 40.0) < 1.0
+    both = plain.part("face", both.rest + np.outer(mirror, [0.0, 0.0, 6.0]), both.triangles)
+    assert texts(both) == [] and len(texts(left)) == 1
+    weak = plain.part("face", left.rest + np.outer(mirror, [0.0, 0.0, 1.0]), left.triangles)
+    assert len(texts(weak)) == 1  # what is less than 0.6 times as steep as a spike is no like
+    beside = np.hypot(left.rest[:, 0] + 40.0, left.rest[:, 1] - 26.0) < 1.0  # 14 mm off its mirror image
+    assert len(texts(plain.part("face", left.rest + np.outer(beside, [0.0, 0.0, 6.0]), left.triangles))) == 1
+
+
+@pytest.mark.parametrize(("x", "y", "z", "usual"), [
+    (0.0, -30.0, 14.0, True), (21.0, -30.0, 14.0, True), (24.0, -30.0, 14.0, False), (0.0, 18.0, 14.0, True),
+    (0.0, 20.0, 14.0, False), (0.0, -60.0, 14.0, True), (0.0, -62.0, 14.0, False), (0.0, -30.0, 11.0, False),
+])  # fmt: skip
+def test_a_nose_may_stick_out(x: float, y: float, z: float, usual: bool) -> None:
+    """0.35 eye distances (22.3 mm) to each side, 0.3 (19.1 mm) up, and 0.9 of the way to the lips (60.7 mm) down."""
+    head = plain.subject(cone(0.0, -30.0, 9.0))
+    found = spikes._usual(head, np.array([[x, y, z]]), np.array([5.0]), Places(head, None))
+    assert found.tolist() == [usual]
+
+
+def test_a_pose_that_throws_a_point_out_is_named() -> None:
+    face = cone(0.0, 0.0, 0.0)
+
+    def thrown(x: float, y: float, mm: float) -> np.ndarray:
+        return np.outer(np.hypot(face.rest[:, 0] - x, face.rest[:, 1] - y) < 1.0, [0.0, 0.0, mm])
+
+    def found(**moves: np.ndarray) -> list[str]:
+        return texts(plain.part("face", face.rest, face.triangles, moves=moves))
+
+    assert found(cheekPuff=thrown(40, -40, 2.9), headYaw=thrown(40, -40, 50.0)) == []  # half of 6 mm
+    assert found(cheekPuff=thrown(40, -40, 3.1)) == [
+        "with cheekPuff = 1 part 'face' sticks out by 3.1 mm or more: left cheek"
+    ]
+    worst = found(cheekPuff=thrown(40, -40, 5.0), jawOpen=thrown(-40, -40, 8.0), mouthLeft=thrown(-40, 40, 7.0))
+    assert worst == ["with jawOpen = 1 part 'face' sticks out by 8.0 mm or more: right cheek"]
+
+
+def test_a_head_without_skin_has_no_spikes() -> None:
+    assert texts(plain.eyeball(0)) == []
