@@ -55,6 +55,9 @@ def test_off_is_the_weighted_median_of_distances_in_radii() -> None:
     d = directions(3000)
     ball = fit_ball(CENTRE + (RADIUS + noise)[:, None] * d, np.ones(3000))
     assert ball.off == pytest.approx(np.median(np.abs(noise)) / RADIUS, rel=0.05)
+    cap = directions(3000, 0.9)
+    ball = fit_ball(CENTRE + (RADIUS + 0.1 * noise)[:, None] * cap, np.full(3000, 1e-6))
+    assert ball.off == pytest.approx(0.1 * np.median(np.abs(noise)) / RADIUS, rel=0.1)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e4])
@@ -64,6 +67,8 @@ def test_what_is_no_sphere_is_none_in_any_unit(scale: float) -> None:
     assert fit_ball(np.zeros((20, 3)), np.ones(20)) is None
     assert fit_ball(scale * directions(50), np.zeros(50)) is None
     assert fit_ball(scale * directions(5), np.ones(5)) is None
+    hardly = flat + scale * 1e-6 * RNG.normal(size=(50, 3))
+    assert fit_ball(hardly, np.ones(50)) is None
     six = fit_ball(scale * np.vstack([np.eye(3), -np.eye(3)]), np.ones(6))
     assert six.radius == pytest.approx(scale)
 

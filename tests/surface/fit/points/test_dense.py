@@ -56,6 +56,8 @@ def test_places_around_others_share_a_vertex_with_them() -> None:
     mix = csr_matrix(np.array([[0.5, 0.5, 0, 0], [0, 0.3, 0.7, 0], [0, 0, 0, 1.0]]))
     places = Places(np.zeros((3, 2)), mix, np.zeros((3, 2)), np.zeros(3, bool))
     assert around(places, mix[[0]]).tolist() == [True, True, False]
+    still = dense_errors(*case(2)[:2], NET, SURFACE.points, np.zeros((0, SURFACE.n, 3)))
+    assert (still.shape == -1).all()
     assert around(places, mix[[2]]).tolist() == [False, False, True]
     assert not around(places, mix[[0]][:0]).any()
 

@@ -159,6 +159,8 @@ def test_stretch_is_the_longest_way_relative_to_the_usual_one() -> None:
     assert unevenness(mesh, [island]) == pytest.approx(found.max()) and unevenness(
         sheet(), find_islands(sheet())
     ) == pytest.approx(1)
+    skewed = replace(mesh, uv=mesh.uv @ np.array([[3.0, 1.0], [0.5, 0.4]]))
+    np.testing.assert_allclose(_stretch(skewed, find_islands(skewed)[0]), found, rtol=1e-6)  # laying out undoes that
     hardly = replace(mesh, uv=squeezed(3.0, 0.05).uv)
     grid_line = sheet(121)
     rare = replace(grid_line, uv=grid_line.uv * np.where(grid_line.uv[:, :1] > 119.5 / 120, [[1.0, 1]], [[0.995, 1]]))

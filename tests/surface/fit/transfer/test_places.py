@@ -58,6 +58,15 @@ def test_eyes_go_with_the_lids_around_them_and_touch_their_fronts() -> None:
     centres, radius = place_eyes(face, moved)
     np.testing.assert_allclose(centres - face.eyes, [[0, 4, 5], [1, 0, 0]], atol=1e-9)
     assert radius == pytest.approx(face.radius)
+
+    def ring(p):  # only the lids around the left eye become larger
+        away = np.linalg.norm(p - face.eyes[0], axis=1)
+        return np.where(((away > 13) & (away < 19))[:, None], face.eyes[0] + 1.3 * (p - face.eyes[0]), p)
+
+    assert place_eyes(face, ring)[1] > 1.02 * face.radius
+    assert place_eyes(face, lambda p: np.where((p[:, :1] > 0) & (p[:, 1:2] < 0), 2.0 * p, p))[1] == pytest.approx(
+        face.radius
+    )
     deeper = replace(face, points=face.points - np.where(face.eye[:, None] == 0, [[0, 0, 2.0]], [[0, 0, 0.0]]))
 
     def push(p):  # the front of the left eye only, in the middle
