@@ -51,6 +51,21 @@ def test_patches_that_do_not_blink_or_turn_are_eyes(looks: bool) -> None:
     assert shaped_sides(mesh, skin(mesh), None) == []
 
 
+def test_what_is_round_but_large_or_blinks_a_little_is_no_eye() -> None:
+    """An island that is a good part of the skin; a patch that follows the lids."""
+    mesh = one_mesh(shapes=False, apart=True)
+    few = np.zeros(len(mesh.faces), bool)
+    few[-len(eyes_faces(mesh)) - 60 :] = True  # with hardly any skin beside them
+    assert island_sides(mesh, few, 0.0, None) == []
+    blinking = one_mesh()
+    deltas = blinking.deltas.copy()
+    count = len(face().vertices)
+    deltas[:2, count:] = 0.1 * np.abs(deltas[:2]).max() * np.array([0, -1.0, 0])
+    assert shaped_sides(replace(blinking, deltas=deltas), skin(blinking), CENTRES + np.array([0, 0, 12.0])) == []
+    deltas[:2, count:] *= 0.2
+    assert shaped_sides(replace(blinking, deltas=deltas), skin(blinking), CENTRES + np.array([0, 0, 12.0]))
+
+
 def test_without_one_of_both_there_is_none() -> None:
     mesh = one_mesh()
     left_only = skin(mesh)

@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, disc, joined, pair, shell
 
+from surface.fit.features import eye_pieces
 from surface.fit.features.eye_pieces import (
     MIRRORED,
+    ROUND,
     SIZES,
+    SPAN,
+    USUAL,
     around,
     is_round,
     mirrored,
@@ -172,3 +176,15 @@ def test_what_lies_in_a_ball_a_little_larger_than_an_eye_belongs_to_it() -> None
     sides = round_sides([p for p in pieces if p.name in "ab"], 0.0, None)
     found = {mesh.pieces[mesh.piece[f]] for f in around(pieces, sides)}
     assert found == {"a", "b", "lens", "spot"} and len(around(pieces, [])) == 0
+
+
+def test_a_pair_is_less_likely_the_further_its_size_and_its_form_are_from_eyes() -> None:
+    def like(radius: float, off: float = 0.0) -> float:
+        a, b = (Ball(c, radius, off, 1.0) for c in CENTRES)
+        return eye_pieces._likeness(a, b, 0.0, None)
+
+    usual = USUAL * 64.0
+    assert like(usual) == pytest.approx(1.0)
+    smaller, larger = like(usual / np.exp(SPAN)), like(usual * np.exp(SPAN))  # a standard deviation off
+    assert smaller == pytest.approx(np.exp(-0.5)) == larger
+    assert like(usual, ROUND) == pytest.approx(0.5) and like(usual, 0.5 * ROUND) == pytest.approx(0.75)
