@@ -156,6 +156,8 @@ def test_clusters_end_at_what_is_near_and_the_nearest_comes_first() -> None:
     found = module._clusters(mesh, skin(mesh), chosen, near, middle)
     at = [mesh.vertices[mesh.faces[f, :3]].mean(axis=(0, 1))[0] for f in found]
     np.testing.assert_allclose(at, [20, 0], atol=0.3)  # the third has too few vertices
+    chosen[-1] = False  # a vertex of the third; the missing corner of triangles is none of it
+    assert [len(f) for f in module._clusters(mesh, skin(mesh), chosen, near, middle)] == [len(f) for f in found]
     near = mesh.vertices[:, 0] < 19
     assert len(module._clusters(mesh, skin(mesh), chosen & near, near, middle)) == 1
     chosen[mesh.vertices[:, 0] > 10] = False

@@ -188,3 +188,23 @@ def test_a_pair_is_less_likely_the_further_its_size_and_its_form_are_from_eyes()
     smaller, larger = like(usual / np.exp(SPAN)), like(usual * np.exp(SPAN))  # a standard deviation off
     assert smaller == pytest.approx(np.exp(-0.5)) == larger
     assert like(usual, ROUND) == pytest.approx(0.5) and like(usual, 0.5 * ROUND) == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "halves"), [(-40, 40, 2), (-8, 40, 1), (-40, 8, 1), (-14, 40, 2), (-40, 14, 2)]
+)
+def test_only_a_piece_that_lies_well_on_both_sides_is_cut(low: float, high: float, halves: int) -> None:
+    strip = disc((0.5 * (low + high), 0.0, 0.0), 0.5 * (high - low))
+    (piece,) = every(strip)
+    assert len(eye_pieces._halves(strip, piece, 0.0)) == halves
+    aside = replace(strip, vertices=strip.vertices + 100.0 * np.eye(3)[0])
+    assert len(eye_pieces._halves(aside, every(aside)[0], 100.0)) == halves
+
+
+def test_the_radius_of_an_iris_is_its_largest_whichever_way_it_is_long() -> None:
+    for wide, tall in ((4.0, 6.0), (6.0, 4.0)):
+        flat = disc(CENTRES[0], 1.0)
+        oval = replace(flat, vertices=CENTRES[0] + (flat.vertices - CENTRES[0]) * np.array([wide, tall, 1.0]))
+        irises = [("IrisLeft", oval), ("IrisRight", replace(oval, vertices=oval.vertices * np.array([-1.0, 1, 1])))]
+        left, _ = named_sides(joined([*pair(shell), *irises]), 0.0)
+        assert left.iris == pytest.approx(6.0, rel=0.02)
