@@ -55,6 +55,8 @@ def test_lids_turn_about_the_eye_and_keep_their_height_above_it(plain, openings)
     radii = [np.hypot(p[changed, 1], p[changed, 2]) for p in (before, after)]
     np.testing.assert_allclose(radii[1], radii[0], atol=1e-9)
     assert changed.any() and not changed[plain.vertices[:, 0] < 5].any()  # the other eye stays
+    beside = np.abs(plain.vertices[:, 0] - 32.0) > 1.4 * 13.0  # beyond the corners
+    assert not changed[beside].any()
     far = np.linalg.norm(plain.vertices - CENTRES[0], axis=1) > 2 * RADIUS
     assert not changed[far].any()
     turned = np.arctan2(after[:, 1], after[:, 2]) - np.arctan2(before[:, 1], before[:, 2])
@@ -111,3 +113,33 @@ def test_edges_are_angles_about_the_eye_over_even_places() -> None:
     np.testing.assert_allclose(found.gap, found.upper - found.lower)
     moved = module._edges(rest + np.array([0, 3.0, 0]), np.arange(40), rest)  # told apart at rest
     assert (moved.upper >= moved.lower - 1e-9).all() and moved.lower[16] < 0 < moved.lower[0]
+
+
+def test_lids_turn_by_the_gap_and_an_overlap_that_fades_towards_the_corners() -> None:
+    """Closed form: the gap left and a millimetre more, of which the upper lid goes 85 hundredths."""
+    x, radius = np.linspace(-13, 13, module.COLUMNS), 12.0
+    opening = np.clip(1.0 - (x / 13) ** 2, 0.0, None)
+    before = module._Edges(x, 0.5 * opening + 0.1, -0.3 * opening + 0.1)
+    after = module._Edges(x, 0.2 * opening + 0.1, -0.1 * opening + 0.1)
+    for at in (0.0, 6.5, -12.1875):
+        share = 1.0 - (at / 13) ** 2
+        need = 0.3 * share + min(4.0 * share, 1.0) / radius
+        for edge, way in ((0.5 * share + 0.1, -0.85), (-0.3 * share + 0.1, 0.15)):
+            rest = np.array([[at, radius * np.sin(edge), radius * np.cos(edge)]])
+            more = module._lengthened(rest, 0 * rest, before, after, radius)
+            after_move = rest + more
+            turned = np.arctan2(after_move[0, 1], after_move[0, 2]) - edge
+            assert turned == pytest.approx(way * need, abs=1e-6), (at, way)
+    none = np.array([[0.0, radius * np.sin(0.5 + 0.1 + 0.71), radius * np.cos(1.31)]])
+    assert not module._lengthened(none, 0 * none, before, after, radius).any()  # a forehead does not turn
+    ahead = np.array([[0.0, 24.5 * np.sin(0.6), 24.5 * np.cos(0.6)], [0.0, -11.6, 3.0]])
+    assert not module._lengthened(ahead, 0 * ahead, before, after, radius).any()  # far before it; beside it
+
+
+def test_lids_are_told_apart_by_a_line_between_corners_that_need_not_be_level() -> None:
+    a = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    slanted = np.column_stack([12 * np.cos(a), 3 * np.sin(a) + 2.5 * np.cos(a), 12 + 0 * a])
+    found = module._edges(slanted, np.arange(40), slanted)
+    lift = np.sqrt(np.maximum(1 - (found.x / 12) ** 2, 0))
+    np.testing.assert_allclose(found.upper, np.arctan2(3 * lift + 2.5 * found.x / 12, 12), atol=0.02)
+    np.testing.assert_allclose(found.lower, np.arctan2(-3 * lift + 2.5 * found.x / 12, 12), atol=0.02)

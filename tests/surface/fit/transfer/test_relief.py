@@ -106,6 +106,9 @@ def test_of_shifts_that_score_alike_the_smaller_is_taken() -> None:
     assert sure == 0.75
     score[20, 20 + 15] = 0.95
     assert module._shift(score)[1] == 0.95
+    shift, sure = module._shift(np.where(score.T == 0.95, 0.80, score.T))
+    np.testing.assert_allclose(shift, [-4.0, 0.0])  # the same along either axis
+    assert sure == 0.75
 
 
 @pytest.mark.parametrize("how", ["find", "refine"])
