@@ -45,7 +45,7 @@ def shut_blinks(mesh: FitMesh, openings: list[Opening], eyes: Floats, radius: fl
         move = deltas[indices].sum(axis=0)
         open_rest, open_shut = (_edges(at, opening.edge, rest) for at in (rest, rest + move))
         left = float(open_shut.gap.max()) * radius
-        if left < -OVERLAP_MM or left > BLINKS * float(open_rest.gap.max()) * radius:
+        if left > BLINKS * float(open_rest.gap.max()) * radius:
             continue
         deltas[indices[0]] += _lengthened(rest, move, open_rest, open_shut, radius)
         if left > 0.5:

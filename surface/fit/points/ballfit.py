@@ -104,11 +104,11 @@ def turning_centre(moves: list[tuple[Floats, Floats]]) -> Floats | None:
     points of its axis where they are: (1 - R) c = t; two axes that cross determine c, by least squares.
     """
     kept = [(r, t) for r, t in moves if turn_angle(r) > LEAST_TURN]
-    if len(kept) < 2:
+    if not kept:
         return None
     system = np.concatenate([np.eye(3) - r for r, _ in kept])
     values = np.linalg.svd(system, compute_uv=False)
-    if values[-1] < 0.2 * values[0]:
+    if values[-1] < 0.2 * values[0]:  # one axis only
         return None
     return np.asarray(np.linalg.lstsq(system, np.concatenate([t for _, t in kept]), rcond=None)[0])
 

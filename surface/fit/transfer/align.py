@@ -55,7 +55,7 @@ def from_pairs(points: Floats, others: Floats, weight: Floats | None = None) -> 
     u, size, vt = np.linalg.svd((w[:, None] * b).T @ a)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     turn = u @ np.diag(sign) @ vt
-    scale = float((size * sign).sum() / max(float(w @ (a * a).sum(axis=1)), 1e-30))
+    scale = float(size @ sign / max(float(w @ (a * a).sum(axis=1)), 1e-30))
     return Similarity(turn, scale, b0 - scale * turn @ a0)
 
 
@@ -91,13 +91,13 @@ class Aligner:
 
     def search(self, up: Floats | None, forward: Floats | None) -> Similarity:
         """The best similarity from the scan to the template; ``up`` and ``forward`` are directions, if known."""
-        found = Similarity(np.eye(3), 1.0, np.zeros(3), 1.0)
+        found: list[Similarity] = []
         turns = list(axis_turns(up, forward))
         others = [t for t in tilted_turns() if _agrees(t, up, forward)]
         for more in (turns[:1], turns[1:], others):  # most files have y up and z forward
-            if found.score > GOOD and more:
-                found = min(found, self._best(more), key=lambda s: s.score)
-        return found
+            if more and all(s.score > GOOD for s in found):
+                found.append(self._best(more))
+        return min(found, key=lambda s: s.score)
 
     def _best(self, turns: list[Floats]) -> Similarity:
         starts = [self.refine(s, self._coarse, STEPS) for turn in turns for s in self._starts(turn)]
@@ -154,6 +154,8 @@ class Aligner:
 
 def foremost(points: Floats, size: float) -> Bools:
     """(n,) which points (n, 3) are seen from the front: none is more than ``size`` before them nearby."""
+    if not len(points):
+        return np.zeros(0, bool)
     column = np.floor(points[:, :2] / size).astype(np.int64)
     column -= column.min(axis=0)
     key = column[:, 0] * (column[:, 1].max() + 1) + column[:, 1]

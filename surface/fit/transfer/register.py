@@ -80,13 +80,9 @@ def choose_nodes(template: Template) -> Ints:
     marks = np.array([p for n, p in template.landmarks.items() if n != "chin"])
     distance = cKDTree(marks).query(template.points)[0]
     features = distance < FEATURE_MM
-    chosen = []
-    for own, count in (
-        (features, FEATURES), (template.face & ~features, FACE), (~template.face & ~features, REST),
-    ):  # fmt: skip
-        ids = np.flatnonzero(own)
-        chosen.append(ids[thinned(template.points[ids], count)])
-    return np.concatenate(chosen)
+    regions = ((features, FEATURES), (template.face & ~features, FACE), (~template.face & ~features, REST))
+    every = ((np.flatnonzero(own), count) for own, count in regions)  # a head may be nothing but a face
+    return np.concatenate([ids[thinned(template.points[ids], count)] for ids, count in every if len(ids)])
 
 
 class Registration:

@@ -38,8 +38,7 @@ class Warp:
 
     def turned(self, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Points (m, 3) moved, and unit normals (m, 3) of a surface through them as it lies then."""
-        other = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-        first = np.cross(normals, other)
+        first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
         first /= np.linalg.norm(first, axis=1)[:, None]
         second = np.cross(normals, first)
         at, along, across = self(points), self(points + STEP_MM * first), self(points + STEP_MM * second)

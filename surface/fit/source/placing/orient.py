@@ -11,7 +11,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.fit.source.placing.anatomy import Eyes, Landmarks
 
-#: Angle (degrees) from straight up, towards the back, of the line from lips or jaw to the eyes of an upright head:
+#: Angle (degrees) from straight up, towards the front, of the line from lips or jaw to the eyes of an upright head:
 #: (eyes found as balls, or on the lids). Measured on the shipped head.
 TILT = {"mouth": (-13.9, -6.0), "jaw": (-3.2, 3.7)}
 LEVEL_DEG = 4.0  # a head whose left lies nearer to an axis is upright as it is: its own small asymmetry
@@ -39,7 +39,7 @@ def orient(vertices: Floats, marks: Landmarks) -> Orientation | None:
 
 
 def oriented_by(vertices: Floats, eyes: Eyes, low: Floats, tilt_deg: float) -> Orientation | None:
-    """Orientation by two eyes and a point ``low`` (3,) of lips or jaw, whose line leans back by ``tilt_deg``."""
+    """Orientation by two eyes and a point ``low`` (3,) of lips or jaw, whose line leans forward by ``tilt_deg``."""
     left, notes = _unit(eyes.centres[0] - eyes.centres[1]), tuple[str, ...]()
     up = eyes.middle - low
     up = up - (up @ left) * left

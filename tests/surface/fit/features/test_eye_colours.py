@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, disc, face, joined, pair, shell
 
+from surface.fit.features import eye_colours
 from surface.fit.features.eye_colours import paint_layers
 from surface.fit.features.generic import make_plan
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.textures import linear
+from surface.fit.source.textures import Samples, linear
 from surface.head.model.data import PartData
 from surface.readers.meshdata import Material
 
@@ -104,3 +105,82 @@ def test_large_eyes_get_an_iris_as_large_as_peoples() -> None:
     mesh = joined([("Head", face()), *pair(lambda c: shell(c - np.array([0, 0, 6.0]), 18.0))])
     found = painted(mesh)
     assert found["eye_left", "iris_radius"][0] * 18.0 == pytest.approx(6.0, abs=0.3)
+
+
+def dots(angle, colours, centre=(3.0, 4.0, 5.0), radius=12.0):
+    """Samples on an eyeball at angles (k,) from straight ahead, 24 around each, of these colours (k, 3)."""
+    around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    a, b = (x.ravel() for x in np.meshgrid(angle, around, indexing="ij"))
+    points = np.array(centre) + radius * np.column_stack([np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)])
+    colour = np.column_stack([np.repeat(colours, 24, axis=0), np.ones(len(a))])
+    return Samples(points, colour, np.sin(a) + 1e-3)
+
+
+def ringed(edge_deg: float, iris=(0.05, 0.1, 0.2), white=(0.7, 0.6, 0.5)):
+    angle = np.radians(np.arange(0.5, 90, 0.5))
+    return dots(angle, np.where(np.degrees(angle)[:, None] < edge_deg, iris, white))
+
+
+@pytest.mark.parametrize("edge", [20.0, 30.0, 40.0])
+def test_an_iris_ends_where_rings_become_white(edge: float) -> None:
+    found = eye_colours._by_rings(ringed(edge), np.array([3.0, 4.0, 5.0]), 0.5)
+    assert found.iris_radius == pytest.approx(np.sin(np.radians(edge)), abs=0.045)
+    np.testing.assert_allclose(found.iris, [0.05, 0.1, 0.2])
+    np.testing.assert_allclose(found.white, [0.7, 0.6, 0.5])
+
+
+def test_the_white_beside_an_iris_counts_and_not_that_in_the_shade_of_lids() -> None:
+    angle = np.radians(np.arange(0.5, 90, 0.5))
+    degrees = np.degrees(angle)[:, None]
+    colours = np.where(degrees < 30, [[0.05, 0.1, 0.2]], np.where(degrees < 47, [[0.7, 0.7, 0.7]], [[0.6, 0.6, 0.6]]))
+    found = eye_colours._by_rings(dots(angle, colours), np.array([3.0, 4.0, 5.0]), 0.5)
+    np.testing.assert_allclose(found.white, 0.7)
+
+
+def test_an_eye_of_one_colour_has_no_iris_and_one_without_white_tells_nothing() -> None:
+    plain = eye_colours._by_rings(ringed(30, (0.7, 0.6, 0.5)), np.array([3.0, 4.0, 5.0]), 0.44)
+    assert plain.iris is None and plain.iris_radius == 0.44
+    np.testing.assert_allclose(plain.white, [0.7, 0.6, 0.5])
+    front = dots(np.radians(np.arange(0.5, 40, 0.5)), np.tile([0.1, 0.2, 0.3], (79, 1)))
+    none = eye_colours._by_rings(front, np.array([3.0, 4.0, 5.0]), 0.44)
+    assert none.iris is None and none.white is None and none.iris_radius == 0.44
+    faint = eye_colours._by_rings(ringed(30, (0.68, 0.58, 0.5)), np.array([3.0, 4.0, 5.0]), 0.44)
+    assert faint.iris is None  # hardly another colour
+
+
+def test_the_pupil_and_the_rim_do_not_colour_an_iris() -> None:
+    angle = np.radians(np.arange(0.5, 90, 0.5))
+    share = (np.sin(angle) / np.sin(np.radians(30)))[:, None]
+    colours = np.where(
+        share < 0.4, [[0.004, 0.004, 0.004]], np.where(share < 0.87, [[0.1, 0.2, 0.05]], [[0.01, 0.01, 0.01]])
+    )
+    colours = np.where(np.degrees(angle)[:, None] > 30, [[0.7, 0.7, 0.7]], colours)
+    found = eye_colours._by_rings(dots(angle, colours), np.array([3.0, 4.0, 5.0]), 0.5)
+    np.testing.assert_allclose(found.iris, [0.1, 0.2, 0.05])
+    disc = np.linspace(0, 1, 60)[1:]
+    around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    r, b = (x.ravel() for x in np.meshgrid(disc, around, indexing="ij"))
+    shade = np.where(r < 0.4, 0.01, np.where(r < 0.87, 0.3, 0.02))
+    flat = Samples(np.column_stack([9 + 5 * r * np.cos(b), 5 * r * np.sin(b), 0 * r]),
+                   np.column_stack([shade, shade, shade, np.ones(len(r))]), r)  # fmt: skip
+    np.testing.assert_allclose(eye_colours._of_iris_piece(flat), 0.3)
+    assert eye_colours._of_iris_piece(None) is None
+    clear = replace(flat, colour=flat.colour * np.array([1, 1, 1, 0.4]))
+    assert eye_colours._of_iris_piece(clear) is None
+
+
+def test_most_is_the_weighted_median_of_what_is_opaque_within_limits() -> None:
+    rng = np.random.default_rng(0)
+    colour = np.column_stack([rng.uniform(0.1, 0.9, (41, 3)), np.ones(41)])
+    weight = rng.integers(1, 4, 41)
+    every = Samples(np.zeros((41, 3)), colour, weight.astype(float))
+    chosen = rng.uniform(size=41) < 0.7
+    found = eye_colours._most(every, chosen, (0.0, 1.0))
+    for k in range(3):
+        rows = np.sort(np.repeat(colour[chosen, k], weight[chosen]))
+        assert found[k] == rows[(len(rows) - 1) // 2]
+    np.testing.assert_allclose(eye_colours._most(every, chosen, (0.0, 0.2)), np.minimum(found, 0.2))
+    np.testing.assert_allclose(eye_colours._most(every, chosen, (0.95, 1.0)), 0.95)
+    assert eye_colours._most(every, chosen & False, (0.0, 1.0)) is None
+    clear = replace(every, colour=np.where(np.arange(41)[:, None] < 40, colour * np.array([1, 1, 1, 0.5]), colour))
+    np.testing.assert_array_equal(eye_colours._most(clear, chosen | True, (0.0, 1.0)), colour[40, :3])

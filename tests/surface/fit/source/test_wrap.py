@@ -143,3 +143,6 @@ def test_triangles_and_squares_are_wrapped_alike():
              for i in islands]  # fmt: skip
     whole, cut = wrap_chart(mesh, islands), wrap_chart(mesh, split)
     np.testing.assert_allclose(cut.mix @ mesh.vertices, whole.mix @ mesh.vertices, atol=1e-6)
+    for by in (7, 300):  # whichever face comes first
+        turned = [Island(i.vertex, i.uv, np.roll(i.faces, by, axis=0)) for i in islands]
+        np.testing.assert_array_equal(wrap_chart(mesh, turned).weight, whole.weight)

@@ -5,14 +5,20 @@ import pytest
 from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
-from surface.fit.source.placing.anatomy import find_landmarks
+from surface.fit.source.placing import frame
+from surface.fit.source.placing.anatomy import Eyes, Landmarks, find_landmarks
+from surface.fit.source.placing.conventions import Convention
 from surface.fit.source.placing.frame import EYES_MM, eye_distance, find_frame, head_scale
+from surface.fit.source.placing.orient import Orientation
+from surface.head.model.parameters import rotation
 
 TURNS = {  # how the file's axes stand: rows are the file's x, y, z seen from the head
     "blender": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
     "backwards": np.array([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]]),
     "sideways": np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]),
 }
+
+NONE = Convention()
 
 
 def face() -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -110,3 +116,114 @@ def test_a_shape_without_its_other_side_says_nothing_of_left_and_right(unit):
     turn = TURNS["sideways"]
     turned = {n: s @ turn.T for n, s in both.items()}
     np.testing.assert_allclose(find_landmarks(unit * vertices @ turn.T, none, turned).left, [0, 1, 0], atol=0.02)
+
+
+GLTF = Convention("glTF", "m", "y", "z")
+
+
+def scaled(measure, told=None, convention=NONE, *, eyes=True):
+    """mm per unit, its name and the notes for eyes so far apart, or a mesh so high."""
+    notes: list[str] = []
+    found = Eyes(np.array([[measure / 2, 0, 0], [-measure / 2, 0, 0]]), True, True, "") if eyes else None
+    return (*frame._scale(found, measure, told, convention, notes), notes)
+
+
+@pytest.mark.parametrize(
+    ("measure", "unit"),
+    [(65.4, "mm"), (6.3, "cm"), (0.066, "m"), (2.6, "in"), (0.21, "ft"), (0.6, "dm"), (90.0, "mm"), (45.0, "mm")],
+)  # fmt: skip
+def test_a_unit_is_guessed_by_eyes_as_people_have_them(measure, unit):
+    scale, name, (note,) = scaled(measure)
+    assert name == unit and scale == frame.UNITS[unit]
+    assert note == f"unit taken for {unit}: its eyes are {scale * measure:.3g} mm apart (say --unit otherwise)"
+
+
+def test_where_no_unit_fits_eyes_are_taken_for_usual_ones():
+    scale, name, (note,) = scaled(14.0)
+    assert name == "" and scale == pytest.approx(EYES_MM / 14.0)
+    assert note == "no usual unit fits: its eyes are taken to be 65 mm apart (say --unit otherwise)"
+    assert scaled(65.4 / 1.59)[1] == "mm" and scaled(65.4 / 1.61)[1] != "mm"
+    assert scaled(14.0, eyes=False)[1] != ""  # without eyes any unit is as good
+
+
+def test_a_unit_that_is_told_is_taken_and_a_far_size_noted():
+    assert scaled(65.0, "mm") == (1.0, "mm", [])
+    scale, name, (note,) = scaled(65.0, "cm")
+    assert (scale, name) == (10.0, "cm") and note == "with --unit cm its eyes are 650 mm apart, a human's 65"
+    assert scaled(65.0, "cm", eyes=False)[2] == []
+    assert scaled(65.4 * 2.4, "mm")[2] == [] and scaled(65.4 * 2.6, "mm")[2] != []
+
+
+def test_a_unit_that_the_format_defines_is_taken_unless_eyes_contradict():
+    assert scaled(0.065, convention=GLTF) == (1000.0, "m", [])
+    assert scaled(0.065 * 2.4, convention=GLTF)[:2] == (1000.0, "m")  # figures may be large
+    scale, name, (note,) = scaled(6.5, convention=GLTF)
+    assert (scale, name) == (10.0, "cm")
+    assert note.startswith(
+        "unit taken for cm, although glTF defines m, since then its eyes are 6.5e+03 mm apart: its eyes are 65 mm"
+    )
+    _, name, (note,) = scaled(14.0, convention=GLTF)
+    assert name == "" and note.startswith("no usual unit fits, although glTF defines m")
+    assert scaled(2.0, convention=GLTF, eyes=False)[:2] == (1000.0, "m")
+    assert scaled(300.0, convention=GLTF, eyes=False)[:2] == (1.0, "mm")
+    assert scaled(0.065, "in", GLTF)[1] == "in"
+
+
+def test_axes_that_are_told_are_taken_and_the_other_one_gives_way():
+    def told(up, forward, found=None, usual=np.eye(3)):
+        turn = frame._told(up, forward, found, usual)
+        assert np.linalg.det(turn) == pytest.approx(1)
+        return [f"{'-' if row.min() < 0 else ''}{'xyz'[int(np.abs(row).argmax())]}" for row in turn[1:]]
+
+    assert told("z", "-y") == ["z", "-y"] and told("y", None) == ["y", "z"]
+    assert told("z", None) == ["z", "-y"] and told("-x", None) == ["-x", "z"]
+    assert told(None, "y") == ["z", "y"] and told(None, "x") == ["y", "x"]
+    blender = TURNS["blender"].T
+    found = Orientation(blender, True)
+    assert told("z", None, found) == ["z", "-y"] and told(None, "-y", found) == ["z", "-y"]
+    tilted = Orientation(blender @ rotation(0.2, 0.1), False)
+    assert told(None, "-y", tilted) == ["z", "-y"]
+    assert told(None, "z", found) == ["y", "z"]
+    with pytest.raises(FitError, match="along one axis") as caught:
+        told("y", "-y")
+    assert "--up z --forward -y" in caught.value.hint
+
+
+def test_what_a_user_would_not_expect_is_said():
+    def said(turn, convention=NONE, found=None, told=False):
+        notes: list[str] = []
+        frame._say(np.asarray(turn, float), convention, found, told=told, notes=notes)
+        return notes
+
+    blender, upright = TURNS["blender"].T, Orientation(np.eye(3), True)
+    assert said(np.eye(3)) == [] == said(np.eye(3), GLTF) and said(blender, Convention("X", "m", "z", "-y")) == []
+    assert said(blender) == ["turned: up is z, forward is -y in the file"]
+    assert said(blender, found=upright) == [
+        "turned: up is z, forward is -y in the file by eyes and mouth (say --up and --forward otherwise)"
+    ]
+    assert said(blender, found=upright, told=True) == ["turned: up is z, forward is -y in the file"]
+    assert said(blender, GLTF) == ["turned: up is z, forward is -y in the file, although glTF defines y and z"]
+    assert said(rotation(np.radians(20), 0.0)) == ["levelled: the head stands askew in the file, by 20 degrees"]
+
+
+def test_what_little_is_known_decides_between_rotations_of_axes():
+    points = np.random.default_rng(0).normal(size=(300, 3)) * [75, 100, 90]
+    jaw = {"jawOpen": np.tile([0, 0, -3.0], (300, 1))}
+
+    def partly(marks=Landmarks(), shapes=jaw, sure=False, usual=np.eye(3)):
+        return frame._partly(points, shapes, marks, usual, sure=sure)
+
+    np.testing.assert_array_equal(partly()[1], [0, 0, 1])  # the jaw opens downwards
+    np.testing.assert_array_equal(partly(sure=True), np.eye(3))
+    np.testing.assert_array_equal(partly(shapes={}), np.eye(3))
+    np.testing.assert_array_equal(partly(shapes={"jawOpen": np.tile([0, -3.0, 0], (300, 1))}), np.eye(3))
+    np.testing.assert_array_equal(partly(Landmarks(left=np.array([0, 1.0, 0])))[0], [0, 1, 0])
+    eyes = Eyes(np.array([[0, 32.0, 10], [0, -32.0, 10]]) + np.array([80.0, 0, 0]), True, True, "")
+    turn = partly(Landmarks(eyes))
+    np.testing.assert_array_equal(np.abs(turn[0]), [0, 1, 0])
+    np.testing.assert_array_equal(turn[1:], [[0, 0, 1], [1, 0, 0]])  # eyes lie in front
+
+
+def test_what_was_found_is_taken_where_it_differs_from_the_usual():
+    for upright, turn, differ in ((True, np.eye(3), False), (False, np.eye(3), True), (True, TURNS["blender"], True)):
+        assert frame._differ(Orientation(turn, upright), np.eye(3)) == differ

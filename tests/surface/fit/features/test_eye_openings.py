@@ -1,0 +1,144 @@
+"""Openings between lids, their edges, and eyeballs fitted behind them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from eye_face import ABOVE, CENTRES, HALF_HEIGHT, HALF_WIDTH, RADIUS, face
+
+from surface.fit.features import eye_openings as module
+from surface.fit.features.eye_openings import (
+    Opening,
+    ball_behind,
+    find_openings,
+    lid_positions,
+    set_back,
+    usual_radius,
+)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return face()
+
+
+def find(mesh, middle=0.0, near=None):
+    return find_openings(mesh, np.ones(len(mesh.faces), bool), middle, near)
+
+
+def test_both_openings_are_found_the_left_one_first(plain) -> None:
+    found = find(plain)
+    assert [o.side for o in found] == ["Left", "Right"]
+    for opening, centre in zip(found, CENTRES, strict=True):
+        np.testing.assert_allclose(opening.middle[:2], centre[:2], atol=1.5)
+        np.testing.assert_allclose(opening.size, [2 * HALF_WIDTH, 2 * HALF_HEIGHT], rtol=0.2)
+        assert len(opening.edge) == len(set(opening.edge.tolist())) >= 12
+        away = np.linalg.norm(plain.vertices[opening.edge] - centre, axis=1)
+        np.testing.assert_allclose(np.sort(away)[:-4], RADIUS + ABOVE, atol=1.0)  # not in the corners
+
+
+def test_what_is_far_from_what_blinks_or_not_mirrored_is_no_opening(plain) -> None:
+    apart = 64.0
+    lids = np.array([o.middle for o in find(plain)])
+    assert find(plain, near=lids) and find(plain, near=lids + np.array([0, 0.4 * apart, 0]))
+    assert not find(plain, near=lids + np.array([0, 0.5 * apart, 0]))
+    assert not find(plain, near=lids + np.array([[0, 0, 0], [0, 0.5 * apart, 0]]))
+    assert not find(plain, middle=60.0) and not find(plain, middle=-33.0)
+    assert not find(face(lids=False))
+    one = np.ones(len(plain.faces), bool)
+    assert not find_openings(plain, one & False, 0.0, None)
+
+
+@pytest.mark.parametrize(("factor", "found"), [(1.0, True), (0.3, False), (2.0, True), (2.7, False)])
+def test_openings_that_are_very_narrow_or_wide_are_none(plain, factor: float, found: bool) -> None:
+    """By their width in distances between both."""
+    x = plain.vertices[:, 0]
+    side = 32.0 * np.sign(x)
+    near = np.abs(x - side) < 15
+    if factor > 1:
+        squeezed = replace(plain, vertices=np.column_stack([x - side + side / factor, plain.vertices[:, 1:]]))
+    else:
+        squeezed = replace(
+            plain, vertices=np.column_stack([np.where(near, side + factor * (x - side), x), plain.vertices[:, 1:]])
+        )
+    assert bool(find(squeezed)) == found
+
+
+def test_holes_seen_from_their_edge_are_none(plain) -> None:
+    turned = replace(plain, vertices=plain.vertices[:, [0, 2, 1]])
+    assert not find(turned)
+    a = np.linspace(0, 2 * np.pi, 20, endpoint=False)
+    ring = np.column_stack([np.cos(a), np.sin(a), 0 * a])
+    for degrees, seen in ((0, True), (70, True), (75, False), (180, True)):
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        assert module._faces_front(9 + ring @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]])) == seen
+    assert not module._faces_front(np.zeros((8, 3)))
+
+
+def test_the_edge_of_a_lid_is_before_the_hole_where_a_lining_leads_back() -> None:
+    """Rings around a hole: the second is nearest to the middle, the hole lies behind it and further out."""
+    count = 24
+    a = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    rings = [(7.0, -2.0), (5.0, 0.0), (9.0, 1.0), (14.0, 0.0)]
+    points = np.vstack([np.column_stack([r * np.cos(a), r * np.sin(a), z + 0 * a]) for r, z in rings])
+    at = np.arange(4 * count).reshape(4, count)
+    nxt = np.roll(at, -1, axis=1)
+    faces = np.stack([at[:-1], at[1:], nxt[1:], nxt[:-1]], axis=-1).reshape(-1, 4)
+    mesh = replace(face(shapes=False), vertices=points, faces=faces, deltas=np.zeros((0, len(points), 3)))
+    skin = np.ones(len(faces), bool)
+    np.testing.assert_array_equal(module._edge(mesh, skin, at[0]), at[1])
+    np.testing.assert_array_equal(module._edge(mesh, skin, at[1]), at[1])  # without a lining it is the hole
+
+
+def test_lids_are_where_shapes_slide_them(plain) -> None:
+    left = find(plain)[0]
+    rest, blink = plain.vertices[left.edge], plain.deltas[0][left.edge]
+    moved = np.linalg.norm(blink, axis=1) > 0.1 * np.linalg.norm(blink, axis=1).max()
+    np.testing.assert_allclose(lid_positions(plain, left), np.vstack([rest, (rest + blink)[moved]]))
+    assert 0 < moved.sum() <= len(moved)
+    bare = replace(plain, names=(), deltas=plain.deltas[:0])
+    np.testing.assert_array_equal(lid_positions(bare, left), rest)
+    still = replace(plain, deltas=0 * plain.deltas)
+    np.testing.assert_array_equal(lid_positions(still, left), rest)
+    named = replace(plain, names=("eyeWideLeft", "eyeSquintRight", "jawOpen"))
+    assert len(lid_positions(named, left)) == len(rest) + moved.sum()
+
+
+@pytest.mark.parametrize(("size", "apart", "radius"), [((20, 8), 64, 12.16), ((40, 8), 64, 16.0), ((20, 26), 64, 18.2)])
+def test_a_usual_radius_is_a_persons_or_fills_the_opening(size, apart, radius) -> None:
+    assert usual_radius(Opening("Left", np.zeros(0, int), np.zeros(3), np.array(size, float)), apart) == pytest.approx(
+        radius
+    )
+
+
+def test_an_eyeball_is_fitted_behind_lids_that_slide_over_it(plain) -> None:
+    for opening, centre in zip(find(plain), CENTRES, strict=True):
+        ball = ball_behind(plain, opening, None, 64.0)
+        np.testing.assert_allclose(ball.centre, centre, atol=2.0)
+        assert ball.radius == pytest.approx(RADIUS, rel=0.08)
+        heights = np.linalg.norm(plain.vertices[opening.edge] - ball.centre, axis=1) - ball.radius
+        assert np.quantile(heights, 0.15) > 0 and abs(np.median(heights) - 0.6) < 0.8
+
+
+def test_a_flat_eye_tells_where_its_eyeball_is(plain) -> None:
+    left = find(plain)[0]
+    free = ball_behind(plain, left, None, 64.0).centre
+    aside = ball_behind(plain, left, left.middle + np.array([4.0, 0, 0]), 64.0).centre
+    assert free[0] < aside[0] < free[0] + 4.0
+    large = ball_behind(plain, left, None, 90.0)
+    assert large.radius > ball_behind(plain, left, None, 64.0).radius + 0.5
+
+
+def test_a_centre_is_set_back_until_nine_tenths_of_an_edge_lie_outside() -> None:
+    a = np.linspace(0, 2 * np.pi, 50, endpoint=False)
+    centre, radius, lift = np.array([1.0, 2, 3]), 10.0, module.LID_MM[0]
+    edge = centre + np.column_stack([6 * np.cos(a), 6 * np.sin(a), 0 * a + 8.0 + lift])  # on the sphere
+    np.testing.assert_allclose(set_back(centre, radius, edge), centre, atol=1e-9)
+    inside = edge - [0, 0, 2.0]
+    np.testing.assert_allclose(set_back(centre, radius, inside), centre - [0, 0, 2.0], atol=1e-9)
+    np.testing.assert_allclose(set_back(centre, radius, edge + np.array([0, 0, 2.0])), centre, atol=1e-9)
+    few = edge.copy()
+    few[:4, 2] -= 2.0
+    np.testing.assert_allclose(set_back(centre, radius, few), centre, atol=1e-9)
+    np.testing.assert_allclose(set_back(centre, radius, edge * [3, 3, 1]), centre)  # beside it
+    np.testing.assert_allclose(set_back(centre, radius, edge - [0, 0, 6.0]), centre)  # too far back to tell

@@ -1,0 +1,238 @@
+"""Skin on a scan: normals, smoothing, detail, seats of lids, closed lips, and what follows the skin."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from small_head import sheet
+
+from surface.fit.transfer import skin as module
+from surface.fit.transfer.register import Matcher, Matches
+from surface.fit.transfer.scan import Samples
+from surface.fit.transfer.skin import Ball, Skin, follow_skin, rims_of, seat
+from surface.head import Contact
+
+OLD = Ball(np.array([[30.0, 0, 0], [-30.0, 0, 0]]), 12.0)
+RIM = np.array([[1e3, 0.0, 0.0]])
+DIRECTIONS = np.random.default_rng(0).normal(size=(200, 3)) * [0.5, 0.5, 0.2] + [0, 0, 1.0]
+DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
+
+
+def grid(count: int = 17):
+    """A curved sheet as part of a head: (u, v) even, triangles two to a square."""
+    u, v = (a.ravel() for a in np.meshgrid(*2 * [np.linspace(0, 1, count)], indexing="ij"))
+    at = np.arange(count * count).reshape(count, count)
+    a, b, c, d = (k.ravel() for k in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]))
+    mesh = SimpleNamespace(uv=np.column_stack([u, v]), side=None,
+                           triangles=np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]))  # fmt: skip
+    surface = sheet(0.0)
+    return SimpleNamespace(name="face", surface=surface, mesh=mesh, vertices=surface.evaluate(mesh.uv))
+
+
+def test_the_smoothing_matrix_is_the_square_of_each_points_step_to_the_mean_of_its_neighbours() -> None:
+    tri, n = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 4]]), 6
+    near = {0: [1, 2, 3], 1: [0, 2, 4], 2: [0, 1, 3, 4], 3: [0, 2], 4: [1, 2], 5: []}
+    step = np.eye(n)
+    for k, others in near.items():
+        step[k, others] -= 1.0 / max(len(others), 1)
+    np.testing.assert_allclose(module._laplacian(tri, n).toarray(), step.T @ step, atol=1e-12)
+
+
+def test_normals_are_those_of_the_surface() -> None:
+    part = grid(33)
+    made = Skin(part, RIM, lambda p: p)
+    du, dv = (
+        part.surface.evaluate(np.clip(part.mesh.uv + e, 0, 1)) - part.surface.evaluate(np.clip(part.mesh.uv - e, 0, 1))
+        for e in ([1e-3, 0], [0, 1e-3])
+    )
+    wanted = np.cross(du, dv)
+    wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
+    assert (made.normals() * wanted).sum(axis=1).min() > 0.998
+    made.at = np.zeros_like(made.at)
+    assert np.isfinite(made.normals()).all()
+
+
+class Lifted:
+    """Stands for a matcher: the scan lies ``height`` along +z above where the skin was at first."""
+
+    def __init__(self, rest, height, found) -> None:
+        self.rest, self.height, self.found, self.heard = rest, height, found, []
+
+    def find(self, at, normals, farthest, slide):
+        self.heard.append((farthest, slide))
+        return Matches(self.found, at + (self.rest + self.height - at) @ np.diag([0, 0, 1.0]))
+
+
+def test_skin_goes_to_the_scan_and_fills_holes_smoothly() -> None:
+    part = grid(21)
+    part.vertices = np.column_stack([40 * part.mesh.uv, 0 * part.mesh.uv[:, 0]])
+    made = Skin(part, np.zeros((0, 3)), lambda p: p)
+    hole = np.linalg.norm(part.mesh.uv - 0.5, axis=1) < 0.2
+    matcher = Lifted(made.rest, np.array([0, 0, 2.0]), ~hole)
+    made.follow(matcher, 1.5)
+    np.testing.assert_allclose(made.at[:, 2], 2.0, atol=0.05)
+    np.testing.assert_allclose(made.at[:, :2], made.rest[:, :2], atol=0.1)
+    assert matcher.heard == [(7.5, 0.0)] * 3
+
+
+def test_skin_at_a_rim_is_carried_along_and_not_pulled_by_itself() -> None:
+    part = grid(41)
+    part.vertices = np.column_stack([40 * part.mesh.uv, 0 * part.mesh.uv[:, 0]])
+    rim = np.column_stack([np.linspace(0, 40, 200), np.zeros(200), np.zeros(200)])
+    made = Skin(part, rim, lambda p: p)
+    y = part.vertices[:, 1]
+    height = np.zeros((len(y), 3))
+    height[y <= 1.01, 2] = 4.0  # what a scanner sees within an opening is not the skin's
+    made.follow(Lifted(made.rest, height, np.ones(len(y), bool)), 1.0)
+    assert np.abs(made.at[:, 2]).max() < 0.3
+    free = Skin(part, np.zeros((0, 3)), lambda p: p)
+    free.follow(Lifted(free.rest, height, np.ones(len(y), bool)), 1.0)
+    assert free.at[:, 2].max() > 2.0
+
+
+def test_the_surface_is_put_where_the_skin_lies() -> None:
+    part = grid(21)
+    made = Skin(part, RIM, lambda p: p)
+    goal = part.surface.points * [1.1, 0.9, 1.0] + [0, 0, 5.0]
+    made.at = part.surface.with_points(goal).evaluate(part.mesh.uv)
+    made.solve()
+    np.testing.assert_allclose(made.points, goal, atol=0.3)
+    np.testing.assert_allclose(made.at, part.surface.with_points(made.points).evaluate(part.mesh.uv), atol=1e-9)
+
+
+def test_a_part_with_copies_at_seams_counts_each_place_once() -> None:
+    part = grid(5)
+    part.vertices = np.vstack([part.vertices, part.vertices[:3]])
+    assert len(Skin(part, RIM, lambda p: p).rest) == 25
+
+
+@pytest.mark.parametrize("radius", [12.0, 15.0])
+def test_lids_are_seated_as_high_above_the_new_eyeballs_as_above_the_old(radius: float) -> None:
+    new = Ball(OLD.centres * 1.1 + [0, 3.0, -2.0], radius)
+    for side in (0, 1):
+        rest = OLD.centres[side] + (12.0 + 0.5) * DIRECTIONS
+        moved = new.centres[side] + radius * (1.0 + 0.2 * np.abs(DIRECTIONS[:, :1])) * DIRECTIONS
+        seated = seat(moved, rest, OLD, new)
+        np.testing.assert_allclose(np.linalg.norm(seated - new.centres[side], axis=1), radius * 12.5 / 12, rtol=0.01)
+        along = (seated - new.centres[side]) / np.linalg.norm(seated - new.centres[side], axis=1, keepdims=True)
+        np.testing.assert_allclose(along, DIRECTIONS, atol=1e-9)
+    far = np.array([[0.0, -80.0, 60.0]])
+    np.testing.assert_array_equal(seat(far + 7.0, far, OLD, new), far + 7.0)
+
+
+def two_lips(columns: int = 9, gap: float = 0.0):
+    """Places of lips on the sheet, the upper above v = 0.5, in rows from the rim on, and its contact."""
+    u = np.linspace(0.1, 0.9, columns)
+    rows = np.linspace(0.0, 0.15, 6)
+    sides = [np.stack(np.meshgrid(u, 0.5 + s * (gap + rows), indexing="ij"), axis=-1) for s in (1, -1)]
+    return Contact("lips", "face", (), -1, 6.0, 0.4, np.stack(sides))
+
+
+def test_of_two_lips_the_nearest_places_of_each_column_are_taken() -> None:
+    rng = np.random.default_rng(3)
+    at = rng.normal(size=(2, 5, 4, 3))
+    lines, gap = module._lip_lines(at)
+    for k in range(5):
+        upper = min((at[0, k, m] for m in range(4)), key=lambda p: p[1])
+        lower = max((at[1, k, m] for m in range(4)), key=lambda p: p[1])
+        np.testing.assert_array_equal(lines[:, k], [upper, lower])
+        assert gap[k] == upper[1] - lower[1]
+
+
+def test_lips_that_a_scan_left_open_are_closed_and_their_share_is_kept() -> None:
+    part, contact = grid(33), two_lips()
+    made = Skin(part, RIM, lambda p: p)
+    uv = part.surface.padded
+    middle = uv[1][:, 1:4].mean(axis=1)
+    made.points = (
+        made.points
+        + np.where(middle[:, None] > 0.5, [[0, 1.5, 0]], [[0, -1.0, 0]]) * (np.abs(middle - 0.5) < 0.4)[:, None]
+    )
+    before = made.points.copy()
+    made.at = part.surface.with_points(made.points).evaluate(part.mesh.uv)
+    share = part.surface.basis_matrix(contact.places[:, :, :4].reshape(-1, 2))
+
+    def gap(points):
+        return module._lip_lines((share @ points).reshape(2, 9, 4, 3))[1]
+
+    rest, opened = gap(part.surface.points), gap(made.points)
+    module.close_lips(made, contact, 1.0)
+    assert (
+        np.abs(gap(made.points) - rest).max() < 0.35 * np.abs(opened - rest).max()
+        or (gap(made.points) <= rest + 1e-6).all()
+    )
+    assert np.array_equal(made.points[:, [0, 2]], before[:, [0, 2]])
+    np.testing.assert_allclose(made.at, part.surface.with_points(made.points).evaluate(part.mesh.uv), atol=1e-9)
+
+
+def test_lips_as_close_as_before_stay_where_they_are() -> None:
+    part, contact = grid(17), two_lips(gap=0.05)
+    made = Skin(part, RIM, lambda p: p)
+    module.close_lips(made, contact, 1.0)
+    np.testing.assert_allclose(made.points, part.surface.points, atol=1e-12)
+    module.close_lips(made, contact, 0.5)
+    assert np.abs(made.points - part.surface.points).max() > 0.1
+
+
+def test_control_points_of_either_lip_move_by_its_share_and_those_far_away_not() -> None:
+    part, contact = grid(9), two_lips()
+    lines = part.surface.evaluate(contact.places[:, :, 0].reshape(-1, 2)).reshape(2, 9, 3)
+    up = module._lip_share(part.surface, contact, lines)
+    v = part.surface.padded[1][:, 1:4].mean(axis=1)
+    near = np.abs(v - 0.5) < 0.05
+    distance = np.min(
+        [np.linalg.norm(part.surface.points[:, None] - line[None], axis=2).min(axis=1) for line in lines], axis=0
+    )
+    assert (np.abs(up[distance > 16.5]) < 1e-12).all() and (distance > 16.5).any() and near.any()
+    assert (up[v > 0.51] <= 0).all() and (up[v < 0.49] >= 0).all() and up.min() < -0.3 < 0.04 < up.max()
+    assert up.min() >= -0.4 and up.max() <= 0.6
+
+
+def test_another_part_follows_the_skin_near_it_and_the_map_far_from_it() -> None:
+    part = grid(21)
+    skin = Skin(part, RIM, lambda p: p + np.array([1.0, 0, 0]))
+    skin.at = skin.at + np.array([0.0, 0.0, 2.0])
+    on, far = skin.rest[[5, 200]] + [0, 0, 0.01], skin.rest[[5, 200]] + [0, 0, 40.0]
+    half = skin.rest[[210]] + [0, 0, 6.0]
+    np.testing.assert_allclose(
+        follow_skin(on, skin, lambda p: p + np.array([1.0, 0, 0])), on + np.array([1, 0, 2]), atol=0.01
+    )
+    np.testing.assert_allclose(
+        follow_skin(far, skin, lambda p: p + np.array([1.0, 0, 0])), far + np.array([1, 0, 0]), atol=1e-9
+    )
+    push = (follow_skin(half, skin, lambda p: p + np.array([1.0, 0, 0])) - half)[0]
+    assert 0.5 < push[2] < 1.5 and push[0] == pytest.approx(1.0)
+
+
+def test_means_of_moves_weigh_what_is_near_more() -> None:
+    rest = np.array([[0.0, 0, 0], [1.0, 0, 0], [0, 2.0, 0], [0, 0, 3.0], [4.0, 0, 0], [0, 5.0, 0], [90.0, 0, 0]])
+    moves = np.eye(7, 3)
+    w = np.array([1.0 / (np.linalg.norm(p) + 0.3) ** 2 for p in rest[:6]])
+    np.testing.assert_allclose(module._followed(np.zeros((1, 3)), rest, moves), [w @ moves[:6] / w.sum()])
+    np.testing.assert_allclose(module._followed(rest[6:], rest, 0 * moves + 3.0), [[3, 3, 3]])
+
+
+def test_rims_are_the_loops_inside_the_face() -> None:
+    part = grid(5)
+    loops = [
+        np.array([[0.0, 0], [1, 0], [1, 1]]),
+        np.array([[0.4, 0.4], [0.6, 0.4], [0.5, 0.6]]),
+        np.array([[0.1, 0.1], [0.2, 0.1], [0.1, 0.2]]),
+    ]
+    contacts = [SimpleNamespace(name="left_lids", part="x"), SimpleNamespace(name="lips", part="face")]
+    parts = [SimpleNamespace(name="x", loops=[]), SimpleNamespace(name="face", loops=loops)]
+    data = SimpleNamespace(contacts=contacts, parts=parts)
+    found = rims_of(SimpleNamespace(data=data, part=lambda name: {"face": part}[name]))
+    np.testing.assert_allclose(found, part.surface.evaluate(np.vstack(loops[1:])))
+
+
+def test_detail_of_a_scan_is_followed_along_normals() -> None:
+    part = grid(31)
+    part.vertices = np.column_stack([40 * part.mesh.uv, 0 * part.mesh.uv[:, 0]])
+    made = Skin(part, np.zeros((0, 3)), lambda p: p)
+    at = np.random.default_rng(0).uniform(0, 40, (4000, 2))
+    samples = Samples(
+        np.column_stack([at, 0.8 + 0.02 * at[:, 0]]), np.tile([0, 0, 1.0], (4000, 1)), np.zeros(4000, bool)
+    )
+    made.follow(Matcher(samples), 1.0)
+    np.testing.assert_allclose(made.at[:, 2], 0.8 + 0.02 * made.at[:, 0], atol=0.08)
