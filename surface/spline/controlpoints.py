@@ -24,14 +24,15 @@ class ControlPoints:
     """Positions, weights, knots and degrees of n control points; immutable.
 
     points : (n, 3) float64
-    weights : (n,) float64, positive
+    weights : (n,) float64, 1e-30 to 1e30
     knots_u, knots_v : n sequences of degree + 2 knots each, or (n, degree + 2) arrays; the degree may differ
-        per point and direction (0 to 7)
+        per point and direction (0 to 9)
     closed_u, closed_v : (start, end) of a direction that is joined at its ends, as around a neck or a torus; the
         points that reach over one end act at the other
 
-    ``ValueError`` for wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
-    decreasing knots or fewer than two distinct knots; names the argument and the index.
+    ``ValueError`` for wrong shapes, no points at all, numbers that are not finite, weights that are not positive
+    or beyond 1e-30 to 1e30, decreasing knots, fewer than two distinct knots, or knots that differ by less than 1e-30
+    without being equal or lie beyond 1e30; names the argument and the index.
     """
 
     def __init__(
