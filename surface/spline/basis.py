@@ -92,7 +92,7 @@ def _check_degrees(degrees: Ints, name: str) -> None:
 
 
 def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
-    """Raise ``ValueError`` for knots that are not finite, that decrease, are all equal, or differ by next to nothing."""
+    """Raise ``ValueError`` for knots that are not finite, decrease, are all equal, or differ by next to nothing."""
     _check_degrees(degrees, name)
     good = np.isfinite(padded).all(axis=1)
     if not good.all():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from hashlib import blake2b
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -162,6 +163,16 @@ class ControlPoints:
         """u0, u1, v0, v1 of the smallest rectangle that holds every subdomain, or of the closed interval."""
         ends = [(float(knots[:, 0].min()), float(knots[:, -1].max())) for knots in self.padded]
         return (*(self._closed[0] or ends[0]), *(self._closed[1] or ends[1]))
+
+    @property
+    def structure(self) -> bytes:
+        """A digest of knots, degrees and closed directions: surfaces that have it in common differ in positions and
+        weights only, and a mesh of one is a mesh of the others."""
+        digest = blake2b(repr(self._closed).encode(), digest_size=16)
+        for knots, degrees in zip(self.padded, self.degrees, strict=True):
+            digest.update(np.ascontiguousarray(knots[:, : degrees.max() + 2] + 0.0).tobytes())
+            digest.update(degrees.tobytes())
+        return digest.digest()
 
     @property
     def bins(self) -> Bins:
