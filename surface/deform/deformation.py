@@ -197,7 +197,8 @@ class Deformation(Generic[Table]):
         else:
             check_ids(which, n * copies)
             bad = found + REFUSED
-            wanted = "finite, and within the range of 32-bit numbers, also where it leads"
+            known = np.isfinite(target[bad]).all()
+            wanted = "within the range of 32-bit numbers, and lead to places that are" if known else "finite"
             raise ValueError(f"{name}[{bad}]: must be {wanted}, got {target[bad].tolist()}")
 
     def _recentre(self) -> None:

@@ -34,7 +34,7 @@ def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: boo
         tests.follow_loops(limits.loop_error or limits.chord_error or 5e-4 * size)
     leaves, inner = quadtree.grow(lattice, tests.split, part_of(progress, 0.0, 0.4))
     if limits.measured and limits.chord_error is not None:
-        progress("chords", 0.4)
+        progress("quad tree", 0.4)
         leaves, inner = tests.tighten(leaves, inner)
     progress("triangles", 0.45)
     corners, owner = quadtree.triangulate(lattice, leaves, inner)
@@ -141,11 +141,11 @@ def _without_poles(flat: Flat, points: Floats, domain: Domain, near: float) -> F
     as at the pole of a sphere: they have no area. ``points`` (m, 3) are those of the vertices."""
     kept = np.ones(len(flat.triangles), dtype=bool)
     for number, border in enumerate(domain.rect):
-        on = flat.uv[:, number // 2] == border
-        for k in range(3):
-            a, b = flat.triangles[:, k], flat.triangles[:, (k + 1) % 3]
-            along = np.flatnonzero(on[a] & on[b])
-            kept[along[np.linalg.norm(points[a[along]] - points[b[along]], axis=1) <= near]] = False
+        on = (flat.uv[:, number // 2] == border)[flat.triangles]
+        at = points[flat.triangles[on]]
+        if len(at) and (np.ptp(at, axis=0) <= near).all():
+            beyond = np.linalg.norm(points[flat.triangles] - at[0], axis=2).max(axis=1) > near
+            kept &= (on.sum(axis=1) < 2) | ~beyond
     return flat if kept.all() else Flat(flat.uv, flat.triangles[kept], flat.owner[kept])
 
 
