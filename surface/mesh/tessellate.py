@@ -99,7 +99,7 @@ def _finish(
     if not keep.all():
         flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])
         code = _codes(flat, lattice, leaves)
-    flat = _without_poles(flat, out[place, 0], domain, 1e-9 * size_of(surface))
+    flat = _without_poles(surface, flat, out[place, 0], domain)
     code = _codes(flat, lattice, leaves)
     if any(lattice.joined):
         flat = _weld(flat, side, domain, lattice.joined)
@@ -136,17 +136,25 @@ def size_of(surface: ControlPoints) -> float:
     return float(np.linalg.norm(np.ptp(surface.points, axis=0))) or 1.0
 
 
-def _without_poles(flat: Flat, points: Floats, domain: Domain, near: float) -> Flat:
-    """Leave out triangles with an edge on a border of the rectangle that is a single point in space (within ``near``),
-    as at the pole of a sphere: they have no area. ``points`` (m, 3) are those of the vertices."""
-    kept = np.ones(len(flat.triangles), dtype=bool)
-    for number, border in enumerate(domain.rect):
-        on = (flat.uv[:, number // 2] == border)[flat.triangles]
-        at = points[flat.triangles[on]]
-        if len(at) and (np.ptp(at, axis=0) <= near).all():
+def _without_poles(surface: ControlPoints, flat: Flat, points: Floats, domain: Domain) -> Flat:
+    """Leave out triangles with an edge on a border of the rectangle that is a single point in space, as at the pole of
+    a sphere: they have no area. ``points`` (m, 3) are those of the vertices."""
+    kept, near = np.ones(len(flat.triangles), dtype=bool), 1e-9 * size_of(surface)
+    for number in range(4):
+        on = (flat.uv[:, number // 2] == domain.rect[number])[flat.triangles]
+        at = np.concatenate([points[flat.triangles[on]], surface.sample(_along(domain, number), None)[2]])
+        if (np.ptp(at, axis=0) <= near).all():
             beyond = np.linalg.norm(points[flat.triangles] - at[0], axis=2).max(axis=1) > near
             kept &= (on.sum(axis=1) < 2) | ~beyond
     return flat if kept.all() else Flat(flat.uv, flat.triangles[kept], flat.owner[kept])
+
+
+def _along(domain: Domain, number: int) -> Floats:
+    """(33, 2) places along a border of the rectangle: 0 and 1 where u ends, 2 and 3 where v does."""
+    axis, low, high = number // 2, np.array(domain.rect[::2]), np.array(domain.rect[1::2])
+    uv = low + np.linspace(0.0, 1.0, 33)[:, None] * (high - low)
+    uv[:, axis] = domain.rect[number]
+    return uv
 
 
 def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
