@@ -129,17 +129,22 @@ class DCPSurface(ControlPoints):
         loop_error: float | None = None,
         roots: tuple[int, int] | None = None,
         flip: bool = False,
+        measured: bool = True,
         progress: Progress = no_progress,
     ) -> Mesh:
         """A watertight mesh by quad tree (paper, 2.3).
 
         max_points : quarter cells until at most so many control points reach each
-        chord_error : quarter cells until the surface is this near to their chords, in units of the points;
-            if neither limit is given, a thousandth of the size of the control net
+        chord_error : quarter cells until the surface is this near to their triangles, in units of the points;
+            if neither limit is given, a thousandth of the size of the control net. The distance is measured at 25
+            samples a cell and holds between them by a margin; it may be exceeded where ``max_depth`` ends, and in the
+            triangles that a loop cuts
         max_depth, min_depth : levels below the roots, at most 20
         domain : where to draw; the rectangle of all subdomains if left out
         loop_error : how near the mesh's border follows the loops; ``chord_error`` if left out
         roots : cells along u and v before any quartering; chosen roughly square if left out
+        measured : False estimates the distance from nine samples a cell, in half the time or less; the surface may then
+            be up to twice ``chord_error`` away
         flip : reverse normals and triangles against S_u x S_v
         progress : is called with the name of a stage and the part of the whole that is done, 0 to 1
 
@@ -148,7 +153,7 @@ class DCPSurface(ControlPoints):
         from surface.mesh.splitting import Limits  # compiled: loaded when first used
         from surface.mesh.tessellate import tessellate
 
-        limits = Limits(max_points, chord_error, max_depth, min_depth, loop_error, roots)
+        limits = Limits(max_points, chord_error, max_depth, min_depth, loop_error, roots, measured)
         return tessellate(self, Domain.of(self) if domain is None else domain, limits, flip, progress)
 
     def deformation(

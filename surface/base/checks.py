@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from surface.base.arrays import Bools, Floats, Ints
 
+LEAST_WEIGHT, MOST_WEIGHT = 1e-30, 1e30
+
 
 def numbers(values: ArrayLike, name: str) -> Floats:
     """A float64 copy; ``ValueError`` naming the first element that is no number, or not of the usual shape."""
@@ -47,12 +49,19 @@ def check_points(points: ArrayLike, name: str = "points") -> Floats:
     return xyz
 
 
+def require_weights(weights: Floats, name: str = "weights") -> None:
+    """``ValueError`` for the first weight that is not positive, or beyond what 32-bit sums can hold."""
+    require(np.isfinite(weights) & (weights > 0), weights, name, "positive and finite")
+    within = (weights >= LEAST_WEIGHT) & (weights <= MOST_WEIGHT)
+    require(within, weights, name, f"between {LEAST_WEIGHT:g} and {MOST_WEIGHT:g} (scale all weights alike)")
+
+
 def check_weights(weights: ArrayLike, name: str = "weights", n: int | None = None) -> Floats:
-    """(n,) float64 copy; ``ValueError`` for another shape or weights that are not positive and finite."""
+    """(n,) float64 copy; ``ValueError`` for another shape or weights that :func:`require_weights` refuses."""
     w = numbers(weights, name)
     if w.ndim != 1:
         raise ValueError(f"{name}: shape {w.shape}, expected (n,)")
-    require(np.isfinite(w) & (w > 0), w, name, "positive and finite")
+    require_weights(w, name)
     if n is not None and len(w) != n:
         raise ValueError(f"{name}: {len(w)} weights for {n} points")
     return w

@@ -14,6 +14,7 @@ import numpy as np
 from surface.base.jit import inlined, kernel
 from surface.spline.lanes import add, div, fma, load, mul, prefetch, root, splat, store, store3, sub, zero
 
+LEAST_SUM = 1e-36  # of the weights at a vertex: float32 has fewer digits for smaller numbers
 AHEAD = 1024  # weights that are prefetched before they are needed
 
 
@@ -235,9 +236,28 @@ def denominators(cells, cell_start, tile_start, rows, room, at, value, slope, in
                         wv += slope[2 * place + 8 + j]
                 if cell_start[c] + 8 * t + j >= cell_start[c + 1]:
                     w = 1.0  # lanes that fill up the last tile
-                inv_w[8 * tile + j] = 1.0 / w
+                inv_w[8 * tile + j] = 1.0 / w if w >= LEAST_SUM else np.inf
                 if slope.shape[0] > 0:
                     dw[16 * tile + j], dw[16 * tile + 8 + j] = wu, wv
+
+
+@kernel
+def unusable(cells, cell_start, tile_start, rows, room, at, value, slope, inv_w):
+    """The first vertex of ``cells`` whose weights add up to less than ``LEAST_SUM``, or one of whose weights or
+    derivative weights is not finite; -1 if there is none."""
+    for q in range(cells.shape[0]):
+        c = cells[q]
+        for vertex in range(cell_start[c], cell_start[c + 1]):
+            t, j = (vertex - cell_start[c]) // 8, (vertex - cell_start[c]) % 8
+            total = np.float64(inv_w[8 * (tile_start[c] + t) + j])
+            for k in range(rows[c]):
+                place = at[c] + (t * room[c] + k) * 8
+                total += abs(value[place + j])
+                if slope.shape[0] > 0:
+                    total += abs(slope[2 * place + j]) + abs(slope[2 * place + 8 + j])
+            if not total < np.inf:
+                return vertex
+    return -1
 
 
 @kernel

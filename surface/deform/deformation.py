@@ -54,7 +54,8 @@ class Deformation(Generic[Table]):
     vertices, normals : (m, 3) float32, current, read-only; (0, 3) without normals
     mesh, basis, lists : the mesh; knots, degrees and weights of the control points; their weights by cell
 
-    ``ValueError`` for no thread at all, or a mesh whose lists name points that the surface does not have.
+    ``ValueError`` for no thread at all, a mesh of a surface with other control points or other knots, or weights so
+    small, or derivatives so large, at a vertex that 32-bit numbers cannot hold them.
 
     One object belongs to one thread at a time. Nothing is allocated by :meth:`move` and :meth:`set_positions`
     but the copy of arguments that are not already int64 and float64 arrays.
@@ -67,6 +68,8 @@ class Deformation(Generic[Table]):
             raise ValueError(f"threads: must be at least 1, not {threads}")
         if mesh.list_ids.max(initial=-1) >= len(surface.shifts) * surface.n:
             raise ValueError(f"mesh: was made from another surface: this one has {surface.n} points")
+        if mesh.structure and mesh.structure != surface.structure:
+            raise ValueError("mesh: was made from another surface, with other knots: tessellate this one")
         self.mesh, self.basis = mesh, Basis.of(surface)
         self.lists = build_lists(surface, mesh, normals, progress)
         self._sign, self._threads = np.float32(-1 if mesh.flip else 1), threads
@@ -78,6 +81,7 @@ class Deformation(Generic[Table]):
         self._all, self._cells = np.arange(surface.n), np.arange(len(mesh.cell_start) - 1, dtype=np.int32)
         self.vertices, self.normals = _view(self._arrays["vertices"]), _view(self._arrays["normals"])
         self._sum_weights(np.arange(len(self._cells)))
+        self._check_weights("mesh", self._cells)
         self._bind()
         self.refresh()
 
@@ -132,7 +136,15 @@ class Deformation(Generic[Table]):
         w = check_weights(weights)
         if w.shape != which.shape:
             raise ValueError(f"weights: shape {w.shape}, expected {which.shape}")
-        self._update_weights(edits.change_weights(self.basis, self.lists, self.mesh, which, w))
+        before = self.basis.weights[which]
+        cells = edits.change_weights(self.basis, self.lists, self.mesh, which, w)
+        self._sum_weights(cells)
+        try:
+            self._check_weights("weights", cells)
+        except ValueError:
+            self._sum_weights(edits.change_weights(self.basis, self.lists, self.mesh, which, before))
+            raise
+        self._update(cells)
 
     def set_knots(self, index: int, knots_u: ArrayLike, knots_v: ArrayLike) -> None:
         """Give one point other knots, and so another subdomain; lists change only where the old or new one reaches.
@@ -142,9 +154,19 @@ class Deformation(Generic[Table]):
         index = int(check_ids([index], self.basis.n)[0])
         rows = [pad_knots([k], name, 1) for k, name in ((knots_u, "knots_u"), (knots_v, "knots_v"))]
         knots, degrees = [row[0][0] for row in rows], [int(row[1][0]) for row in rows]
-        cells = edits.change_knots(self.basis, self.lists, self.mesh, index, knots, degrees)
-        self._bind()
-        self._update_weights(cells)
+        basis = self.basis
+        before = [k[index, : p[index] + 2].copy() for k, p in zip(basis.knots, basis.degrees, strict=True)]
+        cells = edits.change_knots(basis, self.lists, self.mesh, index, knots, degrees)
+        self._sum_weights(cells)
+        try:
+            self._check_weights("knots_u, knots_v", cells)
+        except ValueError:
+            same = [len(k) - 2 for k in before]
+            self._sum_weights(edits.change_knots(basis, self.lists, self.mesh, index, before, same))
+            raise
+        finally:
+            self._bind()
+        self._update(cells)
 
     def refresh(self) -> None:
         """Compute everything again from the control points."""
@@ -175,7 +197,9 @@ class Deformation(Generic[Table]):
         else:
             check_ids(which, n * copies)
             bad = found + REFUSED
-            raise ValueError(f"{name}[{bad}]: must be finite, got {target[bad].tolist()}")
+            known = np.isfinite(target[bad]).all()
+            wanted = "within the range of 32-bit numbers, and lead to places that are" if known else "finite"
+            raise ValueError(f"{name}[{bad}]: must be {wanted}, got {target[bad].tolist()}")
 
     def _recentre(self) -> None:
         """Compute everything again, from origins in the middle of the cells as they are now."""
@@ -195,9 +219,19 @@ class Deformation(Generic[Table]):
             self._arrays["dw"],
         )  # fmt: skip
 
-    def _update_weights(self, cells: Ints) -> None:
-        """Bring ``cells (k,)``, rising, up to date with their changed weights."""
-        self._sum_weights(cells)
+    def _check_weights(self, name: str, cells: Ints) -> None:
+        """``ValueError`` for the first vertex of ``cells`` whose weights 32-bit numbers cannot hold."""
+        bad = apply.unusable(cells, *(getattr(self.lists, key) for key in apply.NAMES[:5]),
+                             self.lists.value, self.lists.slope, self._arrays["inv_w"])  # fmt: skip
+        if bad >= 0:
+            u, v = self.mesh.uv[bad]
+            raise ValueError(
+                f"{name}: at vertex {bad} of the mesh (u = {u:g}, v = {v:g}) the weights of all control points add "
+                "up to nearly nothing, or their derivatives to more than 32-bit numbers hold: scale weights or knots"
+            )
+
+    def _update(self, cells: Ints) -> None:
+        """Bring ``cells (k,)``, rising, up to date with their changed weights, which are summed."""
         self._compute(cells.astype(np.int32))
         self._count = apply.join_ranges(cells, len(cells), self.lists.cell_start, GAP, self._ranges)
 

@@ -23,6 +23,7 @@ STORE = -2  # in ``differences``: compute and store them now
 VALID = 1 << 62  # what :func:`first_invalid` returns where nothing is wrong
 ROUNDING = 6e-8  # half a unit in the last place of float32
 MOST_DRIFT = 8e-7  # of the surface's size
+FARTHEST = 3e38  # coordinates that float32 still has
 REFUSED = 1 << 61  # subtracted from results of :func:`move_points` that mean a bad argument
 
 
@@ -184,14 +185,18 @@ def update_cells(arrays, count, limit, bias, sign):
 
 
 @kernel
-def first_invalid(ids, rows, n):
-    """The first row with an id out of range (as ``-1 - row``) or a number that is not finite (``row``); or VALID."""
+def first_invalid(ids, rows, relative, points):
+    """The first row with an id out of range (as ``-1 - row``), or one that leads to a number that is not finite or that
+    float32 does not have (``row``); or VALID."""
+    n = points.shape[0]
     for q in range(ids.shape[0]):
         if ids[q] < 0 or ids[q] >= n:
             return -1 - q
     for q in range(ids.shape[0]):
-        if not np.isfinite(rows[q, 0] + rows[q, 1] + rows[q, 2]):
-            return q
+        for c in range(3):
+            x = rows[q, c] + points[ids[q], c] if relative else rows[q, c]
+            if not abs(x) <= FARTHEST:
+                return q
     return VALID
 
 
@@ -228,7 +233,7 @@ def move_points(arrays, ids, rows, relative, most, limit, bias, gap, sign):
     """
     cell_start, points = arrays[0], arrays[13]
     found, _, affected, _, moved_ids, delta, _, _, _, _, _, extent = arrays[21:]
-    bad = first_invalid(ids, rows, points.shape[0])
+    bad = first_invalid(ids, rows, relative, points)
     if bad != VALID:
         return bad - REFUSED
     count = store_positions(ids, rows, relative, points, moved_ids, delta)

@@ -13,6 +13,7 @@ from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
 from surface.spline.controlpoints import ControlPoints
 from surface.spline.kernels import bounding_box, points_in
+from surface.spline.weighing import mark_reaching
 
 LANES = 8  # float32 numbers per vector operation
 PER_POINT = 10.0  # cost of reading a control point, in weights
@@ -137,12 +138,18 @@ def _fill_lists(cell_start, uv, knots_u, knots_v, grid, shape, start, ids, list_
         list_start[c + 1] = list_start[c] + points_in(box, knots_u, knots_v, grid, shape, start, ids, room)
 
 
-def point_lists(cell_start: Ints, uv: Floats, surface: ControlPoints) -> tuple[Ints, np.ndarray]:
-    """Control points that may reach each cell: ``list_start (c + 1,)`` and ``list_ids (k,)``, rising per cell."""
+def point_lists(cell_start: Ints, uv: Floats, side: Ints, surface: ControlPoints) -> tuple[Ints, np.ndarray]:
+    """Control points that reach a vertex of each cell: ``list_start (c + 1,)`` and ``list_ids (k,)``, rising per cell.
+
+    A point counts that has a weight at a vertex, or a derivative of it, at the limit that the vertex takes (``side``).
+    """
     start = np.zeros(len(cell_start), dtype=np.int64)
     arrays = (cell_start, uv, *surface.arrays()[:2], *surface.bin_arrays(), start)
     _fill_lists(*arrays, np.zeros(0, dtype=np.int32))
     ids = np.zeros(int(start[-1]), dtype=np.int32)
     _fill_lists(*arrays, ids)
     cell = np.repeat(np.arange(len(start) - 1), np.diff(start))
-    return start, ids[np.lexsort((ids, cell))]
+    ids, reach = ids[np.lexsort((ids, cell))], np.zeros(len(ids), dtype=np.bool_)
+    mark_reaching(*surface.arrays()[:4], uv, side, cell_start, start, ids, reach)
+    kept = np.bincount(cell[reach], minlength=len(start) - 1)
+    return np.concatenate([[0], np.cumsum(kept)]), ids[reach]

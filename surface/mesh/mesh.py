@@ -23,9 +23,11 @@ class Mesh:
     cell : (m,) int32, rising: the vertices of a cell are consecutive
     cell_start : (c + 1,) int64, first vertex of every cell
     list_start : (c + 1,) int64, where every cell's list starts in ``list_ids``
-    list_ids : (k,) int32 control points that may reach the cell's vertices
+    list_ids : (k,) int32 control points that reach a vertex of the cell
     leaves : how many leaf cells the quad tree had
     flip : are normals and triangles reversed against S_u x S_v?
+    structure : :attr:`surface.spline.controlpoints.ControlPoints.structure` of the surface it was made from; empty
+        where that is not known
     """
 
     vertices: Floats
@@ -39,6 +41,7 @@ class Mesh:
     list_ids: np.ndarray
     leaves: int
     flip: bool
+    structure: bytes = b""
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -46,7 +49,7 @@ class Mesh:
                 value.flags.writeable = False
 
     def points_of(self, cell: int) -> np.ndarray:
-        """(k,) int32: control points that may reach a cell."""
+        """(k,) int32: control points that reach a cell."""
         return self.list_ids[self.list_start[cell] : self.list_start[cell + 1]]
 
     @cached_property

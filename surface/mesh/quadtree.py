@@ -138,11 +138,17 @@ def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
     return Leaves(np.concatenate(levels), np.concatenate(found)), split
 
 
-def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[Ints, Ints]:
-    """Triangles without cracks: a leaf's edges have vertices at their middles where neighbours are smaller.
+def quarter(lattice: Lattice, leaves: Leaves, inner: list[Ints], which: Ints) -> tuple[Leaves, list[Ints]]:
+    """The tree with the leaves ``which (k,)`` quartered, too; ``inner`` and what is returned are as of :func:`grow`."""
+    cells = [_decode(lattice, level, code) for level, code in enumerate(inner)]
+    for level in np.unique(leaves.level[which]):
+        more = leaves.cell[which[leaves.level[which] == level]]
+        cells[level] = np.concatenate([cells[level], more])
+    return _balance(lattice, cells)
 
-    Returns lattice keys (t, 3) int64, counter-clockwise in (u, v), and the leaf of every triangle, (t,) int64.
-    """
+
+def patterns(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> Ints:
+    """(n,) which of :data:`TEMPLATES` the triangles of every leaf are."""
     pattern = np.zeros(len(leaves.level), dtype=np.int64)
     for level in np.unique(leaves.level):
         if level >= len(inner):
@@ -153,6 +159,15 @@ def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[In
             pattern[at] |= contains(inner[level], code).astype(np.int64) << edge
     flat = pattern == 0
     pattern[flat] = 16 * (leaves.cell[flat].sum(axis=1) % 2)
+    return pattern
+
+
+def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[Ints, Ints]:
+    """Triangles without cracks: a leaf's edges have vertices at their middles where neighbours are smaller.
+
+    Returns lattice keys (t, 3) int64, counter-clockwise in (u, v), and the leaf of every triangle, (t,) int64.
+    """
+    pattern = patterns(lattice, leaves, inner)
     count = (TEMPLATES[:, :, 0] >= 0).sum(axis=1)[pattern]
     keys = np.zeros((int(count.sum()), 3), dtype=np.int64)
     _emit(leaves.level, leaves.cell, pattern, lattice.depth, (lattice.shape[0] << lattice.depth) + 1, TEMPLATES, keys)

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from surface.base import keys
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.spline.controlpoints import ControlPoints
 
-from . import blocks, loops, quadtree
+from . import blocks, chords, loops, quadtree
 from .domain import Domain
-from .quadtree import Lattice
+from .quadtree import Lattice, Leaves
 
 MOST_CELLS = 4_000_000
 RIM = 64  # cells along a side where the border of what is covered is followed
@@ -28,6 +28,7 @@ class Limits(NamedTuple):
     min_depth: int
     loop_error: float | None
     roots: tuple[int, int] | None
+    measured: bool = True
 
     def check(self) -> None:
         """``ValueError`` for the first limit that is out of range."""
@@ -125,6 +126,39 @@ class SplitTests:
         out, inner = np.zeros(len(rect), dtype=np.int64), np.nextafter(rect, [np.inf, -np.inf, np.inf, -np.inf])
         blocks.count_points(inner, *self.surface.arrays()[:2], *self.surface.bin_arrays(), out)
         return out
+
+    def tighten(self, leaves: Leaves, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
+        """Quarter leaves until the surface is nowhere further than ``chord_error`` from their triangles, or the tree
+        has no more levels; ``inner`` and what is returned are as of :func:`.quadtree.grow`."""
+        passed = np.zeros(0, dtype=np.int64)
+        while True:
+            pattern = quadtree.patterns(self.lattice, leaves, inner)
+            key = self._keys(leaves) * len(quadtree.TEMPLATES) + pattern
+            left = np.flatnonzero((leaves.level < self.lattice.depth) & ~np.isin(key, passed))
+            far = self._too_far(leaves, pattern, left)
+            passed = np.concatenate([passed, key[left[~far]]])
+            if not far.any():
+                return leaves, inner
+            leaves, inner = quadtree.quarter(self.lattice, leaves, inner, left[far])
+
+    def _keys(self, leaves: Leaves) -> Ints:
+        """(n,) one integer for every leaf that there may be."""
+        shift = self.lattice.depth - leaves.level
+        corner = self.lattice.key(leaves.cell[:, 0] << shift, leaves.cell[:, 1] << shift)
+        return corner * (self.lattice.depth + 1) + leaves.level
+
+    def _too_far(self, leaves: Leaves, pattern: Ints, which: Ints) -> Bools:
+        """(k,) bool: from the triangles of which of the leaves ``which (k,)`` the surface is too far."""
+        far = np.zeros(len(which), dtype=bool)
+        for level in np.unique(leaves.level[which]):
+            at = np.flatnonzero(leaves.level[which] == level)
+            cells = leaves.cell[which[at]]
+            rect = self._rects(int(level), cells)
+            at = at[active := self._active(rect, cells, int(level))[0]]
+            uv = chords.sample_places(rect[active])
+            side = inner_side(uv, uv[:, 12], self.domain)
+            far[at] = chords.measured_errors(self.surface, uv, side, pattern[which[at]]) > self.limits.chord_error
+        return far
 
     def _errors(self, level: int, cells: Ints) -> Floats:
         """Greatest distance of the surface from the cell's chords, at edge middles and the centre; 0 if uncovered."""

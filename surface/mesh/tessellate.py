@@ -23,7 +23,7 @@ CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
 def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: bool, progress: Progress) -> Mesh:
     """See :meth:`surface.DCPSurface.tessellate`."""
     limits.check()
-    size = float(np.linalg.norm(np.ptp(surface.points, axis=0))) or 1.0
+    size = size_of(surface)
     if limits.max_points is None and limits.chord_error is None:
         limits = limits._replace(chord_error=1e-3 * size)
     scale = _lengths(surface, domain)
@@ -32,7 +32,10 @@ def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: boo
     tests = SplitTests(surface, domain, lattice, scale, limits)
     if len(domain.segments):
         tests.follow_loops(limits.loop_error or limits.chord_error or 5e-4 * size)
-    leaves, inner = quadtree.grow(lattice, tests.split, part_of(progress, 0.0, 0.45))
+    leaves, inner = quadtree.grow(lattice, tests.split, part_of(progress, 0.0, 0.4))
+    if limits.measured and limits.chord_error is not None:
+        progress("quad tree", 0.4)
+        leaves, inner = tests.tighten(leaves, inner)
     progress("triangles", 0.45)
     corners, owner = quadtree.triangulate(lattice, leaves, inner)
     nodes, _, triangles = keys.unique(corners)
@@ -96,6 +99,8 @@ def _finish(
     if not keep.all():
         flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])
         code = _codes(flat, lattice, leaves)
+    flat = _without_poles(surface, flat, out[place, 0], domain)
+    code = _codes(flat, lattice, leaves)
     if any(lattice.joined):
         flat = _weld(flat, side, domain, lattice.joined)
     progress("cells", 0.7)
@@ -106,7 +111,7 @@ def _finish(
     triangles = rank[flat.triangles]
     uv = np.ascontiguousarray(flat.uv[order])
     start = blocks.group(code, lattice.depth, uv, surface) if len(order) else np.zeros(1, np.int64)
-    list_start, list_ids = blocks.point_lists(start, uv, surface)
+    list_start, list_ids = blocks.point_lists(start, uv, side[order], surface)
     vertices = out[:, 0].copy()
     normals = unit_normals(vertices, out[:, 1], out[:, 2], triangles)
     progress("cells", 1.0)
@@ -122,7 +127,34 @@ def _finish(
         list_ids=list_ids,
         leaves=len(leaves.level),
         flip=flip,
+        structure=surface.structure,
     )
+
+
+def size_of(surface: ControlPoints) -> float:
+    """The diagonal of the box around the control points; 1 where they are all in one place."""
+    return float(np.linalg.norm(np.ptp(surface.points, axis=0))) or 1.0
+
+
+def _without_poles(surface: ControlPoints, flat: Flat, points: Floats, domain: Domain) -> Flat:
+    """Leave out triangles with an edge on a border of the rectangle that is a single point in space, as at the pole of
+    a sphere: they have no area. ``points`` (m, 3) are those of the vertices."""
+    kept, near = np.ones(len(flat.triangles), dtype=bool), 1e-9 * size_of(surface)
+    for number in range(4):
+        on = (flat.uv[:, number // 2] == domain.rect[number])[flat.triangles]
+        at = np.concatenate([points[flat.triangles[on]], surface.sample(_along(domain, number), None)[2]])
+        if (np.ptp(at, axis=0) <= near).all():
+            beyond = np.linalg.norm(points[flat.triangles] - at[0], axis=2).max(axis=1) > near
+            kept &= (on.sum(axis=1) < 2) | ~beyond
+    return flat if kept.all() else Flat(flat.uv, flat.triangles[kept], flat.owner[kept])
+
+
+def _along(domain: Domain, number: int) -> Floats:
+    """(33, 2) places along a border of the rectangle: 0 and 1 where u ends, 2 and 3 where v does."""
+    axis, low, high = number // 2, np.array(domain.rect[::2]), np.array(domain.rect[1::2])
+    uv = low + np.linspace(0.0, 1.0, 33)[:, None] * (high - low)
+    uv[:, axis] = domain.rect[number]
+    return uv
 
 
 def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:

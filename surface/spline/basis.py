@@ -1,6 +1,6 @@
 """B-spline blending functions of single control points, and checks of their knots.
 
-A blending function of degree p has p + 2 knots of its own, 0 <= p <= 7, and is zero outside them.
+A blending function of degree p has p + 2 knots of its own, 0 <= p <= 9, and is zero outside them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from surface.base.arrays import Floats, Ints
 from surface.base.checks import require
 
-MAX_DEGREE = 7
+MAX_DEGREE = 9
+LEAST_SPAN, MOST_KNOT = 1e-30, 1e30  # knots that float64 can divide by, also in products and second derivatives
 
 
 def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str = "right") -> Floats:
@@ -91,7 +92,7 @@ def _check_degrees(degrees: Ints, name: str) -> None:
 
 
 def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
-    """Raise ``ValueError`` for knots that are not finite, that decrease, or are all equal."""
+    """Raise ``ValueError`` for knots that are not finite, decrease, are all equal, or differ by next to nothing."""
     _check_degrees(degrees, name)
     good = np.isfinite(padded).all(axis=1)
     if not good.all():
@@ -105,6 +106,19 @@ def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
             raise ValueError(f"{name}[{i}]: fewer than two distinct knots (all are {padded[i, 0]})")
         k = int(np.argmax(steps[i] < 0)) + 1
         raise ValueError(f"{name}[{i}]: knots decrease at knot {k} ({padded[i, k]} after {padded[i, k - 1]})")
+    _check_spans(padded, steps, name)
+
+
+def _check_spans(padded: Floats, steps: Floats, name: str) -> None:
+    """Raise ``ValueError`` for knots that are neither equal nor far enough apart to divide by, or too large."""
+    far = np.abs(padded) > MOST_KNOT
+    bad = ((steps > 0) & (steps < LEAST_SPAN)) | far[:, 1:] | far[:, :-1]
+    if bad.any():
+        i, k = (int(x) for x in np.argwhere(bad)[0])
+        raise ValueError(
+            f"{name}[{i}]: knots {k} and {k + 1} are {padded[i, k]} and {padded[i, k + 1]}; make them equal, or scale "
+            f"the knots: they must differ by {LEAST_SPAN:g} or more and lie within {MOST_KNOT:g}"
+        )
 
 
 def check_padded(knots: ArrayLike, degrees: ArrayLike, axis: str, n: int) -> tuple[Floats, Ints]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from hashlib import blake2b
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -24,14 +25,15 @@ class ControlPoints:
     """Positions, weights, knots and degrees of n control points; immutable.
 
     points : (n, 3) float64
-    weights : (n,) float64, positive
+    weights : (n,) float64, 1e-30 to 1e30
     knots_u, knots_v : n sequences of degree + 2 knots each, or (n, degree + 2) arrays; the degree may differ
-        per point and direction (0 to 7)
+        per point and direction (0 to 9)
     closed_u, closed_v : (start, end) of a direction that is joined at its ends, as around a neck or a torus; the
         points that reach over one end act at the other
 
-    ``ValueError`` for wrong shapes, no points at all, numbers that are not finite, weights that are not positive,
-    decreasing knots or fewer than two distinct knots; names the argument and the index.
+    ``ValueError`` for wrong shapes, no points at all, numbers that are not finite, weights that are not positive
+    or beyond 1e-30 to 1e30, decreasing knots, fewer than two distinct knots, or knots that differ by less than 1e-30
+    without being equal or lie beyond 1e30; names the argument and the index.
     """
 
     def __init__(
@@ -161,6 +163,16 @@ class ControlPoints:
         """u0, u1, v0, v1 of the smallest rectangle that holds every subdomain, or of the closed interval."""
         ends = [(float(knots[:, 0].min()), float(knots[:, -1].max())) for knots in self.padded]
         return (*(self._closed[0] or ends[0]), *(self._closed[1] or ends[1]))
+
+    @property
+    def structure(self) -> bytes:
+        """A digest of knots, degrees and closed directions: surfaces that have it in common differ in positions and
+        weights only, and a mesh of one is a mesh of the others."""
+        digest = blake2b(repr(self._closed).encode(), digest_size=16)
+        for knots, degrees in zip(self.padded, self.degrees, strict=True):
+            digest.update(np.ascontiguousarray(knots[:, : degrees.max() + 2] + 0.0).tobytes())
+            digest.update(degrees.tobytes())
+        return digest.digest()
 
     @property
     def bins(self) -> Bins:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surface.base.arrays import Floats
-from surface.base.checks import numbers, require
+from surface.base.checks import numbers, require, require_weights
 
 from .basis import MAX_DEGREE
 
@@ -21,13 +21,13 @@ def nurbs_arrays(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Control points of a NURBS surface, each with its own slice of the knot vectors.
 
-    degree_u, degree_v : 0 to 7
+    degree_u, degree_v : 0 to 9
     knots_u, knots_v : (nu + degree_u + 1,), (nv + degree_v + 1,) float64
     control_points : (nu, nv, 3) float64
     weights : (nu, nv) float64, positive; ones if left out
 
     Returns points (nu * nv, 3), weights (nu * nv,), knots_u (nu * nv, degree_u + 2), knots_v (nu * nv, degree_v + 2).
-    ``ValueError`` for shapes that do not fit together, a degree that is no whole number from 0 to 7, numbers that are
+    ``ValueError`` for shapes that do not fit together, a degree that is no whole number from 0 to 9, numbers that are
     not finite, weights that are not positive, knots that decrease; names the argument and the index.
     """
     net = numbers(control_points, "control_points")
@@ -40,7 +40,7 @@ def nurbs_arrays(
     w = np.ones((nu, nv)) if weights is None else numbers(weights, "weights")
     if w.shape != (nu, nv):
         raise ValueError(f"weights: shape {w.shape}, expected {(nu, nv)}")
-    require(np.isfinite(w) & (w > 0), w, "weights", "positive and finite")
+    require_weights(w)
     local_u = _local_knots(knots_u, "u", nu, degree_u)
     local_v = _local_knots(knots_v, "v", nv, degree_v)
     return net.reshape(-1, 3), w.ravel(), np.repeat(local_u, nv, axis=0), np.tile(local_v, (nu, 1))

@@ -77,6 +77,26 @@ def fill_blocks(
 
 
 @kernel
+def mark_reaching(knots_u, knots_v, pu, pv, uv, side, cell_start, list_start, list_ids, reach):
+    """Say in ``reach (k,)`` which listed points have a weight, or a derivative of one, at a vertex of their cell."""
+    work, widest = np.zeros(12), 1
+    for c in range(cell_start.shape[0] - 1):
+        widest = max(widest, cell_start[c + 1] - cell_start[c])
+    at_u, at_v = np.zeros(widest, dtype=np.int64), np.zeros(widest, dtype=np.int64)
+    values_u, values_v = np.zeros((widest, 2)), np.zeros((widest, 2))
+    along_u, along_v, numbers = np.zeros((widest, 2)), np.zeros((widest, 2)), np.zeros((3, widest))
+    for c in range(cell_start.shape[0] - 1):
+        first, size = cell_start[c], cell_start[c + 1] - cell_start[c]
+        cell_uv, sides = uv[first : first + size], side[first : first + size]
+        many_u, many_v = distinct(cell_uv, sides, 0, values_u, at_u), distinct(cell_uv, sides, 1, values_v, at_v)
+        for q in range(list_start[c], list_start[c + 1]):
+            i = list_ids[q]
+            found = along(knots_u, i, pu[i], values_u, many_u, True, work, along_u)
+            found = found and along(knots_v, i, pv[i], values_v, many_v, True, work, along_v)
+            reach[q] = found and _combine(along_u, along_v, at_u, at_v, size, 1.0, numbers)
+
+
+@kernel
 def rewrite_rows(
     knots_u, knots_v, pu, pv, weights, uv, side, cell_start, i, cells, places, value, slope, at, rows, nonzero
 ):

@@ -7,7 +7,7 @@ import numpy as np
 from surface import DCPSurface, Domain, Mesh
 
 
-def scattered(n: int, seed: int, degrees: tuple[int, int] = (1, 7)) -> DCPSurface:
+def scattered(n: int, seed: int, degrees: tuple[int, int] = (1, 9)) -> DCPSurface:
     """Random points over the unit square, random degrees and knots, the whole square covered."""
     rng = np.random.default_rng(seed)
     knots: list[list[np.ndarray]] = [[], []]

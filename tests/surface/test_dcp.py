@@ -85,7 +85,7 @@ def test_basis_matrix_is_the_surface(seed: int) -> None:
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000))
 def test_derivatives_agree_with_differences(seed: int) -> None:
-    surface = scattered(20, seed, degrees=(4, 7))
+    surface = scattered(20, seed, degrees=(4, 9))
     uv = np.random.default_rng(seed).uniform(0.1, 0.9, (40, 2))
     h = 1e-5
     _, su, sv = surface.derivatives(uv)
@@ -130,7 +130,7 @@ BAD = {
     r"knots_v\[0\]: fewer than two": (np.zeros((1, 3)), [1], [[0, 1]], [[3, 3, 3]]),
     r"knots_v\[0\]: knots must be finite": (np.zeros((1, 3)), [1], [[0, 1]], [[3, np.inf, np.inf]]),
     r"knots_u\[0\]: 1 knots": (np.zeros((1, 3)), [1], [[0]], [[3, 4]]),
-    r"knots_u\[0\]: 10 knots": (np.zeros((1, 3)), [1], [range(10)], [[3, 4]]),
+    r"knots_u\[0\]: 12 knots": (np.zeros((1, 3)), [1], [range(12)], [[3, 4]]),
     "knots_u: 1 knot vectors for 2": (np.zeros((2, 3)), [1, 1], [[0, 1]], [[0, 1]] * 2),
     r"knots_u\[0\]: not a flat sequence": (np.zeros((1, 3)), [1], [3], [[0, 1]]),
     r"knots_u\[1\]: must be numbers, got \[0, 'x'\]": (np.zeros((2, 3)), [1, 1], [[0, 1], [0, "x"]], [[0, 1]] * 2),
@@ -169,7 +169,7 @@ def test_places_outside_the_domain_and_wrong_samples_are_named(name: str) -> Non
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"degree_u": 8}, "degree_u: must be a whole number from 0 to 7"),
+        ({"degree_u": 10}, "degree_u: must be a whole number from 0 to 9"),
         ({"degree_v": 1.5}, "degree_v: must be a whole number"),
         ({"knots_u": [0, 0, 2, 1]}, r"knots_u\[3\]: 1.0 after 2.0"),
         ({"knots_v": [0, np.nan, 1, 1]}, r"knots_v\[1\]: nan after 0.0"),

@@ -38,6 +38,7 @@ def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) 
             max_depth=depth,
             domain=replace(domain_of(data), marks=_ends(seams, data.name)),
             loop_error=LOOP_SHARE * chord,
+            measured=False,
         )
 
 

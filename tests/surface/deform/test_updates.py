@@ -145,15 +145,31 @@ def test_only_points_that_really_move_are_stored() -> None:
 
 
 def test_the_first_bad_row_is_found_ids_before_numbers() -> None:
-    rows = np.zeros((3, 3))
-    assert updates.first_invalid(np.array([0, 4, 2]), rows, 5) == updates.VALID
-    assert updates.first_invalid(np.array([0, 5, 2]), rows, 5) == -2
-    assert updates.first_invalid(np.array([-1, 4, 2]), rows, 5) == -1
+    rows, points = np.zeros((3, 3)), np.zeros((5, 3))
+
+    def first(ids: list[int], relative: bool = False) -> int:
+        return int(updates.first_invalid(np.array(ids), rows, relative, points))
+
+    assert first([0, 4, 2]) == updates.VALID
+    assert first([0, 5, 2]) == -2
+    assert first([-1, 4, 2]) == -1
     rows[2, 1] = np.nan
-    assert updates.first_invalid(np.array([0, 4, 2]), rows, 5) == 2
+    assert first([0, 4, 2]) == 2
     rows[0, 2] = np.inf
-    assert updates.first_invalid(np.array([0, 4, 7]), rows, 5) == -3
-    assert updates.first_invalid(np.array([0, 4, 2]), rows, 5) == 0
+    assert first([0, 4, 7]) == -3
+    assert first([0, 4, 2]) == 0
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_rows_that_lead_beyond_float32_are_found(axis: int) -> None:
+    rows, points, ids = np.zeros((2, 3)), np.zeros((5, 3)), np.array([1, 4])
+    rows[1, axis] = -3e38
+    points[4, axis] = -1e37
+    assert updates.first_invalid(ids, rows, False, points) == updates.VALID
+    assert updates.first_invalid(ids, rows, True, points) == 1
+    rows[1, axis] = 3.001e38
+    assert updates.first_invalid(ids, rows, False, points) == 1
+    assert updates.first_invalid(ids, rows, True, points) == updates.VALID
 
 
 def test_from_some_part_of_the_points_on_everything_is_computed_again() -> None:

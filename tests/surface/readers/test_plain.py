@@ -26,7 +26,7 @@ def same(a: DCPSurface, b: DCPSurface) -> bool:
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 10_000))
 def test_a_round_trip_keeps_every_bit(tmp_path: Path, seed: int) -> None:
-    surface = shapes.scattered(12, seed, degrees=(0, 7))
+    surface = shapes.scattered(12, seed, degrees=(0, 9))
     file = tmp_path / "a.json"
     write_surfaces(file, [NamedSurface("scattered", surface), NamedSurface("ü", shapes.hills(6))])
     first, second = read_surface(file)

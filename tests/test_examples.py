@@ -1,0 +1,88 @@
+"""The programs of examples/ do what they say."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from surface.head.model.file import load_data
+from surface.head.model.meshes import make_surface
+from surface.head.model.parameters import NAMES, read_pose
+from surface.head.posing.rig import SkinRig, rigid_motion
+
+SHAPES = {"jawOpen": 0.4, "mouthSmileLeft": 0.9, "browInnerUp": 0.7, "jawLeft": 0.5, "mouthShrugLower": 0.6}
+
+
+def load(path: Path) -> ModuleType:
+    spec = spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def draw_head(root: Path) -> ModuleType:
+    return load(root / "examples" / "draw_head.py")
+
+
+@pytest.fixture(scope="module")
+def found(draw_head: ModuleType, root: Path) -> list:
+    return list(draw_head.parts_of(root / "configs" / "heads" / "ict", SHAPES))
+
+
+def test_a_head_is_evaluated_from_its_files_alone_as_the_engine_does(found: list, root: Path) -> None:
+    """Without contacts and lids, which the program leaves out."""
+    folder = root / "configs" / "heads" / "ict"
+    head = replace(load_data(folder), contacts=[])
+    pose = read_pose(np.array([SHAPES.get(name, 0.0) for name in NAMES]))
+    assert [material for material, *_ in found] == [p.material for p in head.parts]
+    for part, (_, vertices, triangles) in zip(head.parts, found, strict=True):
+        surface = make_surface(part)
+        if part.follows == "skin":
+            points = SkinRig(replace(part, lids=np.zeros(len(part.points))), head).apply(pose)
+        else:
+            linear, shift = rigid_motion(part.follows, head, pose)
+            points = part.points @ linear.T + shift
+        expected = surface.with_points(points).evaluate(part.mesh["mesh_uv"], part.mesh["mesh_side"])
+        assert np.abs(vertices - expected).max() < 1e-9
+        assert np.array_equal(triangles, part.mesh["mesh_triangles"])
+
+
+def test_blending_functions_take_both_limits(draw_head: ModuleType) -> None:
+    knots = np.array([[0.0, 0, 0, 1, 1], [0.0, 1, 2, 3, 4]])
+    left = np.array([False, True, False, True])
+    found = draw_head.blending(knots[:1], 3, np.array([1.0, 1.0, 0.5, 0.5]), left)
+    assert np.allclose(found, [[0, 0, 0.375, 0.375]])
+    found = draw_head.blending(knots[1:], 3, np.array([1.0, 2.0, 4.0, 3.5]), left)
+    assert np.allclose(found, [[1 / 6, 2 / 3, 0, 1 / 48]])
+    steps = draw_head.blending(np.array([[0.0, 1.0]]), 0, np.array([0.0, 1.0, 1.0, 0.0]), left)
+    assert steps.tolist() == [[1, 1, 0, 0]]
+
+
+def test_a_picture_of_a_head_is_drawn(draw_head: ModuleType, found: list, root: Path, tmp_path: Path) -> None:
+    """With numpy alone: skin, teeth and the dark of the mouth are there, and the near hides the far."""
+    image = pytest.importorskip("PIL.Image", reason="Pillow reads the picture: pip install omote[view]")
+    draw_head.write_png(tmp_path / "head.png", draw_head.draw(iter(found), 360, 1.2))
+    pixels = np.asarray(image.open(tmp_path / "head.png")).astype(int)
+    assert pixels.shape == (360, 360, 3) and (pixels[:20, :30] == 244).all()
+    nose, mouth = pixels[145, 180], pixels[180:210, 165:195].reshape(-1, 3)
+    assert nose[0] > nose[1] + 20 > nose[2] + 20
+    pale = (np.ptp(mouth, axis=1) < 40) & (mouth.min(axis=1) > 120)
+    assert 0.05 < pale.mean() < 0.5  # teeth between lips
+    used = {
+        line.split()[1] for line in (root / "examples" / "draw_head.py").read_text().splitlines() if "import " in line
+    }
+    assert not used & {"surface", "controller", "omote"}
+
+
+def test_words_that_are_missing_are_told(root: Path) -> None:
+    done = subprocess.run([sys.executable, root / "examples" / "draw_head.py"], capture_output=True, text=True)
+    assert done.returncode == 1 and "usage: python examples/draw_head.py" in done.stderr
